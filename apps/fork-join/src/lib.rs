@@ -1,0 +1,2 @@
+//! Fork-join.
+#![no_std]

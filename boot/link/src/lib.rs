@@ -1,0 +1,1 @@
+//! Linker arguments of a bootable image.

@@ -1,0 +1,2 @@
+//! Runs DAGs built with `fass` in virtual time on the host.
+#![forbid(unsafe_code)]

@@ -1,0 +1,66 @@
+//! What an app states about its DAGs, before anything has been verified.
+//!
+//! A spec may be wrong in every way; the verification finds out. Times are in
+//! nanoseconds from the start of scheduling.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::any::TypeId;
+
+use crate::policy::{OverrunPolicy, Priority};
+
+/// A DAG task as its app describes it.
+#[derive(Clone, Debug, Default)]
+pub struct DagSpec {
+    /// The name that messages use; may be empty, then messages say `dag 0`.
+    pub name: String,
+    /// The time between two nominal releases; `None` if no source states one.
+    pub period_ns: Option<u64>,
+    /// The time after a release by which all sinks shall have finished.
+    pub relative_deadline_ns: Option<u64>,
+    /// The time of the first nominal release.
+    pub offset_ns: u64,
+    /// The most jobs that may be in flight; `None`: enough for the deadline,
+    /// `ceil(D / T)` jobs and one more.
+    pub in_flight: Option<u32>,
+    /// What happens at a release beyond `in_flight`.
+    pub overrun: OverrunPolicy,
+    /// The number of jobs to release; `None`: without end.
+    pub jobs: Option<u64>,
+    /// The subtasks in the order of their registration.
+    pub subtasks: Vec<SubtaskSpec>,
+    /// Precedence edges `(predecessor, successor)` by position in `subtasks`,
+    /// beside those that follow from topics.
+    pub edges: Vec<(usize, usize)>,
+}
+
+/// A subtask as its app describes it.
+#[derive(Clone, Debug, Default)]
+pub struct SubtaskSpec {
+    /// The name that messages use; may be empty, then messages say `subtask 0`.
+    pub name: String,
+    /// The worst-case execution time, if known.
+    pub wcet_ns: Option<u64>,
+    /// The static priority; `None`: derived from the graph.
+    pub priority: Option<Priority>,
+    /// Whether a started instance keeps its core although preemption is on.
+    pub non_preemptive: bool,
+    /// One port an argument, in order.
+    pub inputs: Vec<TopicPort>,
+    /// One port a return value, in order.
+    pub outputs: Vec<TopicPort>,
+}
+
+/// One end of a topic at a subtask: a typed, named edge bundle.
+#[derive(Clone, Debug)]
+pub struct TopicPort {
+    /// The topic's name.
+    pub topic: String,
+    /// The identity of the message's type.
+    pub type_id: TypeId,
+    /// The name of the message's type, for messages.
+    pub type_name: &'static str,
+    /// Whether several readers of the topic are possible: the message can be
+    /// cloned or shared, rather than only moved.
+    pub can_fan_out: bool,
+}

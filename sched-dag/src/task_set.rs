@@ -1,0 +1,178 @@
+//! The verified model: what remains true for as long as the scheduler runs.
+//!
+//! Only the verification makes a [`TaskSet`], so whoever holds one may rely on
+//! acyclic graphs, non-zero periods and deadlines, and indices in range.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+
+use crate::ids::{DagId, SubtaskId};
+use crate::policy::{OverrunPolicy, Priority};
+
+/// All DAG tasks of one commit.
+#[derive(Clone, Debug)]
+pub struct TaskSet {
+    pub(crate) dags: Box<[Dag]>,
+}
+
+/// A verified DAG task.
+#[derive(Clone, Debug)]
+pub struct Dag {
+    pub(crate) name: String,
+    pub(crate) period_ns: u64,
+    pub(crate) relative_deadline_ns: u64,
+    pub(crate) offset_ns: u64,
+    pub(crate) in_flight: u32,
+    pub(crate) overrun: OverrunPolicy,
+    pub(crate) jobs: Option<u64>,
+    pub(crate) subtasks: Box<[Subtask]>,
+    pub(crate) predecessors: Adjacency,
+    pub(crate) successors: Adjacency,
+    pub(crate) topological_order: Box<[SubtaskId]>,
+}
+
+/// A verified subtask.
+#[derive(Clone, Debug)]
+pub struct Subtask {
+    pub(crate) name: String,
+    pub(crate) wcet_ns: Option<u64>,
+    pub(crate) priority: Priority,
+    pub(crate) non_preemptive: bool,
+}
+
+/// For each subtask a list of neighbours, all lists in one allocation.
+#[derive(Clone, Debug)]
+pub(crate) struct Adjacency {
+    /// `starts[v]..starts[v + 1]` is the range of `v`'s neighbours.
+    pub(crate) starts: Box<[u32]>,
+    pub(crate) neighbours: Box<[SubtaskId]>,
+}
+
+impl TaskSet {
+    /// Returns the DAGs in the order of the commit.
+    #[must_use]
+    pub fn dags(&self) -> &[Dag] {
+        &self.dags
+    }
+
+    /// Returns one DAG.
+    ///
+    /// # Panics
+    ///
+    /// If `dag` is not of this task set.
+    #[must_use]
+    pub fn dag(&self, dag: DagId) -> &Dag {
+        &self.dags[dag.index()]
+    }
+}
+
+impl Dag {
+    /// Returns the name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns the time between two nominal releases, never 0.
+    #[must_use]
+    pub const fn period_ns(&self) -> u64 {
+        self.period_ns
+    }
+
+    /// Returns the time after a release by which the job shall be complete, never 0.
+    #[must_use]
+    pub const fn relative_deadline_ns(&self) -> u64 {
+        self.relative_deadline_ns
+    }
+
+    /// Returns the time of the first nominal release.
+    #[must_use]
+    pub const fn offset_ns(&self) -> u64 {
+        self.offset_ns
+    }
+
+    /// Returns the most jobs that may be in flight, never 0.
+    #[must_use]
+    pub const fn in_flight(&self) -> u32 {
+        self.in_flight
+    }
+
+    /// Returns what happens at a release beyond [`in_flight`](Self::in_flight).
+    #[must_use]
+    pub const fn overrun(&self) -> OverrunPolicy {
+        self.overrun
+    }
+
+    /// Returns the number of jobs to release, or `None` if there is no end.
+    #[must_use]
+    pub const fn jobs(&self) -> Option<u64> {
+        self.jobs
+    }
+
+    /// Returns the subtasks in the order of registration, never empty.
+    #[must_use]
+    pub fn subtasks(&self) -> &[Subtask] {
+        &self.subtasks
+    }
+
+    /// Returns one subtask.
+    ///
+    /// # Panics
+    ///
+    /// If `subtask` is not of this DAG.
+    #[must_use]
+    pub fn subtask(&self, subtask: SubtaskId) -> &Subtask {
+        &self.subtasks[subtask.index()]
+    }
+
+    /// Returns the direct predecessors of a subtask, each once, ascending.
+    #[must_use]
+    pub fn predecessors(&self, subtask: SubtaskId) -> &[SubtaskId] {
+        self.predecessors.of(subtask)
+    }
+
+    /// Returns the direct successors of a subtask, each once, ascending.
+    #[must_use]
+    pub fn successors(&self, subtask: SubtaskId) -> &[SubtaskId] {
+        self.successors.of(subtask)
+    }
+
+    /// Returns the subtasks in an order in which every predecessor comes first.
+    #[must_use]
+    pub fn topological_order(&self) -> &[SubtaskId] {
+        &self.topological_order
+    }
+}
+
+impl Subtask {
+    /// Returns the name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns the worst-case execution time, if the app gave one.
+    #[must_use]
+    pub const fn wcet_ns(&self) -> Option<u64> {
+        self.wcet_ns
+    }
+
+    /// Returns the static priority, given or derived from the graph.
+    #[must_use]
+    pub const fn priority(&self) -> Priority {
+        self.priority
+    }
+
+    /// Reports whether a started instance keeps its core until it finishes.
+    #[must_use]
+    pub const fn is_non_preemptive(&self) -> bool {
+        self.non_preemptive
+    }
+}
+
+impl Adjacency {
+    fn of(&self, subtask: SubtaskId) -> &[SubtaskId] {
+        let index = subtask.index();
+        &self.neighbours[self.starts[index] as usize..self.starts[index + 1] as usize]
+    }
+}
