@@ -1,2 +1,70 @@
-//! Boot.
-#![no_std]
+//! From the machine's reset to 64-bit Rust, on every processor.
+//!
+//! A loader that speaks PVH (`qemu -kernel` does) jumps to `pvh_entry` in
+//! 32-bit mode. `entry.s` maps the first 4 GiB one to one, enters 64-bit mode
+//! and calls into this crate, which collects what the loader tells in a
+//! [`BootInfo`] and hands over to the image's `kernel_main` for good. Later the
+//! kernel starts the other processors through [`processors`].
+//!
+//! Words: the *image* is the program as linked, the *boot processor* the one
+//! that the firmware started, an *application processor* any other.
+//!
+//! What holds at the handover: interrupts are off, SSE is on, memory up to
+//! 4 GiB is identity-mapped and writable, and the stack is part of the image and
+//! has no guard page. The kernel replaces tables and stack as soon as it can.
+//!
+//! Everything that interprets bytes ([`acpi`], [`pvh`]) works on a borrowed view
+//! of memory and is tested on the host; `unsafe` is in `entry`, `image`,
+//! `physical` and `processors` only.
+
+#![cfg_attr(not(test), no_std)]
+
+pub mod acpi;
+#[cfg(not(test))]
+mod entry;
+pub mod image;
+mod list;
+pub mod physical;
+#[cfg(not(test))]
+pub mod processors;
+pub mod pvh;
+
+pub use list::List;
+
+/// The most processors that are told apart: the 8-bit APIC ids, less broadcast.
+pub const MAX_PROCESSORS: usize = 255;
+
+/// What is known of the machine when the kernel takes over.
+#[derive(Debug)]
+pub struct BootInfo {
+    /// The words that the loader passed, without interpretation.
+    pub command_line: List<u8, 2048>,
+    /// The physical memory map.
+    pub memory: List<MemoryRegion, 64>,
+    /// The physical address of the ACPI root pointer, if the loader named it.
+    pub rsdp: Option<u64>,
+    /// The time stamp counter when Rust code began to run, in ticks.
+    pub entry_tsc: u64,
+}
+
+/// A range of physical memory of one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MemoryRegion {
+    /// The address of its first byte.
+    pub start: u64,
+    /// The address after its last byte.
+    pub end: u64,
+    /// Whether it is ordinary memory that nobody uses.
+    pub usable: bool,
+}
+
+impl BootInfo {
+    /// Returns the command line as text.
+    ///
+    /// # Errors
+    ///
+    /// If it is not UTF-8.
+    pub fn command_line(&self) -> Result<&str, core::str::Utf8Error> {
+        core::str::from_utf8(self.command_line.as_slice()).map(str::trim)
+    }
+}

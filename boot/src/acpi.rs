@@ -1,0 +1,291 @@
+//! The few ACPI tables that name the processors and a known clock.
+//!
+//! Root pointer (RSDP) -> RSDT or XSDT -> MADT (processors) and FADT (power
+//! management timer). Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every
+//! table's checksum is verified; what is malformed is as good as absent.
+
+use crate::physical::PhysicalMemory;
+use crate::{List, MAX_PROCESSORS};
+
+/// What the tables tell.
+#[derive(Clone, Copy, Debug)]
+pub struct Platform {
+    /// The local APIC ids of the enabled processors, in the table's order.
+    pub apic_ids: List<u8, MAX_PROCESSORS>,
+    /// The physical address of the local APICs' registers.
+    pub local_apic: u64,
+    /// The power management timer, if the machine has one.
+    pub pm_timer: Option<PmTimer>,
+}
+
+/// The 3.579545 MHz counter of ACPI 4.8.2.1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PmTimer {
+    /// The I/O port to read it from.
+    pub port: u16,
+    /// The number of bits that count: 24 or 32.
+    pub bits: u32,
+}
+
+/// Why the processors could not be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AcpiError {
+    /// No root pointer where the loader said, nor in the BIOS area.
+    NoRootPointer,
+    /// The root pointer leads to no valid table of tables.
+    NoRootTable,
+    /// The table of interrupt controllers (MADT) is missing or malformed.
+    NoProcessorTable,
+}
+
+impl core::fmt::Display for AcpiError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NoRootPointer => "the machine has no ACPI root pointer; boot it with ACPI on",
+            Self::NoRootTable => "the ACPI root table is malformed; update the firmware",
+            Self::NoProcessorTable => "ACPI names no processors (MADT); update the firmware",
+        })
+    }
+}
+
+const HEADER: u64 = 36;
+
+/// Reads the tables, starting from the root pointer that the loader named or,
+/// if it named none, from the one in the BIOS area (ACPI 5.2.5.1).
+///
+/// # Errors
+///
+/// [`AcpiError`] says which link of the chain is missing. Without a MADT there is no
+/// telling which processors exist, so that is an error, not an empty list.
+pub fn read(memory: &impl PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, AcpiError> {
+    let root = rsdp
+        .filter(|at| is_root_pointer(memory, *at))
+        .or_else(|| {
+            (0xe_0000..0x10_0000)
+                .step_by(16)
+                .find(|at| is_root_pointer(memory, *at))
+        })
+        .ok_or(AcpiError::NoRootPointer)?;
+    let tables = RootTable::at(memory, root).ok_or(AcpiError::NoRootTable)?;
+    let madt = tables
+        .find(memory, *b"APIC")
+        .ok_or(AcpiError::NoProcessorTable)?;
+    let mut platform = Platform {
+        apic_ids: List::new(0),
+        local_apic: 0,
+        pm_timer: tables
+            .find(memory, *b"FACP")
+            .and_then(|fadt| pm_timer(memory, fadt)),
+    };
+    read_madt(memory, madt, &mut platform).ok_or(AcpiError::NoProcessorTable)?;
+    Ok(platform)
+}
+
+fn is_root_pointer(memory: &impl PhysicalMemory, address: u64) -> bool {
+    memory
+        .bytes(address, 20)
+        .is_some_and(|bytes| bytes.starts_with(b"RSD PTR ") && sums_to_0(bytes))
+}
+
+fn sums_to_0(bytes: &[u8]) -> bool {
+    bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)) == 0
+}
+
+/// Returns the table's length if it is whole and starts with `signature`.
+fn table_length(memory: &impl PhysicalMemory, table: u64, signature: [u8; 4]) -> Option<u64> {
+    let length = memory.u32(table + 4)?;
+    let bytes = memory.bytes(table, usize::try_from(length).ok()?)?;
+    (bytes.starts_with(&signature) && sums_to_0(bytes)).then_some(u64::from(length))
+}
+
+/// The table of tables: 32-bit entries (RSDT) or 64-bit ones (XSDT).
+struct RootTable {
+    address: u64,
+    length: u64,
+    entry_size: u64,
+}
+
+impl RootTable {
+    fn at(memory: &impl PhysicalMemory, rsdp: u64) -> Option<Self> {
+        let revision = memory.u8(rsdp + 15)?;
+        let xsdt = if revision >= 2 {
+            memory.u64(rsdp + 24)?
+        } else {
+            0
+        };
+        let (address, signature, entry_size) = if xsdt == 0 {
+            (u64::from(memory.u32(rsdp + 16)?), *b"RSDT", 4)
+        } else {
+            (xsdt, *b"XSDT", 8)
+        };
+        let length = table_length(memory, address, signature)?;
+        Some(Self {
+            address,
+            length,
+            entry_size,
+        })
+    }
+
+    fn find(&self, memory: &impl PhysicalMemory, signature: [u8; 4]) -> Option<u64> {
+        (HEADER..self.length)
+            .step_by(usize::try_from(self.entry_size).ok()?)
+            .filter_map(|offset| match self.entry_size {
+                4 => memory.u32(self.address + offset).map(u64::from),
+                _ => memory.u64(self.address + offset),
+            })
+            .find(|table| table_length(memory, *table, signature).is_some())
+    }
+}
+
+/// Reads the processors and the local APIC's address (ACPI 5.2.12).
+fn read_madt(memory: &impl PhysicalMemory, madt: u64, platform: &mut Platform) -> Option<()> {
+    const LOCAL_APIC: u8 = 0;
+    const LOCAL_APIC_ADDRESS_OVERRIDE: u8 = 5;
+    const ENABLED: u32 = 1;
+    let length = u64::from(memory.u32(madt + 4)?);
+    platform.local_apic = u64::from(memory.u32(madt + HEADER)?);
+    let mut offset = HEADER + 8;
+    while offset + 2 <= length {
+        let entry = madt + offset;
+        let size = memory.u8(entry + 1).filter(|size| *size >= 2)?;
+        match memory.u8(entry)? {
+            LOCAL_APIC if memory.u32(entry + 4)? & ENABLED != 0 => {
+                platform.apic_ids.push(memory.u8(entry + 3)?).ok()?;
+            }
+            LOCAL_APIC_ADDRESS_OVERRIDE => platform.local_apic = memory.u64(entry + 4)?,
+            _ => {}
+        }
+        offset += u64::from(size);
+    }
+    (!platform.apic_ids.as_slice().is_empty()).then_some(())
+}
+
+/// Reads where the power management timer is (ACPI 5.2.9).
+fn pm_timer(memory: &impl PhysicalMemory, fadt: u64) -> Option<PmTimer> {
+    const PM_TIMER_BLOCK: u64 = 76;
+    const FLAGS: u64 = 112;
+    const TIMER_IS_32_BITS: u32 = 1 << 8;
+    let port = u16::try_from(memory.u32(fadt + PM_TIMER_BLOCK)?)
+        .ok()
+        .filter(|port| *port != 0)?;
+    let wide = memory.u32(fadt + FLAGS)? & TIMER_IS_32_BITS != 0;
+    Some(PmTimer {
+        port,
+        bits: if wide { 32 } else { 24 },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Machine(Vec<u8>);
+
+    impl PhysicalMemory for Machine {
+        fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
+            let start = usize::try_from(address).ok()?;
+            self.0.get(start..start.checked_add(length)?)
+        }
+    }
+
+    const RSDP: u64 = 0xf_0000;
+
+    impl Machine {
+        /// A machine with `revision` tables: a MADT with APIC ids 0, 2 and a
+        /// disabled 3, and a FADT with a 24-bit timer at port 0x608.
+        fn new(revision: u8) -> Self {
+            let mut machine = Self(vec![0; 0x10_0000]);
+            let entry = |id: u8, flags: u8| [0, 8, id, id, flags, 0, 0, 0];
+            let madt = [
+                [0, 0, 0xe0, 0xfe, 0, 0, 0, 0],
+                entry(0, 1),
+                entry(2, 1),
+                entry(3, 0),
+            ]
+            .concat();
+            machine.put_table(0x5000, *b"APIC", &madt);
+            let mut fadt = [0; 116 - 36];
+            fadt[76 - 36..78 - 36].copy_from_slice(&0x608u16.to_le_bytes());
+            machine.put_table(0x6000, *b"FACP", &fadt);
+            if revision >= 2 {
+                let entries = [0x6000u64, 0x5000].map(u64::to_le_bytes).concat();
+                machine.put_table(0x4000, *b"XSDT", &entries);
+            } else {
+                let entries = [0x6000u32, 0x5000].map(u32::to_le_bytes).concat();
+                machine.put_table(0x4000, *b"RSDT", &entries);
+            }
+            machine.put_root(revision);
+            machine
+        }
+
+        fn put_table(&mut self, at: usize, signature: [u8; 4], body: &[u8]) {
+            let length = u32::try_from(36 + body.len()).unwrap();
+            let table = &mut self.0[at..at + 36 + body.len()];
+            table[..4].copy_from_slice(&signature);
+            table[4..8].copy_from_slice(&length.to_le_bytes());
+            table[36..].copy_from_slice(body);
+            table[9] = table.iter().fold(0u8, |sum, byte| sum.wrapping_sub(*byte));
+        }
+
+        fn put_root(&mut self, revision: u8) {
+            let at = usize::try_from(RSDP).unwrap();
+            let root = &mut self.0[at..at + 36];
+            root[..8].copy_from_slice(b"RSD PTR ");
+            root[15] = revision;
+            let pointer = if revision >= 2 { 24 } else { 16 };
+            root[pointer..pointer + 2].copy_from_slice(&0x4000u16.to_le_bytes());
+            root[8] = root[..20]
+                .iter()
+                .fold(0u8, |sum, byte| sum.wrapping_sub(*byte));
+        }
+    }
+
+    #[test]
+    fn finds_enabled_processors_by_either_root_table() {
+        for revision in [0, 2] {
+            let platform = read(&Machine::new(revision), Some(RSDP)).unwrap();
+            assert_eq!(platform.apic_ids.as_slice(), &[0, 2], "revision {revision}");
+            assert_eq!(platform.local_apic, 0xfee0_0000);
+            assert_eq!(
+                platform.pm_timer,
+                Some(PmTimer {
+                    port: 0x608,
+                    bits: 24
+                })
+            );
+        }
+    }
+
+    #[test]
+    fn searches_the_bios_area_when_the_loader_names_nothing() {
+        assert!(read(&Machine::new(2), None).is_ok());
+        assert!(read(&Machine::new(2), Some(0x1234)).is_ok());
+    }
+
+    #[test]
+    fn refuses_a_broken_chain_by_its_missing_link() {
+        let fault = |machine: &Machine| read(machine, Some(RSDP)).unwrap_err();
+        assert_eq!(
+            fault(&Machine(vec![0; 0x10_0000])),
+            AcpiError::NoRootPointer
+        );
+
+        let mut machine = Machine::new(2);
+        machine.0[0x4010] ^= 1; // spoils the root table's checksum
+        assert_eq!(fault(&machine), AcpiError::NoRootTable);
+
+        let mut machine = Machine::new(0);
+        machine.0[0x5010] ^= 1; // spoils the MADT's
+        assert_eq!(fault(&machine), AcpiError::NoProcessorTable);
+    }
+
+    #[test]
+    fn does_not_loop_on_an_entry_of_length_0() {
+        let mut machine = Machine::new(2);
+        machine.put_table(0x5000, *b"APIC", &[0; 16]);
+        assert_eq!(
+            read(&machine, Some(RSDP)).unwrap_err(),
+            AcpiError::NoProcessorTable
+        );
+    }
+}

@@ -1,0 +1,40 @@
+//! The boot processor's first Rust code.
+
+use core::arch::{asm, global_asm};
+
+use crate::physical::IdentityMap;
+use crate::{BootInfo, processors, pvh};
+
+global_asm!(
+    include_str!("entry.s"),
+    rust_entry = sym rust_entry,
+    stack_tops = sym processors::STACK_TOPS,
+    processor_rust_entry = sym processors::rust_entry,
+);
+global_asm!(include_str!("trampoline.s"), options(att_syntax));
+
+unsafe extern "Rust" {
+    /// Takes over the machine; the image's `entry!` macro defines it.
+    safe fn kernel_main(info: &'static BootInfo) -> !;
+}
+
+/// Collects what the loader told and hands over to the kernel.
+extern "C" fn rust_entry(start_info: u32) -> ! {
+    let entry_tsc = time_stamp();
+    // SAFETY: 1. `entry.s` mapped the first 4 GiB one to one, and the view is
+    // dropped before the kernel changes the map. 2. Only this processor runs,
+    // and it writes to its stack alone, which the loader's data does not overlap.
+    let memory = unsafe { IdentityMap::new() };
+    let info = pvh::boot_info(&memory, u64::from(start_info), entry_tsc);
+    // SAFETY: this frame is never left (`kernel_main` does not return), and the
+    // boot stack is part of the image: `info` lives as long as the machine runs.
+    let info: &'static BootInfo = unsafe { &*core::ptr::from_ref(&info) };
+    kernel_main(info)
+}
+
+fn time_stamp() -> u64 {
+    let (low, high): (u32, u32);
+    // SAFETY: RDTSC only writes the two registers; every 64-bit processor has it.
+    unsafe { asm!("rdtsc", out("eax") low, out("edx") high, options(nomem, nostack)) };
+    u64::from(high) << 32 | u64::from(low)
+}

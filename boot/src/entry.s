@@ -1,0 +1,140 @@
+# The boot processor from the loader's 32-bit jump to 64-bit Rust.
+#
+# The loader (PVH, Xen's "x86/HVM direct boot ABI") enters with paging off, flat
+# segments, interrupts off, and the physical address of its start_info in ebx.
+
+.section .note.pvh, "a", @note
+    .balign 4
+    .long 4                         # size of the name
+    .long 8                         # size of the descriptor
+    .long 18                        # XEN_ELFNOTE_PHYS32_ENTRY
+    .asciz "Xen"
+    .quad pvh_entry
+
+.section .text.pvh_entry, "ax"
+.code32
+.global pvh_entry
+pvh_entry:
+    cli
+    cld
+    mov ebp, ebx                    # start_info; nothing below touches ebp
+
+    # Identity-map the first 4 GiB with 2 MiB pages: 4 directories in a row.
+    mov edi, offset boot_page_directories
+    mov eax, 0x83                   # present, writable, large
+    mov ecx, 2048
+1:  mov [edi], eax
+    mov dword ptr [edi + 4], 0
+    add eax, 0x200000
+    add edi, 8
+    dec ecx
+    jnz 1b
+
+    mov edi, offset boot_directory_pointers
+    mov eax, offset boot_page_directories
+    or eax, 3
+    mov ecx, 4
+2:  mov [edi], eax
+    add eax, 4096
+    add edi, 8
+    dec ecx
+    jnz 2b
+
+    mov edi, offset boot_root_table
+    mov eax, offset boot_directory_pointers
+    or eax, 3
+    mov [edi], eax
+    mov cr3, edi
+
+    lgdt [boot_gdt_pointer]
+    mov esi, offset boot_long_mode_pointer
+    jmp enable_long_mode
+
+# Turns on long mode with the tables that cr3 holds, and SSE, which compiled
+# code uses from its first instruction on. Continues in 64-bit mode at the far
+# pointer that esi points to. Needs no stack; changes eax, ecx, edx. Used by every processor (Intel SDM volume 3, 11.8.5).
+enable_long_mode:
+    mov eax, cr4
+    or eax, (1 << 5) | (1 << 9) | (1 << 10)     # PAE, OSFXSR, OSXMMEXCPT
+    mov cr4, eax
+    mov ecx, 0xc0000080                         # EFER
+    rdmsr
+    or eax, (1 << 8) | (1 << 11)                # long mode, no-execute pages
+    wrmsr
+    mov eax, cr0
+    and eax, ~((1 << 2) | (1 << 3))             # no emulation, no task-switched trap
+    or eax, (1 << 31) | (1 << 16) | (1 << 5) | (1 << 1) # paging, write protection, NE, MP
+    mov cr0, eax
+    jmp fword ptr [esi]
+
+.code64
+boot_long_mode:
+    xor eax, eax
+    mov ds, eax
+    mov es, eax
+    mov ss, eax
+    mov fs, eax
+    mov gs, eax
+    lea rsp, [rip + boot_stack_top]
+    mov edi, ebp
+    xor ebp, ebp
+    call {rust_entry}
+    ud2
+
+# An application processor, sent here by the trampoline in 32-bit mode with cr3
+# loaded and no stack. It finds its own by its APIC id, as an index into a table
+# of stack tops that is filled before any processor is started.
+.code32
+processor_entry:
+    mov ax, 0x10
+    mov ds, ax
+    mov es, ax
+    mov ss, ax
+    mov eax, 1
+    cpuid
+    shr ebx, 24
+    mov ebp, ebx
+    mov esi, offset processor_long_mode_pointer
+    jmp enable_long_mode
+
+.code64
+processor_long_mode:
+    xor eax, eax
+    mov ds, eax
+    mov es, eax
+    mov ss, eax
+    mov fs, eax
+    mov gs, eax
+    lea rax, [rip + {stack_tops}]
+    mov rsp, [rax + rbp * 8]
+    mov edi, ebp
+    xor ebp, ebp
+    call {processor_rust_entry}
+    ud2
+
+.section .rodata.boot_gdt, "a"
+    .balign 16
+boot_gdt:
+    .quad 0
+    .quad 0x00af9b000000ffff                    # 0x08: 64-bit code
+    .quad 0x00cf93000000ffff                    # 0x10: data
+    .quad 0x00cf9b000000ffff                    # 0x18: 32-bit code
+boot_gdt_end:
+boot_gdt_pointer:
+    .word boot_gdt_end - boot_gdt - 1
+    .long boot_gdt
+
+boot_long_mode_pointer:
+    .long boot_long_mode
+    .word 0x08
+processor_long_mode_pointer:
+    .long processor_long_mode
+    .word 0x08
+
+.section .bss.boot, "aw", @nobits
+    .balign 4096
+boot_root_table: .skip 4096
+boot_directory_pointers: .skip 4096
+boot_page_directories: .skip 4 * 4096
+    .skip 32768
+boot_stack_top:

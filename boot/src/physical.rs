@@ -1,0 +1,53 @@
+//! Reading physical memory, behind a trait so that its readers run on the host.
+
+/// A view of physical memory.
+pub trait PhysicalMemory {
+    /// Returns `length` bytes from physical address `address` on, or `None` if
+    /// the view does not cover them.
+    fn bytes(&self, address: u64, length: usize) -> Option<&[u8]>;
+
+    /// Returns the little-endian 8-bit value at `address`.
+    fn u8(&self, address: u64) -> Option<u8> {
+        self.bytes(address, 1)?.first().copied()
+    }
+
+    /// Returns the little-endian 32-bit value at `address`, aligned or not.
+    fn u32(&self, address: u64) -> Option<u32> {
+        Some(u32::from_le_bytes(self.bytes(address, 4)?.try_into().ok()?))
+    }
+
+    /// Returns the little-endian 64-bit value at `address`, aligned or not.
+    fn u64(&self, address: u64) -> Option<u64> {
+        Some(u64::from_le_bytes(self.bytes(address, 8)?.try_into().ok()?))
+    }
+}
+
+/// The machine's own memory through the boot identity map: 4 KiB to 4 GiB.
+#[derive(Clone, Copy, Debug)]
+pub struct IdentityMap(());
+
+impl IdentityMap {
+    /// Grants reading through the identity map.
+    ///
+    /// # Safety
+    ///
+    /// 1. The first 4 GiB are identity-mapped for as long as the value, a copy
+    ///    of it, or a slice that it gave is in use.
+    /// 2. Nothing writes to what is read through it meanwhile.
+    pub const unsafe fn new() -> Self {
+        Self(())
+    }
+}
+
+impl PhysicalMemory for IdentityMap {
+    fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
+        let end = address.checked_add(u64::try_from(length).ok()?)?;
+        if address < 4096 || end > 1 << 32 {
+            return None;
+        }
+        let start = usize::try_from(address).ok()? as *const u8;
+        // SAFETY: the range lies between 4 KiB and 4 GiB, which conditions 1 and
+        // 2 of `new` make readable and constant.
+        Some(unsafe { core::slice::from_raw_parts(start, length) })
+    }
+}

@@ -1,0 +1,155 @@
+//! What a PVH loader tells: Xen's `hvm_start_info`, version 0 or 1.
+//!
+//! The layout is that of Xen's public header `arch-x86/hvm/start_info.h`.
+//! Nothing here can fail: a loader that tells less leaves lists empty, and the
+//! kernel, which can print, says what it misses.
+
+use crate::physical::PhysicalMemory;
+use crate::{BootInfo, List, MemoryRegion};
+
+/// "xEn3" with the top bit of the first letter set.
+const MAGIC: u32 = 0x336e_c578;
+/// The type of memory map entries that describe ordinary memory (as in E820).
+const USABLE: u32 = 1;
+
+mod offset {
+    pub(super) const VERSION: u64 = 4;
+    pub(super) const COMMAND_LINE: u64 = 24;
+    pub(super) const RSDP: u64 = 32;
+    pub(super) const MEMORY_MAP: u64 = 40;
+    pub(super) const MEMORY_MAP_LENGTH: u64 = 48;
+}
+
+/// Reads the start info at `address` into a [`BootInfo`].
+///
+/// `entry_tsc` is passed through. A memory map with more than 64 entries is cut
+/// off there, a command line of more than 2048 bytes likewise.
+pub fn boot_info(memory: &impl PhysicalMemory, address: u64, entry_tsc: u64) -> BootInfo {
+    let mut info = BootInfo {
+        command_line: List::new(0),
+        memory: List::new(MemoryRegion {
+            start: 0,
+            end: 0,
+            usable: false,
+        }),
+        rsdp: None,
+        entry_tsc,
+    };
+    if memory.u32(address) != Some(MAGIC) {
+        return info;
+    }
+    info.rsdp = memory.u64(address + offset::RSDP).filter(|rsdp| *rsdp != 0);
+    read_command_line(memory, address, &mut info);
+    if memory
+        .u32(address + offset::VERSION)
+        .is_some_and(|version| version >= 1)
+    {
+        read_memory_map(memory, address, &mut info);
+    }
+    info
+}
+
+fn read_command_line(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
+    let Some(start) = memory
+        .u64(address + offset::COMMAND_LINE)
+        .filter(|start| *start != 0)
+    else {
+        return;
+    };
+    let text = (start..)
+        .map_while(|at| memory.u8(at))
+        .take_while(|byte| *byte != 0);
+    for byte in text {
+        if info.command_line.push(byte).is_err() {
+            return;
+        }
+    }
+}
+
+fn read_memory_map(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
+    const ENTRY_SIZE: u64 = 24;
+    let (Some(map), Some(length)) = (
+        memory.u64(address + offset::MEMORY_MAP),
+        memory.u32(address + offset::MEMORY_MAP_LENGTH),
+    ) else {
+        return;
+    };
+    for index in 0..u64::from(length) {
+        let entry = map + index * ENTRY_SIZE;
+        let (Some(start), Some(size), Some(kind)) = (
+            memory.u64(entry),
+            memory.u64(entry + 8),
+            memory.u32(entry + 16),
+        ) else {
+            return;
+        };
+        let region = MemoryRegion {
+            start,
+            end: start.saturating_add(size),
+            usable: kind == USABLE,
+        };
+        if info.memory.push(region).is_err() {
+            return;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Bytes(Vec<u8>);
+
+    impl PhysicalMemory for Bytes {
+        fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
+            let start = usize::try_from(address).ok()?;
+            self.0.get(start..start.checked_add(length)?)
+        }
+    }
+
+    fn start_info(magic: u32) -> Bytes {
+        let mut bytes = vec![0; 256];
+        bytes[0..4].copy_from_slice(&magic.to_le_bytes());
+        bytes[4] = 1;
+        bytes[24] = 64; // command line
+        bytes[32] = 0x99; // root pointer
+        bytes[40] = 96; // memory map
+        bytes[48] = 1;
+        bytes[64..73].copy_from_slice(b"jobs=200 ");
+        bytes[97] = 0x10; // start 0x1000
+        bytes[105] = 0x20; // size 0x2000
+        bytes[112] = 1;
+        Bytes(bytes)
+    }
+
+    #[test]
+    fn reads_command_line_memory_and_root_pointer() {
+        let info = boot_info(&start_info(MAGIC), 0, 5);
+        assert_eq!(info.command_line(), Ok("jobs=200"));
+        assert_eq!(info.rsdp, Some(0x99));
+        assert_eq!(info.entry_tsc, 5);
+        let region = MemoryRegion {
+            start: 0x1000,
+            end: 0x3000,
+            usable: true,
+        };
+        assert_eq!(info.memory.as_slice(), &[region]);
+    }
+
+    #[test]
+    fn believes_nothing_without_the_magic_number() {
+        let info = boot_info(&start_info(1), 0, 0);
+        assert_eq!(info.command_line(), Ok(""));
+        assert_eq!(info.rsdp, None);
+        assert!(info.memory.as_slice().is_empty());
+    }
+
+    #[test]
+    fn keeps_what_a_truncated_table_still_tells() {
+        let mut bytes = start_info(MAGIC);
+        bytes.0.truncate(100);
+        let info = boot_info(&bytes, 0, 0);
+        assert_eq!(info.command_line(), Ok("jobs=200"));
+        assert!(info.memory.as_slice().is_empty());
+    }
+}
