@@ -9,10 +9,20 @@ extern crate alloc;
 
 mod ids;
 mod policy;
+mod scheduler;
 mod spec;
 mod task_set;
+mod verify;
+pub mod virtual_time;
 
 pub use ids::{CoreId, DagId, Instance, SubtaskId};
 pub use policy::{OverrunPolicy, Policy, Preemption, Priority};
+pub use scheduler::{
+    DagStatistics, Decision, JobOutcome, Moment, Observer, Released, Scheduler, SchedulerOptions,
+};
 pub use spec::{DagSpec, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, Subtask, TaskSet};
+pub use verify::{
+    CommitOptions, ConstructionPolicy, Count, DagLabel, Direction, Fault, MAX_ARITY, Rejected,
+    SubtaskLabel, Time, Verified, Warning, verify,
+};

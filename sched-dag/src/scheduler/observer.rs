@@ -1,0 +1,100 @@
+//! What the scheduler reports beside its decisions.
+//!
+//! Every report happens at the instant that the driver has given to
+//! [`Scheduler::at`](crate::Scheduler::at), so none carries a "now".
+
+use crate::ids::{DagId, Instance};
+
+/// A receiver of the scheduler's reports; every method does nothing by default.
+///
+/// `()` ignores all reports.
+pub trait Observer {
+    /// Job `job` is released; `release_ns` is its nominal release time, which
+    /// is earlier than now if the release had to wait.
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        let _ = (dag, job, release_ns);
+    }
+
+    /// The release of job `job` is due and waits for an older job to end.
+    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        let _ = (dag, job, release_ns);
+    }
+
+    /// The release of job `job` does not happen.
+    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        let _ = (dag, job, release_ns);
+    }
+
+    /// All that the instance waits for has happened (R2).
+    fn ready(&mut self, instance: Instance) {
+        let _ = instance;
+    }
+
+    /// The instance will not run, because its job was aborted; what its
+    /// predecessors have sent to it can be dropped.
+    fn cancelled(&mut self, instance: Instance) {
+        let _ = instance;
+    }
+
+    /// Job `job` starts no further instance, to make room for a newer job.
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        let _ = (dag, job);
+    }
+
+    /// The deadline of job `job` has passed, and the job is not complete.
+    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        let _ = (dag, job, deadline_ns);
+    }
+
+    /// No instance of job `job` is left (R4).
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
+        let _ = (dag, job, outcome);
+    }
+}
+
+/// How a job ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JobOutcome {
+    /// All subtasks have finished by the deadline.
+    Met,
+    /// All subtasks have finished, the last one after the deadline.
+    Missed,
+    /// The job was aborted.
+    Aborted,
+}
+
+impl Observer for () {}
+
+impl<O: Observer + ?Sized> Observer for &mut O {
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        (**self).released(dag, job, release_ns);
+    }
+
+    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        (**self).queued(dag, job, release_ns);
+    }
+
+    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        (**self).skipped(dag, job, release_ns);
+    }
+
+    fn ready(&mut self, instance: Instance) {
+        (**self).ready(instance);
+    }
+
+    fn cancelled(&mut self, instance: Instance) {
+        (**self).cancelled(instance);
+    }
+
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        (**self).aborted(dag, job);
+    }
+
+    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        (**self).deadline_missed(dag, job, deadline_ns);
+    }
+
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
+        (**self).job_completed(dag, job, outcome);
+    }
+}

@@ -1,0 +1,35 @@
+//! What the scheduler counts, one fixed set of numbers a DAG.
+
+/// Counts over the jobs of one DAG since the scheduler was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DagStatistics {
+    /// Jobs released.
+    pub released: u64,
+    /// Jobs of which all subtasks have finished.
+    pub completed: u64,
+    /// Jobs whose deadline has passed before they were complete, whether they
+    /// were released or still waited for their release.
+    pub misses: u64,
+    /// Misses since a job last met its deadline.
+    pub consecutive_misses: u64,
+    /// The most misses without a job between them that met its deadline.
+    pub most_consecutive_misses: u64,
+    /// Releases that did not happen.
+    pub skips: u64,
+    /// Jobs aborted.
+    pub aborts: u64,
+    /// Releases that had to wait for an older job to end.
+    pub queued: u64,
+}
+
+impl DagStatistics {
+    pub(super) fn count_miss(&mut self) {
+        self.misses += 1;
+        self.consecutive_misses += 1;
+        self.most_consecutive_misses = self.most_consecutive_misses.max(self.consecutive_misses);
+    }
+
+    pub(super) fn count_met(&mut self) {
+        self.consecutive_misses = 0;
+    }
+}

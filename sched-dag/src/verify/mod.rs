@@ -1,0 +1,80 @@
+//! The verification of DAGs at commit.
+//!
+//! After it nothing can be added, and whoever holds the [`TaskSet`] may rely on
+//! what it says. All faults of all DAGs are reported at once, so an app's
+//! author needs one run to see them; warnings stand apart and prevent nothing.
+
+mod fault;
+mod fault_text;
+mod label;
+mod options;
+mod warning;
+
+use alloc::vec::Vec;
+use core::fmt;
+
+pub use fault::{Direction, Fault, Time};
+pub use label::{DagLabel, SubtaskLabel};
+pub use options::{CommitOptions, ConstructionPolicy, Count};
+pub use warning::Warning;
+
+use crate::spec::DagSpec;
+use crate::task_set::TaskSet;
+
+/// The most inputs and the most outputs that a subtask may have.
+pub const MAX_ARITY: usize = 16;
+
+/// DAGs that can be scheduled.
+#[derive(Clone, Debug)]
+pub struct Verified {
+    /// The model for the scheduler.
+    pub task_set: TaskSet,
+    /// What the apps' authors may not have meant.
+    pub warnings: Vec<Warning>,
+}
+
+/// DAGs that cannot be scheduled, with every reason.
+#[derive(Clone, Debug)]
+pub struct Rejected {
+    faults: Vec<Fault>,
+    warnings: Vec<Warning>,
+}
+
+/// Verifies DAGs against the options.
+///
+/// # Errors
+///
+/// All faults of all DAGs, in the order of the DAGs.
+pub fn verify(specs: &[DagSpec], options: &CommitOptions) -> Result<Verified, Rejected> {
+    let _ = (specs, options);
+    todo!()
+}
+
+impl Rejected {
+    /// Returns the faults in the order of the DAGs, never empty.
+    #[must_use]
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
+    /// Returns what else the apps' authors may not have meant.
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+}
+
+/// Writes one line a fault, without a newline at the end.
+impl fmt::Display for Rejected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (position, fault) in self.faults.iter().enumerate() {
+            if position > 0 {
+                f.write_str("\n")?;
+            }
+            write!(f, "{fault}")?;
+        }
+        Ok(())
+    }
+}
+
+impl core::error::Error for Rejected {}
