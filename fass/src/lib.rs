@@ -1,4 +1,121 @@
-//! Function-as-Subtask.
-#![no_std]
+//! Function-as-Subtask: DAG tasks written as plain functions.
+//!
+//! The API of the paper "Function-as-Subtask API Replacing Publish/Subscribe
+//! for OS-Native DAG Scheduling". An app states *functions* and the *topics*
+//! between them; it has no way to publish in mid-function, to match messages,
+//! or to wake anybody. What remains is a DAG task in the sense of real-time
+//! theory, and the scheduler may take it for one.
+//!
+//! # Words
+//!
+//! A *DAG* (or task) is released periodically; each release is a *job*, counted
+//! from 0. A *subtask* is a function in the DAG: its argument tuple is what it
+//! reads, its result tuple what it writes, one *topic* for each element. One
+//! execution of a subtask, for one job, is an *instance*. A *source* reads
+//! nothing and is started by the release, a *sink* writes nothing.
+//!
+//! # A first DAG
+//!
+//! ```
+//! use core::time::Duration;
+//! use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+//! use virtual_time::VirtualTime;
+//!
+//! let machine = VirtualTime::new().cores(2); // on bare metal: the kernel
+//!
+//! let dag = create_dag();
+//! dag.name("vision").jobs(3);
+//! let mut frame = 0;
+//! dag.register_periodic_subtask(
+//!     move || {
+//!         frame += 1;
+//!         (frame,)
+//!     },
+//!     vec!["frame"],
+//!     Duration::from_millis(25),
+//!     SubtaskAttributes::named("camera"),
+//! );
+//! dag.register_subtask(
+//!     |(frame,): (i32,)| (frame * 10,),
+//!     vec!["frame"],
+//!     vec!["edges"],
+//!     SubtaskAttributes::named("detect edges"),
+//! );
+//! dag.register_subtask(
+//!     |(frame,): (i32,)| (frame * 100,),
+//!     vec!["frame"],
+//!     vec!["colours"],
+//!     SubtaskAttributes::named("detect colours"),
+//! );
+//! dag.register_sink_subtask(
+//!     |(edges, colours): (i32, i32)| assert_eq!(edges * 10, colours), // always of one job
+//!     vec!["edges", "colours"],
+//!     Duration::from_millis(25),
+//!     SubtaskAttributes::named("fuse"),
+//! );
+//! finish_create_dags(&[dag]).unwrap();
+//!
+//! let report = machine.run();
+//! assert_eq!(report.jobs.len(), 3);
+//! ```
+//!
+//! # What is guaranteed
+//!
+//! - A function runs when all values of its job have arrived, and gets exactly
+//!   those: no job number is ever off by one, because element i of every topic
+//!   is job i's by construction.
+//! - Nothing a function returns is seen before it has returned, and then all of
+//!   it at once. Sending never waits.
+//! - After the commit the crate allocates nothing, takes no lock and does no
+//!   locked read-modify-write. (What functions and their messages' `clone` do
+//!   is theirs.)
+//! - [`finish_create_dags`] reports everything that is wrong at once.
+//!
+//! # What is not
+//!
+//! - What functions share behind the scheduler's back (a mutex, a static) is
+//!   not in the model; time waited there is execution time.
+//! - A function that never returns holds its core for ever.
+//!
+//! # How it is built
+//!
+//! Top to bottom: [`Dag`] takes registrations; the commit verifies them with
+//! `sched-dag` and makes of each function a [`Body`], one future that is polled
+//! once for each instance; the [`Platform`] gets the [`Plan`] and runs bodies
+//! when its scheduler says so. Values travel in rings with one slot for each job
+//! that may be in flight. The crate names no kernel and needs only `alloc`;
+//! its `unsafe` is in one file, `cell.rs`.
+//!
+//! `docs/paper-map.md` relates the paper's figures 3 and 4 to this code.
+#![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
+
 extern crate alloc;
+
+mod attributes;
+#[allow(unsafe_code, reason = "the one reviewed module that may")]
+mod cell;
+mod commit;
+mod dag;
+mod draft;
+mod fault;
+mod gate;
+mod message;
+mod plan;
+mod platform;
+mod subtask;
+mod topic;
+mod tuple;
+
+pub use attributes::SubtaskAttributes;
+pub use commit::{Commit, finish_create_dags};
+pub use dag::{Dag, create_dag};
+pub use fault::{CommitError, Fault};
+pub use message::{Message, MessageType, Unique};
+pub use plan::{Body, Plan};
+pub use platform::{
+    AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
+};
+pub use sched_dag::{OverrunPolicy, Policy, Preemption, Warning};
+pub use topic::{Ports, Publisher, Subscriber};
+pub use tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};

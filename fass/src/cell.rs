@@ -1,0 +1,211 @@
+//! The two cells in which the crate's `unsafe` lives: a job slot and a set-once.
+//!
+//! # The slot ring
+//!
+//! For our purposes an *edge* is a topic as one of its readers sees it. Each
+//! edge is a ring of J *slots*, J being the number of jobs that the DAG may
+//! have in flight, and job k always uses slot `k mod J`. A ring has exactly one
+//! [`Writer`] and one [`Reader`]. Neither can be cloned, and everything they do
+//! takes `&mut self`; so at any time at most one thread acts for each side.
+//!
+//! A slot holds a value and one atomic word, its *turn*: 0 while the slot is
+//! empty, `k + 1` while it holds the value of job k. One soundness argument
+//! covers the ring, and the `SAFETY` comments below cite it by its name:
+//!
+//! > **Turn invariant.** While a slot's turn is 0, only the ring's writer may
+//! > touch the slot's value, and the value is uninitialised. While it is not 0,
+//! > only the ring's reader may touch the value, and the value is initialised.
+//! > Only the side whose turn it is changes the turn: the writer from 0 to
+//! > `k + 1` once the value is written, the reader back to 0 once the value is
+//! > moved out. The change is a `Release` store and the other side's look at
+//! > it an `Acquire` load, so all that one side did to the value
+//! > happens before all that the other does.
+//!
+//! Because there is one thread a side, a load and a store suffice: nothing here
+//! is a locked read-modify-write. The invariant does not lean on the scheduler:
+//! a platform that runs instances in a wrong order gets its value refused
+//! ([`Writer::put`]) or finds none ([`Reader::take`]), but never a data race.
+//!
+//! # The set-once
+//!
+//! [`SetOnce`] holds the installed platform: empty, then set for ever.
+//!
+//! > **Set-once invariant.** Whoever moves the state from `EMPTY` to `WRITING`
+//! > is the only one that ever writes the value, and does so before it stores
+//! > `SET` with `Release`. After `SET` nobody writes. Readers read only after
+//! > an `Acquire` load gave `SET`.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+use core::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+
+/// The turn of a slot that holds no value.
+const EMPTY_SLOT: u64 = 0;
+
+/// Makes the ring of one edge with `slots` slots and returns its two ends.
+///
+/// # Panics
+///
+/// If `slots` is 0.
+pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
+    assert!(slots > 0, "an edge needs at least one slot");
+    let ring = Arc::new(Ring {
+        slots: (0..slots).map(|_| Slot::empty()).collect(),
+    });
+    let writer = Writer {
+        ring: Arc::clone(&ring),
+    };
+    (writer, Reader { ring })
+}
+
+/// The writing end of an edge. There is one, and it cannot be cloned.
+pub(crate) struct Writer<T> {
+    ring: Arc<Ring<T>>,
+}
+
+/// The reading end of an edge. There is one, and it cannot be cloned.
+pub(crate) struct Reader<T> {
+    ring: Arc<Ring<T>>,
+}
+
+impl<T> Writer<T> {
+    /// Puts the value of `job` into its slot, or gives the value back if the
+    /// slot still holds another job's (or `job` is `u64::MAX`, which has no turn).
+    pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
+        let slot = self.ring.slot(job);
+        let Some(turn) = job.checked_add(1) else {
+            return Err(value);
+        };
+        if slot.turn.load(Ordering::Acquire) != EMPTY_SLOT {
+            return Err(value);
+        }
+        let place = slot.value.get().cast::<T>();
+        // SAFETY: by the turn invariant an empty slot is the writer's alone,
+        // and `&mut self` makes us the only thread that acts as the writer.
+        unsafe { place.write(value) };
+        slot.turn.store(turn, Ordering::Release);
+        Ok(())
+    }
+}
+
+impl<T> Reader<T> {
+    /// Moves the value of `job` out of its slot, or returns `None` if the slot
+    /// does not hold that very job's value.
+    pub(crate) fn take(&mut self, job: u64) -> Option<T> {
+        let slot = self.ring.slot(job);
+        if slot.turn.load(Ordering::Acquire) != job.checked_add(1)? {
+            return None;
+        }
+        let place = slot.value.get().cast::<T>();
+        // SAFETY: by the turn invariant a slot with a turn other than 0 is
+        // initialised and the reader's alone, and `&mut self` makes us the only
+        // thread that acts as the reader. The store below ends our turn, so the
+        // value is not read twice.
+        let value = unsafe { place.read() };
+        slot.turn.store(EMPTY_SLOT, Ordering::Release);
+        Some(value)
+    }
+}
+
+/// The slots that the two ends share.
+struct Ring<T> {
+    slots: Box<[Slot<T>]>,
+}
+
+struct Slot<T> {
+    turn: AtomicU64,
+    value: UnsafeCell<MaybeUninit<T>>,
+}
+
+// SAFETY: the value is reached through the two ends only, which follow the turn
+// invariant; a value is thereby handed from one thread to another but never
+// shared, which is why `T: Send` is enough.
+unsafe impl<T: Send> Sync for Ring<T> {}
+
+impl<T> Ring<T> {
+    fn slot(&self, job: u64) -> &Slot<T> {
+        let slots = self.slots.len();
+        // Both conversions are exact: `usize` has at most 64 bits on every
+        // target, and the remainder is below a `usize`.
+        let index = u64::try_from(slots).map_or(job, |slots| job % slots);
+        &self.slots[usize::try_from(index).unwrap_or(0)]
+    }
+}
+
+impl<T> Slot<T> {
+    const fn empty() -> Self {
+        Self {
+            turn: AtomicU64::new(EMPTY_SLOT),
+            value: UnsafeCell::new(MaybeUninit::uninit()),
+        }
+    }
+}
+
+impl<T> Drop for Slot<T> {
+    fn drop(&mut self) {
+        if *self.turn.get_mut() != EMPTY_SLOT {
+            // SAFETY: by the turn invariant a slot with a turn other than 0 is
+            // initialised; `&mut self` shows that both ends are gone.
+            unsafe { self.value.get_mut().assume_init_drop() };
+        }
+    }
+}
+
+const EMPTY: u8 = 0;
+const WRITING: u8 = 1;
+const SET: u8 = 2;
+
+/// A value that is set at most once and then read by everybody.
+///
+/// `T: Copy`, so that nothing needs to be dropped and reads are by value.
+pub(crate) struct SetOnce<T: Copy> {
+    state: AtomicU8,
+    value: UnsafeCell<MaybeUninit<T>>,
+}
+
+// SAFETY: by the set-once invariant the value is written by one thread before
+// any thread reads it. `T: Send` because the setter hands it to the readers,
+// `T: Sync` because they hold copies at the same time.
+unsafe impl<T: Copy + Send + Sync> Sync for SetOnce<T> {}
+
+impl<T: Copy> SetOnce<T> {
+    pub(crate) const fn new() -> Self {
+        Self {
+            state: AtomicU8::new(EMPTY),
+            value: UnsafeCell::new(MaybeUninit::uninit()),
+        }
+    }
+
+    /// Sets the value, and reports whether this call was the one that did.
+    pub(crate) fn set(&self, value: T) -> bool {
+        let claim =
+            self.state
+                .compare_exchange(EMPTY, WRITING, Ordering::Relaxed, Ordering::Relaxed);
+        if claim.is_err() {
+            return false;
+        }
+        let place = self.value.get().cast::<T>();
+        // SAFETY: we moved the state from `EMPTY` to `WRITING`, so by the
+        // set-once invariant we alone may write, and nobody reads yet.
+        unsafe { place.write(value) };
+        self.state.store(SET, Ordering::Release);
+        true
+    }
+
+    /// Returns the value, or `None` while none is set.
+    pub(crate) fn get(&self) -> Option<T> {
+        if self.state.load(Ordering::Acquire) != SET {
+            return None;
+        }
+        let place = self.value.get().cast::<T>();
+        // SAFETY: the state is `SET`, so by the set-once invariant the value is
+        // initialised and no longer written; `T: Copy` allows many reads.
+        Some(unsafe { place.read() })
+    }
+}
+
+#[cfg(test)]
+#[path = "cell_tests.rs"]
+mod tests;

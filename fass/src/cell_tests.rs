@@ -1,0 +1,198 @@
+//! Tests of the cells, on real threads. They also serve under Miri, where the
+//! counts shrink so that a run ends.
+
+use super::{SetOnce, ring};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::{thread, vec::Vec};
+
+const JOBS: u64 = if cfg!(miri) { 100 } else { 200_000 };
+
+/// A value that counts how many of its kind are alive.
+struct Counted(Arc<AtomicUsize>, u64);
+
+impl Counted {
+    fn new(alive: &Arc<AtomicUsize>, number: u64) -> Self {
+        alive.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(alive), number)
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn a_value_is_found_under_its_own_job_only() {
+    let (mut writer, mut reader) = ring(2);
+    assert_eq!(reader.take(0), None);
+    assert_eq!(writer.put(0, 'a'), Ok(()));
+    assert_eq!(reader.take(2), None, "same slot, other job");
+    assert_eq!(reader.take(1), None, "other slot");
+    assert_eq!(reader.take(0), Some('a'));
+    assert_eq!(reader.take(0), None, "taken once");
+}
+
+#[test]
+fn a_full_slot_gives_the_value_back() {
+    let (mut writer, mut reader) = ring(2);
+    assert_eq!(writer.put(0, 'a'), Ok(()));
+    assert_eq!(writer.put(1, 'b'), Ok(()));
+    assert_eq!(writer.put(2, 'c'), Err('c'));
+    assert_eq!(reader.take(0), Some('a'));
+    assert_eq!(writer.put(2, 'c'), Ok(()));
+    assert_eq!(reader.take(1), Some('b'));
+    assert_eq!(reader.take(2), Some('c'));
+}
+
+#[test]
+fn jobs_may_be_written_and_read_out_of_order() {
+    let (mut writer, mut reader) = ring(3);
+    for job in [2, 0, 1] {
+        assert_eq!(writer.put(job, job), Ok(()));
+    }
+    for job in [1, 2, 0] {
+        assert_eq!(reader.take(job), Some(job));
+    }
+}
+
+#[test]
+fn the_last_job_number_has_no_turn() {
+    let (mut writer, mut reader) = ring(1);
+    assert_eq!(writer.put(u64::MAX, 7), Err(7));
+    assert_eq!(reader.take(u64::MAX), None);
+    assert_eq!(writer.put(u64::MAX - 1, 7), Ok(()));
+    assert_eq!(reader.take(u64::MAX - 1), Some(7));
+}
+
+#[test]
+#[should_panic(expected = "an edge needs at least one slot")]
+fn a_ring_without_slots_is_refused() {
+    let _ = ring::<u8>(0);
+}
+
+#[test]
+fn values_that_nobody_took_are_dropped_once() {
+    let alive = Arc::new(AtomicUsize::new(0));
+    let (mut writer, mut reader) = ring(3);
+    for job in 0..3 {
+        assert!(writer.put(job, Counted::new(&alive, job)).is_ok());
+    }
+    drop(reader.take(1));
+    assert_eq!(alive.load(Ordering::Relaxed), 2);
+    drop(writer);
+    assert_eq!(alive.load(Ordering::Relaxed), 2, "the reader still could");
+    drop(reader);
+    assert_eq!(alive.load(Ordering::Relaxed), 0);
+}
+
+/// The two ends race at full speed; every value arrives, whole, in its job.
+#[test]
+fn two_threads_hand_over_every_job_intact() {
+    for slots in [1, 2, 3, 8] {
+        let alive = Arc::new(AtomicUsize::new(0));
+        let (mut writer, mut reader) = ring(slots);
+        let counter = Arc::clone(&alive);
+        let sender = thread::spawn(move || {
+            for job in 0..JOBS / 8 {
+                // Several words, so that a torn hand-over would show.
+                let mut message = ([job; 5], Counted::new(&counter, job));
+                while let Err(back) = writer.put(job, message) {
+                    message = back;
+                    thread::yield_now();
+                }
+            }
+        });
+        for job in 0..JOBS / 8 {
+            let (words, counted) = loop {
+                match reader.take(job) {
+                    Some(message) => break message,
+                    None => thread::yield_now(),
+                }
+            };
+            assert_eq!(words, [job; 5]);
+            assert_eq!(counted.1, job);
+        }
+        sender.join().expect("the sender ends");
+        drop(reader);
+        assert_eq!(alive.load(Ordering::Relaxed), 0);
+    }
+}
+
+/// A chain over three threads: what arrives was handed over twice.
+#[test]
+fn a_chain_of_rings_keeps_jobs_apart() {
+    let (mut first_writer, mut first_reader) = ring(2);
+    let (mut second_writer, mut second_reader) = ring(2);
+    let jobs = JOBS / 8;
+    let source = thread::spawn(move || {
+        for job in 0..jobs {
+            while first_writer.put(job, job * 3).is_err() {
+                thread::yield_now();
+            }
+        }
+    });
+    let middle = thread::spawn(move || {
+        for job in 0..jobs {
+            let value = loop {
+                match first_reader.take(job) {
+                    Some(value) => break value,
+                    None => thread::yield_now(),
+                }
+            };
+            while second_writer.put(job, value + 1).is_err() {
+                thread::yield_now();
+            }
+        }
+    });
+    for job in 0..jobs {
+        let value = loop {
+            match second_reader.take(job) {
+                Some(value) => break value,
+                None => thread::yield_now(),
+            }
+        };
+        assert_eq!(value, job * 3 + 1);
+    }
+    source.join().expect("the source ends");
+    middle.join().expect("the middle ends");
+}
+
+#[test]
+fn set_once_keeps_the_first_value() {
+    let cell = SetOnce::new();
+    assert_eq!(cell.get(), None);
+    assert!(cell.set(1));
+    assert!(!cell.set(2));
+    assert_eq!(cell.get(), Some(1));
+}
+
+#[test]
+fn set_once_has_one_winner_and_all_see_it() {
+    for _ in 0..if cfg!(miri) { 3 } else { 300 } {
+        let cell = SetOnce::new();
+        let winners = AtomicUsize::new(0);
+        thread::scope(|scope| {
+            let setters: Vec<_> = (0..4_u64)
+                .map(|number| {
+                    let (cell, winners) = (&cell, &winners);
+                    scope.spawn(move || {
+                        if cell.set([number; 4]) {
+                            winners.fetch_add(1, Ordering::Relaxed);
+                        }
+                        if let Some(value) = cell.get() {
+                            assert_eq!(value, [value[0]; 4], "never half written");
+                        }
+                    })
+                })
+                .collect();
+            for setter in setters {
+                setter.join().expect("a setter ends");
+            }
+        });
+        assert_eq!(winners.load(Ordering::Relaxed), 1);
+        assert!(cell.get().is_some());
+    }
+}

@@ -1,0 +1,218 @@
+//! The commit: from drafts to a running plan, or to all that is wrong with them.
+//!
+//! Three steps, each of which either goes through for all DAGs or stops there:
+//!
+//! 1. *Verify.* Every fault of every DAG is collected, ours and the model's. If
+//!    there is one, nothing has happened; the handles are as they were.
+//! 2. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
+//! 3. *Launch.* The platform takes the plan.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+
+use sched_dag::{CommitOptions, DagId, DagLabel, DagSpec, Policy, TaskSet, Verified, Warning};
+
+use crate::dag::Dag;
+use crate::fault::{CommitError, Fault};
+use crate::plan::{Body, Plan};
+use crate::platform;
+use crate::topic::Wiring;
+
+/// Verifies DAGs and hands them to the installed platform, which schedules them.
+///
+/// It ends construction: the DAGs can no longer be changed. They are verified
+/// for the platform's policy and cores, with the paper's construction policy:
+/// one source, one sink, one writer a topic.
+///
+/// # Errors
+///
+/// A [`CommitError`] with *every* fault of every DAG. Nothing runs then, and the
+/// handles can still be added to and committed again, with one exception: after
+/// [`Fault::NotLaunched`] the functions are gone with the refused plan, and the
+/// DAGs must be built anew.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// dag.name("demo");
+/// dag.register_periodic_subtask(
+///     || (1_i32,),
+///     vec!["number"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("source"),
+/// );
+/// dag.register_sink_subtask(
+///     |(number,): (u64,)| println!("{number}"), // not the type that is written
+///     vec!["number"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("sink"),
+/// );
+/// let error = finish_create_dags(&[dag.clone()]).unwrap_err();
+/// assert_eq!(error.faults()[0].code(), "type_mismatch");
+/// ```
+pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
+    let Some(platform) = platform::installed() else {
+        // What else is wrong does not depend on the platform, except for the
+        // attributes; under EDF none is needed.
+        let mut error = match verify(dags, CommitOptions::new(Policy::Edf, 1)) {
+            Ok(accepted) => CommitError {
+                faults: Vec::new(),
+                warnings: accepted.warnings,
+            },
+            Err(error) => error,
+        };
+        error.faults.insert(0, Fault::NoPlatform);
+        return Err(error);
+    };
+    let options = CommitOptions::new(platform.policy(), platform.cores());
+    let Verified {
+        task_set, warnings, ..
+    } = verify(dags, options)?;
+    let plan = tie(dags, task_set);
+    match platform.launch(plan) {
+        Ok(()) => Ok(Commit { warnings }),
+        Err(error) => Err(CommitError {
+            faults: Vec::from([Fault::NotLaunched(error)]),
+            warnings,
+        }),
+    }
+}
+
+/// An accepted commit.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// let period = Duration::from_millis(10);
+/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
+/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::named("sink"));
+///
+/// let commit = finish_create_dags(&[dag]).unwrap();
+/// for warning in commit.warnings() {
+///     println!("warning: {warning}");
+/// }
+/// # assert!(commit.warnings().is_empty());
+/// ```
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Commit {
+    warnings: Vec<Warning>,
+}
+
+impl Commit {
+    /// Returns what the commit accepted although its author may not have meant it.
+    ///
+    /// ```
+    /// # use core::time::Duration;
+    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// # let dag = create_dag();
+    /// # let period = Duration::from_millis(10);
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
+    /// let unmeasured = SubtaskAttributes::named("source").wcet(Duration::ZERO);
+    /// dag.register_periodic_subtask(|| (1,), vec!["number"], period, unmeasured);
+    /// let commit = finish_create_dags(&[dag]).unwrap();
+    /// assert_eq!(commit.warnings()[0].code(), "zero_wcet");
+    /// ```
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+}
+
+/// Verifies all DAGs, and collects the faults of both crates.
+fn verify(dags: &[Dag], options: CommitOptions) -> Result<Verified, CommitError> {
+    let mut faults = Vec::new();
+    let mut specs = Vec::with_capacity(dags.len());
+    for (number, dag) in dags.iter().enumerate() {
+        let draft = dag.draft.borrow();
+        let label = DagLabel {
+            id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
+            name: draft.spec.name.clone(),
+        };
+        let is_repeated = |earlier: &Dag| Rc::ptr_eq(&earlier.draft, &dag.draft);
+        if dags[..number].iter().any(is_repeated) {
+            faults.push(Fault::GivenTwice { dag: label });
+            continue;
+        }
+        if draft.is_committed {
+            faults.push(Fault::AlreadyCommitted { dag: label });
+            continue;
+        }
+        faults.extend((draft.faults.iter()).map(|fault| fault.clone().in_dag(&label)));
+        specs.push(draft.spec_with_known_types());
+    }
+    // A commit of nothing but repeated DAGs has been told what is wrong.
+    if specs.is_empty() && !faults.is_empty() {
+        return Err(CommitError {
+            faults,
+            warnings: Vec::new(),
+        });
+    }
+    match sched_dag::verify(&specs, &options) {
+        Ok(verified) if faults.is_empty() => Ok(verified),
+        Ok(verified) => Err(CommitError {
+            faults,
+            warnings: verified.warnings,
+        }),
+        Err(rejected) => {
+            let model_faults = rejected.faults().iter();
+            let news = model_faults.filter(|fault| !is_consequence(fault, &faults));
+            let news: Vec<Fault> = news.cloned().map(Fault::Model).collect();
+            faults.extend(news);
+            Err(CommitError {
+                faults,
+                warnings: rejected.warnings().to_vec(),
+            })
+        }
+    }
+}
+
+/// Reports whether a fault of the model only repeats one of ours: a period or a
+/// deadline is missing because it was too long to be noted.
+fn is_consequence(fault: &sched_dag::Fault, ours: &[Fault]) -> bool {
+    let (label, missing) = match fault {
+        sched_dag::Fault::MissingPeriod { dag } => (dag, "period"),
+        sched_dag::Fault::MissingDeadline { dag } => (dag, "relative deadline"),
+        _ => return false,
+    };
+    ours.iter().any(|fault| {
+        matches!(fault, Fault::DurationTooLong { dag, what, .. } if dag == label && *what == missing)
+    })
+}
+
+/// Turns verified DAGs into a plan, and closes their handles.
+fn tie(dags: &[Dag], task_set: TaskSet) -> Plan {
+    let bodies = (dags.iter().zip(task_set.dags()))
+        .map(|(dag, verified)| {
+            let (spec, make_bodies) = {
+                let mut draft = dag.draft.borrow_mut();
+                draft.is_committed = true;
+                let name = draft.spec.name.clone();
+                let named = DagSpec {
+                    name,
+                    ..DagSpec::default()
+                };
+                let spec = core::mem::replace(&mut draft.spec, named);
+                (spec, core::mem::take(&mut draft.make_bodies))
+            };
+            let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
+            let mut wiring = Wiring::new(&spec, slots);
+            let make = |(subtask, make_body): (usize, crate::subtask::MakeBody)| -> Body {
+                make_body(&mut wiring, subtask)
+            };
+            make_bodies.into_iter().enumerate().map(make).collect()
+        })
+        .collect();
+    Plan { task_set, bodies }
+}

@@ -1,0 +1,241 @@
+//! Building a DAG: the registering half of the paper's API.
+//!
+//! A [`Dag`] is a handle of a DAG under construction. Registering a subtask
+//! takes a function, the names of the topics it reads and writes, and its
+//! attributes; nothing else can be said about a subtask, and nothing runs.
+//! What is wrong is not reported here but at the commit, all at once
+//! ([`finish_create_dags`](crate::finish_create_dags)). After the commit the
+//! handle is spent.
+//!
+//! Construction happens on one thread; a `Dag` cannot leave it.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::{RefCell, RefMut};
+use core::time::Duration;
+
+use sched_dag::OverrunPolicy;
+
+use crate::attributes::SubtaskAttributes;
+use crate::draft::Draft;
+use crate::tuple::{VecToPubs, VecToSubs};
+
+/// Creates an empty DAG.
+///
+/// # Examples
+///
+/// See the [crate's first example](crate#a-first-dag).
+///
+/// ```
+/// let dag = fass::create_dag();
+/// dag.name("perception");
+/// ```
+#[must_use = "a DAG does nothing until it is committed with `finish_create_dags`"]
+pub fn create_dag() -> Dag {
+    Dag {
+        draft: Rc::default(),
+    }
+}
+
+/// A DAG under construction. Clones are handles of the same DAG.
+///
+/// # Panics
+///
+/// Every method panics, at its caller's line, if the DAG has been committed:
+/// the graph that was verified is the graph that runs, and an addition that
+/// would silently not run is a mistake in the program.
+#[derive(Clone, Debug)]
+pub struct Dag {
+    pub(crate) draft: Rc<RefCell<Draft>>,
+}
+
+impl Dag {
+    /// Names the DAG, for reports and error messages.
+    ///
+    /// ```
+    /// fass::create_dag().name("perception");
+    /// ```
+    #[track_caller]
+    pub fn name(&self, name: &str) -> &Self {
+        self.open().spec.name = name.into();
+        self
+    }
+
+    /// Sets the time of the first release after the start of scheduling;
+    /// without it, 0.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// fass::create_dag().offset(Duration::from_millis(5));
+    /// ```
+    #[track_caller]
+    pub fn offset(&self, offset: Duration) -> &Self {
+        self.open().set_offset(offset);
+        self
+    }
+
+    /// Sets the most jobs that may be in flight at once, at least 1.
+    ///
+    /// It is also the number of slots of every edge. Without it the commit
+    /// takes enough for the relative deadline.
+    ///
+    /// ```
+    /// fass::create_dag().in_flight(2); // a pipeline of two jobs
+    /// ```
+    #[track_caller]
+    pub fn in_flight(&self, jobs: u32) -> &Self {
+        self.open().spec.in_flight = Some(jobs);
+        self
+    }
+
+    /// Sets what happens at a release that finds the most jobs in flight;
+    /// without it the release queues.
+    ///
+    /// ```
+    /// fass::create_dag().overrun(fass::OverrunPolicy::Skip);
+    /// ```
+    #[track_caller]
+    pub fn overrun(&self, policy: OverrunPolicy) -> &Self {
+        self.open().spec.overrun = policy;
+        self
+    }
+
+    /// Sets the number of jobs to release, after which the DAG is finished;
+    /// without it the DAG runs without end.
+    ///
+    /// ```
+    /// fass::create_dag().jobs(100);
+    /// ```
+    #[track_caller]
+    pub fn jobs(&self, jobs: u64) -> &Self {
+        self.open().spec.jobs = Some(jobs);
+        self
+    }
+
+    /// Registers the source: a function without arguments that every release
+    /// starts, at multiples of `period` after the offset.
+    ///
+    /// `output_topics` names one topic for each element of `Ret`.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag};
+    ///
+    /// let dag = create_dag();
+    /// let mut count = 0;
+    /// dag.register_periodic_subtask(
+    ///     move || {
+    ///         count += 1; // a closure may keep state from job to job
+    ///         (count,)
+    ///     },
+    ///     vec!["count"],
+    ///     Duration::from_millis(10),
+    ///     SubtaskAttributes::named("counter"),
+    /// );
+    /// ```
+    #[track_caller]
+    pub fn register_periodic_subtask<F, Ret>(
+        &self,
+        mut f: F,
+        output_topics: Vec<&str>,
+        period: Duration,
+        attributes: SubtaskAttributes,
+    ) where
+        F: FnMut() -> Ret + Send + 'static,
+        Ret: VecToPubs,
+    {
+        let mut draft = self.open();
+        let source = move |()| f();
+        let subtask = draft.register(source, &[], &output_topics, attributes);
+        draft.set_period(period, subtask);
+    }
+
+    /// Registers a subtask between the source and the sink: a function from a
+    /// tuple of inputs to a tuple of outputs.
+    ///
+    /// `input_topics` names one topic for each element of `Args`,
+    /// `output_topics` one for each element of `Ret`.
+    ///
+    /// ```
+    /// use fass::{SubtaskAttributes, create_dag};
+    ///
+    /// create_dag().register_subtask(
+    ///     |(left, right): (i32, i32)| (left + right, left * right),
+    ///     vec!["left", "right"],
+    ///     vec!["sum", "product"],
+    ///     SubtaskAttributes::named("combine"),
+    /// );
+    /// ```
+    ///
+    /// A function that takes its inputs as separate arguments is refused by the
+    /// compiler:
+    ///
+    /// ```compile_fail,E0593
+    /// # use fass::{SubtaskAttributes, create_dag};
+    /// create_dag().register_subtask(
+    ///     |left: i32, right: i32| (left + right,), // should be `|(left, right): (i32, i32)|`
+    ///     vec!["left", "right"],
+    ///     vec!["sum"],
+    ///     SubtaskAttributes::named("combine"),
+    /// );
+    /// ```
+    #[track_caller]
+    pub fn register_subtask<F, Args, Ret>(
+        &self,
+        f: F,
+        input_topics: Vec<&str>,
+        output_topics: Vec<&str>,
+        attributes: SubtaskAttributes,
+    ) where
+        F: FnMut(Args) -> Ret + Send + 'static,
+        Args: VecToSubs,
+        Ret: VecToPubs,
+    {
+        self.open()
+            .register(f, &input_topics, &output_topics, attributes);
+    }
+
+    /// Registers the sink: a function that returns nothing, whose completion
+    /// completes the job, by `relative_deadline` after the release.
+    ///
+    /// `input_topics` names one topic for each element of `Args`.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag};
+    ///
+    /// create_dag().register_sink_subtask(
+    ///     |(sum,): (i32,)| println!("{sum}"),
+    ///     vec!["sum"],
+    ///     Duration::from_millis(10),
+    ///     SubtaskAttributes::named("print"),
+    /// );
+    /// ```
+    #[track_caller]
+    pub fn register_sink_subtask<F, Args>(
+        &self,
+        f: F,
+        input_topics: Vec<&str>,
+        relative_deadline: Duration,
+        attributes: SubtaskAttributes,
+    ) where
+        F: FnMut(Args) + Send + 'static,
+        Args: VecToSubs,
+    {
+        let mut draft = self.open();
+        let subtask = draft.register(f, &input_topics, &[], attributes);
+        draft.set_deadline(relative_deadline, subtask);
+    }
+
+    /// Borrows the draft for a change.
+    #[track_caller]
+    fn open(&self) -> RefMut<'_, Draft> {
+        let draft = self.draft.borrow_mut();
+        assert!(
+            !draft.is_committed,
+            "DAG `{}` is committed and cannot be changed; build a new DAG and commit that",
+            draft.spec.name
+        );
+        draft
+    }
+}

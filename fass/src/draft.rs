@@ -1,0 +1,203 @@
+//! What has been registered of a DAG before its commit.
+//!
+//! A draft accepts everything and remembers what it could not express as a
+//! [`DagSpec`]: durations that do not fit, topic lists that do not fit the
+//! function. The commit reports those together with all other faults. So that
+//! one mistake is not reported as several, a subtask whose list does not fit
+//! keeps its topics in the spec, but with the type [`Unknown`], which the commit
+//! takes to be whatever the topic's other end says.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use sched_dag::{DagId, DagLabel, DagSpec, Priority, SubtaskId, SubtaskLabel};
+use sched_dag::{SubtaskSpec, TopicPort};
+
+use crate::attributes::SubtaskAttributes;
+use crate::fault::Fault;
+use crate::message::MessageType;
+use crate::subtask::{MakeBody, defer};
+use crate::tuple::{VecToPubs, VecToSubs};
+
+/// A DAG as registered so far.
+#[derive(Default)]
+pub(crate) struct Draft {
+    pub(crate) spec: DagSpec,
+    /// One for each of `spec.subtasks`.
+    pub(crate) make_bodies: Vec<MakeBody>,
+    /// What only this crate can find wrong; the DAG's label is still a blank.
+    pub(crate) faults: Vec<Fault>,
+    pub(crate) is_committed: bool,
+}
+
+/// The type of a topic's end that no function states.
+#[derive(Clone)]
+struct Unknown;
+
+impl Draft {
+    /// Adds a subtask and returns its label.
+    pub(crate) fn register<F, Args, Ret>(
+        &mut self,
+        f: F,
+        inputs: &[&str],
+        outputs: &[&str],
+        attributes: SubtaskAttributes,
+    ) -> SubtaskLabel
+    where
+        F: FnMut(Args) -> Ret + Send + 'static,
+        Args: VecToSubs,
+        Ret: VecToPubs,
+    {
+        let subtask = self.next_label(&attributes);
+        let (input_types, output_types) = (Args::input_types(), Ret::output_types());
+        if input_types.len() != inputs.len() {
+            self.faults.push(Fault::InputArity {
+                dag: blank(),
+                subtask: subtask.clone(),
+                expected: input_types.len(),
+                given: inputs.len(),
+            });
+        }
+        if output_types.len() != outputs.len() {
+            self.faults.push(Fault::OutputArity {
+                dag: blank(),
+                subtask: subtask.clone(),
+                expected: output_types.len(),
+                given: outputs.len(),
+            });
+        }
+        let wcet_ns = attributes
+            .wcet
+            .and_then(|wcet| self.convert(wcet, Some(&subtask), "WCET"));
+        self.spec.subtasks.push(SubtaskSpec {
+            name: attributes.name,
+            wcet_ns,
+            priority: attributes.priority.map(Priority),
+            non_preemptive: attributes.non_preemptive,
+            inputs: ports(inputs, &input_types),
+            outputs: ports(outputs, &output_types),
+        });
+        self.make_bodies.push(defer(f));
+        subtask
+    }
+
+    pub(crate) fn set_offset(&mut self, offset: Duration) {
+        self.spec.offset_ns = self.convert(offset, None, "offset").unwrap_or(0);
+    }
+
+    pub(crate) fn set_period(&mut self, period: Duration, subtask: SubtaskLabel) {
+        let Some(period_ns) = self.convert(period, Some(&subtask), "period") else {
+            return;
+        };
+        let first_ns = *self.spec.period_ns.get_or_insert(period_ns);
+        if first_ns != period_ns {
+            self.faults.push(Fault::PeriodsDiffer {
+                dag: blank(),
+                subtask,
+                first_ns,
+                second_ns: period_ns,
+            });
+        }
+    }
+
+    pub(crate) fn set_deadline(&mut self, deadline: Duration, subtask: SubtaskLabel) {
+        let Some(deadline_ns) = self.convert(deadline, Some(&subtask), "relative deadline") else {
+            return;
+        };
+        let first_ns = *self.spec.relative_deadline_ns.get_or_insert(deadline_ns);
+        if first_ns != deadline_ns {
+            self.faults.push(Fault::DeadlinesDiffer {
+                dag: blank(),
+                subtask,
+                first_ns,
+                second_ns: deadline_ns,
+            });
+        }
+    }
+
+    /// Returns the spec with every [`Unknown`] end replaced by its other end's
+    /// type, where that is known.
+    pub(crate) fn spec_with_known_types(&self) -> DagSpec {
+        let mut spec = self.spec.clone();
+        let unknown = MessageType::of::<Unknown>().id();
+        let known: Vec<TopicPort> = (self.spec.subtasks.iter())
+            .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs))
+            .filter(|port| port.type_id != unknown)
+            .cloned()
+            .collect();
+        for subtask in &mut spec.subtasks {
+            for port in subtask.inputs.iter_mut().chain(&mut subtask.outputs) {
+                if port.type_id == unknown
+                    && let Some(other_end) = known.iter().find(|other| other.topic == port.topic)
+                {
+                    port.clone_from(other_end);
+                }
+            }
+        }
+        spec
+    }
+
+    /// Converts a duration, or notes that it is too long.
+    fn convert(
+        &mut self,
+        duration: Duration,
+        subtask: Option<&SubtaskLabel>,
+        what: &'static str,
+    ) -> Option<u64> {
+        let ns = u64::try_from(duration.as_nanos()).ok();
+        if ns.is_none() {
+            self.faults.push(Fault::DurationTooLong {
+                dag: blank(),
+                subtask: subtask.cloned(),
+                what,
+            });
+        }
+        ns
+    }
+
+    fn next_label(&self, attributes: &SubtaskAttributes) -> SubtaskLabel {
+        let number = u32::try_from(self.spec.subtasks.len()).unwrap_or(u32::MAX);
+        SubtaskLabel {
+            id: SubtaskId(number),
+            name: attributes.name.clone(),
+        }
+    }
+}
+
+/// Pairs topics with types; all types are unknown if the numbers differ, since
+/// it cannot be told which one is missing.
+fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
+    let fits = topics.len() == types.len();
+    (topics.iter().enumerate())
+        .map(|(index, topic)| {
+            let known = types.get(index).filter(|_| fits).copied();
+            let message = known.unwrap_or_else(MessageType::of::<Unknown>);
+            TopicPort {
+                topic: (*topic).into(),
+                type_id: message.id(),
+                type_name: message.name(),
+                can_fan_out: message.can_fan_out(),
+            }
+        })
+        .collect()
+}
+
+/// Stands for the DAG's label until the commit fills it in.
+fn blank() -> DagLabel {
+    DagLabel {
+        id: DagId(0),
+        name: String::new(),
+    }
+}
+
+impl fmt::Debug for Draft {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Draft")
+            .field("spec", &self.spec)
+            .field("faults", &self.faults)
+            .field("is_committed", &self.is_committed)
+            .finish_non_exhaustive()
+    }
+}

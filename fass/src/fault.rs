@@ -1,0 +1,294 @@
+//! What can be wrong with a commit, in words.
+//!
+//! Every fault states a fact, names the offender, and says what to do. The
+//! faults of the graph itself are [`sched_dag::Fault`]s; the ones here can only
+//! be seen from this side: the shape of functions, durations, the platform.
+
+use alloc::vec::Vec;
+use core::fmt;
+
+use sched_dag::{DagLabel, SubtaskLabel, Warning};
+
+use crate::platform::LaunchError;
+
+/// One reason why a commit was refused.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Fault, SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// dag.name("demo");
+/// dag.register_periodic_subtask(
+///     || (1, 2),
+///     vec!["numbers"], // one topic for two results
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("source"),
+/// );
+/// dag.register_sink_subtask(
+///     |(_,): (i32,)| (),
+///     vec!["numbers"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("sink"),
+/// );
+/// let error = finish_create_dags(&[dag]).unwrap_err();
+/// let codes: Vec<_> = error.faults().iter().map(Fault::code).collect();
+/// assert_eq!(codes, ["output_arity"]);
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// No platform is installed that could schedule the DAGs.
+    NoPlatform,
+    /// The same DAG stands twice in one commit.
+    GivenTwice {
+        /// The DAG.
+        dag: DagLabel,
+    },
+    /// The DAG was committed before.
+    AlreadyCommitted {
+        /// The DAG.
+        dag: DagLabel,
+    },
+    /// A function takes another number of inputs than its list names topics.
+    InputArity {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The number of elements of the argument tuple.
+        expected: usize,
+        /// The number of topics given.
+        given: usize,
+    },
+    /// A function returns another number of outputs than its list names topics.
+    OutputArity {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The number of elements of the result tuple.
+        expected: usize,
+        /// The number of topics given.
+        given: usize,
+    },
+    /// A duration does not fit into 64 bits of nanoseconds (584 years).
+    DurationTooLong {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask, or `None` if the duration is the DAG's.
+        subtask: Option<SubtaskLabel>,
+        /// What the duration is for.
+        what: &'static str,
+    },
+    /// Two sources of one DAG state different periods.
+    PeriodsDiffer {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask that states the second period.
+        subtask: SubtaskLabel,
+        /// The period stated first, in nanoseconds.
+        first_ns: u64,
+        /// The other period, in nanoseconds.
+        second_ns: u64,
+    },
+    /// Two sinks of one DAG state different relative deadlines.
+    DeadlinesDiffer {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask that states the second deadline.
+        subtask: SubtaskLabel,
+        /// The relative deadline stated first, in nanoseconds.
+        first_ns: u64,
+        /// The other relative deadline, in nanoseconds.
+        second_ns: u64,
+    },
+    /// The graph or its attributes are at fault.
+    Model(sched_dag::Fault),
+    /// The platform did not take the verified plan.
+    NotLaunched(LaunchError),
+}
+
+impl Fault {
+    /// Returns a stable name of the kind of fault, for machines to read.
+    ///
+    /// ```
+    /// assert_eq!(fass::Fault::NoPlatform.code(), "no_platform");
+    /// ```
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoPlatform => "no_platform",
+            Self::GivenTwice { .. } => "given_twice",
+            Self::AlreadyCommitted { .. } => "already_committed",
+            Self::InputArity { .. } => "input_arity",
+            Self::OutputArity { .. } => "output_arity",
+            Self::DurationTooLong { .. } => "duration_too_long",
+            Self::PeriodsDiffer { .. } => "periods_differ",
+            Self::DeadlinesDiffer { .. } => "deadlines_differ",
+            Self::Model(fault) => fault.code(),
+            Self::NotLaunched(_) => "not_launched",
+        }
+    }
+
+    /// Fills in the DAG's label, which registration does not know yet.
+    pub(crate) fn in_dag(mut self, label: &DagLabel) -> Self {
+        match &mut self {
+            Self::GivenTwice { dag }
+            | Self::AlreadyCommitted { dag }
+            | Self::InputArity { dag, .. }
+            | Self::OutputArity { dag, .. }
+            | Self::DurationTooLong { dag, .. }
+            | Self::PeriodsDiffer { dag, .. }
+            | Self::DeadlinesDiffer { dag, .. } => dag.clone_from(label),
+            Self::NoPlatform | Self::Model(_) | Self::NotLaunched(_) => {}
+        }
+        self
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoPlatform => f.write_str(
+                "no platform is installed that could run the DAGs; boot the kernel, \
+                 or make a `virtual_time::VirtualTime` first",
+            ),
+            Self::GivenTwice { dag } => {
+                write!(f, "{dag} is given twice in one commit; give it once")
+            }
+            Self::AlreadyCommitted { dag } => write!(
+                f,
+                "{dag} is committed already; build a new DAG and commit that"
+            ),
+            Self::InputArity {
+                dag,
+                subtask,
+                expected,
+                given,
+            } => write!(
+                f,
+                "{subtask} of {dag} takes {} but lists {}; list one topic for each element \
+                 of its argument tuple",
+                Count(*expected, "input"),
+                Count(*given, "input topic"),
+            ),
+            Self::OutputArity {
+                dag,
+                subtask,
+                expected,
+                given,
+            } => write!(
+                f,
+                "{subtask} of {dag} returns {} but lists {}; list one topic for each element \
+                 of its result tuple",
+                Count(*expected, "output"),
+                Count(*given, "output topic"),
+            ),
+            Self::DurationTooLong { dag, subtask, what } => {
+                write!(f, "the {what} of ")?;
+                if let Some(subtask) = subtask {
+                    write!(f, "{subtask} of ")?;
+                }
+                write!(f, "{dag} is too long; give at most {} ns", u64::MAX)
+            }
+            Self::PeriodsDiffer {
+                dag,
+                subtask,
+                first_ns,
+                second_ns,
+            } => write!(
+                f,
+                "{subtask} gives {dag} a period of {second_ns} ns where {first_ns} ns were given \
+                 before; a DAG has one period, make two DAGs or give the same period"
+            ),
+            Self::DeadlinesDiffer {
+                dag,
+                subtask,
+                first_ns,
+                second_ns,
+            } => write!(
+                f,
+                "{subtask} gives {dag} a relative deadline of {second_ns} ns where {first_ns} ns \
+                 were given before; a DAG has one deadline, give the same to every sink"
+            ),
+            Self::Model(fault) => fault.fmt(f),
+            Self::NotLaunched(error) => write!(f, "the platform did not take the plan: {error}"),
+        }
+    }
+}
+
+/// A number of things, in the singular or the plural.
+struct Count(usize, &'static str);
+
+impl fmt::Display for Count {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(number, thing) = self;
+        let plural = if *number == 1 { "" } else { "s" };
+        write!(f, "{number} {thing}{plural}")
+    }
+}
+
+/// A refused commit: all its faults, and the warnings.
+///
+/// Its `Display` prints one line for each fault.
+///
+/// # Examples
+///
+/// ```
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = fass::create_dag(); // empty
+/// let error = fass::finish_create_dags(&[dag]).unwrap_err();
+/// for fault in error.faults() {
+///     println!("{}: {fault}", fault.code());
+/// }
+/// assert_eq!(error.to_string().lines().count(), error.faults().len());
+/// ```
+#[derive(Clone, Debug)]
+pub struct CommitError {
+    pub(crate) faults: Vec<Fault>,
+    pub(crate) warnings: Vec<Warning>,
+}
+
+impl CommitError {
+    /// Returns the faults, at least one.
+    ///
+    /// ```
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// let error = fass::finish_create_dags(&[fass::create_dag()]).unwrap_err();
+    /// assert!(!error.faults().is_empty());
+    /// ```
+    #[must_use]
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
+    /// Returns what would not have refused the commit but deserves a look.
+    ///
+    /// ```
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// let error = fass::finish_create_dags(&[fass::create_dag()]).unwrap_err();
+    /// assert!(error.warnings().is_empty());
+    /// ```
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+}
+
+impl fmt::Display for CommitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, fault) in self.faults.iter().enumerate() {
+            if index > 0 {
+                f.write_str("\n")?;
+            }
+            fault.fmt(f)?;
+        }
+        Ok(())
+    }
+}
+
+impl core::error::Error for CommitError {}

@@ -1,0 +1,126 @@
+//! The gate through which the platform lets a subtask's future proceed.
+//!
+//! A subtask's future waits in one place only: at the gate in front of
+//! `recv_all`. The *grant* that opens it names a job, and the platform gives
+//! it when the scheduler says that the instance runs; values arriving on topics
+//! do not. This is what keeps a body from circumventing the task model: an
+//! instance cannot begin before all its predecessors are complete (R2), because
+//! beginning is not in the future's own hands, and the future has no second
+//! place to wait at, so it reaches the end of its instance in the same poll
+//! (R3).
+//!
+//! The gate's words are atomics only because a future must be `Send`. All
+//! accesses are `Relaxed`, plain loads and stores on every processor: the gate
+//! belongs to one [`Body`](crate::Body), whose `&mut self` already orders one
+//! use after another, on whatever cores.
+
+use alloc::sync::Arc;
+use core::future::poll_fn;
+use core::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use core::task::Poll;
+
+/// What the platform grants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Grant {
+    /// Do the subtask's part of this job.
+    Run(u64),
+    /// Drop what has arrived for this job, which was cancelled.
+    Discard(u64),
+}
+
+/// A shared handle of one subtask's gate.
+#[derive(Clone)]
+pub(crate) struct Gate(Arc<State>);
+
+struct State {
+    phase: AtomicU8,
+    job: AtomicU64,
+}
+
+/// Waiting for a grant.
+const CLOSED: u8 = 0;
+/// A run is granted and not yet begun.
+const RUN: u8 = 1;
+/// A discard is granted and not yet begun.
+const DISCARD: u8 = 2;
+/// The future passed the gate and has not reported the end.
+const PASSED: u8 = 3;
+
+impl Gate {
+    pub(crate) fn new() -> Self {
+        Self(Arc::new(State {
+            phase: AtomicU8::new(CLOSED),
+            job: AtomicU64::new(0),
+        }))
+    }
+
+    /// Opens the gate for one grant.
+    pub(crate) fn open(&self, grant: Grant) {
+        let (phase, job) = match grant {
+            Grant::Run(job) => (RUN, job),
+            Grant::Discard(job) => (DISCARD, job),
+        };
+        self.0.job.store(job, Ordering::Relaxed);
+        self.0.phase.store(phase, Ordering::Relaxed);
+    }
+
+    /// Waits until the gate is open and passes it.
+    pub(crate) async fn pass(&self) -> Grant {
+        poll_fn(|_| {
+            let job = self.job();
+            let grant = match self.0.phase.load(Ordering::Relaxed) {
+                RUN => Grant::Run(job),
+                DISCARD => Grant::Discard(job),
+                _ => return Poll::Pending,
+            };
+            self.0.phase.store(PASSED, Ordering::Relaxed);
+            Poll::Ready(grant)
+        })
+        .await
+    }
+
+    /// Closes the gate behind a grant that has been carried out.
+    pub(crate) fn close(&self) {
+        self.0.phase.store(CLOSED, Ordering::Relaxed);
+    }
+
+    /// Reports whether the last grant, if any, has been carried out to its end.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.0.phase.load(Ordering::Relaxed) == CLOSED
+    }
+
+    /// Returns the job of the last grant.
+    pub(crate) fn job(&self) -> u64 {
+        self.0.job.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Gate, Grant};
+    use core::pin::pin;
+    use core::task::{Context, Poll, Waker};
+
+    #[test]
+    fn a_closed_gate_lets_nobody_pass() {
+        let gate = Gate::new();
+        let mut context = Context::from_waker(Waker::noop());
+        let mut pass = pin!(gate.pass());
+        assert_eq!(pass.as_mut().poll(&mut context), Poll::Pending);
+        assert_eq!(pass.as_mut().poll(&mut context), Poll::Pending);
+    }
+
+    #[test]
+    fn one_grant_passes_once() {
+        let gate = Gate::new();
+        let mut context = Context::from_waker(Waker::noop());
+        gate.open(Grant::Run(7));
+        assert!(!gate.is_closed());
+        let first = pin!(gate.pass()).poll(&mut context);
+        assert_eq!(first, Poll::Ready(Grant::Run(7)));
+        assert_eq!(pin!(gate.pass()).poll(&mut context), Poll::Pending);
+        assert!(!gate.is_closed(), "open until the end is reported");
+        gate.close();
+        assert!(gate.is_closed());
+    }
+}

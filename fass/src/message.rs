@@ -1,0 +1,207 @@
+//! What may travel on a topic, and what happens when several subtasks read it.
+//!
+//! A *message* is the value that one job carries along one topic. With one
+//! reader it is moved, never copied. With several readers every reader but the
+//! last gets a clone and the last gets the value itself. The app decides what a
+//! clone costs: an `i32` is copied, an `Arc<PointCloud>` is *shared* (all
+//! readers see the same bytes, nothing is copied), a `Vec` is duplicated and so
+//! allocates, which an app with deadlines avoids.
+//!
+//! A type that cannot be cloned, or must not be, travels inside [`Unique`]. It
+//! is always moved; a second reader of its topic is refused at commit.
+
+use core::any::{TypeId, type_name};
+use core::ops::{Deref, DerefMut};
+
+/// A value that a topic can carry from one subtask to others.
+///
+/// Every type that is `Clone + Send + 'static` is a message already, and so is
+/// [`Unique<T>`](Unique) for the types that are not `Clone`. There is nothing to
+/// implement.
+///
+/// # Examples
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// fn is_message<M: fass::Message>() {}
+///
+/// is_message::<i32>();
+/// is_message::<Arc<[f32; 1024]>>(); // shared between readers, not copied
+/// is_message::<fass::Unique<std::sync::mpsc::Receiver<u8>>>(); // only moved
+/// ```
+///
+/// A type that is neither is refused by the compiler:
+///
+/// ```compile_fail,E0277
+/// struct NotClone;
+/// fn is_message<M: fass::Message>() {}
+/// is_message::<NotClone>();
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` cannot travel on a topic",
+    label = "is not `Clone + Send + 'static`",
+    note = "a message is cloned for every reader but the last: derive `Clone`, or share it as `Arc<{Self}>`",
+    note = "a message that is only ever moved, to a single reader, travels as `fass::Unique<{Self}>`"
+)]
+pub trait Message: Send + Sized + 'static {
+    /// Whether a topic of this type may have several readers.
+    const CAN_FAN_OUT: bool;
+
+    /// Makes the value for one more reader, or returns `None` if the type can
+    /// only be moved.
+    fn for_another_reader(&self) -> Option<Self>;
+}
+
+#[diagnostic::do_not_recommend]
+impl<T: Clone + Send + 'static> Message for T {
+    const CAN_FAN_OUT: bool = true;
+
+    fn for_another_reader(&self) -> Option<Self> {
+        Some(self.clone())
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl<T: Send + 'static> Message for Unique<T> {
+    const CAN_FAN_OUT: bool = false;
+
+    fn for_another_reader(&self) -> Option<Self> {
+        None
+    }
+}
+
+/// A message that is moved from its writer to its one reader, never cloned.
+///
+/// It is deliberately not `Clone`, whatever `T` is. Two subtasks reading a topic
+/// of this type are a fault at commit.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, Unique, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// struct Frame([u8; 4096]); // not `Clone`: nobody can copy it by mistake
+///
+/// let machine = VirtualTime::new();
+/// let dag = create_dag();
+/// dag.jobs(2);
+/// dag.register_periodic_subtask(
+///     || (Unique::new(Frame([7; 4096])),),
+///     vec!["frame"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("camera"),
+/// );
+/// dag.register_sink_subtask(
+///     |(frame,): (Unique<Frame>,)| assert_eq!(frame.into_inner().0[0], 7),
+///     vec!["frame"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("store"),
+/// );
+/// finish_create_dags(&[dag]).unwrap();
+/// machine.run();
+/// ```
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Unique<T>(T);
+
+impl<T> Unique<T> {
+    /// Wraps a value.
+    ///
+    /// ```
+    /// assert_eq!(fass::Unique::new(7).into_inner(), 7);
+    /// ```
+    pub const fn new(value: T) -> Self {
+        Self(value)
+    }
+
+    /// Returns the value.
+    ///
+    /// ```
+    /// assert_eq!(fass::Unique::new("a frame").into_inner(), "a frame");
+    /// ```
+    pub fn into_inner(self) -> T {
+        self.0
+    }
+}
+
+impl<T> Deref for Unique<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Unique<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.0
+    }
+}
+
+/// What the commit must know of a message's type.
+///
+/// # Examples
+///
+/// ```
+/// use fass::MessageType;
+///
+/// let shared = MessageType::of::<i32>();
+/// assert_eq!(shared.name(), "i32");
+/// assert!(shared.can_fan_out());
+/// assert!(!MessageType::of::<fass::Unique<i32>>().can_fan_out());
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MessageType {
+    id: TypeId,
+    name: &'static str,
+    can_fan_out: bool,
+}
+
+impl MessageType {
+    /// Describes the type `M`.
+    ///
+    /// ```
+    /// assert_eq!(fass::MessageType::of::<u8>().name(), "u8");
+    /// ```
+    #[must_use]
+    pub fn of<M: Message>() -> Self {
+        Self {
+            id: TypeId::of::<M>(),
+            name: type_name::<M>(),
+            can_fan_out: M::CAN_FAN_OUT,
+        }
+    }
+
+    /// Returns the identity of the type.
+    ///
+    /// ```
+    /// use std::any::TypeId;
+    /// assert_eq!(fass::MessageType::of::<u8>().id(), TypeId::of::<u8>());
+    /// ```
+    #[must_use]
+    pub const fn id(&self) -> TypeId {
+        self.id
+    }
+
+    /// Returns the name of the type, for messages to people.
+    ///
+    /// ```
+    /// assert_eq!(fass::MessageType::of::<u8>().name(), "u8");
+    /// ```
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Reports whether a topic of this type may have several readers.
+    ///
+    /// ```
+    /// assert!(fass::MessageType::of::<u8>().can_fan_out());
+    /// ```
+    #[must_use]
+    pub const fn can_fan_out(&self) -> bool {
+        self.can_fan_out
+    }
+}

@@ -1,0 +1,121 @@
+//! What a commit hands to the platform: the verified model and the bodies.
+//!
+//! The platform's scheduler decides *which* instance runs *where* and *when*;
+//! it then calls [`Body::run`] there. A body never decides anything.
+
+use alloc::vec::Vec;
+use core::task::{Context, Poll, Waker};
+
+use sched_dag::TaskSet;
+
+use crate::gate::{Gate, Grant};
+use crate::subtask::SubtaskFuture;
+
+/// A committed set of DAGs, ready to be scheduled.
+///
+/// # Examples
+///
+/// A platform receives it in [`Platform::launch`](crate::Platform::launch) and
+/// finds a subtask's body at its ids:
+///
+/// ```
+/// use fass::{Body, Plan};
+/// use sched_dag::Instance;
+///
+/// fn body_of(plan: &mut Plan, instance: Instance) -> &mut Body {
+///     &mut plan.bodies[instance.dag.index()][instance.subtask.index()]
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Plan {
+    /// The verified model, for the scheduler.
+    pub task_set: TaskSet,
+    /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
+    pub bodies: Vec<Vec<Body>>,
+}
+
+/// The executable part of a subtask: its function with its ends of the topics.
+///
+/// A body may move between threads or processors from one call to the next;
+/// `&mut self` makes each call's effects visible to the next one.
+///
+/// # Examples
+///
+/// ```
+/// use fass::Body;
+///
+/// /// A platform that runs one instance after another.
+/// fn run_in_turn(bodies: &mut [Body], job: u64) {
+///     for body in bodies {
+///         body.run(job);
+///     }
+/// }
+/// # fn is_send<T: Send>() {}
+/// # is_send::<Body>();
+/// ```
+pub struct Body {
+    future: SubtaskFuture,
+    gate: Gate,
+}
+
+impl Body {
+    pub(crate) fn new(future: SubtaskFuture, gate: Gate) -> Self {
+        Self { future, gate }
+    }
+
+    /// Runs the subtask's part of job `job` to its end.
+    ///
+    /// Returns after the function has returned and its outputs are in their
+    /// slots. Polls the subtask's future exactly once. Does not allocate (the
+    /// function itself may).
+    ///
+    /// The caller reports the completion to the scheduler afterwards, and starts
+    /// the successors only then.
+    ///
+    /// # Panics
+    ///
+    /// - If the function panics. The body cannot be run again.
+    /// - If the body panicked before.
+    /// - If an input of `job` is missing, because a predecessor is not complete.
+    /// - If a slot of an output is still taken, because a cancelled instance's
+    ///   inputs were not [discarded](Self::discard).
+    pub fn run(&mut self, job: u64) {
+        self.grant(Grant::Run(job));
+    }
+
+    /// Drops the inputs of job `job` that have arrived, instead of running it.
+    ///
+    /// To be called for an instance that will not run, once no predecessor of
+    /// it runs any more: a value that arrives later would stay in its slot.
+    /// Calling it again, or for a job of which nothing arrived, does no harm.
+    ///
+    /// # Panics
+    ///
+    /// If the body panicked before.
+    pub fn discard(&mut self, job: u64) {
+        self.grant(Grant::Discard(job));
+    }
+
+    fn grant(&mut self, grant: Grant) {
+        assert!(
+            self.gate.is_closed(),
+            "the subtask panicked in job {} and cannot continue",
+            self.gate.job()
+        );
+        self.gate.open(grant);
+        let mut context = Context::from_waker(Waker::noop());
+        match self.future.as_mut().poll(&mut context) {
+            // The future waits at the gate only, so it is back there.
+            Poll::Pending => debug_assert!(self.gate.is_closed()),
+            Poll::Ready(never) => match never {},
+        }
+    }
+}
+
+impl core::fmt::Debug for Body {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Body")
+            .field("last_job", &self.gate.job())
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,244 @@
+//! What `fass` needs from the machine below, and how a machine offers it.
+//!
+//! `fass` names no kernel. A platform (the kernel, or virtual time on the host)
+//! installs itself once, as a logger or an allocator does, before the app
+//! commits its DAGs. The commit asks it for the policy and the cores to verify
+//! against, and leaves the [`Plan`] with it.
+
+use alloc::string::String;
+use core::fmt;
+use core::time::Duration;
+
+use sched_dag::{Policy, Preemption};
+
+use crate::cell::SetOnce;
+use crate::plan::Plan;
+
+static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
+
+/// A machine that schedules committed DAGs.
+///
+/// # Examples
+///
+/// The smallest platform, which accepts a plan and runs one job of it:
+///
+/// ```standalone_crate
+/// use core::time::Duration;
+/// use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+///
+/// struct OneJob;
+///
+/// impl Platform for OneJob {
+///     fn policy(&self) -> Policy {
+///         Policy::Edf
+///     }
+///     fn preemption(&self) -> Preemption {
+///         Preemption::Disabled
+///     }
+///     fn cores(&self) -> u32 {
+///         1
+///     }
+///     fn now_ns(&self) -> u64 {
+///         0
+///     }
+///     fn execute_for(&self, _: Duration, _: Occupation) {}
+///     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
+///         for (dag, bodies) in plan.task_set.dags().iter().zip(&mut plan.bodies) {
+///             for subtask in dag.topological_order() {
+///                 bodies[subtask.index()].run(0);
+///             }
+///         }
+///         Ok(())
+///     }
+/// }
+///
+/// fass::install(&OneJob).unwrap();
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+pub trait Platform: Sync {
+    /// Returns the scheduling policy, which decides what attributes are needed.
+    fn policy(&self) -> Policy;
+
+    /// Returns whether a started instance may lose its core.
+    fn preemption(&self) -> Preemption;
+
+    /// Returns the number of processors that run subtasks, at least 1.
+    fn cores(&self) -> u32;
+
+    /// Returns the time since the platform's start, in nanoseconds.
+    fn now_ns(&self) -> u64;
+
+    /// Occupies the calling instance's core for `duration` of execution time.
+    fn execute_for(&self, duration: Duration, how: Occupation);
+
+    /// Takes a plan over. Its first release is the platform's to time.
+    ///
+    /// # Errors
+    ///
+    /// If the platform cannot schedule the plan. Nothing of it has run then.
+    fn launch(&self, plan: Plan) -> Result<(), LaunchError>;
+}
+
+/// How a subtask occupies its core in [`execute_for`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Occupation {
+    /// The processor computes until the time is over.
+    Spin,
+    /// The processor halts until the time is over, while the scheduler sees the
+    /// instance run. More busy cores can then be studied than the host has.
+    Hold,
+}
+
+/// Why a platform did not take a plan.
+///
+/// # Examples
+///
+/// ```
+/// let error = fass::LaunchError::new("640 KiB of memory are free, the plan needs 700 KiB; \
+///     register fewer subtasks or give the machine more memory");
+/// assert!(error.to_string().starts_with("640 KiB"));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LaunchError {
+    message: String,
+}
+
+impl LaunchError {
+    /// States the reason: fact, offender, remedy.
+    ///
+    /// ```
+    /// let error = fass::LaunchError::new("a plan runs already; wait for its end");
+    /// assert_eq!(error.to_string(), "a plan runs already; wait for its end");
+    /// ```
+    #[must_use]
+    pub fn new(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+        }
+    }
+}
+
+impl fmt::Display for LaunchError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl core::error::Error for LaunchError {}
+
+/// A platform is installed already; the earlier one stays.
+///
+/// # Examples
+///
+/// ```
+/// assert!(fass::AlreadyInstalled.to_string().contains("already installed"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AlreadyInstalled;
+
+impl fmt::Display for AlreadyInstalled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a platform is already installed; install one platform, once, at start")
+    }
+}
+
+impl core::error::Error for AlreadyInstalled {}
+
+/// Installs the platform, once, for the whole program.
+///
+/// # Errors
+///
+/// [`AlreadyInstalled`] from the second call on.
+///
+/// # Examples
+///
+/// Apps do not call it; the kernel's entry or `VirtualTime` does. See
+/// [`Platform`] for a platform of one's own.
+///
+/// ```standalone_crate
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new(); // installs itself
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> {
+    if PLATFORM.set(platform) {
+        Ok(())
+    } else {
+        Err(AlreadyInstalled)
+    }
+}
+
+/// Returns the installed platform, if there is one.
+pub(crate) fn installed() -> Option<&'static dyn Platform> {
+    PLATFORM.get()
+}
+
+/// Returns the platform's time in nanoseconds.
+///
+/// # Panics
+///
+/// If no platform is installed.
+///
+/// # Examples
+///
+/// ```
+/// let machine = virtual_time::VirtualTime::new();
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+#[must_use]
+pub fn now_ns() -> u64 {
+    expect_installed().now_ns()
+}
+
+/// Executes for `duration` on the calling instance's core, inside a subtask.
+///
+/// Stands for computation that an app does not have yet, or whose time is what
+/// is being studied. Preempted time does not count. In virtual time it is the
+/// only thing that takes time.
+///
+/// # Panics
+///
+/// If no platform is installed.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Occupation, SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let dag = create_dag();
+/// dag.jobs(1);
+/// dag.register_periodic_subtask(
+///     || {
+///         fass::execute_for(Duration::from_millis(3), Occupation::Spin);
+///         (fass::now_ns(),)
+///     },
+///     vec!["time"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("source"),
+/// );
+/// dag.register_sink_subtask(
+///     |(time_ns,): (u64,)| assert_eq!(time_ns, 3_000_000),
+///     vec!["time"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("sink"),
+/// );
+/// finish_create_dags(&[dag]).unwrap();
+/// machine.run();
+/// ```
+pub fn execute_for(duration: Duration, how: Occupation) {
+    expect_installed().execute_for(duration, how);
+}
+
+#[track_caller]
+fn expect_installed() -> &'static dyn Platform {
+    match installed() {
+        Some(platform) => platform,
+        None => panic!(
+            "no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`"
+        ),
+    }
+}

@@ -1,0 +1,64 @@
+//! A subtask as a future: the loop of the paper's figure 4.
+//!
+//! [`create_subtask`] turns a function into the one future that a subtask is
+//! for its whole life. It is polled once an instance. In that poll it receives
+//! all inputs, calls the function, sends all outputs, and comes to rest at the
+//! next `recv_all`. Nothing leaves before the function has returned (R3).
+//!
+//! The figure generates subscribers and publishers in the future's first poll.
+//! Here they are generated before the future is made, since a source may
+//! otherwise publish before a later subtask listens, and that subtask's topics
+//! would be one job behind for ever.
+
+use alloc::boxed::Box;
+use core::convert::Infallible;
+use core::pin::Pin;
+
+use crate::gate::Gate;
+use crate::plan::Body;
+use crate::topic::Wiring;
+use crate::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
+
+/// What the commit calls to make a registered subtask's body: with the DAG's
+/// wiring and the subtask's number.
+pub(crate) type MakeBody = Box<dyn FnOnce(&mut Wiring, usize) -> Body>;
+
+/// The future of a subtask, which never ends.
+pub(crate) type SubtaskFuture = Pin<Box<dyn Future<Output = Infallible> + Send>>;
+
+/// Defers [`create_subtask`] until the commit knows the wiring.
+pub(crate) fn defer<F, Args, Ret>(f: F) -> MakeBody
+where
+    F: FnMut(Args) -> Ret + Send + 'static,
+    Args: VecToSubs,
+    Ret: VecToPubs,
+{
+    Box::new(move |wiring, subtask| {
+        let gate = Gate::new();
+        let future = create_subtask(f, wiring, subtask, &gate);
+        Body::new(Box::pin(future), gate)
+    })
+}
+
+/// Makes the future of one subtask. Its ends of the topics exist on return.
+fn create_subtask<F, Args, Ret>(
+    mut f: F,
+    wiring: &mut Wiring,
+    subtask: usize,
+    gate: &Gate,
+) -> impl Future<Output = Infallible> + Send + use<F, Args, Ret>
+where
+    F: FnMut(Args) -> Ret + Send + 'static,
+    Args: VecToSubs,
+    Ret: VecToPubs,
+{
+    let mut subs = <Args as VecToSubs>::gen_subs(wiring.ports(subtask, gate));
+    let mut pubs = <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask, gate));
+    async move {
+        loop {
+            let args = subs.recv_all().await;
+            let results = f(args);
+            pubs.send_all(results).await;
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! The two ends of a topic inside its subtasks, and how the commit ties them.
+//!
+//! A [`Publisher`] is the writing end of a topic and owns the writer of every
+//! edge that leaves it, one a reading port; a [`Subscriber`] is one reading
+//! port. At commit [`Wiring`] hands out the ends: whichever end of an edge is
+//! asked for first makes the ring and leaves the other end for whoever asks
+//! second. All rings exist before the first release, so no job can be missed
+//! because a reader was not there yet.
+//!
+//! The verification has already compared the types of both ends; the downcast
+//! in [`Wiring`] relies on it.
+
+use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::any::Any;
+
+use sched_dag::DagSpec;
+
+use crate::cell::{Reader, Writer, ring};
+use crate::gate::Gate;
+use crate::message::Message;
+
+/// The reading end of a topic in one subtask. Made by the commit only.
+pub struct Subscriber<T>(Reader<T>);
+
+impl<T> Subscriber<T> {
+    /// Takes the value of `job`.
+    ///
+    /// # Panics
+    ///
+    /// If the value is not there, which means that the platform started the
+    /// instance before a predecessor was complete.
+    pub(crate) fn recv(&mut self, job: u64) -> T {
+        let Some(value) = self.0.take(job) else {
+            panic!(
+                "an input of job {job} is missing: the platform started the instance \
+                 before all its predecessors were complete"
+            );
+        };
+        value
+    }
+
+    /// Drops the value of `job` if it has arrived.
+    pub(crate) fn discard(&mut self, job: u64) {
+        drop(self.0.take(job));
+    }
+}
+
+/// The writing end of a topic in its one writer. Made by the commit only.
+pub struct Publisher<T>(Box<[Writer<T>]>);
+
+impl<T: Message> Publisher<T> {
+    /// Hands the value of `job` to every reader: clones for all but the last,
+    /// the value itself for the last.
+    ///
+    /// # Panics
+    ///
+    /// If a slot is still taken, which means that the platform cancelled an
+    /// instance and did not discard its inputs, or let more jobs be in flight
+    /// than the plan says.
+    pub(crate) fn send(&mut self, job: u64, value: T) {
+        let Some((last, others)) = self.0.split_last_mut() else {
+            return;
+        };
+        for writer in others {
+            // The commit refuses several readers of a type that gives `None`.
+            if let Some(clone) = value.for_another_reader() {
+                put(writer, job, clone);
+            }
+        }
+        put(last, job, value);
+    }
+}
+
+fn put<T>(writer: &mut Writer<T>, job: u64, value: T) {
+    assert!(
+        writer.put(job, value).is_ok(),
+        "an output of job {job} finds its slot taken: the platform cancelled an instance \
+         without discarding its inputs, or exceeded the jobs in flight"
+    );
+}
+
+/// The edges of one DAG while the commit ties them.
+pub(crate) struct Wiring {
+    /// The number of slots of every ring.
+    in_flight: usize,
+    /// For each edge the end that was made but not yet asked for.
+    ends: Vec<Option<Box<dyn Any>>>,
+    /// For each topic its edges, in the order of the reading ports.
+    edges_of_topic: BTreeMap<String, Vec<usize>>,
+    /// For each subtask the edges of its input ports.
+    edges_of_inputs: Vec<Vec<usize>>,
+    /// For each subtask the topics of its output ports.
+    outputs: Vec<Vec<String>>,
+}
+
+impl Wiring {
+    /// Numbers the edges of a verified DAG, one a reading port.
+    pub(crate) fn new(spec: &DagSpec, in_flight: usize) -> Self {
+        let mut edges_of_topic = BTreeMap::<String, Vec<usize>>::new();
+        let mut edges = 0;
+        let mut edges_of_inputs = Vec::with_capacity(spec.subtasks.len());
+        for subtask in &spec.subtasks {
+            let first = edges;
+            for port in &subtask.inputs {
+                let readers = edges_of_topic.entry(port.topic.clone()).or_default();
+                readers.push(edges);
+                edges += 1;
+            }
+            edges_of_inputs.push((first..edges).collect());
+        }
+        let outputs = spec
+            .subtasks
+            .iter()
+            .map(|subtask| subtask.outputs.iter().map(|port| port.topic.clone()))
+            .map(Iterator::collect)
+            .collect();
+        Self {
+            in_flight,
+            ends: (0..edges).map(|_| None).collect(),
+            edges_of_topic,
+            edges_of_inputs,
+            outputs,
+        }
+    }
+
+    /// Returns the ends of subtask number `subtask`, to be taken port by port.
+    pub(crate) fn ports<'w>(&'w mut self, subtask: usize, gate: &Gate) -> Ports<'w> {
+        Ports {
+            wiring: self,
+            gate: gate.clone(),
+            subtask,
+            next: 0,
+        }
+    }
+
+    fn reader<T: Message>(&mut self, edge: usize) -> Reader<T> {
+        if let Some(end) = self.ends[edge].take() {
+            return *end.downcast().expect("the verification compared the types");
+        }
+        let (writer, reader) = ring::<T>(self.in_flight);
+        self.ends[edge] = Some(Box::new(writer));
+        reader
+    }
+
+    fn writer<T: Message>(&mut self, edge: usize) -> Writer<T> {
+        if let Some(end) = self.ends[edge].take() {
+            return *end.downcast().expect("the verification compared the types");
+        }
+        let (writer, reader) = ring::<T>(self.in_flight);
+        self.ends[edge] = Some(Box::new(reader));
+        writer
+    }
+}
+
+/// The topic ends of one subtask that [`gen_subs`](crate::VecToSubs::gen_subs)
+/// and [`gen_pubs`](crate::VecToPubs::gen_pubs) draw from. Made by the commit only.
+pub struct Ports<'w> {
+    wiring: &'w mut Wiring,
+    gate: Gate,
+    subtask: usize,
+    next: usize,
+}
+
+impl Ports<'_> {
+    pub(crate) fn gate(&self) -> Gate {
+        self.gate.clone()
+    }
+
+    /// Takes the end of the next input port.
+    pub(crate) fn subscriber<T: Message>(&mut self) -> Subscriber<T> {
+        let edge = self.wiring.edges_of_inputs[self.subtask][self.next];
+        self.next += 1;
+        Subscriber(self.wiring.reader(edge))
+    }
+
+    /// Takes the end of the next output port.
+    pub(crate) fn publisher<T: Message>(&mut self) -> Publisher<T> {
+        let topic = &self.wiring.outputs[self.subtask][self.next];
+        self.next += 1;
+        let edges = self.wiring.edges_of_topic.get(topic).cloned();
+        let edges = edges.unwrap_or_default();
+        Publisher(edges.iter().map(|&e| self.wiring.writer(e)).collect())
+    }
+}

@@ -1,0 +1,276 @@
+//! The traits of the paper's figure 4, for tuples of 0 to 16 messages.
+//!
+//! A subtask is a function from a tuple of messages to a tuple of messages. The
+//! tuple types say all that the system needs to generate the rest: from the
+//! arguments' tuple come the subscribers ([`VecToSubs`]) that receive them
+//! ([`MulRecv`]), from the results' tuple the publishers ([`VecToPubs`]) that
+//! send them ([`MulSend`]). The names are the paper's. Two things differ from
+//! its figure:
+//!
+//! - `recv_all` and `send_all` return `impl Future + Send` where the figure
+//!   returns a boxed future, so no job allocates.
+//! - They take `&mut self` where the figure takes `&self`: each end of an edge
+//!   then has one user at a time by the borrow checker's word, and needs no lock.
+//!
+//! One macro, [`for_each_arity`], counts from 0 to 16 and implements all four
+//! traits for each arity. Apps never call these traits; they meet them in the
+//! bounds of [`Dag::register_subtask`](crate::Dag::register_subtask) and in the
+//! compiler's messages, which speak our words. The futures exist only inside a
+//! [`Body`](crate::Body).
+
+use alloc::vec::Vec;
+
+use crate::gate::{Gate, Grant};
+use crate::message::{Message, MessageType};
+use crate::topic::{Ports, Publisher, Subscriber};
+
+/// Receives all inputs of an instance at once.
+///
+/// # Examples
+///
+/// ```
+/// fn items_of<R: fass::MulRecv>() -> &'static str {
+///     std::any::type_name::<R::Items>()
+/// }
+/// type Subs = <(i32, u8) as fass::VecToSubs>::Subs;
+/// assert_eq!(items_of::<Subs>(), "(i32, u8)");
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not receive a subtask's inputs",
+    note = "the receivers are generated from the argument tuple: `<Args as VecToSubs>::Subs`"
+)]
+pub trait MulRecv {
+    /// The tuple that one job's inputs form.
+    type Items;
+
+    /// Waits until the platform grants an instance, then returns its inputs,
+    /// all of one job.
+    ///
+    /// # Panics
+    ///
+    /// When polled, if an input is missing: the platform granted an instance
+    /// whose predecessors were not complete.
+    fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send;
+}
+
+/// Sends all outputs of an instance at once; never blocks.
+///
+/// # Examples
+///
+/// ```
+/// fn items_of<S: fass::MulSend>() -> &'static str {
+///     std::any::type_name::<S::Items>()
+/// }
+/// type Pubs = <(i32, u8) as fass::VecToPubs>::Pubs;
+/// assert_eq!(items_of::<Pubs>(), "(i32, u8)");
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not send a subtask's outputs",
+    note = "the senders are generated from the result tuple: `<Ret as VecToPubs>::Pubs`"
+)]
+pub trait MulSend {
+    /// The tuple that one job's outputs form.
+    type Items;
+
+    /// Puts each item into its topic for the instance's job and ends the instance.
+    ///
+    /// # Panics
+    ///
+    /// When polled, if a slot is still taken: the platform did not discard the
+    /// inputs of a cancelled instance.
+    fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send;
+}
+
+/// An argument tuple, from which a subtask's subscribers are generated.
+///
+/// Implemented for tuples of 0 to 16 [`Message`]s. `()` is the argument of a
+/// source, whose function takes no argument at all.
+///
+/// # Examples
+///
+/// ```
+/// use fass::VecToSubs;
+///
+/// assert_eq!(<(i32, String)>::input_types().len(), 2);
+/// ```
+///
+/// An argument that is no tuple is refused by the compiler:
+///
+/// ```compile_fail,E0277
+/// use fass::VecToSubs;
+/// let _ = <i32 as VecToSubs>::input_types(); // should be `(i32,)`
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not the argument of a subtask",
+    label = "should be a tuple of messages, one for each input topic",
+    note = "a subtask takes one tuple of at most 16 messages; with one input topic that is `({Self},)`, comma included",
+    note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
+)]
+pub trait VecToSubs: Sized + Send + 'static {
+    /// The subscribers, one for each element.
+    type Subs: MulRecv<Items = Self> + Send + 'static;
+
+    /// Returns the types of the elements, in order.
+    ///
+    /// ```
+    /// use fass::VecToSubs;
+    /// assert_eq!(<(u8,)>::input_types()[0].name(), "u8");
+    /// ```
+    fn input_types() -> Vec<MessageType>;
+
+    /// Generates the subscribers from a subtask's ports. Called by the commit.
+    fn gen_subs(ports: Ports<'_>) -> Self::Subs;
+}
+
+/// A result tuple, from which a subtask's publishers are generated.
+///
+/// Implemented for tuples of 0 to 16 [`Message`]s. `()` is the result of a sink.
+///
+/// # Examples
+///
+/// ```
+/// use fass::VecToPubs;
+///
+/// assert_eq!(<(i32, String)>::output_types().len(), 2);
+/// ```
+///
+/// A result that is no tuple is refused by the compiler:
+///
+/// ```compile_fail,E0277
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag};
+///
+/// create_dag().register_periodic_subtask(
+///     || 7, // should be `(7,)`
+///     vec!["number"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::default(),
+/// );
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not the result of a subtask",
+    label = "should be a tuple of messages, one for each output topic",
+    note = "a subtask returns one tuple of at most 16 messages; with one output topic that is `({Self},)`, comma included",
+    note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
+)]
+pub trait VecToPubs: Sized + Send + 'static {
+    /// The publishers, one for each element.
+    type Pubs: MulSend<Items = Self> + Send + 'static;
+
+    /// Returns the types of the elements, in order.
+    ///
+    /// ```
+    /// use fass::VecToPubs;
+    /// assert_eq!(<(u8,)>::output_types()[0].name(), "u8");
+    /// ```
+    fn output_types() -> Vec<MessageType>;
+
+    /// Generates the publishers from a subtask's ports. Called by the commit.
+    fn gen_pubs(ports: Ports<'_>) -> Self::Pubs;
+}
+
+/// The subscribers of a subtask: a tuple of [`Subscriber`]s behind the gate.
+pub struct Subscribers<Ends> {
+    gate: Gate,
+    ends: Ends,
+}
+
+/// The publishers of a subtask: a tuple of [`Publisher`]s behind the gate.
+pub struct Publishers<Ends> {
+    gate: Gate,
+    ends: Ends,
+}
+
+/// Implements the four traits for one arity.
+macro_rules! implement_arity {
+    ($(($Item:ident $item:ident $end:ident))*) => {
+        #[allow(
+            unused_mut,
+            unused_variables,
+            clippy::unused_unit,
+            reason = "the empty tuple has no ends"
+        )]
+        const _: () = {
+            impl<$($Item: Message),*> MulRecv for Subscribers<($(Subscriber<$Item>,)*)> {
+                type Items = ($($Item,)*);
+
+                async fn recv_all(&mut self) -> Self::Items {
+                    let ($($end,)*) = &mut self.ends;
+                    loop {
+                        match self.gate.pass().await {
+                            Grant::Run(job) => return ($($end.recv(job),)*),
+                            Grant::Discard(job) => {
+                                $($end.discard(job);)*
+                                self.gate.close();
+                            }
+                        }
+                    }
+                }
+            }
+
+            impl<$($Item: Message),*> MulSend for Publishers<($(Publisher<$Item>,)*)> {
+                type Items = ($($Item,)*);
+
+                async fn send_all(&mut self, items: Self::Items) {
+                    let job = self.gate.job();
+                    let ($($item,)*) = items;
+                    let ($($end,)*) = &mut self.ends;
+                    $($end.send(job, $item);)*
+                    self.gate.close();
+                }
+            }
+
+            impl<$($Item: Message),*> VecToSubs for ($($Item,)*) {
+                type Subs = Subscribers<($(Subscriber<$Item>,)*)>;
+
+                fn input_types() -> Vec<MessageType> {
+                    Vec::from([$(MessageType::of::<$Item>()),*])
+                }
+
+                fn gen_subs(mut ports: Ports<'_>) -> Self::Subs {
+                    Subscribers {
+                        gate: ports.gate(),
+                        ends: ($(ports.subscriber::<$Item>(),)*),
+                    }
+                }
+            }
+
+            impl<$($Item: Message),*> VecToPubs for ($($Item,)*) {
+                type Pubs = Publishers<($(Publisher<$Item>,)*)>;
+
+                fn output_types() -> Vec<MessageType> {
+                    Vec::from([$(MessageType::of::<$Item>()),*])
+                }
+
+                fn gen_pubs(mut ports: Ports<'_>) -> Self::Pubs {
+                    Publishers {
+                        gate: ports.gate(),
+                        ends: ($(ports.publisher::<$Item>(),)*),
+                    }
+                }
+            }
+        };
+    };
+}
+
+/// Calls a macro with no element, with the first element, with the first two,
+/// and so on up to all of them.
+macro_rules! for_each_arity {
+    ($implement:ident: $($element:tt)*) => {
+        for_each_arity!(@step $implement [] $($element)*);
+    };
+    (@step $implement:ident [$($taken:tt)*]) => {
+        $implement!($($taken)*);
+    };
+    (@step $implement:ident [$($taken:tt)*] $next:tt $($rest:tt)*) => {
+        $implement!($($taken)*);
+        for_each_arity!(@step $implement [$($taken)* $next] $($rest)*);
+    };
+}
+
+for_each_arity!(implement_arity:
+    (A a a_end) (B b b_end) (C c c_end) (D d d_end)
+    (E e e_end) (F f f_end) (G g g_end) (H h h_end)
+    (I i i_end) (J j j_end) (K k k_end) (L l l_end)
+    (M m m_end) (N n n_end) (O o o_end) (P p p_end)
+);
