@@ -1,1 +1,44 @@
-//! Harness.
+//! The host tool and the test harness: one place that starts QEMU, one that
+//! reads the serial protocol.
+//!
+//! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is
+//! all it printed, lines for people and machine lines mixed. Its *ending* is
+//! how QEMU's process ended; its *verdict* is its own last line. The tool's
+//! *subcommands* (`run`, `test`, ...) are what the scripts in `scripts/` call.
+//!
+//! The library serves two callers: the tool (`main.rs`), and the boot tests
+//! in `tests/boot_*.rs`, which boot a [`Guest`] and judge its [`Outcome`].
+//! From the bottom up:
+//!
+//! - [`json`], [`protocol`]: what a guest prints, read strictly;
+//! - [`elf`], [`image`], [`tiny`]: what is booted;
+//! - [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
+//! - [`install`], [`probe`], [`system`]: what the host has;
+//! - [`options`]: command lines by a table;
+//! - [`guest`]: all that for a test;
+//! - [`run`]: the subcommands.
+//!
+//! It guarantees that no guest runs without a limit, and that no run counts
+//! as good that did not say so twice. It uses the standard library only, and
+//! no `unsafe`.
+
+#![forbid(unsafe_code)]
+
+pub mod elf;
+pub mod guest;
+pub mod image;
+pub mod install;
+pub mod json;
+pub mod options;
+pub mod outcome;
+pub mod probe;
+pub mod protocol;
+pub mod qemu;
+pub mod run;
+pub mod system;
+pub mod tail;
+pub mod tiny;
+
+pub use guest::Guest;
+pub use outcome::Outcome;
+pub use qemu::{Machine, Mode};

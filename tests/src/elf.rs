@@ -1,0 +1,86 @@
+//! As much of ELF as it takes to weigh an image.
+//!
+//! *Stripped size* is what `strip` would leave: the file's headers, every
+//! byte that is loaded or a note, and a section table of the sections left
+//! with their names. Symbols and debugging data do not count. The sum is a
+//! few bytes above what `strip` gives, never below, as padding is included.
+
+/// Where the fields of a 64-bit ELF header and its tables stand (System V
+/// ABI, AMD64 supplement; gabi, chapters 4 and 5).
+const SECTION_HEADER_BYTES: u64 = 64;
+const PROGRAM_HEADER_BYTES: u64 = 56;
+const SHF_ALLOC: u64 = 2;
+
+/// The mean length that we take for a section's name, and its alignment.
+const NAME_BYTES: u64 = 24;
+
+/// Returns the stripped size of a 64-bit little-endian ELF file.
+///
+/// # Errors
+///
+/// In words: it is none, or a table points outside it.
+pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
+    if !file.starts_with(b"\x7fELF\x02\x01") {
+        return Err("not a 64-bit little-endian ELF file".into());
+    }
+    let segments = table(file, 32, 56, PROGRAM_HEADER_BYTES)?;
+    let mut end = 64 + PROGRAM_HEADER_BYTES * count(segments.len());
+    for segment in segments {
+        let offset = number(file, segment + 8, 8)?;
+        let length = number(file, segment + 32, 8)?;
+        end = end.max(offset.saturating_add(length));
+    }
+    let mut kept = 2; // the null section and the section names
+    for section in table(file, 40, 60, SECTION_HEADER_BYTES)? {
+        let flags = number(file, section + 8, 8)?;
+        kept += u64::from(flags & SHF_ALLOC != 0);
+    }
+    Ok(end + kept * (SECTION_HEADER_BYTES + NAME_BYTES))
+}
+
+/// Returns the offsets of a table's entries; `offset_at` and `count_at` say
+/// where in the ELF header its place and length stand.
+fn table(file: &[u8], offset_at: u64, count_at: u64, entry: u64) -> Result<Vec<u64>, String> {
+    let offset = number(file, offset_at, 8)?;
+    let entries = number(file, count_at, 2)?;
+    Ok((0..entries)
+        .map(|index| offset.saturating_add(index * entry))
+        .collect())
+}
+
+fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
+    let start = usize::try_from(at).unwrap_or(usize::MAX);
+    let bytes = file.get(start..start.saturating_add(length));
+    let bytes = bytes.ok_or("a header points outside the file")?;
+    Ok(bytes
+        .iter()
+        .rev()
+        .fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
+}
+
+fn count(length: usize) -> u64 {
+    u64::try_from(length).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stripped_bytes;
+    use crate::tiny::{TinyEnd, tiny_image};
+
+    #[test]
+    fn symbols_after_the_loaded_bytes_do_not_count() {
+        let mut image = tiny_image("hello", TinyEnd::Never);
+        let loaded = u64::try_from(image.len()).unwrap();
+        let alone = stripped_bytes(&image).unwrap();
+        assert!((loaded..loaded + 256).contains(&alone), "{alone}");
+        image.extend([0; 100_000]);
+        assert_eq!(stripped_bytes(&image), Ok(alone));
+    }
+
+    #[test]
+    fn what_is_no_whole_elf_file_is_refused() {
+        assert!(stripped_bytes(b"#!/bin/sh").is_err());
+        let image = tiny_image("hello", TinyEnd::Never);
+        assert!(stripped_bytes(&image[..100]).is_err());
+    }
+}

@@ -1,0 +1,162 @@
+//! Booting a guest inside a test.
+//!
+//! A boot test says which image, how many cores, which words on the guest's
+//! command line, and then judges the [`Outcome`]:
+//!
+//! ```no_run
+//! use harness::Guest;
+//!
+//! let outcome = Guest::new("fork-join").cores(4).word("jobs=20").succeed();
+//! assert_eq!(outcome.transcript.of_kind("fork_join").count(), 3);
+//! ```
+//!
+//! Whatever goes wrong ends in a panic that shows the end of the serial log
+//! and where all of it lies. A good run's log is removed.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use crate::image::{self, Image};
+use crate::install;
+use crate::outcome::{Outcome, boot};
+use crate::protocol::Status;
+use crate::qemu::{Machine, Mode, Qemu};
+use crate::system;
+
+/// How long a guest may take in wall time if the test does not say.
+const LIMIT: Duration = Duration::from_secs(120);
+
+/// A guest that a test describes and boots.
+#[derive(Clone, Debug)]
+pub struct Guest {
+    package: String,
+    qemu: Qemu,
+    words: Vec<String>,
+    limit: Duration,
+}
+
+impl Guest {
+    /// Describes a guest that boots the image of a package: one core, 32 MiB,
+    /// a microvm, deterministic, 120 s.
+    #[must_use]
+    pub fn new(package: &str) -> Guest {
+        Guest {
+            package: package.into(),
+            qemu: Qemu::default(),
+            words: Vec::new(),
+            limit: LIMIT,
+        }
+    }
+
+    /// Sets the number of processors.
+    #[must_use]
+    pub fn cores(mut self, cores: u64) -> Guest {
+        self.qemu.cores = cores;
+        self
+    }
+
+    /// Sets the memory, in MiB.
+    #[must_use]
+    pub fn memory_mib(mut self, memory_mib: u64) -> Guest {
+        self.qemu.memory_mib = memory_mib;
+        self
+    }
+
+    /// Sets what time means.
+    #[must_use]
+    pub fn mode(mut self, mode: Mode) -> Guest {
+        self.qemu.mode = mode;
+        self
+    }
+
+    /// Sets the board.
+    #[must_use]
+    pub fn machine(mut self, machine: Machine) -> Guest {
+        self.qemu.machine = machine;
+        self
+    }
+
+    /// Adds words to the guest's command line, such as `jobs=20`.
+    #[must_use]
+    pub fn word(mut self, word: &str) -> Guest {
+        self.words.push(word.into());
+        self
+    }
+
+    /// Sets how long the guest may take in wall time.
+    #[must_use]
+    pub fn limit(mut self, limit: Duration) -> Guest {
+        self.limit = limit;
+        self
+    }
+
+    /// Builds the image if need be, boots it and waits for the end, whatever
+    /// that is.
+    ///
+    /// # Panics
+    ///
+    /// Panics if QEMU or the image is missing and cannot be had.
+    #[must_use]
+    pub fn boot(&self) -> Outcome {
+        let run = || {
+            let image = built(&self.package)?;
+            let log = system::new_log(&self.package)?;
+            let mut qemu = self.qemu.clone();
+            let mode = format!("mode={}", qemu.mode);
+            let words = std::iter::once(&mode).chain(&self.words);
+            qemu.guest_words = words.cloned().collect::<Vec<_>>().join(" ");
+            boot(&qemu, &image.path, &log, self.limit, |_| {})
+        };
+        run().unwrap_or_else(|error: String| panic!("`{}` did not boot: {error}", self.package))
+    }
+
+    /// Boots the guest, which must succeed.
+    ///
+    /// # Panics
+    ///
+    /// Panics with the serial log's end if it does not.
+    #[must_use]
+    pub fn succeed(&self) -> Outcome {
+        let outcome = self.boot();
+        if let Err(fault) = outcome.judge() {
+            panic!("{}\n{}", fault.reason, outcome.tail());
+        }
+        let _ = fs::remove_file(&outcome.log);
+        outcome
+    }
+
+    /// Boots the guest, which must end with this status and say so in both
+    /// ways, verdict and exit status.
+    ///
+    /// # Panics
+    ///
+    /// Panics with the serial log's end if it ends otherwise.
+    #[must_use]
+    pub fn end_in(&self, status: Status) -> Outcome {
+        let outcome = self.boot();
+        let verdict = outcome.transcript.verdict().map(|verdict| verdict.status);
+        let exit = &outcome.ending;
+        if *exit != crate::qemu::Ending::Guest(status) || verdict != Ok(status) {
+            let tail = outcome.tail();
+            panic!("wanted the end {status:?}, got: {exit}; verdict {verdict:?}\n{tail}");
+        }
+        let _ = fs::remove_file(&outcome.log);
+        outcome
+    }
+}
+
+/// Builds each image once in the life of a test binary.
+fn built(package: &str) -> Result<Image, String> {
+    static BUILT: Mutex<BTreeMap<String, Image>> = Mutex::new(BTreeMap::new());
+    // The map is whole at every moment, so a panic elsewhere does not harm it.
+    let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(image) = built.get(package) {
+        return Ok(image.clone());
+    }
+    install::ensure_qemu()?;
+    let image = image::build(package).map_err(|error| error.to_string())?;
+    built.insert(package.into(), image.clone());
+    Ok(image)
+}

@@ -1,0 +1,187 @@
+//! Images: building them with cargo, finding the file, weighing it.
+//!
+//! An *image* is the freestanding ELF file that a package under `apps/` (or
+//! the guest side of the boot tests) is linked into; it bears the package's
+//! name. Images are always built in release. Cargo itself is asked where the
+//! file lies, so no setting of cargo's can make us boot a stale one.
+
+use std::fmt;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use crate::elf;
+use crate::json::{self, Value};
+use crate::options::nearest;
+use crate::system;
+
+/// The most that a stripped image may weigh.
+pub const MOST_STRIPPED_BYTES: u64 = 512 << 10;
+
+/// A built image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// The package it was built from.
+    pub package: String,
+    /// Where it lies.
+    pub path: PathBuf,
+}
+
+/// Why there is no image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ImageError {
+    /// There is no such app.
+    Unknown(String),
+    /// Cargo failed, or gave no image.
+    Build(String),
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ImageError::Unknown(text) | ImageError::Build(text) => f.write_str(text),
+        }
+    }
+}
+
+impl std::error::Error for ImageError {}
+
+/// Returns the names of the apps: the packages under `apps/`, sorted.
+#[must_use]
+pub fn apps() -> Vec<String> {
+    let entries = fs::read_dir(system::workspace().join("apps"));
+    let folders = entries
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path());
+    let mut names: Vec<String> = folders.filter_map(|folder| package_name(&folder)).collect();
+    names.sort();
+    names
+}
+
+fn package_name(folder: &Path) -> Option<String> {
+    let manifest = fs::read_to_string(folder.join("Cargo.toml")).ok()?;
+    let line = manifest.lines().find(|line| line.starts_with("name"))?;
+    let name = line.split('"').nth(1)?;
+    Some(name.to_string())
+}
+
+/// Makes sure that `name` is an app.
+///
+/// # Errors
+///
+/// One line that names it and those there are.
+pub fn check_app(name: &str) -> Result<(), ImageError> {
+    let apps = apps();
+    if apps.iter().any(|app| app == name) {
+        return Ok(());
+    }
+    let names: Vec<&str> = apps.iter().map(String::as_str).collect();
+    let hint =
+        nearest(name, &names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    Err(ImageError::Unknown(format!(
+        "no app `{name}`; there are: {}{hint}",
+        names.join(", ")
+    )))
+}
+
+/// Builds the image of a package. Cargo's progress and errors go to standard
+/// error as they come.
+///
+/// # Errors
+///
+/// Cargo failed, or the package has no binary of its own name.
+pub fn build(package: &str) -> Result<Image, ImageError> {
+    let failed = |why: String| ImageError::Build(format!("cannot build `{package}`: {why}"));
+    let mut command = system::cargo();
+    command.args([
+        "build",
+        "--release",
+        "--quiet",
+        "-p",
+        package,
+        "--bin",
+        package,
+    ]);
+    command.arg("--message-format=json-render-diagnostics");
+    command.stdin(Stdio::null()).stdout(Stdio::piped());
+    let mut cargo = command
+        .spawn()
+        .map_err(|error| failed(format!("cargo: {error}")))?;
+
+    let mut path = None;
+    if let Some(output) = cargo.stdout.take() {
+        for line in BufReader::new(output).lines().map_while(Result::ok) {
+            path = executable(&line, package).or(path);
+        }
+    }
+    let status = cargo
+        .wait()
+        .map_err(|error| failed(format!("cargo: {error}")))?;
+    if !status.success() {
+        return Err(failed("see cargo's errors above".into()));
+    }
+    match path {
+        Some(path) => Ok(Image {
+            package: package.into(),
+            path,
+        }),
+        None => Err(failed("cargo built no binary of that name".into())),
+    }
+}
+
+/// Reads one of cargo's messages: the executable, if it announces ours.
+fn executable(message: &str, package: &str) -> Option<PathBuf> {
+    let message = json::parse(message).ok()?;
+    let name = message.at(&["target", "name"]).and_then(Value::as_text)?;
+    let path = message.get("executable").and_then(Value::as_text)?;
+    (name == package).then(|| path.into())
+}
+
+impl Image {
+    /// Returns the bytes that the image would have after stripping symbols
+    /// and debugging data.
+    ///
+    /// # Errors
+    ///
+    /// In words: the file cannot be read, or is no ELF file.
+    pub fn stripped_bytes(&self) -> Result<u64, String> {
+        let place = self.path.display();
+        let bytes = fs::read(&self.path).map_err(|error| format!("`{place}`: {error}"))?;
+        elf::stripped_bytes(&bytes).map_err(|error| format!("`{place}`: {error}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ImageError, apps, check_app, executable};
+    use std::path::PathBuf;
+
+    #[test]
+    fn the_apps_are_the_packages_under_apps() {
+        assert!(apps().contains(&"fork-join".to_string()), "{:?}", apps());
+        assert_eq!(check_app("fork-join"), Ok(()));
+    }
+
+    #[test]
+    fn an_unknown_app_is_named_with_those_there_are() {
+        let Err(ImageError::Unknown(text)) = check_app("fork-jion") else {
+            panic!("there is no such app");
+        };
+        assert!(
+            text.starts_with("no app `fork-jion`; there are: "),
+            "{text}"
+        );
+        assert!(text.ends_with("; did you mean `fork-join`?"), "{text}");
+    }
+
+    #[test]
+    fn cargo_says_where_the_image_lies() {
+        let message = r#"{"reason":"compiler-artifact","target":{"name":"a"},"executable":"/x/a"}"#;
+        assert_eq!(executable(message, "a"), Some(PathBuf::from("/x/a")));
+        assert_eq!(executable(message, "b"), None);
+        assert_eq!(executable("not a message", "a"), None);
+    }
+}

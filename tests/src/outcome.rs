@@ -1,0 +1,228 @@
+//! What became of one guest, and the judgement on it.
+//!
+//! Two witnesses speak at the end of a run: QEMU's exit status and the
+//! verdict, the last line of the serial log. A run is good only if both are
+//! there, both say success, no machine line is damaged, and no line reports a
+//! violation. One witness alone proves nothing: a guest could print success
+//! and then hang, or end in success having printed nothing.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use crate::protocol::{Status, Transcript};
+use crate::qemu::{Ending, Qemu};
+use crate::tail::Tail;
+
+/// How many of the last serial lines are shown at a failure.
+const SHOWN_LINES: usize = 30;
+
+/// What became of one guest.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// How QEMU ended.
+    pub ending: Ending,
+    /// The whole serial log; bytes that are no UTF-8 are replaced.
+    pub serial: String,
+    /// The log taken apart.
+    pub transcript: Transcript,
+    /// Where the log lies.
+    pub log: PathBuf,
+    /// The wall time from start to end.
+    pub elapsed: Duration,
+    /// What QEMU itself complained of; mostly empty.
+    pub complaints: String,
+}
+
+/// Why a run is not good.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// [`Status::Usage`] if the guest refused its command line, otherwise
+    /// [`Status::Failure`].
+    pub status: Status,
+    /// One line that says why.
+    pub reason: String,
+}
+
+/// Boots `image`, shows each whole serial line to `show` as it comes, and
+/// waits for the end.
+///
+/// # Errors
+///
+/// In words: QEMU could not be started, or the log could not be read.
+pub fn boot(
+    qemu: &Qemu,
+    image: &Path,
+    log: &Path,
+    limit: Duration,
+    mut show: impl FnMut(&str),
+) -> Result<Outcome, String> {
+    let mut running = qemu.start(image, log)?;
+    let mut tail = Tail::new(log);
+    let ending = running.wait(limit, || tail.follow(&mut show));
+    tail.finish(&mut show);
+    let bytes = fs::read(log)
+        .map_err(|error| format!("cannot read the serial log `{}`: {error}", log.display()))?;
+    let serial = String::from_utf8_lossy(&bytes).into_owned();
+    Ok(Outcome {
+        ending,
+        transcript: Transcript::read(&serial),
+        serial,
+        log: log.to_path_buf(),
+        elapsed: running.elapsed(),
+        complaints: running.complaints(),
+    })
+}
+
+impl Outcome {
+    /// Judges the run by both witnesses.
+    ///
+    /// # Errors
+    ///
+    /// The first reason why it is not good.
+    pub fn judge(&self) -> Result<(), Fault> {
+        let failure = |reason: String| Fault {
+            status: Status::Failure,
+            reason,
+        };
+        let Ending::Guest(by_exit) = self.ending else {
+            let mut reason = self.ending.to_string();
+            if !self.complaints.is_empty() {
+                // Writing into a `String` cannot fail.
+                let _ = write!(reason, "; QEMU says: {}", self.complaints);
+            }
+            return Err(failure(reason));
+        };
+        let verdict = self.transcript.verdict().map_err(failure)?;
+        if verdict.status != by_exit {
+            return Err(failure(format!(
+                "the verdict line says {:?}, QEMU's exit status {by_exit:?}",
+                verdict.status
+            )));
+        }
+        if let Some(fault) = self.transcript.faults.first() {
+            return Err(failure(fault.to_string()));
+        }
+        if by_exit != Status::Success {
+            return Err(Fault {
+                status: by_exit,
+                reason: verdict.reason,
+            });
+        }
+        let violated = |line: &&_| crate::protocol::MachineLine::number_at(line, "violations");
+        let mut lines = self.transcript.machine.iter();
+        match lines.find(|line| violated(line).is_some_and(|count| count > 0)) {
+            Some(line) => Err(failure(format!(
+                "serial line {} reports violations in spite of the verdict",
+                line.number
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the last serial lines, indented, and where all of them are.
+    #[must_use]
+    pub fn tail(&self) -> String {
+        let lines: Vec<&str> = self.serial.lines().collect();
+        let shown = &lines[lines.len().saturating_sub(SHOWN_LINES)..];
+        let mut text = String::new();
+        let log = self.log.display();
+        // Writing into a `String` cannot fail.
+        let _ = match lines.len() {
+            0 => writeln!(text, "the guest printed nothing; its log is {log}"),
+            all if all > SHOWN_LINES => {
+                writeln!(
+                    text,
+                    "the last {SHOWN_LINES} of {all} serial lines of {log}:"
+                )
+            }
+            _ => writeln!(text, "the serial log {log}:"),
+        };
+        for line in shown {
+            let _ = writeln!(text, "  | {line}");
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Outcome;
+    use crate::protocol::{Status, Transcript};
+    use crate::qemu::Ending;
+    use std::time::Duration;
+
+    const SUCCESS: &str = "{\"kind\":\"verdict\",\"status\":\"success\",\"reason\":\"\"}\n";
+    const USAGE: &str = "{\"kind\":\"verdict\",\"status\":\"usage\",\"reason\":\"`x=1`: no\"}\n";
+
+    fn outcome(ending: Ending, serial: &str) -> Outcome {
+        Outcome {
+            ending,
+            serial: serial.into(),
+            transcript: Transcript::read(serial),
+            log: "the.log".into(),
+            elapsed: Duration::ZERO,
+            complaints: String::new(),
+        }
+    }
+
+    fn reason(ending: Ending, serial: &str) -> String {
+        outcome(ending, serial).judge().unwrap_err().reason
+    }
+
+    #[test]
+    fn a_run_is_good_only_if_both_witnesses_say_so() {
+        let success = Ending::Guest(Status::Success);
+        assert_eq!(outcome(success.clone(), SUCCESS).judge(), Ok(()));
+        assert_eq!(
+            reason(success.clone(), ""),
+            "the guest printed no verdict line"
+        );
+        assert_eq!(
+            reason(success, USAGE),
+            "the verdict line says Usage, QEMU's exit status Success"
+        );
+        let limit = Duration::from_millis(1500);
+        assert_eq!(
+            reason(Ending::TimedOut(limit), SUCCESS),
+            "no end within 1.5 s, QEMU was killed"
+        );
+        assert!(reason(Ending::Status(0), SUCCESS).contains("triple fault"));
+    }
+
+    #[test]
+    fn damage_and_violations_outweigh_a_verdict_of_success() {
+        let success = || Ending::Guest(Status::Success);
+        assert_eq!(
+            reason(success(), &format!("{{\"kind\":\n{SUCCESS}")),
+            "serial line 1: column 9: the line ends where a value must stand"
+        );
+        assert_eq!(
+            reason(
+                success(),
+                &format!("{{\"kind\":\"own\",\"violations\":3}}\n{SUCCESS}")
+            ),
+            "serial line 1 reports violations in spite of the verdict"
+        );
+    }
+
+    #[test]
+    fn a_refused_command_line_is_told_from_a_failure() {
+        let fault = outcome(Ending::Guest(Status::Usage), USAGE)
+            .judge()
+            .unwrap_err();
+        assert_eq!(fault.status, Status::Usage);
+        assert_eq!(fault.reason, "`x=1`: no");
+    }
+
+    #[test]
+    fn the_tail_shows_the_last_lines_and_the_place_of_all() {
+        let long: String = (1..=40).map(|n| format!("line {n}\n")).collect();
+        let tail = outcome(Ending::Signal, &long).tail();
+        assert!(tail.starts_with("the last 30 of 40 serial lines of the.log:\n  | line 11\n"));
+        assert!(tail.ends_with("  | line 40\n"));
+        let tail = outcome(Ending::Signal, "").tail();
+        assert_eq!(tail, "the guest printed nothing; its log is the.log\n");
+    }
+}

@@ -1,0 +1,263 @@
+//! Starting QEMU: which machine, in which sense of time, with what image.
+//!
+//! A [`Qemu`] is a description that becomes a command line; [`Qemu::start`]
+//! makes it a process ([`Running`]). The *mode* says what the guest's clock
+//! means, the *machine* which board QEMU imitates. Everything a guest could
+//! see of the host is fixed or left out (`-nodefaults`, no display, no
+//! network), so that in [`Mode::Deterministic`] two runs give the same bytes.
+//!
+//! Serial output goes to a file, for that loses nothing, whereas a slow pipe
+//! drops bytes. The guest ends its run by writing to the port of QEMU's
+//! `isa-debug-exit` device, see [`Ending`].
+
+mod process;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+pub use process::{Ending, Running};
+
+/// The name under which QEMU is looked for.
+pub const PROGRAM: &str = "qemu-system-x86_64";
+
+/// The least memory that a guest gets, in MiB.
+pub const LEAST_MEMORY_MIB: u64 = 16;
+
+/// The most processors that a guest gets.
+pub const MOST_CORES: u64 = 64;
+
+/// What time means in the guest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Real cores in real time, by the host's virtualization.
+    Kvm,
+    /// One instruction is one virtual nanosecond; every run is the same.
+    Deterministic,
+    /// Emulated cores in real time, one host thread each.
+    Threads,
+}
+
+impl Mode {
+    /// The words for [`Mode`] on command lines.
+    pub const NAMES: &[&str] = &["kvm", "deterministic", "threads"];
+
+    /// Returns the mode of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Mode> {
+        let all = [Mode::Kvm, Mode::Deterministic, Mode::Threads];
+        all.into_iter().find(|mode| mode.name() == name)
+    }
+
+    /// Returns the mode's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Kvm => "kvm",
+            Mode::Deterministic => "deterministic",
+            Mode::Threads => "threads",
+        }
+    }
+
+    /// Says in one sentence what a time printed in this mode is worth.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Mode::Kvm => "real nanoseconds on real cores, the host's noise included",
+            Mode::Deterministic => {
+                "one instruction is one virtual nanosecond, idle time is skipped, busy \
+                 processors share one clock; these are not wall times, and are the same \
+                 on every machine"
+            }
+            Mode::Threads => {
+                "real nanoseconds of emulated processors; expect milliseconds of \
+                 noise where the host has fewer cores"
+            }
+        }
+    }
+
+    fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
+            // The sleep=off makes an idle guest jump to its next timer.
+            Mode::Deterministic => &[
+                "-accel",
+                "tcg",
+                "-icount",
+                "shift=0,sleep=off",
+                "-cpu",
+                "max",
+                "-seed",
+                "1",
+                "-rtc",
+                "base=2000-01-01,clock=vm",
+            ],
+            Mode::Threads => &["-accel", "tcg,thread=multi", "-cpu", "max"],
+        }
+    }
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The board that QEMU imitates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Machine {
+    /// The smallest one, which boots in a tenth of a second.
+    Microvm,
+    /// A PC with PCI Express, HPET and all.
+    Q35,
+}
+
+impl Machine {
+    /// The words for [`Machine`] on command lines.
+    pub const NAMES: &[&str] = &["microvm", "q35"];
+
+    /// Returns the machine of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Machine> {
+        let all = [Machine::Microvm, Machine::Q35];
+        all.into_iter().find(|machine| machine.name() == name)
+    }
+
+    /// Returns the machine's name, which is also QEMU's.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Machine::Microvm => "microvm",
+            Machine::Q35 => "q35",
+        }
+    }
+}
+
+impl fmt::Display for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A guest to be started.
+#[derive(Clone, Debug)]
+pub struct Qemu {
+    /// The QEMU to use: a name on the `PATH`, or a path.
+    pub program: PathBuf,
+    /// What time means.
+    pub mode: Mode,
+    /// The board.
+    pub machine: Machine,
+    /// The number of processors.
+    pub cores: u64,
+    /// The memory in MiB.
+    pub memory_mib: u64,
+    /// The guest's command line.
+    pub guest_words: String,
+    /// Wait for a debugger on TCP port 1234 before the first instruction.
+    pub wait_for_debugger: bool,
+}
+
+impl Default for Qemu {
+    /// Describes one core with 32 MiB on a microvm, deterministic.
+    fn default() -> Self {
+        Qemu {
+            program: PROGRAM.into(),
+            mode: Mode::Deterministic,
+            machine: Machine::Microvm,
+            cores: 1,
+            memory_mib: 32,
+            guest_words: String::new(),
+            wait_for_debugger: false,
+        }
+    }
+}
+
+impl Qemu {
+    /// Returns QEMU's arguments for booting `image` with its serial output
+    /// going to `serial`.
+    #[must_use]
+    pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<String> {
+        let mut arguments = vec!["-machine".into(), self.machine.name().into()];
+        arguments.extend(self.mode.arguments().iter().map(ToString::to_string));
+        arguments.extend(["-smp".into(), self.cores.to_string()]);
+        arguments.extend(["-m".into(), format!("{}M", self.memory_mib)]);
+        arguments.extend(["-kernel".into(), image.display().to_string()]);
+        arguments.extend(["-append".into(), self.guest_words.clone()]);
+        // A comma would end the file's name in QEMU's syntax unless doubled.
+        let serial = serial.display().to_string().replace(',', ",,");
+        arguments.extend(["-serial".into(), format!("file:{serial}")]);
+        let exit_device = "isa-debug-exit,iobase=0xf4,iosize=0x04";
+        arguments.extend(["-device", exit_device].map(String::from));
+        arguments.extend(["-nodefaults", "-no-user-config"].map(String::from));
+        arguments.extend(["-display", "none", "-no-reboot"].map(String::from));
+        if self.wait_for_debugger {
+            arguments.extend(["-S", "-gdb", "tcp::1234"].map(String::from));
+        }
+        arguments
+    }
+
+    /// Starts the guest. QEMU's own complaints go to a file beside `serial`.
+    ///
+    /// # Errors
+    ///
+    /// In words: a file could not be made, or QEMU could not be started.
+    pub fn start(&self, image: &Path, serial: &Path) -> Result<Running, String> {
+        let name = self.program.display().to_string();
+        let program = crate::system::find_program(&name)
+            .ok_or_else(|| format!("there is no program `{name}`; install QEMU or name another"))?;
+        let mut command = Command::new(program);
+        command.args(self.arguments(image, serial));
+        Running::start(command, serial)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Machine, Mode, Qemu};
+    use std::path::Path;
+
+    fn line(qemu: &Qemu) -> String {
+        qemu.arguments(Path::new("image"), Path::new("a,b.log"))
+            .join(" ")
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for name in Mode::NAMES {
+            assert_eq!(Mode::from_name(name).map(Mode::name), Some(*name));
+        }
+        for name in Machine::NAMES {
+            assert_eq!(Machine::from_name(name).map(Machine::name), Some(*name));
+        }
+        assert_eq!(Mode::from_name("fast"), None);
+    }
+
+    #[test]
+    fn a_deterministic_guest_sees_nothing_of_the_host() {
+        let line = line(&Qemu::default());
+        for part in [
+            "-machine microvm",
+            "-accel tcg -icount shift=0,sleep=off -cpu max",
+            "-seed 1 -rtc base=2000-01-01,clock=vm",
+            "-smp 1 -m 32M",
+            "-serial file:a,,b.log",
+            "-nodefaults -no-user-config -display none -no-reboot",
+        ] {
+            assert!(line.contains(part), "`{part}` is not in `{line}`");
+        }
+        assert!(!line.contains("-gdb"));
+    }
+
+    #[test]
+    fn each_mode_has_its_accelerator() {
+        let with = |mode| {
+            line(&Qemu {
+                mode,
+                ..Qemu::default()
+            })
+        };
+        assert!(with(Mode::Kvm).contains("-accel kvm -cpu host"));
+        assert!(with(Mode::Threads).contains("-accel tcg,thread=multi -cpu max"));
+    }
+}

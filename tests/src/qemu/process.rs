@@ -1,0 +1,181 @@
+//! A QEMU process: waiting for it with a limit, and ending it.
+//!
+//! *Ending* is how the process went, seen from outside. A guest writes a byte
+//! `v` to port 0xf4, and QEMU's `isa-debug-exit` ends the process with status
+//! `(v << 1) | 1`: 33 for success, 35 for failure, 37 for a refused command
+//! line. No other status is a guest's own word.
+//!
+//! A QEMU started here does not outlive the tool: it is killed by its own
+//! process id when the limit is over and when [`Running`] is dropped; ctrl-C
+//! reaches it as a member of the terminal's process group; and where
+//! `setpriv` exists the system kills it if the tool itself is killed.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::protocol::Status;
+
+/// The most that a guest may print; beyond it something prints without end.
+const MOST_SERIAL_BYTES: u64 = 64 << 20;
+
+/// How long one look at the process is from the next.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// How a QEMU process ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The guest ended it with one of the agreed statuses.
+    Guest(Status),
+    /// QEMU ended with another status; 0 is a reset or a shutdown.
+    Status(i32),
+    /// A signal ended it.
+    Signal,
+    /// It did not end within this limit and was killed.
+    TimedOut(Duration),
+    /// It printed more than a run may and was killed.
+    TooMuchOutput,
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Ending::Guest(Status::Success) => f.write_str("the guest ended in success"),
+            Ending::Guest(Status::Failure) => f.write_str("the guest ended in failure"),
+            Ending::Guest(Status::Usage) => f.write_str("the guest refused its command line"),
+            Ending::Status(0) => f.write_str(
+                "the machine was reset or shut down without an exit status (a triple fault?)",
+            ),
+            Ending::Status(status) => write!(f, "QEMU ended with status {status}"),
+            Ending::Signal => f.write_str("a signal ended QEMU"),
+            Ending::TimedOut(limit) => {
+                write!(
+                    f,
+                    "no end within {} s, QEMU was killed",
+                    limit.as_secs_f64()
+                )
+            }
+            Ending::TooMuchOutput => write!(
+                f,
+                "more than {} MiB of serial output, QEMU was killed",
+                MOST_SERIAL_BYTES >> 20
+            ),
+        }
+    }
+}
+
+/// A QEMU that was started and not yet waited for.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+    started: Instant,
+    serial: PathBuf,
+    complaints: PathBuf,
+}
+
+impl Running {
+    /// Starts `command` with its streams away from the terminal.
+    pub(super) fn start(command: Command, serial: &Path) -> Result<Running, String> {
+        let file_error = |path: &Path| {
+            let path = path.display().to_string();
+            move |error| format!("cannot write `{path}`: {error}; name a file elsewhere")
+        };
+        File::create(serial).map_err(file_error(serial))?;
+        let mut complaints = serial.as_os_str().to_owned();
+        complaints.push(OsString::from(".qemu"));
+        let complaints = PathBuf::from(complaints);
+        let errors = File::create(&complaints).map_err(file_error(&complaints))?;
+
+        let program = command.get_program().to_owned();
+        let mut command = bound_to_us(command);
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(errors);
+        let child = command
+            .spawn()
+            .map_err(|error| format!("cannot start `{}`: {error}", program.display()))?;
+        Ok(Running {
+            child,
+            started: Instant::now(),
+            serial: serial.to_path_buf(),
+            complaints,
+        })
+    }
+
+    /// Waits for the end, for at most `limit` since the start. `look` is
+    /// called between two looks at the process, to show what was printed.
+    pub fn wait(&mut self, limit: Duration, mut look: impl FnMut()) -> Ending {
+        loop {
+            // An error here would mean that someone else has reaped it.
+            match self.child.try_wait() {
+                Ok(Some(status)) => return ending_of(status),
+                Ok(None) => {}
+                Err(_) => return Ending::Signal,
+            }
+            if self.started.elapsed() >= limit {
+                self.kill();
+                return Ending::TimedOut(limit);
+            }
+            if fs::metadata(&self.serial).is_ok_and(|file| file.len() > MOST_SERIAL_BYTES) {
+                self.kill();
+                return Ending::TooMuchOutput;
+            }
+            look();
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    /// Returns the time since the start.
+    #[must_use]
+    pub fn elapsed(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    /// Returns what QEMU itself complained of, on one line; mostly empty.
+    #[must_use]
+    pub fn complaints(&self) -> String {
+        let text = fs::read(&self.complaints).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
+        text.lines().collect::<Vec<_>>().join("; ")
+    }
+
+    fn kill(&mut self) {
+        // It may have ended by itself in between: then there is nothing to do.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.kill();
+        let _ = fs::remove_file(&self.complaints);
+    }
+}
+
+fn ending_of(status: ExitStatus) -> Ending {
+    match status.code() {
+        Some(33) => Ending::Guest(Status::Success),
+        Some(35) => Ending::Guest(Status::Failure),
+        Some(37) => Ending::Guest(Status::Usage),
+        Some(code) => Ending::Status(code),
+        None => Ending::Signal,
+    }
+}
+
+/// Has the system kill the program when we die, if `setpriv` is there to ask
+/// for it. `setpriv` becomes the program, so the process id stays the same.
+fn bound_to_us(command: Command) -> Command {
+    if crate::system::find_program("setpriv").is_none() {
+        return command;
+    }
+    let mut bound = Command::new("setpriv");
+    bound.args(["--pdeathsig", "KILL", "--"]);
+    bound.arg(command.get_program());
+    bound.args(command.get_args());
+    bound
+}

@@ -1,0 +1,234 @@
+//! The subcommand `run`: from a command line to a judged run of an app.
+//!
+//! The order matters: first everything that can be refused is checked, then
+//! QEMU is made sure of, the mode is settled, the image is built, the guest
+//! is booted, and its output is shown while it runs. Whatever is refused
+//! before the build leaves nothing behind.
+//!
+//! Exit codes: 0 all is well, 1 a failure, 2 a refused command line (ours or
+//! the guest's).
+
+mod screen;
+mod table;
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use crate::image;
+use crate::install;
+use crate::options::{Parsed, Request, UsageError};
+use crate::outcome::{Outcome, boot};
+use crate::probe;
+use crate::protocol::Status;
+use crate::qemu::{Machine, Mode, PROGRAM, Qemu};
+use crate::system;
+use screen::Screen;
+
+pub use table::RUN;
+
+/// Why a run ended before the guest did.
+enum Refusal {
+    /// The command line is at fault: exit code 2.
+    Usage(String),
+    /// Something else is: exit code 1.
+    Failure(String),
+}
+
+impl From<UsageError> for Refusal {
+    fn from(error: UsageError) -> Self {
+        Refusal::Usage(error.0)
+    }
+}
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn run(words: &[String]) -> ExitCode {
+    match attempt(words) {
+        Ok(code) => code,
+        Err(Refusal::Usage(line)) => {
+            eprintln!("run: {line}");
+            ExitCode::from(2)
+        }
+        Err(Refusal::Failure(line)) => {
+            eprintln!("run: {line}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
+    let options = match RUN.parse(words)? {
+        Request::Work(options) => options,
+        Request::Help(text) => {
+            print!("{text}");
+            return Ok(ExitCode::SUCCESS);
+        }
+    };
+    if options.is_given("json") && options.is_given("plain") {
+        let line = "`--json` and `--plain` exclude each other; give one";
+        return Err(Refusal::Usage(line.into()));
+    }
+    let app = options.text("app").unwrap_or_default().to_string();
+    image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
+    let program = choose_program(&options)?;
+    let log = Log::choose(&options, &app)?;
+
+    let (mode, why) = choose_mode(&options, &program)?;
+    let image = match options.text("image") {
+        Some(path) => PathBuf::from(path),
+        None => {
+            let built = image::build(&app);
+            built
+                .map_err(|error| Refusal::Failure(error.to_string()))?
+                .path
+        }
+    };
+    let qemu = describe(&options, &program, mode);
+    let limit = limit(&options);
+    let mut screen = Screen::new(&options);
+    introduce(&screen, &options, &qemu, why);
+    let outcome = boot(&qemu, &image, &log.path, limit, |line| screen.show(line));
+    screen.end();
+    let outcome = outcome.map_err(Refusal::Failure)?;
+    Ok(conclude(&outcome, &log, &screen))
+}
+
+/// Finds the QEMU to use, installing one if none is named and none is there.
+fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
+    if let Some(named) = options.text("qemu") {
+        return system::find_program(named)
+            .ok_or_else(|| Refusal::Usage(format!("`--qemu {named}`: there is no such program")));
+    }
+    if let Some(path) = options.text("image")
+        && !Path::new(path).is_file()
+    {
+        return Err(Refusal::Usage(format!(
+            "`--image {path}`: there is no such file"
+        )));
+    }
+    install::ensure_qemu().map_err(Refusal::Failure)?;
+    Ok(PROGRAM.into())
+}
+
+/// Settles the mode, and says why if the person did not.
+fn choose_mode(options: &Parsed, program: &Path) -> Result<(Mode, Option<String>), Refusal> {
+    let named = options.text("mode").and_then(Mode::from_name);
+    match named {
+        None => match probe::kvm(program) {
+            Ok(()) => Ok((Mode::Kvm, Some("a guest ran under KVM".into()))),
+            Err(why) => Ok((
+                Mode::Deterministic,
+                Some(format!("KVM is of no use here: {why}")),
+            )),
+        },
+        Some(Mode::Kvm) => match probe::kvm(program) {
+            Ok(()) => Ok((Mode::Kvm, None)),
+            Err(why) => Err(Refusal::Usage(format!(
+                "`--mode kvm`: KVM is of no use here: {why}; use deterministic or threads"
+            ))),
+        },
+        Some(mode) => Ok((mode, None)),
+    }
+}
+
+fn describe(options: &Parsed, program: &Path, mode: Mode) -> Qemu {
+    let machine = options.text("machine").and_then(Machine::from_name);
+    let mut words = vec![format!("mode={mode}")];
+    for name in table::GUEST_WORDS {
+        words.extend(options.text(name).map(|value| format!("{name}={value}")));
+    }
+    words.extend(options.text("append").map(String::from));
+    Qemu {
+        program: program.into(),
+        mode,
+        machine: machine.unwrap_or(Machine::Microvm),
+        cores: options.number("cores").unwrap_or(1),
+        memory_mib: options.number("memory").unwrap_or(32),
+        guest_words: words.join(" "),
+        wait_for_debugger: options.is_given("gdb"),
+    }
+}
+
+/// The person's limit, or one that is generous also where a job takes its
+/// real time: two minutes, and a second for each job.
+fn limit(options: &Parsed) -> Duration {
+    let jobs = options.number("jobs").unwrap_or(0);
+    let seconds = options.number("timeout").unwrap_or(120 + jobs);
+    if options.is_given("gdb") {
+        // A person at a debugger takes all day.
+        return Duration::from_secs(86_400);
+    }
+    Duration::from_secs(seconds)
+}
+
+/// Says what is run, and what its times are worth.
+fn introduce(screen: &Screen, options: &Parsed, qemu: &Qemu, why: Option<String>) {
+    let of = |name: &str| options.text(name).unwrap_or("?").to_string();
+    screen.say(&format!(
+        "app {}, seed {}, {} jobs, policy {}",
+        of("app"),
+        of("seed"),
+        of("jobs"),
+        of("policy")
+    ));
+    screen.say(&format!(
+        "mode {}, machine {}, {} cores, {} MiB of memory",
+        qemu.mode, qemu.machine, qemu.cores, qemu.memory_mib
+    ));
+    screen.say(&format!("time: {}", qemu.mode.meaning()));
+    if let Some(why) = why {
+        screen.say(&format!("mode {} because {why}", qemu.mode));
+    }
+    if qemu.wait_for_debugger {
+        screen.say("waiting for a debugger: `gdb IMAGE -ex 'target remote :1234'`");
+    }
+    screen.say("");
+}
+
+fn conclude(outcome: &Outcome, log: &Log, screen: &Screen) -> ExitCode {
+    let Err(fault) = outcome.judge() else {
+        screen.say(&format!(
+            "\nwell ended after {:.1} s",
+            outcome.elapsed.as_secs_f64()
+        ));
+        log.discard();
+        return ExitCode::SUCCESS;
+    };
+    if fault.status == Status::Usage {
+        eprintln!("run: the guest refused its command line: {}", fault.reason);
+        log.discard();
+        return ExitCode::from(2);
+    }
+    eprint!("{}", outcome.tail());
+    eprintln!("run: failed: {}", fault.reason);
+    ExitCode::FAILURE
+}
+
+/// Where the serial log goes, and whether it stays.
+struct Log {
+    path: PathBuf,
+    stays: bool,
+}
+
+impl Log {
+    fn choose(options: &Parsed, app: &str) -> Result<Log, Refusal> {
+        let Some(named) = options.text("serial") else {
+            let path = system::new_log(app).map_err(Refusal::Failure)?;
+            return Ok(Log { path, stays: false });
+        };
+        File::create(named).map_err(|error| {
+            Refusal::Usage(format!("`--serial {named}`: cannot be written: {error}"))
+        })?;
+        let path = named.into();
+        Ok(Log { path, stays: true })
+    }
+
+    fn discard(&self) {
+        if !self.stays {
+            // It is ours, and in the way of no one if it cannot be removed.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! What a person (or a program) sees of a run while it goes on.
+//!
+//! Lines for people and machine lines go to standard output in the order of
+//! the serial log, so that `grep '^{'` works there as on the log itself.
+//! Progress lines become one line on standard error that renews itself if
+//! that is a terminal, and otherwise a line each tenth of the way.
+
+use std::io::{IsTerminal, Write, stderr, stdout};
+
+use crate::options::Parsed;
+use crate::protocol::{MachineLine, read_line};
+
+/// The width of the bar.
+const BAR: u64 = 30;
+
+/// Where each kind of line goes.
+pub(super) struct Screen {
+    people: bool,
+    machine: bool,
+    quiet: bool,
+    on_terminal: bool,
+    bar_is_shown: bool,
+    tenths_shown: u64,
+}
+
+impl Screen {
+    pub(super) fn new(options: &Parsed) -> Screen {
+        Screen {
+            people: !options.is_given("json"),
+            machine: !options.is_given("plain"),
+            quiet: options.is_given("quiet"),
+            on_terminal: stderr().is_terminal(),
+            bar_is_shown: false,
+            tenths_shown: 0,
+        }
+    }
+
+    /// Says something of our own, unless we shall be quiet.
+    pub(super) fn say(&self, line: &str) {
+        if self.quiet {
+            return;
+        }
+        if self.people {
+            put(&mut stdout(), line);
+        } else {
+            put(&mut stderr(), line);
+        }
+    }
+
+    /// Shows one line of the serial log.
+    pub(super) fn show(&mut self, line: &str) {
+        // The number is for messages only, and the judge makes those.
+        let read = read_line(0, line);
+        if let Some(Ok(machine)) = &read
+            && machine.kind == "progress"
+        {
+            self.advance(machine);
+            return;
+        }
+        let wanted = if read.is_some() {
+            self.machine
+        } else {
+            self.people
+        };
+        if wanted {
+            self.end();
+            put(&mut stdout(), line);
+        }
+    }
+
+    /// Wipes the progress line away.
+    pub(super) fn end(&mut self) {
+        if std::mem::take(&mut self.bar_is_shown) {
+            let _ = write!(stderr(), "\r\x1b[K");
+        }
+    }
+
+    fn advance(&mut self, line: &MachineLine) {
+        let (Some(done), Some(total)) = (line.number_at("done"), line.number_at("total")) else {
+            return;
+        };
+        if self.quiet || total == 0 {
+            return;
+        }
+        let done = done.min(total);
+        // In `u128` no product of two `u64` overflows.
+        let part_of = |whole: u64| {
+            let part = u128::from(done) * u128::from(whole) / u128::from(total);
+            u64::try_from(part).unwrap_or(whole)
+        };
+        if self.on_terminal {
+            let filled: String = (0..BAR)
+                .map(|i| if i < part_of(BAR) { '#' } else { '.' })
+                .collect();
+            let _ = write!(stderr(), "\r\x1b[K[{filled}] {done} of {total} jobs");
+            self.bar_is_shown = true;
+        } else if part_of(10) != self.tenths_shown {
+            self.tenths_shown = part_of(10);
+            put(&mut stderr(), &format!("progress: {done} of {total} jobs"));
+        }
+    }
+}
+
+/// Writes a line. That no one reads it (`| head`) must not end the run.
+fn put(stream: &mut impl Write, line: &str) {
+    let _ = writeln!(stream, "{line}");
+}

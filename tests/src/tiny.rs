@@ -1,0 +1,125 @@
+//! A guest of a few instructions, made in memory.
+//!
+//! It prints a given text on the first serial port, then ends QEMU with a
+//! given byte or halts for good. It needs no compiler and no kernel, so it
+//! answers two questions by themselves: does virtualization truly work here
+//! (the device file may exist and be of no use), and does the tool's own way
+//! of starting, reading and ending QEMU work.
+//!
+//! The image is an ELF file with the note that makes QEMU's `-kernel` enter
+//! it by PVH: 32-bit protected mode, flat segments, at the address in the
+//! note ("x86/HVM direct boot ABI", `docs/misc/pvh.pandoc` of Xen).
+
+/// Where the image is loaded and entered: above the first MiB.
+const BASE: u32 = 0x10_0000;
+
+/// The ELF header and two program headers.
+const HEADERS: u32 = 64 + 2 * 56;
+
+/// The PVH note: its header, the name `Xen`, and one 32-bit address.
+const NOTE: u32 = 20;
+
+/// Xen's number for the note that holds the 32-bit entry address.
+const XEN_ELFNOTE_PHYS32_ENTRY: u32 = 18;
+
+/// How a tiny guest ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TinyEnd {
+    /// By writing this byte to QEMU's exit port.
+    Exit(u8),
+    /// Never: it halts with no interrupt to wake it.
+    Never,
+}
+
+/// Returns the image of a guest that prints `text` and ends so.
+///
+/// # Panics
+///
+/// Panics if `text` has 4 GiB or more.
+#[must_use]
+pub fn tiny_image(text: &str, end: TinyEnd) -> Vec<u8> {
+    let code_at = BASE + HEADERS + NOTE;
+    let length = u32::try_from(text.len()).expect("a tiny guest's text is short");
+    let code = code(code_at, length, end);
+    let code_length = u32::try_from(code.len()).expect("the code has some 30 bytes");
+    let file_length = HEADERS + NOTE + code_length + length;
+
+    let mut image = elf_header(code_at);
+    image.extend(program_header(PT_LOAD, 0, file_length));
+    image.extend(program_header(PT_NOTE, HEADERS, NOTE));
+    for word in [4, 4, XEN_ELFNOTE_PHYS32_ENTRY] {
+        image.extend(u32::to_le_bytes(word));
+    }
+    image.extend(b"Xen\0");
+    image.extend(code_at.to_le_bytes());
+    image.extend(code);
+    image.extend(text.bytes());
+    image
+}
+
+const PT_LOAD: u32 = 1;
+const PT_NOTE: u32 = 4;
+
+fn code(code_at: u32, text_length: u32, end: TinyEnd) -> Vec<u8> {
+    // The first instruction's operand is the text's address, which depends on
+    // the length of the code but not the other way round.
+    let make = |text_at: u32| {
+        let mut code = vec![0xbe]; // mov esi, text
+        code.extend(text_at.to_le_bytes());
+        code.push(0xb9); // mov ecx, length
+        code.extend(text_length.to_le_bytes());
+        code.extend([0x66, 0xba, 0xf8, 0x03]); // mov dx, 0x3f8: first serial port
+        code.push(0xfc); // cld
+        code.extend([0xe3, 0x04]); // jecxz over the loop
+        code.extend([0xac, 0xee, 0xe2, 0xfc]); // again: lodsb; out dx, al; loop again
+        if let TinyEnd::Exit(value) = end {
+            code.extend([0xb0, value, 0xe6, 0xf4]); // mov al, value; out 0xf4, al
+        }
+        code.extend([0xfa, 0xf4, 0xeb, 0xfd]); // cli; halt: hlt; jmp halt
+        code
+    };
+    let length = u32::try_from(make(0).len()).expect("the code has some 30 bytes");
+    make(code_at + length)
+}
+
+fn elf_header(entry: u32) -> Vec<u8> {
+    let mut header = Vec::new();
+    header.extend(b"\x7fELF\x02\x01\x01"); // 64-bit, little-endian, version 1
+    header.extend([0; 9]);
+    header.extend([2, 0, 62, 0, 1, 0, 0, 0]); // executable, x86-64, version 1
+    header.extend(u64::from(entry).to_le_bytes());
+    header.extend(64_u64.to_le_bytes()); // program headers follow at once
+    header.extend(0_u64.to_le_bytes()); // no section headers
+    header.extend(0_u32.to_le_bytes()); // no flags
+    for half in [64_u16, 56, 2, 64, 0, 0] {
+        header.extend(half.to_le_bytes());
+    }
+    header
+}
+
+fn program_header(kind: u32, offset: u32, length: u32) -> Vec<u8> {
+    let address = u64::from(BASE + offset);
+    let (offset, length) = (u64::from(offset), u64::from(length));
+    let mut header = Vec::new();
+    header.extend(kind.to_le_bytes());
+    header.extend(5_u32.to_le_bytes()); // readable, executable
+    for word in [offset, address, address, length, length, 4] {
+        header.extend(word.to_le_bytes());
+    }
+    header
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HEADERS, NOTE, TinyEnd, tiny_image};
+
+    #[test]
+    fn the_parts_stand_where_the_headers_say() {
+        let image = tiny_image("hi", TinyEnd::Exit(0x10));
+        let code_at = usize::try_from(HEADERS + NOTE).unwrap();
+        assert_eq!(image[code_at], 0xbe);
+        let text_at = u32::from_le_bytes(image[code_at + 1..code_at + 5].try_into().unwrap());
+        let text_at = usize::try_from(text_at - super::BASE).unwrap();
+        assert_eq!(&image[text_at..], b"hi");
+    }
+}
