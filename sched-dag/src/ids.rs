@@ -58,3 +58,12 @@ impl fmt::Display for Instance {
         write!(f, "dag {} job {job} subtask {}", dag.0, subtask.0)
     }
 }
+
+/// Returns an index as an id's number.
+///
+/// # Panics
+///
+/// If it does not fit, which the verification has excluded before.
+pub(crate) fn to_u32(index: usize) -> u32 {
+    u32::try_from(index).expect("counts are verified to fit 32 bits")
+}

@@ -7,8 +7,10 @@
 
 extern crate alloc;
 
+pub mod analysis;
 mod ids;
 mod policy;
+mod priorities;
 mod scheduler;
 mod spec;
 mod task_set;
@@ -17,6 +19,7 @@ pub mod virtual_time;
 
 pub use ids::{CoreId, DagId, Instance, SubtaskId};
 pub use policy::{OverrunPolicy, Policy, Preemption, Priority};
+pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use scheduler::{
     DagStatistics, Decision, JobOutcome, Moment, Observer, Released, Scheduler, SchedulerOptions,
 };

@@ -26,6 +26,8 @@ pub struct Dag {
     pub(crate) overrun: OverrunPolicy,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
+    pub(crate) sources: Box<[SubtaskId]>,
+    pub(crate) sinks: Box<[SubtaskId]>,
     pub(crate) predecessors: Adjacency,
     pub(crate) successors: Adjacency,
     pub(crate) topological_order: Box<[SubtaskId]>,
@@ -125,6 +127,18 @@ impl Dag {
         &self.subtasks[subtask.index()]
     }
 
+    /// Returns the subtasks without predecessor, ascending, never empty.
+    #[must_use]
+    pub fn sources(&self) -> &[SubtaskId] {
+        &self.sources
+    }
+
+    /// Returns the subtasks without successor, ascending, never empty.
+    #[must_use]
+    pub fn sinks(&self) -> &[SubtaskId] {
+        &self.sinks
+    }
+
     /// Returns the direct predecessors of a subtask, each once, ascending.
     #[must_use]
     pub fn predecessors(&self, subtask: SubtaskId) -> &[SubtaskId] {
@@ -171,7 +185,7 @@ impl Subtask {
 }
 
 impl Adjacency {
-    fn of(&self, subtask: SubtaskId) -> &[SubtaskId] {
+    pub(crate) fn of(&self, subtask: SubtaskId) -> &[SubtaskId] {
         let index = subtask.index();
         &self.neighbours[self.starts[index] as usize..self.starts[index + 1] as usize]
     }

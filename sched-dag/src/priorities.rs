@@ -1,0 +1,90 @@
+//! Static priorities from the graph, for apps that give none.
+//!
+//! A subtask's *remaining path* is the longest path from its start to the end
+//! of the DAG, its own WCET included. The subtask with the longest remaining
+//! path comes first (the "highest level first" order; T. C. Hu, Operations
+//! Research 9, 1961, and, as upward rank, Topcuoglu, Hariri and Wu, IEEE TPDS
+//! 13, 2002); between equal paths the order of registration decides.
+//!
+//! If the WCET of any subtask of the DAG is unknown, every subtask counts 1, so
+//! that the path's number of subtasks decides: to mix known and invented times
+//! would favour whatever happened to be measured.
+//!
+//! Between DAGs, [`verify`](crate::verify) gives derived priorities deadline
+//! monotonically: all subtasks of the DAG with the shorter relative deadline
+//! come before all of the other (then the order of the commit), which is the
+//! order that the fixed-priority tests assume. Where some DAGs have priorities
+//! and others have not, the derived ones come after all that are given.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::ids::{SubtaskId, to_u32};
+use crate::policy::Priority;
+use crate::task_set::{Adjacency, Dag};
+
+/// Returns each subtask's remaining path in nanoseconds, in the order of
+/// registration, or `None` if a WCET is unknown.
+#[must_use]
+pub fn remaining_paths_ns(dag: &Dag) -> Option<Vec<u64>> {
+    let wcets_ns: Option<Vec<u64>> = dag
+        .subtasks()
+        .iter()
+        .map(|subtask| subtask.wcet_ns())
+        .collect();
+    Some(remaining_paths(
+        &wcets_ns?,
+        &dag.successors,
+        &dag.topological_order,
+    ))
+}
+
+/// Returns priorities from 0 on, the longest remaining path first, in the order
+/// of registration; all are different.
+#[must_use]
+pub fn longest_remaining_path_first(dag: &Dag) -> Vec<Priority> {
+    let wcets_ns: Vec<Option<u64>> = dag
+        .subtasks()
+        .iter()
+        .map(|subtask| subtask.wcet_ns())
+        .collect();
+    let ranks = ranks(&wcets_ns, &dag.successors, &dag.topological_order);
+    ranks.into_iter().map(Priority).collect()
+}
+
+/// Returns each subtask's position in the order of remaining paths.
+pub(crate) fn ranks(
+    wcets_ns: &[Option<u64>],
+    successors: &Adjacency,
+    topological_order: &[SubtaskId],
+) -> Vec<u32> {
+    let known: Option<Vec<u64>> = wcets_ns.iter().copied().collect();
+    let weights = known.unwrap_or_else(|| vec![1; wcets_ns.len()]);
+    let paths = remaining_paths(&weights, successors, topological_order);
+    let mut order: Vec<u32> = (0..to_u32(paths.len())).collect();
+    // Stable, so equal paths stay in the order of registration.
+    order.sort_by_key(|&subtask| core::cmp::Reverse(paths[subtask as usize]));
+    let mut ranks = vec![0; paths.len()];
+    for (rank, &subtask) in order.iter().enumerate() {
+        ranks[subtask as usize] = to_u32(rank);
+    }
+    ranks
+}
+
+fn remaining_paths(
+    weights: &[u64],
+    successors: &Adjacency,
+    topological_order: &[SubtaskId],
+) -> Vec<u64> {
+    let mut paths = vec![0_u64; weights.len()];
+    for &subtask in topological_order.iter().rev() {
+        let after = successors
+            .of(subtask)
+            .iter()
+            .map(|next| paths[next.index()])
+            .max();
+        // The sum of all WCETs fits, so no path overflows.
+        paths[subtask.index()] = weights[subtask.index()].saturating_add(after.unwrap_or(0));
+    }
+    paths
+}

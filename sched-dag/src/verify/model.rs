@@ -1,0 +1,130 @@
+//! From specs without fault to the model.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use super::attributes::in_flight;
+use super::fault::Fault;
+use super::findings::Findings;
+use super::label::DagLabel;
+use super::shape::Shape;
+use crate::ids::{SubtaskId, to_u32};
+use crate::policy::Priority;
+use crate::priorities::ranks;
+use crate::spec::DagSpec;
+use crate::task_set::{Adjacency, Dag, Subtask, TaskSet};
+
+/// Makes the model, or notes that the derived priorities do not fit.
+///
+/// # Panics
+///
+/// If the specs have a fault that an earlier check finds.
+pub(super) fn build(
+    specs: &[DagSpec],
+    shapes: Vec<Shape>,
+    findings: &mut Findings,
+) -> Option<TaskSet> {
+    let bases = priority_bases(specs, findings);
+    if findings.has_faults() {
+        return None;
+    }
+    let dags = specs.iter().zip(shapes).zip(bases);
+    Some(TaskSet {
+        dags: dags
+            .map(|((spec, shape), base)| build_dag(spec, shape, base))
+            .collect(),
+    })
+}
+
+/// Returns for each DAG without priorities the number of its first one:
+/// deadline monotonic, after all that are given.
+fn priority_bases(specs: &[DagSpec], findings: &mut Findings) -> Vec<u32> {
+    let given = specs
+        .iter()
+        .filter(|spec| has_priorities(spec))
+        .flat_map(|spec| &spec.subtasks);
+    let largest = given
+        .filter_map(|subtask| subtask.priority)
+        .map(|Priority(number)| number)
+        .max();
+    let mut next = largest.map_or(0, |number| u64::from(number) + 1);
+
+    let mut order: Vec<usize> = (0..specs.len())
+        .filter(|&dag| !has_priorities(&specs[dag]))
+        .collect();
+    order.sort_by_key(|&dag| specs[dag].relative_deadline_ns);
+    let mut bases = alloc::vec![0; specs.len()];
+    for dag in order {
+        let after = next + specs[dag].subtasks.len() as u64;
+        match u32::try_from(next) {
+            Ok(base) if after <= u64::from(u32::MAX) + 1 => bases[dag] = base,
+            _ => findings.fault(
+                dag,
+                Fault::PrioritiesExhausted {
+                    dag: DagLabel::new(specs, dag),
+                },
+            ),
+        }
+        next = after;
+    }
+    bases
+}
+
+fn has_priorities(spec: &DagSpec) -> bool {
+    spec.subtasks
+        .iter()
+        .all(|subtask| subtask.priority.is_some())
+}
+
+fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
+    let Shape {
+        graph,
+        topological_order,
+    } = shape;
+    let ranks = if has_priorities(spec) {
+        Vec::new()
+    } else {
+        let wcets_ns: Vec<Option<u64>> = spec
+            .subtasks
+            .iter()
+            .map(|subtask| subtask.wcet_ns)
+            .collect();
+        ranks(&wcets_ns, &graph.successors, &topological_order)
+    };
+    let subtasks = spec
+        .subtasks
+        .iter()
+        .enumerate()
+        .map(|(index, subtask)| Subtask {
+            name: subtask.name.clone(),
+            wcet_ns: subtask.wcet_ns,
+            priority: match ranks.get(index) {
+                Some(rank) => Priority(priority_base + rank),
+                None => subtask.priority.expect("given to all subtasks of the dag"),
+            },
+            non_preemptive: subtask.non_preemptive,
+        });
+    Dag {
+        name: spec.name.clone(),
+        period_ns: spec.period_ns.expect("verified to be given"),
+        relative_deadline_ns: spec.relative_deadline_ns.expect("verified to be given"),
+        offset_ns: spec.offset_ns,
+        in_flight: u32::try_from(in_flight(spec)).expect("verified to fit the instance limit"),
+        overrun: spec.overrun,
+        jobs: spec.jobs,
+        subtasks: subtasks.collect(),
+        sources: without_neighbours(&graph.predecessors),
+        sinks: without_neighbours(&graph.successors),
+        predecessors: graph.predecessors,
+        successors: graph.successors,
+        topological_order: topological_order.into_boxed_slice(),
+    }
+}
+
+fn without_neighbours(adjacency: &Adjacency) -> Box<[SubtaskId]> {
+    let count = to_u32(adjacency.starts.len() - 1);
+    (0..count)
+        .map(SubtaskId)
+        .filter(|&subtask| adjacency.of(subtask).is_empty())
+        .collect()
+}
