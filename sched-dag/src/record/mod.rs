@@ -1,0 +1,189 @@
+//! What happened in a run: the times of every job and instance.
+//!
+//! A driver fills a [`Record`] while it runs a task set whose DAGs have a limit
+//! of jobs; all its memory is taken before. Afterwards [`violations`] holds the
+//! record against the model's rules, and reports compute their figures from it.
+//! Times are in nanoseconds on the scheduler's clock.
+
+mod violation;
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+pub use violation::{Violation, violations};
+
+use crate::ids::{CoreId, DagId, Instance, SubtaskId};
+use crate::task_set::TaskSet;
+
+/// The times of one instance; each `None` until it has happened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InstanceRecord {
+    /// When all that it waits for had happened.
+    pub ready_ns: Option<u64>,
+    /// When its function was called.
+    pub start_ns: Option<u64>,
+    /// When its function had returned.
+    pub finish_ns: Option<u64>,
+    /// The core on which it finished.
+    pub core: Option<CoreId>,
+    /// How many times its function has returned; more than 1 is a violation.
+    pub runs: u32,
+}
+
+/// The times of one job; each `None` until it has happened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct JobRecord {
+    /// The nominal release time, once the job is released.
+    pub release_ns: Option<u64>,
+    /// When the release was carried out.
+    pub released_ns: Option<u64>,
+}
+
+/// The times of all jobs of all DAGs.
+#[derive(Clone, Debug)]
+pub struct Record {
+    dags: Vec<DagRecord>,
+}
+
+#[derive(Clone, Debug)]
+struct DagRecord {
+    subtasks: usize,
+    jobs: Vec<JobRecord>,
+    /// Job by job, within a job by subtask.
+    instances: Vec<InstanceRecord>,
+}
+
+impl Record {
+    /// Makes an empty record for all jobs of `task_set`. A DAG without a limit
+    /// of jobs gets no room: nothing is recorded of it.
+    ///
+    /// Returns `None` if the jobs are too many for this machine's memory to
+    /// address.
+    #[must_use]
+    pub fn new(task_set: &TaskSet) -> Option<Self> {
+        let dags = task_set.dags().iter().map(|dag| {
+            let jobs = usize::try_from(dag.jobs().unwrap_or(0)).ok()?;
+            let subtasks = dag.subtasks().len();
+            let instances = jobs.checked_mul(subtasks)?;
+            Some(DagRecord {
+                subtasks,
+                jobs: vec![JobRecord::default(); jobs],
+                instances: vec![InstanceRecord::default(); instances],
+            })
+        });
+        Some(Self {
+            dags: dags.collect::<Option<_>>()?,
+        })
+    }
+
+    /// Returns the bytes that a record for `task_set` needs, `None` if that is
+    /// beyond a `usize`.
+    #[must_use]
+    pub fn size_of(task_set: &TaskSet) -> Option<usize> {
+        task_set.dags().iter().try_fold(0usize, |sum, dag| {
+            let jobs = usize::try_from(dag.jobs().unwrap_or(0)).ok()?;
+            let job = size_of::<InstanceRecord>()
+                .checked_mul(dag.subtasks().len())?
+                .checked_add(size_of::<JobRecord>())?;
+            sum.checked_add(jobs.checked_mul(job)?)
+        })
+    }
+
+    /// Returns the jobs of a DAG.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn jobs(&self, dag: DagId) -> &[JobRecord] {
+        &self.dags[dag.index()].jobs
+    }
+
+    /// Returns the instances of a job by subtask; empty if it is not recorded.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn instances(&self, dag: DagId, job: u64) -> &[InstanceRecord] {
+        let dag = &self.dags[dag.index()];
+        let range = usize::try_from(job).ok().and_then(|job| {
+            let start = job.checked_mul(dag.subtasks)?;
+            Some(start..start.checked_add(dag.subtasks)?)
+        });
+        range
+            .and_then(|range| dag.instances.get(range))
+            .unwrap_or(&[])
+    }
+
+    /// Returns an instance's times, `None` if it is not recorded.
+    #[must_use]
+    pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
+        self.instances(instance.dag, instance.job)
+            .get(instance.subtask.index())
+    }
+
+    /// Returns an instance's times to be filled in, `None` if it is not recorded.
+    pub fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
+        let dag = self.dags.get_mut(instance.dag.index())?;
+        let job = usize::try_from(instance.job).ok()?;
+        let index = job
+            .checked_mul(dag.subtasks)?
+            .checked_add(instance.subtask.index())?;
+        dag.instances.get_mut(index)
+    }
+
+    /// Returns a job's times to be filled in, `None` if it is not recorded.
+    pub fn job_mut(&mut self, dag: DagId, job: u64) -> Option<&mut JobRecord> {
+        self.dags
+            .get_mut(dag.index())?
+            .jobs
+            .get_mut(usize::try_from(job).ok()?)
+    }
+
+    /// Returns when all predecessors of a subtask had finished their part of
+    /// the job: the earliest time at which the model lets it become ready by R2.
+    /// `None` if it has no predecessor, or one has not finished.
+    #[must_use]
+    pub fn join_ns(&self, task_set: &TaskSet, instance: Instance) -> Option<u64> {
+        let Instance { dag, job, subtask } = instance;
+        let job = self.instances(dag, job);
+        let predecessors = task_set.dag(dag).predecessors(subtask);
+        latest(predecessors.iter().map(|u| job.get(u.index())?.finish_ns))
+    }
+
+    /// Returns when a job was complete (R4): the latest finish of its subtasks.
+    /// `None` if one has not finished.
+    #[must_use]
+    pub fn completion_ns(&self, dag: DagId, job: u64) -> Option<u64> {
+        latest(
+            self.instances(dag, job)
+                .iter()
+                .map(|instance| instance.finish_ns),
+        )
+    }
+
+    fn all_instances<'a>(
+        &'a self,
+        task_set: &'a TaskSet,
+    ) -> impl Iterator<Item = (Instance, &'a InstanceRecord)> {
+        (0..)
+            .map(DagId)
+            .zip(task_set.dags())
+            .flat_map(move |(dag, _)| {
+                (0u64..).zip(self.jobs(dag)).flat_map(move |(job, _)| {
+                    (0..)
+                        .map(SubtaskId)
+                        .zip(self.instances(dag, job))
+                        .map(move |(subtask, record)| (Instance { dag, job, subtask }, record))
+                })
+            })
+    }
+}
+
+/// Returns the latest of some times, `None` if one is missing or there are none.
+fn latest(times: impl Iterator<Item = Option<u64>>) -> Option<u64> {
+    times
+        .reduce(|latest, time| Some(latest?.max(time?)))
+        .flatten()
+}
