@@ -1,0 +1,195 @@
+//! Blocks in raw memory: the only place that reads and writes them.
+//!
+//! A [`Block`] is a pointer to a header. Its methods are safe to call because
+//! only [`Block::create_region`] and [`Block::of_payload`] make one from
+//! nothing, and both are `unsafe`; the rest follows from the invariants
+//! **Ownership**, **Tiling** and **Listing** of the [module above](super), which
+//! each method here keeps and relies on.
+//!
+//! ```text
+//!  |<-------------- size (multiple of 16) ------------->|
+//!  | size, free bit | previous | links, while free  ... | header of the next
+//!  ^ block, 16-aligned         ^ payload, 16-aligned
+//! ```
+//!
+//! Pointers stay pointers, never integers: each is derived from the pointer with
+//! which its region was added, as strict provenance asks for.
+
+use core::ptr::NonNull;
+
+/// Bytes that all block addresses and sizes are multiples of, and the alignment
+/// that every payload has.
+pub(super) const GRANULE: usize = 16;
+/// Bytes before the payload of a block.
+pub(super) const HEADER_SIZE: usize = size_of::<Header>();
+/// Bytes of the smallest block: its payload holds the links when it is free.
+pub(super) const MIN_BLOCK_SIZE: usize = HEADER_SIZE + size_of::<Links>();
+
+const _: () = assert!(HEADER_SIZE == GRANULE && align_of::<Header>() == GRANULE);
+const _: () = assert!(MIN_BLOCK_SIZE == 2 * GRANULE && align_of::<Links>() <= GRANULE);
+
+/// The bit of [`Header::size_and_free`] that is set while the block is free.
+const FREE: usize = 1;
+
+/// A block of the tiling, or an end marker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Block(NonNull<Header>);
+
+#[derive(Clone, Copy)]
+#[repr(C, align(16))]
+struct Header {
+    /// The size; its lowest bits, zero in a multiple of 16, hold [`FREE`].
+    size_and_free: usize,
+    /// The block that ends where this one starts; none for a region's first.
+    previous: Option<Block>,
+}
+
+/// The neighbours of a free block in the list of its class.
+#[derive(Clone, Copy)]
+pub(super) struct Links {
+    pub(super) before: Option<Block>,
+    pub(super) after: Option<Block>,
+}
+
+impl Block {
+    /// Makes a region of one used block of `size` bytes and an end marker.
+    ///
+    /// # Safety
+    ///
+    /// 1. `start` is 16-aligned; `size` is a multiple of 16, at least
+    ///    [`MIN_BLOCK_SIZE`].
+    /// 2. **Ownership** holds for `size + HEADER_SIZE` bytes from `start` on.
+    pub(super) unsafe fn create_region(start: NonNull<u8>, size: usize) -> Self {
+        let block = Self(start.cast());
+        // The end marker has size 0, and is used so that nothing merges with it.
+        let end = block.at_offset(size);
+        end.write(Header {
+            size_and_free: 0,
+            previous: Some(block),
+        });
+        block.write(Header {
+            size_and_free: size,
+            previous: None,
+        });
+        block
+    }
+
+    /// Returns the block that has this payload.
+    ///
+    /// # Safety
+    ///
+    /// `payload` is what [`payload`](Self::payload) returned for a block that is
+    /// still in the tiling.
+    pub(super) const unsafe fn of_payload(payload: NonNull<u8>) -> Self {
+        // SAFETY: by the caller's promise and Tiling a header lies before it, in
+        // the same region.
+        Self(unsafe { payload.byte_sub(HEADER_SIZE) }.cast())
+    }
+
+    /// Returns the memory after the header.
+    pub(super) fn payload(self) -> NonNull<u8> {
+        self.at_offset(HEADER_SIZE).0.cast()
+    }
+
+    /// Returns the size in bytes, header included; 0 for an end marker.
+    pub(super) fn size(self) -> usize {
+        self.read().size_and_free & !FREE
+    }
+
+    pub(super) fn is_free(self) -> bool {
+        self.read().size_and_free & FREE != 0
+    }
+
+    /// Returns the block before this one, or `None` if it is its region's first.
+    pub(super) fn previous(self) -> Option<Self> {
+        self.read().previous
+    }
+
+    /// Returns the block, or the end marker, after this block.
+    pub(super) fn next(self) -> Self {
+        debug_assert!(self.size() != 0, "nothing follows an end marker");
+        self.at_offset(self.size())
+    }
+
+    /// Marks the block as free, or as used. Only the free lists may: **Listing**.
+    pub(super) fn set_free(self, free: bool) {
+        let header = self.read();
+        let flag = if free { FREE } else { 0 };
+        self.write(Header {
+            size_and_free: header.size_and_free & !FREE | flag,
+            ..header
+        });
+    }
+
+    /// Cuts a used block after `size` bytes and returns the part behind the cut,
+    /// used as well. Both parts must come out as large as a block can be small.
+    pub(super) fn split(self, size: usize) -> Self {
+        let whole = self.read();
+        debug_assert!(size >= MIN_BLOCK_SIZE && size.is_multiple_of(GRANULE));
+        debug_assert!(whole.size_and_free - size >= MIN_BLOCK_SIZE);
+        let after = self.next();
+        let rest = self.at_offset(size);
+        rest.write(Header {
+            size_and_free: whole.size_and_free - size,
+            previous: Some(self),
+        });
+        self.write(Header {
+            size_and_free: size,
+            ..whole
+        });
+        after.set_previous(rest);
+        rest
+    }
+
+    /// Merges the used block `next`, which follows this used block, into it.
+    pub(super) fn absorb(self, next: Self) {
+        debug_assert!(self.next() == next && !self.is_free() && !next.is_free());
+        let header = self.read();
+        let after = next.next();
+        self.write(Header {
+            size_and_free: header.size_and_free + next.size(),
+            ..header
+        });
+        after.set_previous(self);
+    }
+
+    /// Returns the links of a listed block.
+    pub(super) fn links(self) -> Links {
+        debug_assert!(self.is_free(), "a used block has no links");
+        let links: NonNull<Links> = self.payload().cast();
+        // SAFETY: by Listing they are initialised, by Ownership ours to read.
+        unsafe { links.read() }
+    }
+
+    /// Sets the links of a block that is listed, or is about to be.
+    pub(super) fn set_links(self, links: Links) {
+        let place: NonNull<Links> = self.payload().cast();
+        // SAFETY: no caller holds this block, so that by Ownership its payload is
+        // ours; by Tiling it has the room, and the alignment of a granule.
+        unsafe { place.write(links) };
+    }
+
+    fn set_previous(self, previous: Self) {
+        self.write(Header {
+            previous: Some(previous),
+            ..self.read()
+        });
+    }
+
+    /// The place `offset` bytes after the start of this block, at most its size.
+    fn at_offset(self, offset: usize) -> Self {
+        // SAFETY: by Tiling a block and the header after it are in one region.
+        Self(unsafe { self.0.byte_add(offset) })
+    }
+
+    fn read(self) -> Header {
+        // SAFETY: by Tiling the header is initialised, by Ownership ours to read.
+        unsafe { self.0.read() }
+    }
+
+    fn write(self, header: Header) {
+        // SAFETY: by Tiling and Ownership headers are ours to write, also where a
+        // split is about to put one: within a block that no caller holds.
+        unsafe { self.0.write(header) };
+    }
+}
