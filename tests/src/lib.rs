@@ -12,11 +12,11 @@
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
 //! - [`elf`], [`image`], [`tiny`]: what is booted;
-//! - [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
+//! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table;
 //! - [`guest`]: all that for a test;
-//! - [`run`]: the subcommands.
+//! - [`run`](mod@run), [`test`](mod@test): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
 //! as good that did not say so twice. It uses the standard library only, and
@@ -24,6 +24,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod child;
 pub mod elf;
 pub mod guest;
 pub mod image;
@@ -37,6 +38,7 @@ pub mod qemu;
 pub mod run;
 pub mod system;
 pub mod tail;
+pub mod test;
 pub mod tiny;
 
 pub use guest::Guest;

@@ -14,11 +14,18 @@ use harness::options::nearest;
 type Work = fn(&[String]) -> ExitCode;
 
 /// The subcommands: name, what it does in a few words, and its function.
-const SUBCOMMANDS: &[(&str, &str, Work)] = &[(
-    "run",
-    "boot an app in QEMU and judge the run",
-    harness::run::run,
-)];
+const SUBCOMMANDS: &[(&str, &str, Work)] = &[
+    (
+        "run",
+        "boot an app in QEMU and judge the run",
+        harness::run::run,
+    ),
+    (
+        "test",
+        "run every test, on the host and in QEMU",
+        harness::test::test,
+    ),
+];
 
 fn main() -> ExitCode {
     if let Some(folder) = env::var_os("HARNESS_CALLED_IN") {

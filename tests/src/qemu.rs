@@ -14,7 +14,6 @@ mod process;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 pub use process::{Ending, Running};
 
@@ -206,7 +205,7 @@ impl Qemu {
         let name = self.program.display().to_string();
         let program = crate::system::find_program(&name)
             .ok_or_else(|| format!("there is no program `{name}`; install QEMU or name another"))?;
-        let mut command = Command::new(program);
+        let mut command = crate::child::bound_to_us(&program);
         command.args(self.arguments(image, serial));
         Running::start(command, serial)
     }

@@ -5,25 +5,21 @@
 //! `(v << 1) | 1`: 33 for success, 35 for failure, 37 for a refused command
 //! line. No other status is a guest's own word.
 //!
-//! A QEMU started here does not outlive the tool: it is killed by its own
-//! process id when the limit is over and when [`Running`] is dropped; ctrl-C
-//! reaches it as a member of the terminal's process group; and where
-//! `setpriv` exists the system kills it if the tool itself is killed.
+//! A QEMU started here does not outlive the tool, see [`crate::child`];
+//! ctrl-C reaches it as a member of the terminal's process group.
 
 use std::ffi::OsString;
 use std::fmt;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::Duration;
 
+use crate::child::{Child, Waited};
 use crate::protocol::Status;
 
 /// The most that a guest may print; beyond it something prints without end.
 const MOST_SERIAL_BYTES: u64 = 64 << 20;
-
-/// How long one look at the process is from the next.
-const PAUSE: Duration = Duration::from_millis(10);
 
 /// How a QEMU process ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -71,14 +67,13 @@ impl fmt::Display for Ending {
 #[derive(Debug)]
 pub struct Running {
     child: Child,
-    started: Instant,
     serial: PathBuf,
     complaints: PathBuf,
 }
 
 impl Running {
     /// Starts `command` with its streams away from the terminal.
-    pub(super) fn start(command: Command, serial: &Path) -> Result<Running, String> {
+    pub(super) fn start(mut command: Command, serial: &Path) -> Result<Running, String> {
         let file_error = |path: &Path| {
             let path = path.display().to_string();
             move |error| format!("cannot write `{path}`: {error}; name a file elsewhere")
@@ -89,18 +84,14 @@ impl Running {
         let complaints = PathBuf::from(complaints);
         let errors = File::create(&complaints).map_err(file_error(&complaints))?;
 
-        let program = command.get_program().to_owned();
-        let mut command = bound_to_us(command);
         command
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(errors);
-        let child = command
-            .spawn()
-            .map_err(|error| format!("cannot start `{}`: {error}", program.display()))?;
+        let child = Child::start(&mut command)
+            .map_err(|error| format!("cannot start QEMU: {error}; is it for this machine?"))?;
         Ok(Running {
             child,
-            started: Instant::now(),
             serial: serial.to_path_buf(),
             complaints,
         })
@@ -109,30 +100,22 @@ impl Running {
     /// Waits for the end, for at most `limit` since the start. `look` is
     /// called between two looks at the process, to show what was printed.
     pub fn wait(&mut self, limit: Duration, mut look: impl FnMut()) -> Ending {
-        loop {
-            // An error here would mean that someone else has reaped it.
-            match self.child.try_wait() {
-                Ok(Some(status)) => return ending_of(status),
-                Ok(None) => {}
-                Err(_) => return Ending::Signal,
-            }
-            if self.started.elapsed() >= limit {
-                self.kill();
-                return Ending::TimedOut(limit);
-            }
-            if fs::metadata(&self.serial).is_ok_and(|file| file.len() > MOST_SERIAL_BYTES) {
-                self.kill();
-                return Ending::TooMuchOutput;
-            }
+        let serial = &self.serial;
+        let waited = self.child.wait(limit, || {
             look();
-            std::thread::sleep(PAUSE);
+            fs::metadata(serial).is_ok_and(|file| file.len() <= MOST_SERIAL_BYTES)
+        });
+        match waited {
+            Waited::Ended(status) => ending_of(status),
+            Waited::TimedOut => Ending::TimedOut(limit),
+            Waited::GivenUp => Ending::TooMuchOutput,
         }
     }
 
     /// Returns the time since the start.
     #[must_use]
     pub fn elapsed(&self) -> Duration {
-        self.started.elapsed()
+        self.child.elapsed()
     }
 
     /// Returns what QEMU itself complained of, on one line; mostly empty.
@@ -142,17 +125,11 @@ impl Running {
         let text = String::from_utf8_lossy(&text);
         text.lines().collect::<Vec<_>>().join("; ")
     }
-
-    fn kill(&mut self) {
-        // It may have ended by itself in between: then there is nothing to do.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
-        self.kill();
+        // It is ours, and in the way of no one if it cannot be removed.
         let _ = fs::remove_file(&self.complaints);
     }
 }
@@ -165,17 +142,4 @@ fn ending_of(status: ExitStatus) -> Ending {
         Some(code) => Ending::Status(code),
         None => Ending::Signal,
     }
-}
-
-/// Has the system kill the program when we die, if `setpriv` is there to ask
-/// for it. `setpriv` becomes the program, so the process id stays the same.
-fn bound_to_us(command: Command) -> Command {
-    if crate::system::find_program("setpriv").is_none() {
-        return command;
-    }
-    let mut bound = Command::new("setpriv");
-    bound.args(["--pdeathsig", "KILL", "--"]);
-    bound.arg(command.get_program());
-    bound.args(command.get_args());
-    bound
 }

@@ -1,0 +1,80 @@
+//! The subcommand `test`: every test there is, counted.
+//!
+//! A *test* is a libtest test of any package (boot tests are such: they boot
+//! guests), a doctest, or a *check*: one property of the whole tree with a
+//! name of its own, such as "clippy has nothing to say". All of them end up
+//! in one [`Tally`], whose last line is `N passed, M failed`, with
+//! `, K skipped` if something could not run; the reasons stand above it.
+//!
+//! Nothing passes by not running: a test binary that does not compile, dies
+//! without its result line, or does not end within its time is a failure.
+
+mod checks;
+mod crates;
+mod libtest;
+mod lint;
+mod table;
+mod tally;
+mod unsafe_places;
+
+use std::process::ExitCode;
+
+use crate::image;
+use crate::install;
+use crate::options::Request;
+use libtest::Plan;
+
+pub use table::TEST;
+pub use tally::Tally;
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn test(words: &[String]) -> ExitCode {
+    let options = match TEST.parse(words) {
+        Ok(Request::Work(options)) => options,
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => {
+            eprintln!("test: {error}");
+            return ExitCode::from(2);
+        }
+    };
+    let plan = Plan {
+        filter: options.positional().map(String::from),
+        quick: options.is_given("quick"),
+        verbose: options.is_given("verbose"),
+        boots: install::ensure_qemu(),
+    };
+    let mut tally = Tally::default();
+    build_images(&plan, &mut tally);
+    libtest::run_all(&plan, &mut tally);
+    checks::run_all(&plan, &mut tally);
+
+    print!("{tally}");
+    if tally.is_empty() {
+        let filter = plan.filter.unwrap_or_default();
+        eprintln!("test: nothing is called `{filter}`; give a part of a test's name");
+        return ExitCode::from(2);
+    }
+    if tally.failed() > 0 {
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}
+
+/// Builds the images before the tests that boot them, so that their limits do
+/// not have to hold for a compiler too. A failure shows in those tests.
+fn build_images(plan: &Plan, tally: &mut Tally) {
+    if plan.quick {
+        return;
+    }
+    for app in image::apps() {
+        let name = format!("image of {app} builds");
+        if plan.wants(&name) {
+            let built = image::build(&app);
+            tally.add(&name, built.map(|_| ()).map_err(|error| error.to_string()));
+        }
+    }
+}

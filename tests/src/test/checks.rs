@@ -1,0 +1,174 @@
+//! Checks: properties of the whole tree, each counted as one test.
+//!
+//! They hold the promises that no unit test can: the image's weight, no
+//! package but our own, `unsafe` only where it may stand, no file too long,
+//! nothing for the formatter, the linter and the documentation to complain
+//! of, and a guest under KVM where KVM works.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::libtest::Plan;
+use super::tally::Tally;
+use super::{lint, unsafe_places};
+use crate::image::{self, MOST_STRIPPED_BYTES};
+use crate::probe;
+use crate::qemu::PROGRAM;
+use crate::system;
+
+/// The most lines of a source file.
+const MOST_LINES: usize = 400;
+
+/// Runs the checks that the plan wants.
+pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
+    let sources = sources();
+    let quick: [(&str, Result<(), String>); 4] = [
+        ("Cargo.lock names only our own packages", lock_is_ours()),
+        (
+            "unsafe stands only where it may",
+            unsafe_places::check(&sources),
+        ),
+        (
+            "no source file has more than 400 lines",
+            files_are_short(&sources),
+        ),
+        (
+            "every source file opens with an essay",
+            files_have_essays(&sources),
+        ),
+    ];
+    for (name, result) in quick {
+        if plan.wants(name) {
+            tally.add(name, result);
+        }
+    }
+    for (name, check) in lint::CHECKS {
+        match (plan.wants(name), plan.quick) {
+            (false, _) => {}
+            (true, true) => tally.skip(name, "left out by --quick"),
+            (true, false) => tally.add(name, check()),
+        }
+    }
+    if plan.quick {
+        return;
+    }
+    for app in image::apps() {
+        let name = format!(
+            "image of {app} weighs at most {} KiB",
+            MOST_STRIPPED_BYTES >> 10
+        );
+        if plan.wants(&name) {
+            tally.add(&name, image_is_light(&app));
+        }
+    }
+    let name = "a guest runs under KVM";
+    if plan.wants(name) {
+        match probe::kvm(Path::new(PROGRAM)) {
+            Ok(()) => tally.add(name, Ok(())),
+            Err(why) => tally.skip(name, &why),
+        }
+    }
+}
+
+/// Returns all Rust files of the workspace but the generated ones.
+fn sources() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![system::workspace().to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if path.is_dir() && !name.starts_with('.') && name != "target" {
+                folders.push(path);
+            } else if name.ends_with(".rs") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// A package of ours has no `source`: it lies in the workspace.
+fn lock_is_ours() -> Result<(), String> {
+    let path = system::workspace().join("Cargo.lock");
+    let lock = fs::read_to_string(&path).map_err(|error| format!("Cargo.lock: {error}"))?;
+    foreign(&lock)
+}
+
+fn foreign(lock: &str) -> Result<(), String> {
+    let packages = lock.split("[[package]]").skip(1);
+    let foreign = packages.filter(|package| package.contains("\nsource = "));
+    let name = |package: &str| package.split('"').nth(1).unwrap_or("?").to_string();
+    let names: Vec<String> = foreign.map(name).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "packages of others: {}; do without them",
+        names.join(", ")
+    ))
+}
+
+fn files_are_short(sources: &[PathBuf]) -> Result<(), String> {
+    complain(sources, |text| {
+        let lines = text.lines().count();
+        (lines > MOST_LINES).then(|| format!("has {lines} lines, split it"))
+    })
+}
+
+fn files_have_essays(sources: &[PathBuf]) -> Result<(), String> {
+    complain(sources, |text| {
+        let code = text
+            .lines()
+            .find(|line| !line.trim().is_empty() && !line.starts_with("#!"));
+        let essay = code.is_some_and(|line| line.starts_with("//!"));
+        (!essay).then(|| "does not open with `//!`".to_string())
+    })
+}
+
+/// Asks for a fault of each file and gathers them on one line.
+fn complain(sources: &[PathBuf], fault: impl Fn(&str) -> Option<String>) -> Result<(), String> {
+    let mut faults = Vec::new();
+    for path in sources {
+        let shown = path
+            .strip_prefix(system::workspace())
+            .unwrap_or(path)
+            .display();
+        match fs::read_to_string(path) {
+            Ok(text) => faults.extend(fault(&text).map(|fault| format!("{shown} {fault}"))),
+            Err(error) => faults.push(format!("{shown}: {error}")),
+        }
+    }
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(faults.join("; "))
+}
+
+fn image_is_light(app: &str) -> Result<(), String> {
+    let image = image::build(app).map_err(|error| error.to_string())?;
+    let bytes = image.stripped_bytes()?;
+    println!("image of {app}: {bytes} bytes stripped");
+    if bytes <= MOST_STRIPPED_BYTES {
+        return Ok(());
+    }
+    Err(format!(
+        "it weighs {bytes} bytes, {MOST_STRIPPED_BYTES} are allowed"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::foreign;
+
+    #[test]
+    fn a_package_from_a_registry_is_named() {
+        let own = "version = 4\n\n[[package]]\nname = \"boot\"\nversion = \"0.1.0\"\n";
+        assert_eq!(foreign(own), Ok(()));
+        let with = format!("{own}\n[[package]]\nname = \"libc\"\nsource = \"registry+x\"\n");
+        let fault = foreign(&with).unwrap_err();
+        assert_eq!(fault, "packages of others: libc; do without them");
+    }
+}

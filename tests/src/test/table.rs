@@ -1,0 +1,35 @@
+//! What `test` accepts: the one table behind its parser and its help text.
+
+use crate::options::{Command, Opt, Takes};
+
+/// The table of `test`.
+pub static TEST: Command = Command {
+    invocation: "./scripts/test",
+    about: "Runs every test, on the host and in QEMU, and counts them.",
+    positional: Some((
+        "FILTER",
+        "Run only tests and checks whose name contains this.",
+    )),
+    options: &[
+        Opt {
+            name: "quick",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "Only what runs on the host: no guests, no images, no lints.",
+        },
+        Opt {
+            name: "verbose",
+            short: Some('v'),
+            takes: Takes::Nothing,
+            default: "",
+            help: "Show every test by name, not only those that fail.",
+        },
+    ],
+    notes: "\
+The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
+the reasons above it.
+
+exit codes: 0 nothing failed; 1 something failed; 2 a refused command line
+",
+};
