@@ -1,2 +1,178 @@
-//! Runs DAGs built with `fass` in virtual time on the host.
+//! Runs DAGs built with `fass` on the host, in virtual time.
+//!
+//! For our purposes *virtual time* is a clock that jumps from one event to the
+//! next. The real functions run, with real values on real topics, under the very
+//! scheduler that the kernel uses; only the passing of time is made up: a
+//! function takes no time except where it says so with `fass::execute_for`. An
+//! hour of a DAG's life takes milliseconds, and every run of the same DAGs gives
+//! the same events at the same nanosecond.
+//!
+//! It is the place to test an app: build the DAGs with the app's own code,
+//! commit them, [`run`](VirtualTime::run), and look into the [`Report`].
+//!
+//! # What is guaranteed
+//!
+//! - The schedule is the one that rules R1-R5 of the task model prescribe.
+//!   [`Report::violations`] checks R1-R4 over what was recorded.
+//! - Machines belong to threads: tests that run in parallel, each with its own
+//!   [`VirtualTime`], do not disturb one another.
+//!
+//! # What is not
+//!
+//! - Functions run one after another, on one thread. Races between functions
+//!   that share data behind the scheduler's back do not show here.
+//! - An instance's function runs at the instant of its start, and all at once.
+//!   If the instance is preempted in virtual time, its function has long
+//!   returned; `fass::now_ns` inside it counts as if it were not preempted.
+//! - The kernel's own overheads are zero.
 #![forbid(unsafe_code)]
+
+mod error;
+mod event;
+mod platform;
+mod record;
+mod recorder;
+mod report;
+mod rules;
+mod session;
+
+use std::rc::Rc;
+use std::time::Duration;
+
+use fass::{Policy, Preemption};
+pub use sched_dag::{CoreId, DagId, DagStatistics, Instance, JobOutcome, SubtaskId};
+
+pub use error::RunError;
+pub use event::{Event, EventKind};
+use platform::Machine;
+pub use record::{InstanceRecord, JobRecord};
+pub use report::Report;
+pub use rules::{Rule, Violation};
+
+/// A machine in virtual time, belonging to the thread that makes it.
+///
+/// Made with one core, EDF and preemption; the builder's methods change that
+/// and are to be called before the commit. A thread's newest machine is the one
+/// that `fass::finish_create_dags` commits to; dropping it removes it.
+///
+/// # Examples
+///
+/// ```
+/// use std::time::Duration;
+/// use fass::{Occupation, Policy, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new().cores(1).policy(Policy::Edf);
+/// let dag = create_dag();
+/// dag.jobs(2);
+/// let period = Duration::from_millis(10);
+/// dag.register_periodic_subtask(
+///     || {
+///         execute_for(Duration::from_millis(2), Occupation::Spin);
+///         (1,)
+///     },
+///     vec!["number"],
+///     period,
+///     SubtaskAttributes::named("source"),
+/// );
+/// dag.register_sink_subtask(
+///     |(_,): (i32,)| execute_for(Duration::from_millis(3), Occupation::Spin),
+///     vec!["number"],
+///     period,
+///     SubtaskAttributes::named("sink"),
+/// );
+/// finish_create_dags(&[dag]).unwrap();
+///
+/// let report = machine.run();
+/// assert_eq!(report.violations(), []);
+/// assert_eq!(report.jobs[0].response_time_ns(), Some(5_000_000));
+/// assert_eq!(report.jobs[1].release_ns, 10_000_000);
+/// ```
+#[derive(Debug)]
+pub struct VirtualTime {
+    machine: Rc<Machine>,
+}
+
+impl VirtualTime {
+    /// Makes a machine for this thread, and installs virtual time as the
+    /// program's platform if that has not happened yet.
+    ///
+    /// # Panics
+    ///
+    /// If the program has installed another platform.
+    #[must_use = "dropping the machine removes it from the thread"]
+    #[allow(clippy::new_without_default, reason = "it installs a platform")]
+    pub fn new() -> Self {
+        Self {
+            machine: platform::make_current(),
+        }
+    }
+
+    /// Sets the number of cores.
+    #[must_use = "the machine itself is returned"]
+    pub fn cores(self, cores: u32) -> Self {
+        self.machine.cores.set(cores);
+        self
+    }
+
+    /// Sets the scheduling policy.
+    #[must_use = "the machine itself is returned"]
+    pub fn policy(self, policy: Policy) -> Self {
+        self.machine.policy.set(policy);
+        self
+    }
+
+    /// Sets whether a started instance may lose its core.
+    #[must_use = "the machine itself is returned"]
+    pub fn preemption(self, preemption: Preemption) -> Self {
+        self.machine.preemption.set(preemption);
+        self
+    }
+
+    /// Runs until every job of every DAG has ended, and reports all that
+    /// happened since the commit.
+    ///
+    /// # Panics
+    ///
+    /// If [`try_run`](Self::try_run) gives an error, with its message.
+    pub fn run(&self) -> Report {
+        or_panic(self.try_run())
+    }
+
+    /// Runs for `duration` of virtual time, including events at its very end,
+    /// and reports all that happened since the commit. May be called again to
+    /// go on.
+    ///
+    /// # Panics
+    ///
+    /// If [`try_run_for`](Self::try_run_for) gives an error, with its message.
+    pub fn run_for(&self, duration: Duration) -> Report {
+        or_panic(self.try_run_for(duration))
+    }
+
+    /// Runs as [`run`](Self::run) does.
+    ///
+    /// # Errors
+    ///
+    /// See [`RunError`]. The run is over then.
+    pub fn try_run(&self) -> Result<Report, RunError> {
+        self.machine.run(None)
+    }
+
+    /// Runs as [`run_for`](Self::run_for) does.
+    ///
+    /// # Errors
+    ///
+    /// See [`RunError`]. The run is over then.
+    pub fn try_run_for(&self, duration: Duration) -> Result<Report, RunError> {
+        self.machine.run(Some(duration))
+    }
+}
+
+#[track_caller]
+fn or_panic(result: Result<Report, RunError>) -> Report {
+    match result {
+        Ok(report) => report,
+        Err(error) => panic!("{error}"),
+    }
+}

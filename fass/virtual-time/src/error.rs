@@ -1,0 +1,71 @@
+//! Why a run could not go on.
+
+use std::error::Error;
+use std::fmt;
+
+use crate::report::Report;
+
+/// Why a run in virtual time ended early, or could not begin.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum RunError {
+    /// Nothing has been committed on this thread since the machine was made, or
+    /// an earlier run has failed.
+    NothingToRun,
+    /// A run to the end was asked for, but this DAG has no end.
+    Endless {
+        /// The DAG's name.
+        dag: String,
+    },
+    /// A subtask's function panicked. No function runs after it.
+    Panicked {
+        /// The DAG's name.
+        dag: String,
+        /// The subtask's name.
+        subtask: String,
+        /// The job.
+        job: u64,
+        /// The panic's message.
+        message: String,
+        /// What happened up to the panic.
+        report: Box<Report>,
+    },
+    /// An instance would finish after `u64::MAX` nanoseconds.
+    TimeOverflow {
+        /// The DAG's name.
+        dag: String,
+        /// The subtask's name.
+        subtask: String,
+        /// The job.
+        job: u64,
+    },
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NothingToRun => f.write_str(
+                "there is nothing to run; commit DAGs on this thread after making the `VirtualTime`",
+            ),
+            Self::Endless { dag } => write!(
+                f,
+                "{dag} has no limit of jobs, so its run has no end; set `jobs` or use `run_for`"
+            ),
+            Self::Panicked {
+                dag,
+                subtask,
+                job,
+                message,
+                ..
+            } => write!(f, "{subtask} of {dag} panicked in job {job}: {message}"),
+            Self::TimeOverflow { dag, subtask, job } => write!(
+                f,
+                "{subtask} of {dag} would finish job {job} after {} ns, the last time there is; \
+                 execute for less",
+                u64::MAX
+            ),
+        }
+    }
+}
+
+impl Error for RunError {}

@@ -1,0 +1,71 @@
+//! What happened, one event at a time.
+//!
+//! Events stand in the order in which the scheduler let them happen. Their
+//! times and their order are the same in every run, so a test may compare whole
+//! sequences.
+
+use sched_dag::{CoreId, DagId, Instance, JobOutcome};
+
+/// Something that happened at an instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// When, in nanoseconds since the start of scheduling.
+    pub time_ns: u64,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the fields' names are the words of the model")]
+pub enum EventKind {
+    /// A job was released.
+    Released { dag: DagId, job: u64 },
+    /// A release was due and waits for an older job to end.
+    Queued { dag: DagId, job: u64 },
+    /// A release did not happen.
+    Skipped { dag: DagId, job: u64 },
+    /// All that an instance waits for has happened.
+    Ready { instance: Instance },
+    /// A core began an instance.
+    Started { instance: Instance, core: CoreId },
+    /// A core gave up an unfinished instance.
+    Preempted { instance: Instance, core: CoreId },
+    /// A core continued a preempted instance.
+    Resumed { instance: Instance, core: CoreId },
+    /// An instance finished.
+    Finished { instance: Instance, core: CoreId },
+    /// An instance will not run, because its job was aborted.
+    Cancelled { instance: Instance },
+    /// A job starts no further instance.
+    Aborted { dag: DagId, job: u64 },
+    /// A job's deadline passed before the job was complete.
+    DeadlineMissed { dag: DagId, job: u64 },
+    /// No instance of a job is left.
+    JobCompleted {
+        dag: DagId,
+        job: u64,
+        outcome: JobOutcome,
+    },
+}
+
+impl EventKind {
+    /// Returns a word for the kind of event.
+    #[must_use]
+    pub const fn verb(&self) -> &'static str {
+        match self {
+            Self::Released { .. } => "release",
+            Self::Queued { .. } => "queue",
+            Self::Skipped { .. } => "skip",
+            Self::Ready { .. } => "ready",
+            Self::Started { .. } => "start",
+            Self::Preempted { .. } => "preempt",
+            Self::Resumed { .. } => "resume",
+            Self::Finished { .. } => "finish",
+            Self::Cancelled { .. } => "cancel",
+            Self::Aborted { .. } => "abort",
+            Self::DeadlineMissed { .. } => "miss",
+            Self::JobCompleted { .. } => "complete",
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The platform that `fass` sees: one for the program, one machine a thread.
+//!
+//! The installed platform itself has no state. Everything it is asked, it asks
+//! the calling thread's current machine. A machine without a run in progress
+//! keeps its run in `run`; while a run steps, the run is taken out of there, so
+//! that a function's calls into the platform meet nothing borrowed.
+
+use std::cell::{Cell, RefCell};
+use std::rc::{Rc, Weak};
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+
+use crate::error::RunError;
+use crate::report::Report;
+use crate::session::Session;
+
+/// What one thread's virtual machine is and does.
+#[derive(Debug)]
+pub(crate) struct Machine {
+    pub(crate) cores: Cell<u32>,
+    pub(crate) policy: Cell<Policy>,
+    pub(crate) preemption: Cell<Preemption>,
+    /// The time that functions are told: the start of the instance and what it
+    /// has executed.
+    pub(crate) now_ns: Cell<u64>,
+    /// What the running function has executed; `None` outside functions.
+    pub(crate) executed_ns: Cell<Option<u64>>,
+    session: RefCell<Option<Session>>,
+    has_launched: Cell<bool>,
+}
+
+thread_local! {
+    static CURRENT: RefCell<Weak<Machine>> = const { RefCell::new(Weak::new()) };
+}
+
+/// Makes a machine and makes it this thread's.
+pub(crate) fn make_current() -> Rc<Machine> {
+    static IS_OURS: OnceLock<bool> = OnceLock::new();
+    assert!(
+        IS_OURS.get_or_init(|| fass::install(&HostPlatform).is_ok()),
+        "another platform is installed; virtual time must be the program's only platform"
+    );
+    let machine = Rc::new(Machine {
+        cores: Cell::new(1),
+        policy: Cell::new(Policy::Edf),
+        preemption: Cell::new(Preemption::Enabled),
+        now_ns: Cell::new(0),
+        executed_ns: Cell::new(None),
+        session: RefCell::new(None),
+        has_launched: Cell::new(false),
+    });
+    CURRENT.set(Rc::downgrade(&machine));
+    machine
+}
+
+impl Machine {
+    /// Steps the session to its end or for a duration.
+    pub(crate) fn run(&self, duration: Option<Duration>) -> Result<Report, RunError> {
+        let mut session = self.session.take().ok_or(RunError::NothingToRun)?;
+        let result = session.run(self, duration);
+        // A failed session is not put back: its functions cannot continue.
+        if result.is_ok() {
+            self.session.replace(Some(session));
+        }
+        result
+    }
+}
+
+/// The installed platform, which has no state of its own.
+struct HostPlatform;
+
+impl Platform for HostPlatform {
+    fn policy(&self) -> Policy {
+        current().map_or(Policy::Edf, |machine| machine.policy.get())
+    }
+
+    fn preemption(&self) -> Preemption {
+        current().map_or(Preemption::Enabled, |machine| machine.preemption.get())
+    }
+
+    fn cores(&self) -> u32 {
+        current().map_or(1, |machine| machine.cores.get())
+    }
+
+    fn now_ns(&self) -> u64 {
+        expect_current().now_ns.get()
+    }
+
+    fn execute_for(&self, duration: Duration, _how: Occupation) {
+        let machine = expect_current();
+        let Some(executed_ns) = machine.executed_ns.get() else {
+            panic!("`execute_for` is called outside a subtask; call it in a subtask's function");
+        };
+        // A sum that does not fit is reported by the driver as a finish beyond
+        // the last time there is.
+        let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        machine
+            .executed_ns
+            .set(Some(executed_ns.saturating_add(ns)));
+        machine.now_ns.set(machine.now_ns.get().saturating_add(ns));
+    }
+
+    fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
+        let Some(machine) = current() else {
+            return Err(LaunchError::new(
+                "this thread has no `VirtualTime`; make one on the thread that commits",
+            ));
+        };
+        if machine.has_launched.replace(true) {
+            return Err(LaunchError::new(
+                "this `VirtualTime` has a plan already; commit all DAGs in one call, \
+                 or make a new `VirtualTime`",
+            ));
+        }
+        let session = Session::new(plan, &machine);
+        machine.session.replace(Some(session));
+        Ok(())
+    }
+}
+
+fn current() -> Option<Rc<Machine>> {
+    CURRENT.with_borrow(Weak::upgrade)
+}
+
+fn expect_current() -> Rc<Machine> {
+    current().expect("this thread has no `VirtualTime`; make one on the thread that commits")
+}

@@ -1,0 +1,51 @@
+//! What is known of each instance and of each job after a run.
+
+use sched_dag::{CoreId, DagId, Instance, JobOutcome};
+
+/// The times of one instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InstanceRecord {
+    /// The instance.
+    pub instance: Instance,
+    /// When all that it waits for had happened.
+    pub ready_ns: u64,
+    /// When it began, if it did.
+    pub start_ns: Option<u64>,
+    /// When it finished, if it did.
+    pub finish_ns: Option<u64>,
+    /// How long it executes in all, once it has begun.
+    pub execution_ns: u64,
+    /// The core on which it began.
+    pub core: Option<CoreId>,
+    /// How often it was preempted.
+    pub preemptions: u32,
+}
+
+/// The times of one job that was released.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JobRecord {
+    /// The DAG.
+    pub dag: DagId,
+    /// The job.
+    pub job: u64,
+    /// The nominal release time, from which the deadline counts.
+    pub release_ns: u64,
+    /// When the release took place; later than `release_ns` if it had to queue.
+    pub released_at_ns: u64,
+    /// The absolute deadline.
+    pub deadline_ns: u64,
+    /// When the job ended, if it did.
+    pub finish_ns: Option<u64>,
+    /// How the job ended, if it did.
+    pub outcome: Option<JobOutcome>,
+    /// Whether the deadline passed before the job was complete.
+    pub has_missed: bool,
+}
+
+impl JobRecord {
+    /// Returns the time from the nominal release to the end, if there was one.
+    #[must_use]
+    pub fn response_time_ns(&self) -> Option<u64> {
+        self.finish_ns.map(|finish_ns| finish_ns - self.release_ns)
+    }
+}

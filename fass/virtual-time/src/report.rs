@@ -1,0 +1,140 @@
+//! What a run leaves behind.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use sched_dag::{DagId, DagStatistics, Instance, SubtaskId, TaskSet};
+
+use crate::event::{Event, EventKind};
+use crate::record::{InstanceRecord, JobRecord};
+use crate::rules::{self, Violation};
+
+/// Everything that happened from the commit to the end of a run.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The instances that became ready, in that order.
+    pub instances: Vec<InstanceRecord>,
+    /// The jobs that were released, in that order.
+    pub jobs: Vec<JobRecord>,
+    /// All events in the order in which they happened.
+    pub events: Vec<Event>,
+    /// The scheduler's counters, one set for each DAG.
+    pub statistics: Vec<DagStatistics>,
+    /// The time of the last event.
+    pub end_ns: u64,
+    pub(crate) task_set: Arc<TaskSet>,
+}
+
+impl Report {
+    /// Returns the records of one subtask, in the order of its jobs.
+    ///
+    /// # Panics
+    ///
+    /// If there is no DAG or no subtask of that name: a test that asks for a
+    /// name that does not exist is wrong.
+    #[must_use]
+    pub fn subtask(&self, dag: &str, subtask: &str) -> Vec<InstanceRecord> {
+        let (dag, subtask) = self.find(dag, subtask);
+        let of_subtask = self
+            .instances
+            .iter()
+            .filter(|record| record.instance.dag == dag && record.instance.subtask == subtask);
+        of_subtask.copied().collect()
+    }
+
+    /// Returns the record of one instance, if it became ready.
+    #[must_use]
+    pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
+        (self.instances.iter()).find(|record| record.instance == instance)
+    }
+
+    /// Returns the verified model that ran.
+    #[must_use]
+    pub fn task_set(&self) -> &TaskSet {
+        &self.task_set
+    }
+
+    /// Checks rules R1 to R4 of the task model over the records, and returns
+    /// what breaks them: nothing, unless the scheduler is wrong.
+    #[must_use]
+    pub fn violations(&self) -> Vec<Violation> {
+        rules::check(self)
+    }
+
+    /// Returns the events as lines such as `5000000 start sink[0] core 1`:
+    /// time, verb, name with the job in brackets, and what else there is.
+    ///
+    /// For tests that compare whole sequences in words.
+    #[must_use]
+    pub fn event_lines(&self) -> Vec<String> {
+        self.events.iter().map(|event| self.line(event)).collect()
+    }
+
+    fn line(&self, event: &Event) -> String {
+        let mut line = format!("{} {} ", event.time_ns, event.kind.verb());
+        let (name, job, more) = match event.kind {
+            EventKind::Released { dag, job }
+            | EventKind::Queued { dag, job }
+            | EventKind::Skipped { dag, job }
+            | EventKind::Aborted { dag, job }
+            | EventKind::DeadlineMissed { dag, job } => (self.dag_name(dag), job, String::new()),
+            EventKind::JobCompleted { dag, job, outcome } => {
+                let outcome = format!(" {outcome:?}").to_lowercase();
+                (self.dag_name(dag), job, outcome)
+            }
+            EventKind::Ready { instance } | EventKind::Cancelled { instance } => {
+                (self.subtask_name(instance), instance.job, String::new())
+            }
+            EventKind::Started { instance, core }
+            | EventKind::Preempted { instance, core }
+            | EventKind::Resumed { instance, core }
+            | EventKind::Finished { instance, core } => {
+                let core = format!(" core {}", core.0);
+                (self.subtask_name(instance), instance.job, core)
+            }
+        };
+        // Writing to a string cannot fail.
+        let _ = write!(line, "{name}[{job}]{more}");
+        line
+    }
+
+    pub(crate) fn dag_name(&self, dag: DagId) -> String {
+        dag_name(&self.task_set, dag)
+    }
+
+    pub(crate) fn subtask_name(&self, instance: Instance) -> String {
+        subtask_name(&self.task_set, instance)
+    }
+
+    fn find(&self, dag: &str, subtask: &str) -> (DagId, SubtaskId) {
+        for (dag_id, candidate) in (0..).map(DagId).zip(self.task_set.dags()) {
+            if candidate.name() != dag {
+                continue;
+            }
+            for (subtask_id, candidate) in (0..).map(SubtaskId).zip(candidate.subtasks()) {
+                if candidate.name() == subtask {
+                    return (dag_id, subtask_id);
+                }
+            }
+            panic!("DAG `{dag}` has no subtask `{subtask}`");
+        }
+        panic!("there is no DAG `{dag}`");
+    }
+}
+
+/// Returns a DAG's name, or `dag 0`.
+pub(crate) fn dag_name(task_set: &TaskSet, dag: DagId) -> String {
+    match task_set.dag(dag).name() {
+        "" => format!("dag {}", dag.0),
+        name => name.to_owned(),
+    }
+}
+
+/// Returns the name of an instance's subtask, or `subtask 0`.
+pub(crate) fn subtask_name(task_set: &TaskSet, instance: Instance) -> String {
+    let dag = task_set.dag(instance.dag);
+    match dag.subtask(instance.subtask).name() {
+        "" => format!("subtask {}", instance.subtask.0),
+        name => name.to_owned(),
+    }
+}

@@ -1,0 +1,258 @@
+//! A plan while it runs: the scheduler's driver, the bodies and the recorder.
+//!
+//! The driver is `sched_dag::virtual_time`, the one loop in virtual time; it
+//! asks for the execution time of each instance at its start. [`Runner`] answers
+//! by running the instance's real body and adding up what it executed.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Duration;
+
+use fass::{Body, Plan};
+use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
+use sched_dag::{
+    CoreId, DagId, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions, TaskSet,
+};
+
+use crate::error::RunError;
+use crate::event::EventKind;
+use crate::platform::Machine;
+use crate::recorder::Recorder;
+use crate::report::{Report, dag_name, subtask_name};
+
+/// A plan that runs, or can go on running.
+#[derive(Debug)]
+pub(crate) struct Session {
+    task_set: Arc<TaskSet>,
+    driver: Driver,
+    bodies: Vec<Vec<Body>>,
+    recorder: Recorder,
+}
+
+impl Session {
+    pub(crate) fn new(plan: Plan, machine: &Machine) -> Self {
+        let task_set = Arc::new(plan.task_set);
+        let options = SchedulerOptions {
+            policy: machine.policy.get(),
+            preemption: machine.preemption.get(),
+            cores: machine.cores.get(),
+        };
+        Self {
+            driver: Driver::new(Scheduler::new(Arc::clone(&task_set), options)),
+            recorder: Recorder::new(Arc::clone(&task_set)),
+            bodies: plan.bodies,
+            task_set,
+        }
+    }
+
+    /// Runs for a duration, or to the end.
+    pub(crate) fn run(
+        &mut self,
+        machine: &Machine,
+        duration: Option<Duration>,
+    ) -> Result<Report, RunError> {
+        let until_ns = match duration {
+            Some(duration) => {
+                let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+                self.recorder.run_until_ns.saturating_add(ns)
+            }
+            None => {
+                self.require_end()?;
+                u64::MAX
+            }
+        };
+        let mut runner = Runner {
+            machine,
+            bodies: &mut self.bodies,
+            recorder: &mut self.recorder,
+            panic: None,
+        };
+        let end = self.driver.run_until(until_ns, &mut runner);
+        let panic = runner.panic;
+        self.recorder.run_until_ns = until_ns;
+        machine.now_ns.set(match end {
+            End::TimeReached => until_ns,
+            End::Finished | End::TimeOverflow(_) => self.recorder.now_ns,
+        });
+        if let Some((instance, message)) = panic {
+            return Err(RunError::Panicked {
+                dag: format!("DAG `{}`", dag_name(&self.task_set, instance.dag)),
+                subtask: format!("subtask `{}`", subtask_name(&self.task_set, instance)),
+                job: instance.job,
+                message,
+                report: Box::new(self.report()),
+            });
+        }
+        match end {
+            End::Finished | End::TimeReached => Ok(self.report()),
+            End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
+                dag: format!("DAG `{}`", dag_name(&self.task_set, instance.dag)),
+                subtask: format!("subtask `{}`", subtask_name(&self.task_set, instance)),
+                job: instance.job,
+            }),
+        }
+    }
+
+    fn require_end(&self) -> Result<(), RunError> {
+        let mut dags = (0..).map(DagId).zip(self.task_set.dags());
+        match dags.find(|(_, dag)| dag.jobs().is_none()) {
+            None => Ok(()),
+            Some((dag, _)) => Err(RunError::Endless {
+                dag: format!("DAG `{}`", dag_name(&self.task_set, dag)),
+            }),
+        }
+    }
+
+    fn report(&self) -> Report {
+        let scheduler = self.driver.scheduler();
+        let dags = (0..).map(DagId).zip(self.task_set.dags());
+        Report {
+            instances: self.recorder.instances.clone(),
+            jobs: self.recorder.jobs.clone(),
+            events: self.recorder.events.clone(),
+            statistics: dags.map(|(dag, _)| *scheduler.statistics(dag)).collect(),
+            end_ns: self.recorder.now_ns,
+            task_set: Arc::clone(&self.task_set),
+        }
+    }
+}
+
+/// The workload of the driver: runs bodies, and passes all else to the recorder.
+struct Runner<'s> {
+    machine: &'s Machine,
+    bodies: &'s mut [Vec<Body>],
+    recorder: &'s mut Recorder,
+    /// The instance whose function panicked, and the message. The driver cannot
+    /// be stopped, so from here on nothing runs and nothing is recorded.
+    panic: Option<(Instance, String)>,
+}
+
+impl Runner<'_> {
+    fn body(&mut self, instance: Instance) -> &mut Body {
+        &mut self.bodies[instance.dag.index()][instance.subtask.index()]
+    }
+
+    /// Returns the recorder, unless the run has failed.
+    fn recorder(&mut self) -> Option<&mut Recorder> {
+        self.panic.is_none().then_some(&mut *self.recorder)
+    }
+}
+
+impl Workload for Runner<'_> {
+    fn execute(&mut self, instance: Instance, now_ns: u64) -> u64 {
+        if self.panic.is_some() {
+            return 0;
+        }
+        let machine = self.machine;
+        machine.now_ns.set(now_ns);
+        machine.executed_ns.set(Some(0));
+        let body = self.body(instance);
+        // Unwind safety: a body that panicked is never run again, and the
+        // machine's cells hold plain numbers.
+        let result = catch_unwind(AssertUnwindSafe(|| body.run(instance.job)));
+        let executed_ns = machine.executed_ns.take().unwrap_or(0);
+        if let Err(payload) = result {
+            let message = (payload.downcast_ref::<String>().map(String::as_str))
+                .or_else(|| payload.downcast_ref::<&str>().copied())
+                .unwrap_or("(a payload that is no text)");
+            self.panic = Some((instance, message.to_owned()));
+            return 0;
+        }
+        self.recorder
+            .of(instance, |record| record.execution_ns = executed_ns);
+        executed_ns
+    }
+
+    fn started(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(now_ns, EventKind::Started { instance, core });
+        recorder.of(instance, |record| {
+            record.start_ns = Some(now_ns);
+            record.core = Some(core);
+        });
+    }
+
+    fn preempted(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(now_ns, EventKind::Preempted { instance, core });
+        recorder.of(instance, |record| record.preemptions += 1);
+    }
+
+    fn resumed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(now_ns, EventKind::Resumed { instance, core });
+    }
+
+    fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(now_ns, EventKind::Finished { instance, core });
+        recorder.of(instance, |record| record.finish_ns = Some(now_ns));
+    }
+}
+
+impl Observer for Runner<'_> {
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        if let Some(recorder) = self.recorder() {
+            recorder.released(dag, job, release_ns);
+        }
+    }
+
+    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(release_ns, EventKind::Queued { dag, job });
+    }
+
+    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(release_ns, EventKind::Skipped { dag, job });
+    }
+
+    fn ready(&mut self, instance: Instance) {
+        if let Some(recorder) = self.recorder() {
+            recorder.ready(instance);
+        }
+    }
+
+    fn cancelled(&mut self, instance: Instance) {
+        if self.panic.is_some() {
+            return;
+        }
+        self.recorder.now(EventKind::Cancelled { instance });
+        // Functions run at the start of their instances, so whatever the
+        // predecessors will ever send has been sent.
+        self.body(instance).discard(instance.job);
+    }
+
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.now(EventKind::Aborted { dag, job });
+    }
+
+    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(deadline_ns, EventKind::DeadlineMissed { dag, job });
+        recorder.of_job(dag, job, |record| record.has_missed = true);
+    }
+
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
+        if let Some(recorder) = self.recorder() {
+            recorder.job_completed(dag, job, outcome);
+        }
+    }
+}
