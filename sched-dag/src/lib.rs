@@ -11,6 +11,7 @@ pub mod analysis;
 mod ids;
 mod policy;
 mod priorities;
+pub mod record;
 mod scheduler;
 mod spec;
 mod task_set;

@@ -31,6 +31,7 @@ pub mod image;
 pub mod install;
 pub mod json;
 pub mod options;
+pub mod oracle;
 pub mod outcome;
 pub mod probe;
 pub mod protocol;

@@ -25,6 +25,11 @@ const SUBCOMMANDS: &[(&str, &str, Work)] = &[
         "run every test, on the host and in QEMU",
         harness::test::test,
     ),
+    (
+        "oracle",
+        "compare reference cases with the scheduler and its analysis",
+        harness::oracle::oracle,
+    ),
 ];
 
 fn main() -> ExitCode {

@@ -1,0 +1,119 @@
+//! Capacity-augmentation tests: global EDF and RM, implicit deadlines.
+//!
+//! J. Li, J.-J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, "Analysis of
+//! Federated and Global Scheduling for Parallel Real-Time Tasks", ECRTS 2014,
+//! doi:10.1109/ECRTS.2014.23. A set is schedulable if its total utilisation is
+//! at most `m / b` and each length at most `D / b`, with
+//!
+//! - global EDF: `b = (3 - 2/m + sqrt(5 - 8/m + 4/m^2)) / 2`,
+//! - global RM: `b = 2 + sqrt(3)`.
+//!
+//! Roots are avoided: `p/q >= b` exactly if `p/q` is right of the larger root
+//! of the polynomial that `b` solves, which integers can tell:
+//! `m p^2 - (3m - 2) p q + (m - 1) q^2 >= 0` and `2 m p >= (3m - 2) q` for EDF,
+//! `p^2 - 4 p q + q^2 >= 0` and `p >= 2 q` for RM.
+//!
+//! Assumes: preemptive, `D = T` for every DAG; for RM priorities by period, one
+//! a DAG. Linear in the number of DAGs, but accepts few sets.
+
+use super::ratio::Ratio;
+use super::task::Task;
+
+/// Tests global EDF. `None`: does not apply (a DAG has `D != T`, or there are
+/// no cores); `Some(false)`: not proven.
+#[must_use]
+pub fn gedf_capacity(tasks: &[&Task], cores: u32) -> Option<bool> {
+    let m = i128::from(cores);
+    accepts(tasks, cores, |p, q| {
+        let square = m.checked_mul(p.checked_mul(p)?)?;
+        let mixed = (3 * m - 2).checked_mul(p.checked_mul(q)?)?;
+        let rest = (m - 1).checked_mul(q.checked_mul(q)?)?;
+        let right_of_both = (2 * m).checked_mul(p)? >= (3 * m - 2).checked_mul(q)?;
+        Some(square.checked_sub(mixed)?.checked_add(rest)? >= 0 && right_of_both)
+    })
+}
+
+/// Tests global RM. `None`: does not apply (a DAG has `D != T`, or there are no
+/// cores); `Some(false)`: not proven.
+#[must_use]
+pub fn grm_capacity(tasks: &[&Task], cores: u32) -> Option<bool> {
+    accepts(tasks, cores, |p, q| {
+        let square = p.checked_mul(p)?;
+        let mixed = p.checked_mul(q)?.checked_mul(4)?;
+        let rest = q.checked_mul(q)?;
+        Some(square.checked_sub(mixed)?.checked_add(rest)? >= 0 && p >= q.checked_mul(2)?)
+    })
+}
+
+/// Applies the test, where `reaches(p, q)` tells whether `p/q >= b`, or `None`
+/// on overflow, which counts as not proven.
+fn accepts(
+    tasks: &[&Task],
+    cores: u32,
+    reaches: impl Fn(i128, i128) -> Option<bool>,
+) -> Option<bool> {
+    let implicit = |task: &&Task| task.relative_deadline_ns() == task.period_ns();
+    if cores == 0 || !tasks.iter().all(implicit) {
+        return None;
+    }
+    let reaches = |numerator: u128, denominator: u128| {
+        let p = i128::try_from(numerator).ok()?;
+        reaches(p, i128::try_from(denominator).ok()?)
+    };
+    // D / length >= b, as length / D rounded up.
+    let short = tasks.iter().all(|task| {
+        Ratio::new(task.length_ns().into(), task.relative_deadline_ns().into())
+            .and_then(|ratio| reaches(ratio.denominator, ratio.numerator))
+            .unwrap_or(false)
+    });
+    // m / U >= b.
+    let utilisation = tasks
+        .iter()
+        .map(|task| (task.volume_ns(), task.period_ns()));
+    let light = Ratio::sum(utilisation)
+        .and_then(|sum| reaches(u128::from(cores) * sum.denominator, sum.numerator))
+        .unwrap_or(false);
+    Some(short && light)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{gedf_capacity, grm_capacity};
+    use crate::analysis::Task;
+
+    fn copies(count: usize) -> Vec<Task> {
+        let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
+        let one = Task::new(9, 9, vec![1, 2, 2, 1], &diamond).unwrap();
+        vec![one; count]
+    }
+
+    #[test]
+    fn e7_two_copies_pass_three_do_not() {
+        for (count, expected) in [(1, true), (2, true), (3, false)] {
+            let copies = copies(count);
+            let tasks: Vec<&Task> = copies.iter().collect();
+            assert_eq!(gedf_capacity(&tasks, 4), Some(expected));
+        }
+    }
+
+    #[test]
+    fn one_core_edf_is_exact() {
+        let chains = [3, 3, 3].map(|period| Task::new(period, period, vec![1], &[]).unwrap());
+        let tasks: Vec<&Task> = chains.iter().collect();
+        assert_eq!(gedf_capacity(&tasks, 1), Some(true));
+        assert_eq!(
+            gedf_capacity(&[tasks[0], tasks[1], tasks[2], tasks[0]], 1),
+            Some(false)
+        );
+    }
+
+    #[test]
+    fn rate_monotonic_needs_a_factor_of_two_plus_root_three() {
+        // 2 + sqrt(3) = 3.7320...
+        let single = |wcet, period| Task::new(period, period, vec![wcet], &[]).unwrap();
+        assert_eq!(grm_capacity(&[&single(1000, 3733)], 1), Some(true));
+        assert_eq!(grm_capacity(&[&single(1000, 3732)], 1), Some(false));
+        let constrained = Task::new(10, 9, vec![1], &[]).unwrap();
+        assert_eq!(grm_capacity(&[&constrained], 1), None);
+    }
+}

@@ -1,0 +1,118 @@
+//! Figures of one graph: bottom levels, longest path, path of most subtasks.
+//!
+//! Words: the *bottom level* (also *rank*) of a subtask is the largest sum of
+//! WCETs along a path that begins with it, itself included. The largest bottom
+//! level is the task's length.
+//!
+//! Ranks order subtasks: the descending rank is the list order of HLF, "highest
+//! level first" (T. C. Hu, Operations Research 9(6), 1961) and, with
+//! communication times on the edges, of HEFT (H. Topcuoglu, S. Hariri, M.-Y. Wu,
+//! IEEE TPDS 13(3), 2002, doi:10.1109/71.993206).
+//!
+//! All functions are linear in subtasks and edges and walk the topological
+//! order backwards instead of recursing. No sum can overflow: each is at most
+//! the volume, except with communication times, which saturate.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::task::Task;
+
+impl Task {
+    /// Returns the bottom level of each subtask.
+    #[must_use]
+    pub fn bottom_levels(&self) -> Vec<u64> {
+        self.bottom_levels_with(|_, _| 0)
+    }
+
+    /// Returns the bottom levels with a communication time on each edge:
+    /// `rank(v) = c_v + max over successors w of (communication(v, w) + rank(w))`.
+    ///
+    /// Sums saturate at `u64::MAX`.
+    #[must_use]
+    pub fn bottom_levels_with(&self, communication_ns: impl Fn(usize, usize) -> u64) -> Vec<u64> {
+        let mut levels = vec![0_u64; self.subtask_count()];
+        for &subtask in self.topological_order().iter().rev() {
+            let rest = self
+                .successors(subtask)
+                .iter()
+                .map(|&next| levels[next].saturating_add(communication_ns(subtask, next)))
+                .max()
+                .unwrap_or(0);
+            levels[subtask] = self.wcets_ns()[subtask].saturating_add(rest);
+        }
+        levels
+    }
+
+    /// Returns the subtasks by descending bottom level, ties by position: the
+    /// HLF order, in which every predecessor with a positive WCET comes first.
+    #[must_use]
+    pub fn by_bottom_level(&self) -> Vec<usize> {
+        let levels = self.bottom_levels();
+        let mut order: Vec<usize> = (0..self.subtask_count()).collect();
+        order.sort_by_key(|&subtask| (core::cmp::Reverse(levels[subtask]), subtask));
+        order
+    }
+
+    /// Returns a longest path for the given weights; ties go to the smallest
+    /// position for the first subtask and to the first edge for the others.
+    ///
+    /// The weights replace the WCETs and must sum to at most `u64::MAX`.
+    ///
+    /// # Panics
+    ///
+    /// If `weights` has fewer entries than there are subtasks.
+    #[must_use]
+    pub fn longest_path(&self, weights: &[u64]) -> Vec<usize> {
+        let count = self.subtask_count();
+        let mut levels = vec![0_u64; count];
+        let mut next = vec![None; count];
+        for &subtask in self.topological_order().iter().rev() {
+            let mut rest = 0;
+            for &successor in self.successors(subtask) {
+                if next[subtask].is_none() || levels[successor] > rest {
+                    rest = levels[successor];
+                    next[subtask] = Some(successor);
+                }
+            }
+            levels[subtask] = weights[subtask] + rest;
+        }
+        let mut at = (0..count).max_by_key(|&v| (levels[v], core::cmp::Reverse(v)));
+        let mut path = Vec::new();
+        while let Some(subtask) = at {
+            path.push(subtask);
+            at = next[subtask];
+        }
+        path
+    }
+
+    /// Returns the largest number of subtasks on one path.
+    #[must_use]
+    pub fn most_subtasks_on_a_path(&self) -> u64 {
+        let mut counts = vec![0_u64; self.subtask_count()];
+        for &subtask in self.topological_order().iter().rev() {
+            let successors = self.successors(subtask).iter();
+            counts[subtask] = 1 + successors.map(|&next| counts[next]).max().unwrap_or(0);
+        }
+        counts.into_iter().max().unwrap_or(0)
+    }
+
+    /// Returns the largest WCET of a subtask, 0 if there is none.
+    #[must_use]
+    pub fn largest_wcet_ns(&self) -> u64 {
+        self.wcets_ns().iter().copied().max().unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::task::Task;
+
+    #[test]
+    fn the_longest_path_follows_first_edges_on_ties() {
+        let task = Task::new(9, 9, vec![1, 2, 2, 1], &[(0, 2), (0, 1), (1, 3), (2, 3)]).unwrap();
+        assert_eq!(task.longest_path(task.wcets_ns()), [0, 2, 3]);
+        assert_eq!(task.longest_path(&[0, 0, 0, 0]), [0, 2, 3]);
+        assert_eq!(task.most_subtasks_on_a_path(), 3);
+    }
+}

@@ -1,0 +1,218 @@
+//! One DAG whose subtasks have priorities of their own.
+//!
+//! Q. He, X. Jiang, N. Guan, Z. Guo, "Intra-Task Priority Assignment in
+//! Real-Time Scheduling of DAG Tasks on Multi-Cores", IEEE TPDS 30(10), 2019.
+//! Let `I(v)` be the subtasks parallel to `v` of higher priority. Then
+//! `R = max over complete paths p of len(p) + c(union of I(v) over p, less p) / m`.
+//!
+//! Assumes: preemptive, one job alone on `m` cores, and priorities that respect
+//! precedence (a predecessor has the higher one).
+//!
+//! Trap: carrying one "best" path per subtask through the graph, as published
+//! code does, is unsafe, because the union is not additive: in example E5 that
+//! gives 63, and a schedule of 64 exists. So paths are enumerated, up to
+//! [`PATH_LIMIT`]; beyond, callers use the long-paths bound.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::closure::{Closure, contains, insert};
+use super::task::Task;
+
+/// The most complete paths that [`intra_task`] enumerates: 4,096.
+pub const PATH_LIMIT: u32 = 4096;
+
+/// Bounds the response time of one job alone, its subtasks given by descending
+/// priority.
+///
+/// `None`: does not apply (no cores, `order` does not name each subtask once,
+/// or contradicts precedence) or takes too long (more than [`PATH_LIMIT`]
+/// paths or [`SUBTASK_LIMIT`](super::SUBTASK_LIMIT) subtasks).
+#[must_use]
+pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
+    let count = task.subtask_count();
+    let ranks = ranks(task, order)?;
+    let closure = Closure::of(task)?;
+    let words = closure.words();
+    let wcets = task.wcets_ns();
+    let interferes = |v: usize, u: usize| {
+        ranks[u] < ranks[v] && !closure.precedes(u, v) && !closure.precedes(v, u)
+    };
+    let mut interfering = vec![0_u64; words * count];
+    for v in 0..count {
+        for u in (0..count).filter(|&u| interferes(v, u)) {
+            insert(&mut interfering[v * words..], u);
+        }
+    }
+
+    let mut is_source = vec![true; count];
+    for v in 0..count {
+        for &next in task.successors(v) {
+            is_source[next] = false;
+        }
+    }
+    let mut bound = 0;
+    let mut paths = 0;
+    let mut path: Vec<usize> = Vec::new();
+    // Next successor to try, by place on the path; unions, by place, in a row.
+    let mut tried: Vec<usize> = Vec::new();
+    let mut unions: Vec<u64> = Vec::new();
+    for source in (0..count).filter(|&v| is_source[v]) {
+        let mut step = Some(source);
+        loop {
+            if let Some(v) = step {
+                let before = unions.len().checked_sub(words);
+                for word in 0..words {
+                    let inherited = before.map_or(0, |start| unions[start + word]);
+                    unions.push(inherited | interfering[v * words + word]);
+                }
+                path.push(v);
+                tried.push(0);
+            }
+            let Some(&last) = path.last() else {
+                break;
+            };
+            if task.successors(last).is_empty() {
+                paths += 1;
+                if paths > PATH_LIMIT {
+                    return None;
+                }
+                let union = &unions[unions.len() - words..];
+                let length: u64 = path.iter().map(|&v| wcets[v]).sum();
+                let parallel = (0..count).filter(|&v| contains(union, v) && !path.contains(&v));
+                let beside: u64 = parallel.map(|v| wcets[v]).sum();
+                bound = bound.max(length + beside.checked_div(cores.into())?);
+            }
+            let place = path.len() - 1;
+            step = task.successors(last).get(tried[place]).copied();
+            tried[place] += 1;
+            if step.is_none() {
+                path.pop();
+                tried.pop();
+                unions.truncate(unions.len() - words);
+            }
+        }
+    }
+    (cores > 0).then_some(bound)
+}
+
+/// Assigns priorities within a DAG: the subtasks by descending priority.
+///
+/// Along the longest remaining path each subtask is numbered after its
+/// unnumbered ancestors, which are treated alike among themselves; then on to
+/// the next longest path. Ties go to the smallest position. Returns `None`
+/// beyond [`SUBTASK_LIMIT`](super::SUBTASK_LIMIT) subtasks.
+#[must_use]
+pub fn assign_intra_task(task: &Task) -> Option<Vec<usize>> {
+    let closure = Closure::of(task)?;
+    let count = task.subtask_count();
+    let mut numbered = vec![false; count];
+    let mut order = Vec::with_capacity(count);
+    // Each entry: a subtask to number once its ancestors are.
+    let mut waiting: Vec<usize> = Vec::new();
+    while order.len() < count {
+        let goal = waiting.last().copied();
+        let eligible = |v: usize| !numbered[v] && goal.is_none_or(|goal| closure.precedes(v, goal));
+        match longest_within(task, eligible) {
+            Some(path) => waiting.extend(path.into_iter().rev()),
+            None => {
+                let Some(done) = waiting.pop() else {
+                    break;
+                };
+                if !numbered[done] {
+                    numbered[done] = true;
+                    order.push(done);
+                }
+            }
+        }
+    }
+    Some(order)
+}
+
+/// Returns a longest path among the eligible subtasks, `None` if there is none.
+fn longest_within(task: &Task, eligible: impl Fn(usize) -> bool) -> Option<Vec<usize>> {
+    let count = task.subtask_count();
+    let mut levels = vec![0_u64; count];
+    let mut next = vec![None; count];
+    for &v in task
+        .topological_order()
+        .iter()
+        .rev()
+        .filter(|&&v| eligible(v))
+    {
+        for &successor in task.successors(v).iter().filter(|&&v| eligible(v)) {
+            if next[v].is_none_or(|best: usize| levels[successor] > levels[best]) {
+                next[v] = Some(successor);
+            }
+        }
+        levels[v] = task.wcets_ns()[v] + next[v].map_or(0, |after| levels[after]);
+    }
+    let eligible = (0..count).filter(|&v| eligible(v));
+    let mut at = eligible.max_by_key(|&v| (levels[v], core::cmp::Reverse(v)));
+    at?;
+    let mut path = Vec::new();
+    while let Some(v) = at {
+        path.push(v);
+        at = next[v];
+    }
+    Some(path)
+}
+
+/// Returns each subtask's place in `order`, if that is a permutation that
+/// respects precedence.
+fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
+    let count = task.subtask_count();
+    let mut ranks = vec![usize::MAX; count];
+    for (rank, &v) in order.iter().enumerate() {
+        *ranks.get_mut(v)? = rank;
+    }
+    let complete = order.len() == count && !ranks.contains(&usize::MAX);
+    let respects = |v: usize| {
+        task.successors(v)
+            .iter()
+            .all(|&next| ranks[v] < ranks[next])
+    };
+    (complete && (0..count).all(respects)).then_some(ranks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{assign_intra_task, intra_task};
+    use crate::analysis::{Task, long_paths};
+
+    const EDGES: [(usize, usize); 12] = [
+        (0, 1),
+        (0, 3),
+        (0, 4),
+        (1, 2),
+        (1, 4),
+        (2, 7),
+        (3, 4),
+        (4, 5),
+        (4, 6),
+        (4, 7),
+        (5, 7),
+        (6, 7),
+    ];
+
+    #[test]
+    fn e5_paths_are_enumerated() {
+        let task = Task::new(1000, 1000, vec![5, 16, 15, 1, 10, 17, 7, 11], &EDGES).unwrap();
+        // Priorities [0, 1, 2, 3, 4, 6, 5, 7] by subtask, as an order:
+        assert_eq!(intra_task(&task, &[0, 1, 2, 3, 4, 6, 5, 7], 2), Some(70));
+        assert_eq!(long_paths(&task, 2), Some(67));
+        // Assigned priorities [0, 1, 5, 2, 3, 4, 6, 7] by subtask, as an order:
+        let assigned = assign_intra_task(&task).unwrap();
+        assert_eq!(assigned, [0, 1, 3, 4, 5, 2, 6, 7]);
+        assert_eq!(intra_task(&task, &assigned, 2), Some(65));
+    }
+
+    #[test]
+    fn orders_against_precedence_do_not_apply() {
+        let task = Task::new(9, 9, vec![1, 1], &[(0, 1)]).unwrap();
+        assert_eq!(intra_task(&task, &[1, 0], 2), None);
+        assert_eq!(intra_task(&task, &[0, 0], 2), None);
+        assert_eq!(intra_task(&task, &[0, 1], 0), None);
+        assert_eq!(intra_task(&task, &[0, 1], 2), Some(2));
+    }
+}

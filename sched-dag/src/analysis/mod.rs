@@ -1,0 +1,33 @@
+//! Draft.
+mod bonifaci;
+mod capacity;
+mod closure;
+mod federated;
+mod graham;
+mod graph;
+mod intra_task;
+mod long_paths;
+mod melani;
+mod non_preemptive;
+mod pipelined;
+mod ratio;
+mod refusal;
+mod response;
+mod set;
+mod task;
+mod width;
+mod workload;
+
+pub use bonifaci::{bonifaci_dm, bonifaci_edf};
+pub use capacity::{gedf_capacity, grm_capacity};
+pub use closure::SUBTASK_LIMIT;
+pub use federated::{Federation, federated, federated_long_paths};
+pub use graham::graham;
+pub use intra_task::{PATH_LIMIT, assign_intra_task, intra_task};
+pub use long_paths::{long_paths, long_paths_among, path_list};
+pub use melani::{melani_edf, melani_edf_width, melani_fp, melani_fp_width};
+pub use non_preemptive::{np_safe_edf, np_safe_fp, np_safe_fp_width};
+pub use pipelined::{pipelined_fp, pipelined_fp_reference};
+pub use refusal::Refusal;
+pub use task::{Task, TaskError};
+pub use width::{parallelism, width};

@@ -1,0 +1,58 @@
+//! Why a test gives no bounds.
+
+use core::fmt;
+
+use super::response::Unsolved;
+use super::set::Solution;
+
+/// Why a sufficient test did not prove a set of DAGs schedulable.
+///
+/// None of these says that the set is infeasible.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// The set is outside the test's assumptions: there are no cores, or a
+    /// deadline or priority is not of the kind the test is about.
+    DoesNotApply,
+    /// This DAG, by its position, has no bound within its relative deadline.
+    Fails {
+        /// The position of the DAG in the order given.
+        position: usize,
+    },
+    /// The computation reached a limit on steps, on jobs in flight or on the
+    /// size of numbers, at this DAG.
+    Limit {
+        /// The position of the DAG in the order given.
+        position: usize,
+    },
+}
+
+impl Solution {
+    /// Returns the bounds if there is one for each DAG.
+    pub(super) fn complete(self) -> Result<alloc::vec::Vec<u64>, Refusal> {
+        match self.first_failing {
+            Some((position, Unsolved::BeyondDeadline)) => Err(Refusal::Fails { position }),
+            Some((position, Unsolved::Limit)) => Err(Refusal::Limit { position }),
+            None => Ok(self.responses.into_iter().flatten().collect()),
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DoesNotApply => f.write_str("the test does not apply to these DAGs"),
+            Self::Fails { position } => write!(
+                f,
+                "DAG {position} has no bound within its relative deadline; \
+                 give it more time, more cores or less interference"
+            ),
+            Self::Limit { position } => write!(
+                f,
+                "the analysis of DAG {position} reached a limit; \
+                 shorten its deadline in periods or use a coarser unit of time"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}

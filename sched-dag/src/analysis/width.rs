@@ -1,0 +1,210 @@
+//! The width: the largest number of subtasks that may run side by side.
+//!
+//! The width is the size of the largest antichain. By Dilworth's theorem (1950,
+//! doi:10.2307/1969503) it equals the least number of chains that cover the
+//! graph, which is `n` minus a maximum matching of the bipartite graph whose
+//! edges are the pairs of the transitive closure (Fulkerson 1956). The matching
+//! is found as by Hopcroft and Karp (SIAM J. Comput. 2(4), 1973,
+//! doi:10.1137/0202019), with bit rows, so a phase takes `n * n / 64` word
+//! operations and there are at most about `2 * sqrt(n)` phases.
+//!
+//! One job never runs on more than `width` cores at an instant; that is what
+//! the workload bounds use it for. Subtasks with WCET 0 count.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::closure::{Closure, first_common, insert, remove, words_for};
+use super::task::Task;
+
+/// Returns the width, or `None` for a DAG of more than
+/// [`SUBTASK_LIMIT`](super::SUBTASK_LIMIT) subtasks.
+#[must_use]
+pub fn width(task: &Task) -> Option<u64> {
+    let closure = Closure::of(task)?;
+    let mut matching = Matching::empty(task.subtask_count());
+    while matching.layer(&closure) {
+        for left in 0..task.subtask_count() {
+            matching.augment(&closure, left);
+        }
+    }
+    let free = matching.right_of.iter().filter(|mate| mate.is_none());
+    u64::try_from(free.count()).ok()
+}
+
+/// Returns the most cores that one job can use at an instant, at least 1:
+/// `min(cores, width)`, or just `cores` where the width is not known.
+#[must_use]
+pub fn parallelism(task: &Task, cores: u32) -> u64 {
+    let cores = u64::from(cores);
+    width(task).map_or(cores, |width| width.min(cores)).max(1)
+}
+
+/// A matching between the subtasks (left) and their copies (right).
+struct Matching {
+    right_of: Vec<Option<usize>>,
+    left_of: Vec<Option<usize>>,
+    /// The phase's layer of each left subtask, `usize::MAX` if not reached.
+    layers: Vec<usize>,
+    /// The right subtasks not yet visited in this phase's search.
+    unvisited: Vec<u64>,
+    /// Per layer the right subtasks that its left subtasks may go on to.
+    reached_in: Vec<Vec<u64>>,
+}
+
+impl Matching {
+    fn empty(count: usize) -> Self {
+        Self {
+            right_of: vec![None; count],
+            left_of: vec![None; count],
+            layers: vec![usize::MAX; count],
+            unvisited: vec![0; words_for(count)],
+            reached_in: Vec::new(),
+        }
+    }
+
+    /// Layers the graph by distance from the free left subtasks (breadth
+    /// first) and reports whether a free right subtask was reached.
+    fn layer(&mut self, closure: &Closure) -> bool {
+        let count = self.right_of.len();
+        self.layers.fill(usize::MAX);
+        self.reached_in.clear();
+        for right in 0..count {
+            insert(&mut self.unvisited, right);
+        }
+        let mut frontier: Vec<usize> = (0..count).filter(|&v| self.right_of[v].is_none()).collect();
+        let mut found = false;
+        while !frontier.is_empty() && !found {
+            let depth = self.reached_in.len();
+            let mut reached = vec![0; closure.words()];
+            let mut following = Vec::new();
+            for &left in &frontier {
+                self.layers[left] = depth;
+                while let Some(right) = first_common(closure.row(left), &self.unvisited) {
+                    remove(&mut self.unvisited, right);
+                    insert(&mut reached, right);
+                    match self.left_of[right] {
+                        Some(next) => following.push(next),
+                        None => found = true,
+                    }
+                }
+            }
+            self.reached_in.push(reached);
+            frontier = following;
+        }
+        found
+    }
+
+    /// Searches one augmenting path from a free left subtask along the layers
+    /// (depth first, with an explicit stack) and applies it.
+    fn augment(&mut self, closure: &Closure, root: usize) {
+        if self.right_of[root].is_some() {
+            return;
+        }
+        // Each entry: a left subtask and the right one through which its search goes on.
+        let mut path: Vec<(usize, usize)> = Vec::new();
+        let mut left = root;
+        loop {
+            let depth = path.len();
+            let step = self
+                .reached_in
+                .get(depth)
+                .and_then(|reached| first_common(closure.row(left), reached));
+            match step {
+                Some(right) => {
+                    // Removed for good: a dead end stays one for this phase.
+                    remove(&mut self.reached_in[depth], right);
+                    match self.left_of[right] {
+                        None => {
+                            path.push((left, right));
+                            for (one, other) in path {
+                                self.right_of[one] = Some(other);
+                                self.left_of[other] = Some(one);
+                            }
+                            return;
+                        }
+                        Some(next) if self.layers[next] == depth + 1 => {
+                            path.push((left, right));
+                            left = next;
+                        }
+                        Some(_) => {}
+                    }
+                }
+                None => match path.pop() {
+                    Some((previous, _)) => left = previous,
+                    None => return,
+                },
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{parallelism, width};
+    use crate::analysis::{SUBTASK_LIMIT, Task};
+
+    fn task(count: usize, edges: &[(usize, usize)]) -> Task {
+        Task::new(1000, 1000, vec![1; count], edges).unwrap()
+    }
+
+    #[test]
+    fn known_widths() {
+        assert_eq!(width(&task(0, &[])), Some(0));
+        assert_eq!(width(&task(5, &[])), Some(5));
+        assert_eq!(width(&task(4, &[(0, 1), (1, 2), (2, 3)])), Some(1));
+        // Two chains of two with a crossing edge: {0, 2} or {1, 2}, ...
+        assert_eq!(width(&task(4, &[(0, 1), (2, 3), (0, 3)])), Some(2));
+        // A layered graph: 3 sources, each before 2 of 4 sinks.
+        let edges = [(0, 3), (0, 4), (1, 4), (1, 5), (2, 5), (2, 6)];
+        assert_eq!(width(&task(7, &edges)), Some(4));
+    }
+
+    #[test]
+    fn agrees_with_all_subsets_of_small_graphs() {
+        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+        for _ in 0..300 {
+            let mut next = |bound: u64| {
+                seed ^= seed << 13;
+                seed ^= seed >> 7;
+                seed ^= seed << 17;
+                seed % bound
+            };
+            let count = usize::try_from(1 + next(10)).unwrap();
+            let mut edges = Vec::new();
+            for to in 0..count {
+                for from in 0..to {
+                    if next(4) == 0 {
+                        edges.push((from, to));
+                    }
+                }
+            }
+            let mut reach = vec![vec![false; count]; count];
+            for from in (0..count).rev() {
+                for &(_, to) in edges.iter().filter(|edge| edge.0 == from) {
+                    reach[from][to] = true;
+                    for after in 0..count {
+                        reach[from][after] |= reach[to][after];
+                    }
+                }
+            }
+            let antichain = |set: u32| {
+                let members: Vec<usize> = (0..count).filter(|&v| set >> v & 1 == 1).collect();
+                let ordered = |&a: &usize| members.iter().any(|&b| reach[a][b]);
+                !members.iter().any(ordered)
+            };
+            let sets = (0_u32..1 << count).filter(|&set| antichain(set));
+            let largest = sets.map(u32::count_ones).max().map(u64::from);
+            assert_eq!(width(&task(count, &edges)), largest, "edges {edges:?}");
+        }
+    }
+
+    #[test]
+    fn beyond_the_limit_all_cores_count() {
+        let chain: Vec<(usize, usize)> = (0..SUBTASK_LIMIT).map(|v| (v, v + 1)).collect();
+        let long = task(SUBTASK_LIMIT + 1, &chain);
+        assert_eq!(width(&long), None);
+        assert_eq!(parallelism(&long, 8), 8);
+        assert_eq!(parallelism(&task(3, &[(0, 1), (1, 2)]), 8), 1);
+    }
+}

@@ -1,0 +1,233 @@
+//! Workload: how much one DAG can execute in a window, whoever else runs.
+//!
+//! A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo,
+//! "Schedulability Analysis of Conditional Parallel Task Graphs in Multicore
+//! Systems", IEEE Trans. Computers 66(2), 2017, doi:10.1109/TC.2016.2584064
+//! (first at ECRTS 2015). With `p` cores at most at an instant, in any window
+//! of length `L`, while every job is complete within `R` of its release:
+//!
+//! - `A = p (L + R) - volume`,
+//! - `W(L) = min(p L, (A / (p T)) volume + min(volume, A mod (p T)))`;
+//!   if `A < 0`, `W(L) = min(volume, p L)`.
+//!
+//! Under EDF, with respect to a job of relative deadline `D_k`, only jobs with
+//! a deadline no later count:
+//!
+//! - `N = max(0, (D_k - D) / T + 1)` (floor),
+//! - `WE = N volume + min(volume, p max(0, D_k - N T - (D - R)))`.
+//!
+//! The paper has `p = m`. `p = min(m, width)` is a refinement of our own: the
+//! worst case packs each job into a rectangle as wide as the DAG can be at an
+//! instant. Jobs that overlap (`R > T`) stack: up to `ceil(R / T)` of them are
+//! in flight, so `p = min(m, ceil(R / T) width)`; that needs `volume <= m T`.
+//!
+//! Trap: the closed form overshoots `p L` for short windows; hence the cap.
+
+use super::response::Form;
+use super::task::Task;
+
+/// A DAG that may execute beside the one under analysis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Workload {
+    volume: u128,
+    period: u128,
+    response: u128,
+    parallelism: u128,
+    /// No window holds more, whatever its length (EDF's `WE`).
+    ceiling: Option<u128>,
+}
+
+/// A workload at one window length, and how it goes on from there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    /// The workload.
+    pub(super) value: u128,
+    /// By how much it grows at least for each further nanosecond of window...
+    pub(super) slope: u128,
+    /// ...for so many nanoseconds, at least 1; `None`: for ever.
+    pub(super) span: Option<u128>,
+}
+
+impl Workload {
+    /// Describes a task whose jobs are complete within `response_ns`, with at
+    /// most `parallelism` cores a job and `cores < 2^32` cores for all jobs.
+    pub(super) fn new(
+        task: &Task,
+        response_ns: u64,
+        parallelism: u64,
+        cores: u64,
+        form: Form,
+    ) -> Self {
+        let in_flight = match form {
+            Form::Sound => u128::from(response_ns.div_ceil(task.period_ns()).max(1)),
+            Form::Reference => 1,
+        };
+        Self {
+            volume: task.volume_ns().into(),
+            period: task.period_ns().into(),
+            response: response_ns.into(),
+            parallelism: (in_flight * u128::from(parallelism)).min(cores.into()),
+            ceiling: None,
+        }
+    }
+
+    /// Adds the limit that EDF gives with respect to a job of relative deadline
+    /// `deadline_ns`; `own_deadline_ns` is this task's, `>= response`.
+    ///
+    /// Only for tasks with a relative deadline no longer than the period.
+    pub(super) fn under_edf(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
+        let (own, other) = (u128::from(own_deadline_ns), u128::from(deadline_ns));
+        let jobs = other
+            .checked_sub(own)
+            .map_or(0, |gap| gap / self.period + 1);
+        let slack = own.saturating_sub(self.response);
+        let carried_in = other
+            .saturating_sub(jobs * self.period)
+            .saturating_sub(slack);
+        let carried = self.volume.min(self.parallelism * carried_in);
+        self.ceiling = Some(jobs.saturating_mul(self.volume).saturating_add(carried));
+        self
+    }
+
+    /// Returns the workload in a window.
+    ///
+    /// Nothing overflows: times are below 2^64 and parallelism below 2^32, so
+    /// every area is below 2^98; the one larger product saturates.
+    pub(super) fn at(&self, window_ns: u64) -> Piece {
+        let area = self.parallelism * u128::from(window_ns);
+        let body = self.body(area);
+        let piece = if area <= body.value {
+            // The cap rises as steeply as the body can: it stays below for
+            // as long as the body rises, and until it meets a flat body.
+            let rising = if body.slope == 0 {
+                (body.value - area) / self.parallelism
+            } else {
+                u128::MAX
+            };
+            Piece {
+                value: area,
+                slope: self.parallelism,
+                span: Some(body.span.unwrap_or(u128::MAX).min(rising)),
+            }
+            .or_one_flat_step()
+        } else {
+            body
+        };
+        match self.ceiling {
+            Some(ceiling) if piece.value >= ceiling => Piece {
+                value: ceiling,
+                slope: 0,
+                span: None,
+            },
+            Some(ceiling) if piece.slope > 0 => {
+                let room = (ceiling - piece.value) / piece.slope;
+                let span = Some(piece.span.map_or(room, |span| span.min(room)));
+                Piece { span, ..piece }.or_one_flat_step()
+            }
+            _ => piece,
+        }
+    }
+
+    /// Returns the closed form for `p L = area`, without the cap.
+    fn body(&self, area: u128) -> Piece {
+        let shift = self.parallelism * self.response;
+        let Some(packed) = (area + shift).checked_sub(self.volume) else {
+            return Piece {
+                value: self.volume,
+                slope: 0,
+                span: Some(1),
+            };
+        };
+        let pitch = self.parallelism * self.period;
+        let (jobs, rest) = (packed / pitch, packed % pitch);
+        let whole = jobs.saturating_mul(self.volume);
+        if rest < self.volume {
+            let piece = Piece {
+                value: whole.saturating_add(rest),
+                slope: self.parallelism,
+                span: Some((self.volume.min(pitch) - rest) / self.parallelism),
+            };
+            piece.or_one_flat_step()
+        } else {
+            Piece {
+                value: whole.saturating_add(self.volume),
+                slope: 0,
+                span: Some((pitch - rest).div_ceil(self.parallelism)),
+            }
+        }
+    }
+}
+
+impl Piece {
+    /// Replaces an empty piece by a step of 1 ns without growth: never more
+    /// than the workload, which never falls.
+    fn or_one_flat_step(self) -> Self {
+        if self.span == Some(0) {
+            Self {
+                slope: 0,
+                span: Some(1),
+                ..self
+            }
+        } else {
+            self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Form, Workload};
+    use crate::analysis::Task;
+
+    #[test]
+    fn e2_e3_and_e13_workloads() {
+        let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
+        let one = Task::new(10, 10, vec![1, 2, 2, 1], &diamond).unwrap();
+        let at = |workload: Workload, windows: [u64; 3]| windows.map(|l| workload.at(l).value);
+        assert_eq!(
+            at(Workload::new(&one, 5, 2, 2, Form::Sound), [8, 11, 14]),
+            [6, 12, 12]
+        );
+
+        let chain = Task::new(10, 10, vec![2, 3], &[(0, 1)]).unwrap();
+        assert_eq!(
+            at(Workload::new(&chain, 6, 2, 2, Form::Sound), [4, 9, 14]),
+            [5, 10, 10]
+        );
+        assert_eq!(
+            at(Workload::new(&chain, 6, 1, 2, Form::Sound), [4, 9, 14]),
+            [4, 5, 10]
+        );
+
+        let forks = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
+        let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
+        let in_two = Workload::new(&one, 9, 2, 2, Form::Sound).under_edf(10, 20);
+        assert_eq!(in_two.at(1000).value, 12);
+        let in_one = Workload::new(&two, 14, 2, 2, Form::Sound).under_edf(20, 10);
+        assert_eq!(in_one.at(1000).value, 8);
+    }
+
+    #[test]
+    fn pieces_never_exceed_the_workload_and_it_never_falls() {
+        for parallelism in 1..4 {
+            for response in 10..22 {
+                let task = Task::new(9, 9, vec![2, 3, 5], &[(0, 1)]).unwrap();
+                let plain = Workload::new(&task, response, parallelism, 3, Form::Sound);
+                for workload in [plain, plain.under_edf(13, 30)] {
+                    let values: Vec<u128> = (0..80).map(|l| workload.at(l).value).collect();
+                    assert!(values.is_sorted(), "{values:?}");
+                    for window in 0..60 {
+                        let piece = workload.at(window);
+                        let last = piece.span.unwrap_or(20).min(20);
+                        assert!(last > 0);
+                        for step in 0..=last {
+                            let index = usize::try_from(u128::from(window) + step).unwrap();
+                            let least = piece.value + piece.slope * step;
+                            assert!(values[index] >= least, "{workload:?} {window} {step}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Reading reference files line by line: words, numbers, and where they are.
+//!
+//! Reference files are records of blank-separated words, one record a line;
+//! blank lines count but say nothing. Everything unexpected is a
+//! [`Malformed`] with the number of its line, so that a broken file is never
+//! taken for a failing implementation.
+
+use std::fmt;
+use std::num::IntErrorKind;
+use std::str::FromStr;
+
+/// What is wrong with a reference file, and on which line, counted from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Malformed {
+    /// The line.
+    pub line: usize,
+    /// The fact and its remedy, in one line.
+    pub reason: String,
+}
+
+/// One record.
+#[derive(Clone, Debug)]
+pub struct Line<'a> {
+    /// The line's number, counted from 1.
+    pub number: usize,
+    /// The first word: the kind of the record.
+    pub kind: &'a str,
+    /// The other words.
+    pub words: Vec<&'a str>,
+}
+
+/// The records of a file, one after the other.
+#[derive(Clone, Debug)]
+pub struct Lines<'a> {
+    rest: std::iter::Enumerate<std::str::Lines<'a>>,
+    last: usize,
+}
+
+impl<'a> Lines<'a> {
+    /// Starts at the first line.
+    #[must_use]
+    pub fn new(text: &'a str) -> Self {
+        Self {
+            rest: text.lines().enumerate(),
+            last: 0,
+        }
+    }
+
+    /// Returns the next record, or `None` at the end of the file.
+    pub fn next_line(&mut self) -> Option<Line<'a>> {
+        for (index, text) in self.rest.by_ref() {
+            self.last = index + 1;
+            let mut words = text.split_whitespace();
+            if let Some(kind) = words.next() {
+                return Some(Line {
+                    number: index + 1,
+                    kind,
+                    words: words.collect(),
+                });
+            }
+        }
+        None
+    }
+
+    /// Returns the next record, which must be of this kind.
+    ///
+    /// # Errors
+    ///
+    /// [`Malformed`] if it is of another kind, or there is none.
+    pub fn expect(&mut self, kind: &str) -> Result<Line<'a>, Malformed> {
+        match self.next_line() {
+            Some(line) if line.kind == kind => Ok(line),
+            Some(line) => {
+                Err(line.malformed(format!("expected a `{kind}` record, found `{}`", line.kind)))
+            }
+            None => Err(self.ended(&format!("a `{kind}` record"))),
+        }
+    }
+
+    /// Returns the error of a file that ends too early.
+    #[must_use]
+    pub fn ended(&self, expected: &str) -> Malformed {
+        Malformed {
+            line: self.last + 1,
+            reason: format!("the file ends where {expected} should be"),
+        }
+    }
+}
+
+impl Line<'_> {
+    /// Returns an error on this line.
+    #[must_use]
+    pub fn malformed(&self, reason: impl Into<String>) -> Malformed {
+        Malformed {
+            line: self.number,
+            reason: reason.into(),
+        }
+    }
+
+    /// Returns the words, of which there must be so many.
+    ///
+    /// # Errors
+    ///
+    /// [`Malformed`] if there are fewer or more.
+    pub fn exactly(&self, count: usize) -> Result<&[&str], Malformed> {
+        if self.words.len() == count {
+            Ok(&self.words)
+        } else {
+            Err(self.malformed(format!(
+                "`{}` takes {count} words, found {}",
+                self.kind,
+                self.words.len()
+            )))
+        }
+    }
+
+    /// Reads a number in the range of its type.
+    ///
+    /// # Errors
+    ///
+    /// [`Malformed`] if the word is no number or too large a one.
+    pub fn number<T: FromStr<Err = std::num::ParseIntError>>(
+        &self,
+        word: &str,
+    ) -> Result<T, Malformed> {
+        if !word.bytes().all(|byte| byte.is_ascii_digit()) {
+            return Err(self.malformed(format!("`{word}` is not a whole number")));
+        }
+        word.parse().map_err(|error: std::num::ParseIntError| {
+            self.malformed(match error.kind() {
+                IntErrorKind::PosOverflow => format!("`{word}` is too large here"),
+                _ => format!("`{word}` is not a whole number"),
+            })
+        })
+    }
+
+    /// Reads all words as numbers, of which there must be so many.
+    ///
+    /// # Errors
+    ///
+    /// As [`exactly`](Self::exactly) and [`number`](Self::number).
+    pub fn numbers<T: FromStr<Err = std::num::ParseIntError>>(
+        &self,
+        count: usize,
+    ) -> Result<Vec<T>, Malformed> {
+        let words = self.exactly(count)?;
+        words.iter().map(|word| self.number(word)).collect()
+    }
+}
+
+impl fmt::Display for Malformed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}: {}", self.line, self.reason)
+    }
+}
+
+impl std::error::Error for Malformed {}
+
+#[cfg(test)]
+mod tests {
+    use super::Lines;
+
+    #[test]
+    fn records_know_their_lines() {
+        let mut lines = Lines::new("one 1 2\n\n  two\nthree 18446744073709551616 x\n");
+        let one = lines.expect("one").unwrap();
+        assert_eq!(one.numbers::<u64>(2).unwrap(), [1, 2]);
+        assert_eq!(one.exactly(3).unwrap_err().line, 1);
+        assert_eq!(lines.expect("one").unwrap_err().line, 3);
+        let three = lines.next_line().unwrap();
+        let large = three.number::<u64>(three.words[0]).unwrap_err();
+        assert_eq!(
+            large.to_string(),
+            "line 4: `18446744073709551616` is too large here"
+        );
+        let word = three.number::<u64>(three.words[1]).unwrap_err();
+        assert_eq!(word.to_string(), "line 4: `x` is not a whole number");
+        assert_eq!(lines.expect("four").unwrap_err().line, 5);
+    }
+}

@@ -1,0 +1,92 @@
+//! The oracle: reference data against the scheduler and its analysis.
+//!
+//! `oracle KIND FILE...` reads reference files and compares each case with what
+//! this project computes. For a failing case the first difference is printed;
+//! the last line is `N passed, M failed`. The exit code is 0 if none failed, 1
+//! if some did, and 2 if a file could not be read as what it should be, which
+//! is said with its line number, and then nothing is compared.
+//!
+//! - [`lines`]: words and numbers of a reference file, with line numbers;
+//! - [`bounds`]: the analysis at commit.
+
+pub mod bounds;
+pub mod lines;
+
+use std::process::ExitCode;
+
+use lines::Malformed;
+
+/// One kind of reference file: how to read its cases and how to check one.
+struct Kind<Case> {
+    parse: fn(&str) -> Result<Vec<Case>, Malformed>,
+    name: fn(&Case) -> &str,
+    check: fn(&Case) -> Result<(), String>,
+}
+
+const USAGE: &str = "usage: oracle KIND FILE...
+
+Compares reference cases with what the scheduler and its analysis compute.
+KIND is one of:
+  bounds      lengths, widths, response-time bounds and verdicts
+
+Prints the first difference of each failing case, then `N passed, M failed`.
+Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
+";
+
+/// Runs the subcommand.
+#[must_use]
+pub fn oracle(words: &[String]) -> ExitCode {
+    if words.iter().any(|word| word == "--help" || word == "-h") {
+        print!("{USAGE}");
+        return ExitCode::SUCCESS;
+    }
+    match words.split_first() {
+        Some((kind, files)) if kind == "bounds" && !files.is_empty() => {
+            let bounds = Kind {
+                parse: bounds::parse,
+                name: |case: &bounds::Case| &case.name,
+                check: bounds::check,
+            };
+            run_files(&bounds, files)
+        }
+        Some((kind, [])) if kind == "bounds" => {
+            refuse("which files? name at least one reference file")
+        }
+        Some((kind, _)) => refuse(&format!("no kind of reference file `{kind}`")),
+        None => refuse("which kind of reference file?"),
+    }
+}
+
+fn refuse(reason: &str) -> ExitCode {
+    eprint!("oracle: {reason}\n{USAGE}");
+    ExitCode::from(2)
+}
+
+fn run_files<Case>(kind: &Kind<Case>, files: &[String]) -> ExitCode {
+    let mut cases = Vec::new();
+    for file in files {
+        let text = match std::fs::read_to_string(file) {
+            Ok(text) => text,
+            Err(error) => {
+                eprintln!("oracle: cannot read {file}: {error}");
+                return ExitCode::from(2);
+            }
+        };
+        match (kind.parse)(&text) {
+            Ok(parsed) => cases.extend(parsed),
+            Err(Malformed { line, reason }) => {
+                eprintln!("oracle: {file}:{line}: {reason}");
+                return ExitCode::from(2);
+            }
+        }
+    }
+    let mut failed = 0_usize;
+    for case in &cases {
+        if let Err(difference) = (kind.check)(case) {
+            failed += 1;
+            println!("{}: {difference}", (kind.name)(case));
+        }
+    }
+    println!("{} passed, {failed} failed", cases.len() - failed);
+    ExitCode::from(u8::from(failed > 0))
+}
