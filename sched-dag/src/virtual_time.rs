@@ -3,14 +3,47 @@
 //! Time jumps from event to event. What the cores do comes from a
 //! [`Workload`], which is asked once for each instance, at its start, how long
 //! it executes; it may run the instance's real function to find out.
+//!
+//! An instance that executes for no time finishes at the instant of its start,
+//! after the dispatch that started it; another dispatch at the same instant
+//! follows, and so on until nothing happens any more.
+//!
+//! After [`VirtualTime::new`] nothing is allocated here.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+//! use sched_dag::{
+//!     CommitOptions, DagId, DagSpec, Policy, Preemption, Scheduler, SchedulerOptions, SubtaskSpec, verify,
+//! };
+//!
+//! let dag = DagSpec {
+//!     period_ns: Some(100),
+//!     relative_deadline_ns: Some(50),
+//!     jobs: Some(3),
+//!     subtasks: vec![SubtaskSpec::default(), SubtaskSpec::default()],
+//!     edges: vec![(0, 1)],
+//!     ..DagSpec::default()
+//! };
+//! let verified = verify(&[dag], &CommitOptions::new(Policy::Edf, 1)).expect("the DAG is right");
+//! let options = SchedulerOptions { policy: Policy::Edf, preemption: Preemption::Enabled, cores: 1 };
+//! let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
+//! assert_eq!(run.run(&mut ExecutionTimes(|_instance| 20)), End::Finished);
+//! assert_eq!(run.now_ns(), 240);
+//! assert_eq!(run.scheduler().statistics(DagId(0)).misses, 0);
+//! ```
+
+use alloc::boxed::Box;
+use alloc::vec;
 
 use crate::ids::{CoreId, Instance};
-use crate::scheduler::{Observer, Scheduler};
+use crate::scheduler::heap::IndexedHeap;
+use crate::scheduler::{Decision, Observer, Scheduler};
 
 /// What instances do and how long it takes them.
 ///
-/// The methods without a body of their own are called in the order in which
-/// things happen; those of [`Observer`] among them.
+/// Beside [`execute`](Self::execute), the methods report what happens in the
+/// order in which it happens, those of [`Observer`] among them.
 pub trait Workload: Observer {
     /// Returns the execution time of an instance in nanoseconds. Called once
     /// for each instance, at its start; 0 is allowed.
@@ -39,13 +72,11 @@ pub trait Workload: Observer {
 }
 
 /// A workload of which only the execution times matter.
-///
-/// ```
-/// use sched_dag::virtual_time::ExecutionTimes;
-/// let mut every_instance_takes_5_ns = ExecutionTimes(|_instance| 5);
-/// ```
 #[derive(Debug)]
-pub struct ExecutionTimes<F>(pub F);
+pub struct ExecutionTimes<F>(
+    /// Returns the execution time of an instance in nanoseconds.
+    pub F,
+);
 
 impl<F> Observer for ExecutionTimes<F> {}
 
@@ -59,6 +90,16 @@ impl<F: FnMut(Instance) -> u64> Workload for ExecutionTimes<F> {
 #[derive(Debug)]
 pub struct VirtualTime {
     scheduler: Scheduler,
+    /// When the instance on each busy core finishes if nothing intervenes; at
+    /// one instant the core with the smaller number comes first.
+    finish_times: IndexedHeap<(u64, CoreId)>,
+    /// What each core executes.
+    executing: Box<[Option<Instance>]>,
+    /// What is left of each preempted instance, by its subtask's index over all
+    /// DAGs.
+    remaining_ns: Box<[u64]>,
+    /// The index of each DAG's first subtask.
+    first_subtasks: Box<[usize]>,
 }
 
 /// Why a run in virtual time has ended.
@@ -69,39 +110,114 @@ pub enum End {
     Finished,
     /// The next event lies after the time up to which the run should go.
     TimeReached,
-    /// An instance would finish after the last time there is.
+    /// The instance would finish after the last time there is. The run cannot
+    /// be continued.
     TimeOverflow(Instance),
 }
 
 impl VirtualTime {
-    /// Makes a driver at time 0, and allocates all that it will need.
+    /// Makes a driver for a scheduler that has not begun, and allocates all that
+    /// it will need.
     #[must_use]
     pub fn new(scheduler: Scheduler) -> Self {
-        Self { scheduler }
+        let cores = scheduler.options().cores as usize;
+        let mut subtasks = 0;
+        let first_subtasks = scheduler.task_set().dags().iter().map(|dag| {
+            subtasks += dag.subtasks().len();
+            subtasks - dag.subtasks().len()
+        });
+        let first_subtasks = first_subtasks.collect();
+        Self {
+            scheduler,
+            finish_times: IndexedHeap::new(cores),
+            executing: vec![None; cores].into_boxed_slice(),
+            remaining_ns: vec![0; subtasks].into_boxed_slice(),
+            first_subtasks,
+        }
     }
 
     /// Runs until every job has ended.
     ///
-    /// A DAG without a limit of jobs has no end; see [`run_until`](Self::run_until).
+    /// With a DAG without a limit of jobs this is the end of time; see
+    /// [`run_until`](Self::run_until).
     pub fn run(&mut self, workload: &mut impl Workload) -> End {
         self.run_until(u64::MAX, workload)
     }
 
-    /// Runs all events up to and including `until_ns`; may be called again.
+    /// Runs all events up to and including those at `until_ns`. May be called
+    /// again with a later time.
     pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload) -> End {
-        let _ = (until_ns, workload);
-        todo!()
+        loop {
+            let finish_ns = self
+                .finish_times
+                .peek()
+                .map(|((finish_ns, _), _)| finish_ns);
+            let event_ns = match (finish_ns, self.scheduler.next_event_ns()) {
+                (Some(finish_ns), Some(event_ns)) => finish_ns.min(event_ns),
+                (one, other) => match one.or(other) {
+                    Some(event_ns) => event_ns,
+                    None => return End::Finished,
+                },
+            };
+            if event_ns > until_ns {
+                return End::TimeReached;
+            }
+            if let Err(instance) = self.step(event_ns, workload) {
+                return End::TimeOverflow(instance);
+            }
+        }
     }
 
-    /// Returns the time of the last event.
+    /// Returns the time of the last event, in nanoseconds.
     #[must_use]
-    pub fn now_ns(&self) -> u64 {
-        todo!()
+    pub const fn now_ns(&self) -> u64 {
+        self.scheduler.now_ns()
     }
 
     /// Returns the scheduler, for its statistics.
     #[must_use]
     pub const fn scheduler(&self) -> &Scheduler {
         &self.scheduler
+    }
+
+    /// Lets one instant happen. An instance that cannot finish is the error.
+    fn step(&mut self, now_ns: u64, workload: &mut impl Workload) -> Result<(), Instance> {
+        let mut moment = self.scheduler.at(now_ns);
+        while let Some(((finish_ns, core), index)) = self.finish_times.peek()
+            && finish_ns <= now_ns
+        {
+            self.finish_times.remove(index);
+            if let Some(instance) = self.executing[index].take() {
+                workload.finished(instance, core, now_ns);
+                moment.complete(instance, workload);
+            }
+        }
+        for &decision in moment.release_due(workload).dispatch() {
+            let (core, instance) = (decision.core(), decision.instance());
+            let index = self.first_subtasks[instance.dag.index()] + instance.subtask.index();
+            let remaining_ns = match decision {
+                Decision::Preempt { .. } => {
+                    let finish_ns = self
+                        .finish_times
+                        .key(core.index())
+                        .map_or(now_ns, |(at_ns, _)| at_ns);
+                    self.remaining_ns[index] = finish_ns - now_ns;
+                    workload.preempted(instance, core, now_ns);
+                    continue;
+                }
+                Decision::Resume { .. } => {
+                    workload.resumed(instance, core, now_ns);
+                    self.remaining_ns[index]
+                }
+                Decision::Start { .. } => {
+                    workload.started(instance, core, now_ns);
+                    workload.execute(instance, now_ns)
+                }
+            };
+            let finish_ns = now_ns.checked_add(remaining_ns).ok_or(instance)?;
+            self.finish_times.set(core.index(), (finish_ns, core));
+            self.executing[core.index()] = Some(instance);
+        }
+        Ok(())
     }
 }

@@ -1,25 +1,79 @@
 //! The scheduler as a pure state machine.
+//!
+//! It has no clock, no thread and no I/O. A *driver* tells it what has happened
+//! and when; it answers with *decisions*. All that it needs is allocated when it
+//! is made.
+//!
+//! # One instant
+//!
+//! R5 orders what happens at one instant: completions, then releases, then one
+//! dispatch that sees both. The types force this order:
+//!
+//! 1. [`Scheduler::at`] begins the instant and gives a [`Moment`], which takes
+//!    completions;
+//! 2. [`Moment::release_due`] turns it into a [`Released`], which takes none;
+//! 3. [`Released::dispatch`] ends it with the [`Decision`]s.
+//!
+//! A driver calls them when a subtask has returned, and at the latest at
+//! [`Scheduler::next_event_ns`].
+//!
+//! # What it guarantees
+//!
+//! - The rules R1 to R5 (see the [crate]), with the key that R5 states.
+//! - Each job ends exactly once, in the order of its DAG's jobs, and each due
+//!   job is released or skipped exactly once.
+//! - Bounded steps: a release costs the sources of its DAG, a completion the
+//!   successors of its subtask, a decision the logarithm of the number of
+//!   subtasks. Beside that an aborted job costs its instances, once. After a
+//!   pause of the driver, each release and each deadline that has passed
+//!   meanwhile costs its step.
+//!
+//! # What it does not
+//!
+//! It does not know execution times: a subtask that never returns keeps its
+//! core (or, preempted, its place in line). It does not measure, it believes
+//! the driver's times; a time earlier than one before counts as that one.
 
+mod cores;
 mod decision;
+mod dispatch;
+pub(crate) mod heap;
+mod instances;
+mod jobs;
+mod joins;
+mod key;
+mod moment;
 mod observer;
+mod overrun;
 mod statistics;
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 pub use decision::Decision;
+pub use moment::{Moment, Released};
 pub use observer::{JobOutcome, Observer};
 pub use statistics::DagStatistics;
 
-use crate::ids::{CoreId, DagId, Instance};
+use cores::Cores;
+use heap::IndexedHeap;
+use instances::Phase;
+use jobs::Jobs;
+use joins::Joins;
+use key::Key;
+
+use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::policy::{Policy, Preemption};
-use crate::task_set::TaskSet;
+use crate::task_set::{Dag, TaskSet};
 
 /// How a scheduler orders instances, and for how many cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SchedulerOptions {
     /// How the ready instances are ordered.
     pub policy: Policy,
-    /// Whether a started instance may lose its core.
+    /// Whether a started instance may lose its core. With
+    /// [`Preemption::Enabled`], non-preemptive subtasks still keep theirs.
     pub preemption: Preemption,
     /// The number of cores, at least 1.
     pub cores: u32,
@@ -30,43 +84,92 @@ pub struct SchedulerOptions {
 pub struct Scheduler {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
+    now_ns: u64,
+    dags: Box<[DagState]>,
+    /// What each subtask's next instance does, by index over all DAGs.
+    phases: Box<[Phase]>,
+    /// The ready instances that do not run, by the same index.
+    ready: IndexedHeap<Key>,
+    cores: Cores,
+    /// When something happens to each DAG without a completion.
+    timers: IndexedHeap<u64>,
+    /// Subtasks whose instances have ended and whose successors do not know yet.
+    ending: Vec<SubtaskId>,
+    decisions: Vec<Decision>,
 }
 
-/// One instant, in which completions are still accepted.
+/// The state of one DAG.
 #[derive(Debug)]
-#[must_use = "an instant without `release_due` and `dispatch` leaves cores idle"]
-pub struct Moment<'s> {
-    scheduler: &'s mut Scheduler,
-}
-
-/// One instant after its completions and releases.
-#[derive(Debug)]
-#[must_use = "an instant without `dispatch` leaves cores idle"]
-pub struct Released<'s> {
-    scheduler: &'s mut Scheduler,
+struct DagState {
+    /// The index over all DAGs of its first subtask.
+    first_subtask: usize,
+    jobs: Jobs,
+    joins: Joins,
+    statistics: DagStatistics,
 }
 
 impl Scheduler {
-    /// Makes a scheduler with no job released, and allocates all it will need.
+    /// Makes a scheduler with no job released, and allocates all that it will
+    /// ever need. Time begins at 0.
     ///
     /// # Panics
     ///
     /// If the options say 0 cores.
     #[must_use]
     pub fn new(task_set: Arc<TaskSet>, options: SchedulerOptions) -> Self {
-        Self { task_set, options }
+        assert!(
+            options.cores > 0,
+            "a scheduler for 0 cores; give it at least 1"
+        );
+        let dags = task_set.dags();
+        let longest = dags
+            .iter()
+            .map(|dag| dag.subtasks().len())
+            .max()
+            .unwrap_or(0);
+        let mut subtasks = 0;
+        let states: Box<[DagState]> = dags
+            .iter()
+            .map(|dag| {
+                let first_subtask = subtasks;
+                subtasks += dag.subtasks().len();
+                DagState::new(dag, first_subtask)
+            })
+            .collect();
+        let mut timers = IndexedHeap::new(dags.len());
+        for (index, (dag, state)) in dags.iter().zip(&states).enumerate() {
+            if let Some(event_ns) = state.jobs.next_event_ns(dag, 0) {
+                timers.set(index, event_ns);
+            }
+        }
+        Self {
+            options,
+            now_ns: 0,
+            dags: states,
+            phases: alloc::vec![Phase::Absent; subtasks].into_boxed_slice(),
+            ready: IndexedHeap::new(subtasks),
+            cores: Cores::new(options.cores),
+            timers,
+            ending: Vec::with_capacity(longest),
+            // A dispatch names a core at most twice: to preempt and to start.
+            decisions: Vec::with_capacity(2 * options.cores as usize),
+            task_set,
+        }
     }
 
-    /// Begins the instant `now_ns`.
+    /// Begins the instant `now_ns`. A time earlier than one before counts as
+    /// that one.
     pub fn at(&mut self, now_ns: u64) -> Moment<'_> {
-        let _ = now_ns;
-        Moment { scheduler: self }
+        self.now_ns = self.now_ns.max(now_ns);
+        Moment::new(self)
     }
 
-    /// Returns the time of the next release or expiry of a deadline.
+    /// Returns when the driver has to begin the next instant, if nothing
+    /// completes before: at the next release, or when a deadline has passed.
+    /// `None`: only completions are to come, or nothing.
     #[must_use]
     pub fn next_event_ns(&self) -> Option<u64> {
-        todo!()
+        self.timers.peek().map(|(event_ns, _)| event_ns)
     }
 
     /// Returns what a core executes.
@@ -76,15 +179,16 @@ impl Scheduler {
     /// If there is no such core.
     #[must_use]
     pub fn running(&self, core: CoreId) -> Option<Instance> {
-        let _ = core;
-        todo!()
+        self.cores.running(core).map(Key::instance)
     }
 
     /// Reports whether all jobs of all DAGs have been released or skipped, and
     /// none is in flight. Never true if a DAG has no limit of jobs.
     #[must_use]
     pub fn is_finished(&self) -> bool {
-        todo!()
+        let dags = self.task_set.dags().iter().zip(&self.dags);
+        dags.into_iter()
+            .all(|(dag, state)| state.jobs.are_over(dag))
     }
 
     /// Returns a DAG's counters.
@@ -94,13 +198,23 @@ impl Scheduler {
     /// If there is no such DAG.
     #[must_use]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
-        let _ = dag;
-        todo!()
+        &self.dags[dag.index()].statistics
+    }
+
+    /// Returns the number of jobs of a DAG that are due and wait for an older
+    /// job to end.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn waiting(&self, dag: DagId) -> u64 {
+        self.dags[dag.index()].jobs.waiting()
     }
 
     /// Returns the model that is scheduled.
     #[must_use]
-    pub fn task_set(&self) -> &Arc<TaskSet> {
+    pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
     }
 
@@ -109,33 +223,42 @@ impl Scheduler {
     pub const fn options(&self) -> SchedulerOptions {
         self.options
     }
-}
 
-impl<'s> Moment<'s> {
-    /// Takes note that an instance has finished.
-    ///
-    /// # Panics
-    ///
-    /// If the instance has not started or has finished before.
-    pub fn complete(&mut self, instance: Instance, observer: &mut impl Observer) {
-        let _ = (instance, observer);
-        todo!()
+    /// Returns the latest instant begun, in nanoseconds.
+    #[must_use]
+    pub const fn now_ns(&self) -> u64 {
+        self.now_ns
     }
 
-    /// Releases the jobs that are due, and notices deadlines that have passed.
-    pub fn release_due(self, observer: &mut impl Observer) -> Released<'s> {
-        let _ = observer;
-        Released {
-            scheduler: self.scheduler,
+    /// Returns a subtask's index over all DAGs. At most one instance of a
+    /// subtask is ready or runs at a time, so tables of them use this index.
+    fn subtask_index(&self, dag: DagId, subtask: SubtaskId) -> usize {
+        self.dags[dag.index()].first_subtask + subtask.index()
+    }
+
+    /// Returns whether a started instance of a subtask may lose its core.
+    fn may_be_preempted(&self, dag: DagId, subtask: SubtaskId) -> bool {
+        self.options.preemption == Preemption::Enabled
+            && !self.task_set.dag(dag).subtask(subtask).is_non_preemptive()
+    }
+}
+
+impl DagState {
+    fn new(dag: &Dag, first_subtask: usize) -> Self {
+        Self {
+            first_subtask,
+            jobs: Jobs::new(dag),
+            joins: Joins::new(dag),
+            statistics: DagStatistics::default(),
         }
     }
 }
 
-impl<'s> Released<'s> {
-    /// Gives the cores to the instances with the smallest keys (R5).
-    #[must_use = "the decisions are for the driver to carry out"]
-    pub fn dispatch(self) -> &'s [Decision] {
-        let _ = &self.scheduler;
-        &[]
-    }
+/// Returns the key of an instance that is ready.
+fn key_of(policy: Policy, dag: &Dag, instance: Instance) -> Key {
+    let urgency = match policy {
+        Policy::StaticPriority => u64::from(dag.subtask(instance.subtask).priority().0),
+        Policy::Edf => jobs::deadline_ns(dag, instance.job),
+    };
+    Key::new(urgency, instance)
 }

@@ -1,0 +1,61 @@
+//! One instant, in the order that its types force.
+
+use super::{Decision, Observer, Scheduler};
+use crate::ids::{DagId, Instance, to_u32};
+
+/// One instant, in which completions are still taken.
+#[derive(Debug)]
+#[must_use = "an instant without `release_due` and `dispatch` leaves cores idle"]
+pub struct Moment<'s> {
+    scheduler: &'s mut Scheduler,
+}
+
+/// One instant after its completions and releases.
+#[derive(Debug)]
+#[must_use = "an instant without `dispatch` leaves cores idle"]
+pub struct Released<'s> {
+    scheduler: &'s mut Scheduler,
+}
+
+impl<'s> Moment<'s> {
+    pub(super) fn new(scheduler: &'s mut Scheduler) -> Self {
+        Self { scheduler }
+    }
+
+    /// Takes note that an instance has finished.
+    ///
+    /// It need not run any more in the scheduler's eyes: on a machine an
+    /// instance may finish while the decision to preempt it is under way. Then
+    /// it only leaves the line, and the core goes on with what it was given.
+    ///
+    /// # Panics
+    ///
+    /// If the instance has not started or has been completed before.
+    pub fn complete(&mut self, instance: Instance, observer: &mut impl Observer) {
+        self.scheduler.finish(instance, observer);
+    }
+
+    /// Releases the jobs that are due, and notices deadlines that have passed.
+    pub fn release_due(self, observer: &mut impl Observer) -> Released<'s> {
+        let now_ns = self.scheduler.now_ns;
+        while let Some((event_ns, index)) = self.scheduler.timers.peek()
+            && event_ns <= now_ns
+        {
+            self.scheduler.serve(DagId(to_u32(index)), observer);
+        }
+        Released {
+            scheduler: self.scheduler,
+        }
+    }
+}
+
+impl<'s> Released<'s> {
+    /// Gives the cores to the instances with the smallest keys (R5), and
+    /// returns the changes. They are in effect for the scheduler; the driver
+    /// has to carry them out.
+    #[must_use = "the decisions are for the driver to carry out"]
+    pub fn dispatch(self) -> &'s [Decision] {
+        self.scheduler.decide();
+        &self.scheduler.decisions
+    }
+}

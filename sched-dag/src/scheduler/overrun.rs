@@ -1,0 +1,117 @@
+//! Releases, and what happens to those that find no room.
+//!
+//! # Rules of every policy
+//!
+//! 1. A job is due at its nominal release time O + kT, whatever happened to the
+//!    jobs before it. Its deadline is that time plus D, also if it is released
+//!    later.
+//! 2. Jobs are released in the order of their numbers. A due job is released at
+//!    once unless an older one waits or its release is blocked (the job J
+//!    before it, or an older one, is in flight).
+//! 3. A waiting job is released at the first instant at which it is the oldest
+//!    that waits and is not blocked; completions of that instant count.
+//! 4. A miss is noticed at the first instant after the deadline, whether the
+//!    job is in flight or waits, and once. A job that is skipped or aborted
+//!    before its deadline counts as that and never as a miss.
+//! 5. The run of consecutive misses ends only with a job that meets its
+//!    deadline. Skipped and aborted jobs neither lengthen nor end it.
+//!
+//! # Queue
+//!
+//! A due job that cannot be released waits. Any number of jobs may wait, in
+//! constant memory, since only their numbers are kept; what stays bounded is
+//! the number in flight. An overload that lasts therefore lasts in the
+//! deadlines, too; choose another policy if old jobs are worth nothing.
+//!
+//! # Skip
+//!
+//! A due job that cannot be released is skipped. No job ever waits.
+//!
+//! # Abort
+//!
+//! A due job that cannot be released aborts the oldest job in flight that is
+//! not aborted yet, and waits. If all in flight are aborted already, the oldest
+//! waiting job, which may be the due one itself, is skipped.
+//!
+//! An aborted job starts no further instance: those that are ready are
+//! cancelled at once, the others when they would become ready. Those that have
+//! started go on, at their key, to their end; a preempted one has started. The
+//! aborted job ends, and makes room, when no instance of it is left; if none
+//! has started and not finished, then at once.
+
+use super::Scheduler;
+use super::jobs::release_ns;
+use crate::ids::{DagId, to_u32};
+use crate::policy::OverrunPolicy;
+use crate::scheduler::Observer;
+
+impl Scheduler {
+    /// Releases all jobs of a DAG that are due, and notices deadlines that have
+    /// passed.
+    pub(super) fn serve(&mut self, dag: DagId, observer: &mut impl Observer) {
+        self.judge(dag, observer);
+        self.release_waiting(dag, observer);
+        while let Some((job, release_ns)) = self.take_due(dag) {
+            self.release_waiting(dag, observer);
+            if !self.is_waiting(dag, job) {
+                continue;
+            }
+            match self.task_set.dag(dag).overrun() {
+                OverrunPolicy::Queue => {}
+                OverrunPolicy::Skip => self.skip_oldest_waiting(dag, observer),
+                OverrunPolicy::Abort => {
+                    self.make_room(dag, observer);
+                    self.release_waiting(dag, observer);
+                }
+            }
+            if self.is_waiting(dag, job) {
+                self.dags[dag.index()].statistics.queued += 1;
+                observer.queued(dag, job, release_ns);
+            }
+        }
+        self.judge(dag, observer);
+        self.set_timer(dag);
+    }
+
+    fn take_due(&mut self, dag: DagId) -> Option<(u64, u64)> {
+        let jobs = &mut self.dags[dag.index()].jobs;
+        jobs.take_due(self.task_set.dag(dag), self.now_ns)
+    }
+
+    fn is_waiting(&self, dag: DagId, job: u64) -> bool {
+        self.dags[dag.index()].jobs.is_waiting(job)
+    }
+
+    /// Releases waiting jobs as long as none is blocked.
+    fn release_waiting(&mut self, dag: DagId, observer: &mut impl Observer) {
+        while let Some(job) = self.dags[dag.index()].jobs.releasable() {
+            let model = self.task_set.dag(dag);
+            let state = &mut self.dags[dag.index()];
+            let sequence = state.jobs.release_waiting(to_u32(model.subtasks().len()));
+            state.statistics.released += 1;
+            observer.released(dag, job, release_ns(model, job));
+            for position in 0..model.sources().len() {
+                let source = self.task_set.dag(dag).sources()[position];
+                self.release_source(dag, sequence, source, observer);
+            }
+        }
+    }
+
+    fn make_room(&mut self, dag: DagId, observer: &mut impl Observer) {
+        let state = &mut self.dags[dag.index()];
+        let Some(sequence) = state.jobs.abort_oldest() else {
+            self.skip_oldest_waiting(dag, observer);
+            return;
+        };
+        state.statistics.aborts += 1;
+        observer.aborted(dag, state.jobs.job(sequence).number);
+        self.cancel_ready(dag, sequence, observer);
+    }
+
+    fn skip_oldest_waiting(&mut self, dag: DagId, observer: &mut impl Observer) {
+        let state = &mut self.dags[dag.index()];
+        let job = state.jobs.skip_waiting();
+        state.statistics.skips += 1;
+        observer.skipped(dag, job, release_ns(self.task_set.dag(dag), job));
+    }
+}
