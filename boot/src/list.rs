@@ -34,6 +34,11 @@ impl<T: Copy, const N: usize> List<T, N> {
         Ok(())
     }
 
+    /// Returns the values, to be changed.
+    pub fn as_mut_slice(&mut self) -> &mut [T] {
+        &mut self.items[..self.length]
+    }
+
     /// Returns the values.
     pub fn as_slice(&self) -> &[T] {
         &self.items[..self.length]

@@ -1,2 +1,61 @@
-//! Kernel.
-#![no_std]
+//! The unikernel: runs committed DAGs on bare x86_64 processors.
+//!
+//! An app is one function. It states its DAGs with `fass`, commits them, and
+//! tells its [`Machine`] to run them; the kernel does the rest:
+//!
+//! ```no_run
+//! use kernel::{Ending, Machine};
+//!
+//! fn main(machine: &Machine) -> Result<(), Ending> {
+//!     machine.options().finish(&[])?;
+//!     // create_dag(), register_*(), finish_create_dags() ...
+//!     let run = machine.run()?;
+//!     kernel::println!("{} violations", run.violations().count());
+//!     Ok(())
+//! }
+//! # // In an app's `main.rs`: kernel::entry!(main);
+//! ```
+//!
+//! # Principles
+//!
+//! 1. **The scheduler decides, the kernel carries out.** `sched-dag` is told
+//!    what happens and when; no line here chooses an instance.
+//! 2. **One lock around the scheduler**, held with interrupts off for one step
+//!    of it, never across an app's function.
+//! 3. **After commit nothing allocates**: from a job's release to its completion
+//!    all memory is there already.
+//! 4. **A core without work halts**, and is woken by the core that has some.
+//! 5. **`unsafe` is in `machine`, `memory` and `entry`** alone, each block with
+//!    the invariant that it relies on.
+//! 6. **Apps are not trusted**: what they say is verified at commit.
+//!
+//! # From bottom to top
+//!
+//! `machine` (processor, interrupts, time) and `memory` know nothing of what is
+//! above. `execution` holds the scheduler, `worker` is the loop of each core,
+//! `platform` answers `fass`, [`Machine`] is what an app sees. [`console`],
+//! [`json`], [`options`] and [`report`] serve input and output.
+
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
+pub mod console;
+#[doc(hidden)]
+pub mod entry;
+mod execution;
+pub mod json;
+mod machine;
+mod machine_handle;
+mod memory;
+pub mod options;
+mod panic;
+mod platform;
+pub mod report;
+mod run;
+mod start;
+mod worker;
+
+pub use machine_handle::{Ending, Machine};
+pub use memory::heap::KernelHeap;
+pub use run::Run;

@@ -1,2 +1,133 @@
-//! Fork-join.
-#![no_std]
+//! The paper's workload: one source -> N parallel subtasks -> one sink.
+//!
+//! Every 25 ms the source starts a job. Each of the N parallel subtasks executes
+//! for a time drawn uniformly from 1 to 50 ms; the sink joins them. As a parallel
+//! subtask's mean load is 25.5 / 25, backlogs grow slowly however many cores there
+//! are, and deadlines come to be missed: that is the workload's nature, not an
+//! error. An error is a *mixed join*: a sink that receives values of different
+//! jobs, which [`Joins`] counts and which must not happen.
+//!
+//! The code here knows no kernel: the tests run it in virtual time.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+mod draw;
+mod sink;
+
+use alloc::format;
+use alloc::vec;
+use core::time::Duration;
+
+use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
+
+pub use draw::ExecutionTimes;
+pub use sink::Joins;
+
+/// The time between two jobs.
+pub const PERIOD: Duration = Duration::from_millis(25);
+
+/// The time that a job is meant to take: four periods, so that deadlines are met
+/// until the backlog has grown.
+pub const RELATIVE_DEADLINE: Duration = Duration::from_millis(100);
+
+/// The longest time that a parallel subtask executes for.
+pub const WCET: Duration = Duration::from_millis(50);
+
+/// The most parallel subtasks: the sink's arguments are a tuple.
+pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
+
+/// What a fork-join run is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Workload {
+    /// The number N of parallel subtasks, 1 to [`MOST_PARALLEL`].
+    pub parallel: usize,
+    /// The number of jobs.
+    pub jobs: u64,
+    /// The seed of the execution times.
+    pub seed: u64,
+    /// How execution occupies a core.
+    pub occupation: Occupation,
+}
+
+impl Workload {
+    /// Builds the DAG and the counts that its sink keeps.
+    ///
+    /// As many jobs may be in flight as there are, up to 256: the backlog of the
+    /// slowest parallel subtask, some 130 jobs after 2000, must not hold back the
+    /// releases.
+    ///
+    /// # Panics
+    ///
+    /// If `parallel` is 0 or more than [`MOST_PARALLEL`].
+    #[must_use]
+    pub fn build(&self) -> (Dag, Joins) {
+        let dag = create_dag();
+        dag.name("fork-join").jobs(self.jobs);
+        dag.in_flight(u32::try_from(self.jobs).unwrap_or(u32::MAX).clamp(1, 256));
+
+        let mut next_job = 0u64;
+        let source = move || {
+            let job = next_job;
+            next_job += 1;
+            (job,)
+        };
+        let attributes = SubtaskAttributes::named("source");
+        dag.register_periodic_subtask(source, vec!["job"], PERIOD, attributes);
+
+        for branch in 0..self.parallel {
+            let mut times = ExecutionTimes::new(self.seed, branch);
+            let occupation = self.occupation;
+            let execute = move |(job,): (u64,)| {
+                fass::execute_for(times.next_time(), occupation);
+                (job,)
+            };
+            let attributes = SubtaskAttributes::named(&format!("parallel-{branch}")).wcet(WCET);
+            let output = format!("part-{branch}");
+            dag.register_subtask(execute, vec!["job"], vec![&output], attributes);
+        }
+
+        let joins = Joins::default();
+        sink::register(&dag, self.parallel, &joins);
+        (dag, joins)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use virtual_time::VirtualTime;
+
+    fn workload(parallel: usize) -> Workload {
+        Workload {
+            parallel,
+            jobs: 100,
+            seed: 1,
+            occupation: Occupation::Hold,
+        }
+    }
+
+    #[test]
+    fn joins_every_job_whatever_the_number_of_cores() {
+        for (parallel, cores) in [(1, 1), (2, 1), (2, 4), (4, 3), (6, 8), (16, 64)] {
+            let machine = VirtualTime::new().cores(cores);
+            let (dag, joins) = workload(parallel).build();
+            fass::finish_create_dags(&[dag]).unwrap();
+            let report = machine.run();
+            assert_eq!(
+                report.violations().count(),
+                0,
+                "N = {parallel}, {cores} cores"
+            );
+            assert_eq!((joins.total(), joins.mixed()), (100, 0));
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "1 to 16")]
+    fn refuses_a_sink_without_arguments() {
+        let _ = workload(0).build();
+    }
+}

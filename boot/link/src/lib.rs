@@ -12,15 +12,13 @@
 /// position-independent: the loader places it where the script says. Pages of
 /// 4 KiB, so that each section can have its own access rights without padding
 /// the file to 2 MiB.
-const ARGUMENTS: [&str; 8] = [
+const ARGUMENTS: [&str; 6] = [
     "-nostartfiles",
     "-nostdlib",
     "-static",
     "-no-pie",
     "-Wl,--build-id=none",
-    "-Wl,--gc-sections",
     "-Wl,-z,max-page-size=4096",
-    "-Wl,-z,noexecstack",
 ];
 
 /// The linker script, beside the boot code that its symbols serve.

@@ -5,7 +5,7 @@
 /// Byte counts are of whole blocks, 16-byte headers and rounding included, so
 /// that `capacity_bytes - in_use_bytes` is what the free blocks hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Usage {
+pub(crate) struct Usage {
     /// Allocations that succeeded since the start.
     pub allocations: u64,
     /// Deallocations since the start, at most `allocations`.

@@ -1,0 +1,123 @@
+//! The one printer of machine lines: one JSON object a line, `{` in column 0.
+//!
+//! `docs/serial-protocol.md` lists the kinds. An object is described by a
+//! closure that names its fields, so printing one allocates nothing.
+
+use core::fmt::{self, Display, Formatter};
+
+/// Writes the fields of one object.
+#[expect(missing_debug_implementations, reason = "a `Formatter` has none")]
+pub struct Object<'a, 'f> {
+    out: &'a mut Formatter<'f>,
+    first: bool,
+    result: fmt::Result,
+}
+
+impl Object<'_, '_> {
+    /// Writes a field with a whole number.
+    pub fn number(&mut self, name: &str, value: impl Into<u64>) -> &mut Self {
+        let value = value.into();
+        self.field(name, |out| Display::fmt(&value, out))
+    }
+
+    /// Writes a field with text.
+    pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
+        self.field(name, |out| {
+            use fmt::Write;
+            out.write_char('"')?;
+            write!(Escaped(out), "{value}")?;
+            out.write_char('"')
+        })
+    }
+
+    /// Writes a field with an object.
+    pub fn object(&mut self, name: &str, fields: impl Fn(&mut Object<'_, '_>)) -> &mut Self {
+        self.field(name, |out| Fields(&fields).fmt(out))
+    }
+
+    fn field(
+        &mut self,
+        name: &str,
+        value: impl FnOnce(&mut Formatter<'_>) -> fmt::Result,
+    ) -> &mut Self {
+        let separator = if self.first { "" } else { "," };
+        self.first = false;
+        self.result = self
+            .result
+            .and_then(|()| write!(self.out, "{separator}\"{name}\":"))
+            .and_then(|()| value(self.out));
+        self
+    }
+}
+
+/// An object as text.
+struct Fields<F>(F);
+
+impl<F: Fn(&mut Object<'_, '_>)> Display for Fields<F> {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        out.write_str("{")?;
+        let mut object = Object {
+            out,
+            first: true,
+            result: Ok(()),
+        };
+        (self.0)(&mut object);
+        object.result?;
+        out.write_str("}")
+    }
+}
+
+/// Text inside the quotes of a JSON string (RFC 8259, section 7).
+struct Escaped<'a, 'f>(&'a mut Formatter<'f>);
+
+impl fmt::Write for Escaped<'_, '_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        text.chars().try_for_each(|character| match character {
+            '"' => self.0.write_str("\\\""),
+            '\\' => self.0.write_str("\\\\"),
+            '\n' => self.0.write_str("\\n"),
+            control if control < ' ' => write!(self.0, "\\u{:04x}", u32::from(control)),
+            other => self.0.write_char(other),
+        })
+    }
+}
+
+/// Returns a machine line of kind `kind`, without the line's end.
+pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
+    Fields(move |object: &mut Object<'_, '_>| {
+        object.text("kind", kind);
+        fields(object);
+    })
+}
+
+/// Prints a machine line of kind `kind`.
+pub fn emit(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
+    crate::println!("{}", line(kind, fields));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writes_fields_in_order_and_nests() {
+        let line = line("fork_join", |object| {
+            object.number("jobs", 7u64).object("latency_ns", |latency| {
+                latency.number("min", 1u32).number("max", 2u32);
+            });
+        });
+        let expected = r#"{"kind":"fork_join","jobs":7,"latency_ns":{"min":1,"max":2}}"#;
+        assert_eq!(line.to_string(), expected);
+    }
+
+    #[test]
+    fn escapes_what_json_cannot_hold() {
+        let line = line("panic", |object| {
+            object.text("message", "a \"b\"\\\n\u{1}é");
+        });
+        assert_eq!(
+            line.to_string(),
+            r#"{"kind":"panic","message":"a \"b\"\\\n\u0001é"}"#
+        );
+    }
+}

@@ -1,0 +1,103 @@
+//! The processor's own instructions: interrupt flag, halt, registers, identity.
+//!
+//! Each function is one instruction (or the few that belong together) with a
+//! safe signature where no use of it can break memory safety.
+
+use core::arch::asm;
+use core::arch::x86_64::__cpuid;
+
+/// Disables interrupts on this processor and reports whether they were enabled.
+pub(crate) fn disable_interrupts() -> bool {
+    let flags: u64;
+    // SAFETY: reads the flags through the stack and clears the interrupt flag,
+    // which delays interrupts and changes no memory that Rust knows of.
+    unsafe { asm!("pushfq", "pop {}", "cli", out(reg) flags) };
+    flags & (1 << 9) != 0
+}
+
+/// Enables interrupts on this processor.
+pub(crate) fn enable_interrupts() {
+    // SAFETY: handlers keep all registers of what they interrupt and touch only
+    // data behind locks or atomics, so an interrupt may come anywhere.
+    unsafe { asm!("sti") };
+}
+
+/// Enables interrupts and halts until one has been handled; leaves them enabled.
+///
+/// To be called with interrupts disabled: as `sti` takes effect only after the
+/// next instruction, no interrupt that the caller has checked for can slip in
+/// between and leave the processor halted with work to do.
+pub(crate) fn enable_interrupts_and_halt() {
+    // SAFETY: as for `enable_interrupts`; halting changes no state.
+    unsafe { asm!("sti", "hlt") };
+}
+
+/// Stops this processor for good.
+pub(crate) fn halt_forever() -> ! {
+    loop {
+        // SAFETY: with interrupts disabled nothing runs here again, so no
+        // invariant of interrupted code can be observed.
+        unsafe { asm!("cli", "hlt") };
+    }
+}
+
+/// Tells the processor that this is a waiting loop.
+///
+/// Under QEMU's instruction counting it also passes the turn to the next
+/// processor, so a waiting loop without it would starve the others.
+pub(crate) fn relax() {
+    core::hint::spin_loop();
+}
+
+/// Reads the time stamp counter, in ticks.
+pub(crate) fn time_stamp() -> u64 {
+    // SAFETY: RDTSC only writes two registers; every 64-bit processor has it.
+    unsafe { core::arch::x86_64::_rdtsc() }
+}
+
+/// Writes a model-specific register.
+///
+/// # Safety
+///
+/// The processor has the register, and the value is right for it.
+pub(crate) unsafe fn write_msr(register: u32, value: u64) {
+    let (low, high) = (value & 0xffff_ffff, value >> 32);
+    // SAFETY: the caller vouches for register and value.
+    unsafe { asm!("wrmsr", in("ecx") register, in("rax") low, in("rdx") high) };
+}
+
+/// Reads the address whose access caused the last page fault.
+pub(crate) fn fault_address() -> u64 {
+    let address: u64;
+    // SAFETY: reading CR2 changes nothing.
+    unsafe { asm!("mov {}, cr2", out(reg) address, options(nomem, nostack)) };
+    address
+}
+
+/// Switches to the page table at physical address `root`.
+///
+/// # Safety
+///
+/// `root` maps the image, the current stack and all memory in use to where they
+/// are now.
+pub(crate) unsafe fn set_page_table(root: u64) {
+    // SAFETY: the caller vouches for the table; the write flushes old entries.
+    unsafe { asm!("mov cr3, {}", in(reg) root) };
+}
+
+/// The hypervisor's signature (CPUID 0x4000_0000), if there is one.
+pub(crate) fn hypervisor() -> Option<[u8; 12]> {
+    const HYPERVISOR_PRESENT: u32 = 1 << 31;
+    if __cpuid(1).ecx & HYPERVISOR_PRESENT == 0 {
+        return None;
+    }
+    let leaf = __cpuid(0x4000_0000);
+    let mut signature = [0; 12];
+    for (place, register) in signature
+        .chunks_exact_mut(4)
+        .zip([leaf.ebx, leaf.ecx, leaf.edx])
+    {
+        place.copy_from_slice(&register.to_le_bytes());
+    }
+    Some(signature)
+}

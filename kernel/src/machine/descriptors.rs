@@ -1,0 +1,154 @@
+//! Segment and interrupt descriptors: what the processor must be told so that
+//! each interrupt finds its code and its stack (Intel SDM volume 3, 3.4, 6.14, 7.7).
+
+use core::arch::asm;
+
+use alloc::boxed::Box;
+
+use super::once::Once;
+
+/// The code segment's selector.
+const CODE: u16 = 0x08;
+/// The task state segment's selector.
+const TASK_STATE: u16 = 0x18;
+
+/// The stack that each kind of interrupt arrives on, as IST numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum InterruptStack {
+    /// The running context's save area.
+    Context = 1,
+    /// Exceptions that code causes.
+    Exception = 2,
+    /// The double fault: the exception stack may be what is broken.
+    DoubleFault = 3,
+    /// The non-maskable interrupt, which may hit any handler.
+    NonMaskable = 4,
+    /// The machine check, likewise.
+    MachineCheck = 5,
+}
+
+/// The 64-bit task state segment, of which only the interrupt stacks matter.
+#[derive(Debug)]
+#[repr(C, packed(4))]
+pub(crate) struct TaskState {
+    reserved_0: u32,
+    privilege_stacks: [u64; 3],
+    reserved_1: u64,
+    /// IST 1 to 7.
+    interrupt_stacks: [u64; 7],
+    reserved_2: [u16; 5],
+    io_map_base: u16,
+}
+
+const _: () = assert!(size_of::<TaskState>() == 104);
+
+impl TaskState {
+    /// Creates a segment with the given stack tops, in the order of [`InterruptStack`].
+    pub(crate) const fn new(tops: [u64; 5]) -> Self {
+        let [
+            context,
+            exception,
+            double_fault,
+            non_maskable,
+            machine_check,
+        ] = tops;
+        Self {
+            reserved_0: 0,
+            privilege_stacks: [0; 3],
+            reserved_1: 0,
+            interrupt_stacks: [
+                context,
+                exception,
+                double_fault,
+                non_maskable,
+                machine_check,
+                0,
+                0,
+            ],
+            reserved_2: [0; 5],
+            io_map_base: 104,
+        }
+    }
+}
+
+/// Loads segments for this core, with `task_state` as its interrupt stacks.
+pub(crate) fn load_segments(task_state: &'static TaskState) {
+    let base = core::ptr::from_ref(task_state) as u64;
+    let limit = size_of::<TaskState>() as u64 - 1;
+    let table: &'static [u64; 5] = Box::leak(Box::new([
+        0,
+        0x00af_9b00_0000_ffff, // 64-bit code
+        0x00cf_9300_0000_ffff, // data
+        limit | (base & 0xff_ffff) << 16 | 0x89 << 40 | (base >> 24 & 0xff) << 56,
+        base >> 32,
+    ]));
+    let pointer = TablePointer::to(table);
+    // SAFETY: the table is valid and lives forever; the code segment is the
+    // same as before, so execution goes on unchanged.
+    unsafe { asm!("lgdt [{}]", in(reg) &pointer) };
+    // SAFETY: reloads cs with the selector of a 64-bit code segment by a far
+    // return to the next instruction; the data segments may be null.
+    unsafe {
+        asm!(
+            "push {code}", "lea {scratch}, [rip + 2f]", "push {scratch}", "retfq", "2:",
+            "mov ss, {null:e}",
+            code = const CODE,
+            scratch = out(reg) _,
+            null = in(reg) 0,
+        );
+    };
+    // SAFETY: the selector names the task state segment of the table just loaded.
+    unsafe { asm!("ltr {:x}", in(reg) TASK_STATE) };
+}
+
+static INTERRUPT_TABLE: Once<Box<[[u64; 2]; 256]>> = Once::new();
+
+/// Loads the interrupt table for this core: vector v at `stubs + 16 v`.
+pub(crate) fn load_interrupts(stubs: u64) {
+    let table = INTERRUPT_TABLE.get().unwrap_or_else(|| {
+        // Only the boot processor gets here, before it starts any other.
+        let table = Box::new(core::array::from_fn(|vector| {
+            gate(stubs + 16 * vector as u64, vector)
+        }));
+        INTERRUPT_TABLE
+            .set(table)
+            .unwrap_or_else(|_| unreachable!("one processor boots"))
+    });
+    let pointer = TablePointer::to(&**table);
+    // SAFETY: every gate leads to a stub that saves and restores all state.
+    unsafe { asm!("lidt [{}]", in(reg) &pointer) };
+}
+
+/// An interrupt gate (interrupts stay disabled) to `address` (Intel SDM 3, 6.14.1).
+const fn gate(address: u64, vector: usize) -> [u64; 2] {
+    let stack = match vector {
+        2 => InterruptStack::NonMaskable,
+        8 => InterruptStack::DoubleFault,
+        18 => InterruptStack::MachineCheck,
+        0..32 => InterruptStack::Exception,
+        _ => InterruptStack::Context,
+    };
+    let low = address & 0xffff
+        | (CODE as u64) << 16
+        | (stack as u64) << 32
+        | 0x8e << 40
+        | (address >> 16 & 0xffff) << 48;
+    [low, address >> 32]
+}
+
+/// What `lgdt` and `lidt` read.
+#[repr(C, packed(2))]
+struct TablePointer {
+    limit: u16,
+    base: u64,
+}
+
+impl TablePointer {
+    fn to<T>(table: &'static T) -> Self {
+        let limit = u16::try_from(size_of::<T>() - 1).expect("descriptor tables fit in 64 KiB");
+        Self {
+            limit,
+            base: core::ptr::from_ref(table) as u64,
+        }
+    }
+}

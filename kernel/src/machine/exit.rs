@@ -1,0 +1,23 @@
+//! The end of the run: telling QEMU, or whoever runs the machine.
+
+use super::{cpu, port};
+
+/// How a run ended, as the value that QEMU's debug exit device takes. QEMU's
+/// own exit status is twice that plus 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Status {
+    /// All is well (QEMU exits with 33).
+    Success = 0x10,
+    /// Something failed (35).
+    Failure = 0x11,
+    /// The command line was wrong (37).
+    Usage = 0x12,
+}
+
+/// Ends the run. Without the debug exit device the machine stays halted.
+pub(crate) fn exit(status: Status) -> ! {
+    const DEBUG_EXIT: u16 = 0xf4;
+    // SAFETY: the port belongs to QEMU's isa-debug-exit device or to nobody.
+    unsafe { port::write_u32(DEBUG_EXIT, status as u32) };
+    cpu::halt_forever()
+}

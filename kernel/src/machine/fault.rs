@@ -1,0 +1,63 @@
+//! Exceptions: what the processor says about code that cannot go on.
+
+use super::context::Registers;
+use super::cpu;
+use super::interrupt::Handlers;
+
+/// The vector of a non-maskable interrupt: another core stops this one.
+const NON_MASKABLE: u64 = 2;
+const PAGE_FAULT: u64 = 14;
+
+/// An exception, in words and numbers.
+#[derive(Debug)]
+pub(crate) struct Exception<'a> {
+    /// What happened, such as `page fault`.
+    pub(crate) name: &'static str,
+    /// The registers at the faulting instruction.
+    pub(crate) registers: &'a Registers,
+    /// The address that was accessed, for a page fault.
+    pub(crate) address: Option<u64>,
+}
+
+/// The names of Intel SDM volume 3, table 6-1, by vector.
+const NAMES: [&str; 22] = [
+    "division error",
+    "debug exception",
+    "non-maskable interrupt",
+    "breakpoint",
+    "overflow",
+    "bound range exceeded",
+    "invalid opcode",
+    "device not available",
+    "double fault",
+    "coprocessor segment overrun",
+    "invalid task state segment",
+    "segment not present",
+    "stack segment fault",
+    "general protection fault",
+    "page fault",
+    "reserved exception",
+    "x87 floating-point error",
+    "alignment check",
+    "machine check",
+    "vector floating-point error",
+    "virtualization exception",
+    "control protection exception",
+];
+
+/// Passes an exception to its handler, or stops the core if it is the signal to
+/// stop or nobody handles exceptions yet.
+pub(super) fn raise(registers: &Registers, handlers: Option<&Handlers>) -> ! {
+    let vector = registers.vector;
+    let Some(handlers) = handlers.filter(|_| vector != NON_MASKABLE) else {
+        cpu::halt_forever();
+    };
+    let name = usize::try_from(vector)
+        .ok()
+        .and_then(|vector| NAMES.get(vector));
+    (handlers.exception)(&Exception {
+        name: name.unwrap_or(&"reserved exception"),
+        registers,
+        address: (vector == PAGE_FAULT).then(cpu::fault_address),
+    })
+}

@@ -1,0 +1,130 @@
+//! The local APIC: a core's own timer, and interrupts to other cores.
+//!
+//! Used in xAPIC mode, by memory-mapped registers (Intel SDM volume 3, chapter
+//! 11). All local APICs appear at the same address, each core seeing its own.
+
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use super::cpu;
+use super::interrupt::vector;
+
+/// The registers' address; set once before any use.
+static BASE: AtomicU64 = AtomicU64::new(0);
+
+#[derive(Clone, Copy)]
+enum Register {
+    Id = 0x20,
+    TaskPriority = 0x80,
+    EndOfInterrupt = 0xb0,
+    SpuriousVector = 0xf0,
+    CommandLow = 0x300,
+    CommandHigh = 0x310,
+    TimerEntry = 0x320,
+    Pin0Entry = 0x350,
+    Pin1Entry = 0x360,
+    ErrorEntry = 0x370,
+    InitialCount = 0x380,
+    CurrentCount = 0x390,
+    DivideConfiguration = 0x3e0,
+}
+
+const MASKED: u32 = 1 << 16;
+
+/// Names the address at which the registers are mapped.
+///
+/// # Safety
+///
+/// `base` is the local APIC's address, mapped uncached and writable.
+pub(crate) unsafe fn set_base(base: u64) {
+    BASE.store(base, Ordering::Release);
+}
+
+fn address(register: Register) -> *mut u32 {
+    (BASE.load(Ordering::Relaxed) + register as u64) as *mut u32
+}
+
+fn read(register: Register) -> u32 {
+    // SAFETY: the register is one of the mapped local APIC's (`set_base`).
+    unsafe { address(register).read_volatile() }
+}
+
+fn write(register: Register, value: u32) {
+    // SAFETY: as in `read`; this module alone decides what is written, and no
+    // value makes the local APIC touch memory.
+    unsafe { address(register).write_volatile(value) };
+}
+
+/// Returns the id of the core that executes this.
+pub(crate) fn id() -> u8 {
+    (read(Register::Id) >> 24).to_le_bytes()[0]
+}
+
+/// Turns on the local APIC of this core, with only its timer unmasked.
+pub(crate) fn enable() {
+    const SOFTWARE_ENABLE: u32 = 1 << 8;
+    const DIVIDE_BY_1: u32 = 0b1011;
+    write(Register::TaskPriority, 0);
+    write(Register::Pin0Entry, MASKED);
+    write(Register::Pin1Entry, MASKED);
+    write(Register::ErrorEntry, MASKED);
+    write(Register::DivideConfiguration, DIVIDE_BY_1);
+    write(Register::TimerEntry, u32::from(vector::TIMER));
+    write(
+        Register::SpuriousVector,
+        SOFTWARE_ENABLE | u32::from(vector::SPURIOUS),
+    );
+}
+
+/// Ends the interrupt that is being handled.
+pub(crate) fn acknowledge() {
+    write(Register::EndOfInterrupt, 0);
+}
+
+/// Starts this core's one-shot timer: it fires after `count` ticks, never if 0.
+pub(crate) fn start_timer(count: u32) {
+    write(Register::InitialCount, count);
+}
+
+/// Returns the ticks that are left of the running timer.
+pub(crate) fn timer_count() -> u32 {
+    read(Register::CurrentCount)
+}
+
+/// Sends interrupt `vector` to the core with id `apic_id`.
+pub(crate) fn send(apic_id: u8, vector: u8) {
+    command(apic_id, u32::from(vector));
+}
+
+/// Sends the INIT interrupt: the processor waits for its startup interrupt.
+pub(crate) fn send_init(apic_id: u8) {
+    const INIT_ASSERT: u32 = 0b101 << 8 | 1 << 14;
+    command(apic_id, INIT_ASSERT);
+}
+
+/// Sends the startup interrupt: the processor starts at page `vector`.
+pub(crate) fn send_startup(apic_id: u8, vector: u8) {
+    const STARTUP: u32 = 0b110 << 8 | 1 << 14;
+    command(apic_id, STARTUP | u32::from(vector));
+}
+
+/// Sends the non-maskable interrupt to all cores but this one.
+pub(crate) fn send_stop_to_others() {
+    const NON_MASKABLE_ALL_BUT_SELF: u32 = 0b100 << 8 | 1 << 14 | 0b11 << 18;
+    command(0, NON_MASKABLE_ALL_BUT_SELF);
+}
+
+/// Writes an interrupt command. The two halves must not be separated by a
+/// handler's command, so interrupts are disabled meanwhile.
+fn command(apic_id: u8, low: u32) {
+    const PENDING: u32 = 1 << 12;
+    let were_enabled = cpu::disable_interrupts();
+    // Delivery takes microseconds at most; the hardware bounds the wait.
+    while read(Register::CommandLow) & PENDING != 0 {
+        cpu::relax();
+    }
+    write(Register::CommandHigh, u32::from(apic_id) << 24);
+    write(Register::CommandLow, low);
+    if were_enabled {
+        cpu::enable_interrupts();
+    }
+}

@@ -1,0 +1,24 @@
+//! The machine layer: everything that is particular to x86_64 and a PC.
+//!
+//! With `memory` and the `entry!` macro it is the only part of the kernel that
+//! contains `unsafe`. It names nothing above it: whoever uses it passes the
+//! functions that it shall call. Each module states the invariant that its
+//! SAFETY comments cite.
+
+pub(crate) mod clock;
+pub(crate) mod context;
+pub(crate) mod cpu;
+pub(crate) mod descriptors;
+pub(crate) mod exit;
+pub(crate) mod fault;
+pub(crate) mod interrupt;
+pub(crate) mod legacy;
+pub(crate) mod local_apic;
+pub(crate) mod once;
+pub(crate) mod paging;
+pub(crate) mod port;
+pub(crate) mod processors;
+pub(crate) mod serial;
+pub(crate) mod spinlock;
+pub(crate) mod this_core;
+pub(crate) mod timer;

@@ -1,0 +1,159 @@
+//! The page table: one for all cores, identity-mapped, no page both writable
+//! and executable, page 0 absent.
+//!
+//! Entries only ever go from absent to present, so no core can hold an
+//! outdated translation and none needs to be told of a change.
+
+use core::ops::Range;
+
+/// The smallest page, in bytes.
+pub(crate) const PAGE: u64 = 4096;
+
+/// What may be done with a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Access {
+    /// Read only.
+    Constant,
+    /// Read and write.
+    Data,
+    /// Read and execute.
+    Code,
+    /// Read and write, uncached: a device's registers.
+    Device,
+}
+
+impl Access {
+    const fn bits(self) -> u64 {
+        const WRITABLE: u64 = 1 << 1;
+        const UNCACHED: u64 = 1 << 3 | 1 << 4;
+        const NO_EXECUTE: u64 = 1 << 63;
+        match self {
+            Self::Constant => NO_EXECUTE,
+            Self::Data => WRITABLE | NO_EXECUTE,
+            Self::Code => 0,
+            Self::Device => WRITABLE | UNCACHED | NO_EXECUTE,
+        }
+    }
+}
+
+/// Something that a page cannot be mapped for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MapError {
+    /// No frame is left for the table itself.
+    OutOfFrames,
+    /// The page is mapped already.
+    AlreadyMapped,
+}
+
+const PRESENT: u64 = 1;
+const WRITABLE: u64 = 1 << 1;
+const LARGE: u64 = 1 << 7;
+const ADDRESS: u64 = 0x000f_ffff_ffff_f000;
+
+/// A page table and where its own pages come from.
+///
+/// **Table invariant**: every table page is a zeroed frame of its own, reachable
+/// at its physical address, and linked from the root exactly once.
+#[derive(Debug)]
+pub(crate) struct PageTable {
+    root: u64,
+}
+
+impl PageTable {
+    /// Creates an empty table.
+    ///
+    /// # Safety
+    ///
+    /// Frames from `new_frame` are unused, zeroed, and identity-mapped and
+    /// writable now and under this table; the same holds for every later call.
+    pub(crate) unsafe fn new(new_frame: &mut dyn FnMut() -> Option<u64>) -> Result<Self, MapError> {
+        Ok(Self {
+            root: new_frame().ok_or(MapError::OutOfFrames)?,
+        })
+    }
+
+    /// Returns the physical address of the root.
+    pub(crate) const fn root(&self) -> u64 {
+        self.root
+    }
+
+    /// Maps the whole pages `virtual_range` to physical addresses from
+    /// `physical` on, with the largest pages that fit.
+    pub(crate) fn map(
+        &mut self,
+        virtual_range: Range<u64>,
+        physical: u64,
+        access: Access,
+        new_frame: &mut dyn FnMut() -> Option<u64>,
+    ) -> Result<(), MapError> {
+        const PAGE_2_MIB: u64 = 1 << 21;
+        let offset = physical.wrapping_sub(virtual_range.start);
+        let mut address = virtual_range.start;
+        while address < virtual_range.end {
+            let fits = |size: u64| {
+                address.is_multiple_of(size)
+                    && address.wrapping_add(offset).is_multiple_of(size)
+                    && virtual_range.end - address >= size
+            };
+            let (size, level, large) = match fits(PAGE_2_MIB) {
+                true => (PAGE_2_MIB, 1, LARGE),
+                false => (PAGE, 0, 0),
+            };
+            let slot = self.entry(address, level, new_frame)?;
+            if read_entry(slot) & PRESENT != 0 {
+                return Err(MapError::AlreadyMapped);
+            }
+            write_entry(
+                slot,
+                address.wrapping_add(offset) | access.bits() | large | PRESENT,
+            );
+            address += size;
+        }
+        Ok(())
+    }
+
+    /// Returns the entry for `address` at `level` (0: 4 KiB pages, 1: 2 MiB),
+    /// adding the table pages that lead there.
+    fn entry(
+        &mut self,
+        address: u64,
+        level: u32,
+        new_frame: &mut dyn FnMut() -> Option<u64>,
+    ) -> Result<Entry, MapError> {
+        let mut table = self.root;
+        for above in (level + 1..=3).rev() {
+            let slot = Entry::of(table, address, above);
+            let mut entry = read_entry(slot);
+            if entry & PRESENT == 0 {
+                entry = new_frame().ok_or(MapError::OutOfFrames)? | PRESENT | WRITABLE;
+                write_entry(slot, entry);
+            } else if entry & LARGE != 0 {
+                return Err(MapError::AlreadyMapped);
+            }
+            table = entry & ADDRESS;
+        }
+        Ok(Entry::of(table, address, level))
+    }
+}
+
+/// The place of an entry in a table page.
+#[derive(Clone, Copy)]
+struct Entry(*mut u64);
+
+impl Entry {
+    fn of(table: u64, address: u64, level: u32) -> Self {
+        let index = address >> (12 + 9 * level) & 511;
+        Self((table + 8 * index) as *mut u64)
+    }
+}
+
+fn read_entry(entry: Entry) -> u64 {
+    // SAFETY: the entry lies in a page of the table (table invariant).
+    unsafe { entry.0.read_volatile() }
+}
+
+fn write_entry(entry: Entry, value: u64) {
+    // SAFETY: the entry lies in a page of the table (table invariant); what it
+    // newly maps is named by the caller of `PageTable::map`.
+    unsafe { entry.0.write_volatile(value) };
+}

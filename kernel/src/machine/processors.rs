@@ -1,0 +1,62 @@
+//! Starting the other cores.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use super::{clock, cpu, local_apic, this_core};
+
+/// Cores that have arrived in their entry function, the boot processor not
+/// counted.
+static ARRIVED: AtomicU32 = AtomicU32::new(0);
+
+/// Says that the core which executes this has arrived.
+pub(crate) fn arrive() {
+    ARRIVED.fetch_add(1, Ordering::Release);
+}
+
+/// Starts all other cores at `entry` and returns how many have arrived after at
+/// most 100 ms (Intel SDM volume 3, 9.4.4: INIT, 10 ms, startup, 200 us, startup).
+///
+/// # Safety
+///
+/// As for [`boot::processors::prepare`].
+pub(crate) unsafe fn start_others(root_table: u64, entry: boot::processors::Entry) -> u32 {
+    let others = || this_core::all().iter().skip(1);
+    // SAFETY: passed on from the caller.
+    unsafe { boot::processors::prepare(root_table, entry) };
+    for core in others() {
+        boot::processors::set_stack(core.apic_id(), core.work_stack());
+    }
+    let expected = u32::try_from(others().count()).unwrap_or(u32::MAX);
+    if expected == 0 {
+        return 0;
+    }
+    for core in others() {
+        // Under QEMU's instruction counting INIT lets virtual time jump to the
+        // next alarm; this one keeps the jump short, and does no harm elsewhere.
+        local_apic::start_timer(clock::apic_ticks(2_000));
+        local_apic::send_init(core.apic_id());
+    }
+    local_apic::start_timer(0);
+    wait(10_000_000, expected);
+    for attempt_ns in [200_000, 100_000_000] {
+        for core in others() {
+            local_apic::send_startup(core.apic_id(), boot::processors::startup_vector());
+        }
+        if wait(attempt_ns, expected) {
+            break;
+        }
+    }
+    ARRIVED.load(Ordering::Acquire)
+}
+
+/// Waits `ns`, or until `expected` cores have arrived, and reports the latter.
+fn wait(ns: u64, expected: u32) -> bool {
+    let end_ns = clock::now_ns().saturating_add(ns);
+    loop {
+        let all_here = ARRIVED.load(Ordering::Acquire) >= expected;
+        if all_here || clock::now_ns() >= end_ns {
+            return all_here;
+        }
+        cpu::relax();
+    }
+}

@@ -1,0 +1,46 @@
+//! The first serial port: a 16550 at I/O port 0x3f8, by polling.
+//!
+//! Polling, because output comes at boot, at the end, on a panic, or from an
+//! idle core byte by byte; an interrupt for each byte would only disturb.
+//! Registers: National Semiconductor PC16550D data sheet, 8.0.
+
+use super::port;
+
+const BASE: u16 = 0x3f8;
+
+/// Sets the port to 115200 baud, 8 data bits, no parity, one stop bit.
+pub(crate) fn initialize() {
+    const SETUP: [(u16, u8); 7] = [
+        (1, 0x00), // no interrupts
+        (3, 0x80), // the next two set the divisor
+        (0, 0x01), // 115200 baud
+        (1, 0x00),
+        (3, 0x03), // 8 data bits, no parity, one stop bit
+        (2, 0xc7), // FIFOs on and cleared
+        (4, 0x03), // ready to send
+    ];
+    for (register, value) in SETUP {
+        // SAFETY: the ports from 0x3f8 are the serial port's, which is this module's.
+        unsafe { port::write_u8(BASE + register, value) };
+    }
+}
+
+/// Sends one byte, waiting until there is room for it.
+///
+/// The wait is bounded: a port that never gets ready (because there is none)
+/// costs its bytes, not the kernel.
+pub(crate) fn send(byte: u8) {
+    const TRANSMITTER_EMPTY: u8 = 1 << 5;
+    /// Several times the 1.4 ms that a full FIFO of 16 bytes takes.
+    const MOST_POLLS: u32 = 100_000;
+    for _ in 0..MOST_POLLS {
+        // SAFETY: reading the line status of this module's device.
+        let status = unsafe { port::read_u8(BASE + 5) };
+        if status & TRANSMITTER_EMPTY != 0 {
+            break;
+        }
+        super::cpu::relax();
+    }
+    // SAFETY: the data register of this module's device.
+    unsafe { port::write_u8(BASE, byte) };
+}

@@ -1,0 +1,62 @@
+//! Each core's alarms, all on its one hardware timer.
+//!
+//! An *alarm* is a time at which the core shall be interrupted, for one of a
+//! few fixed purposes. The hardware timer is armed for the earliest. It may
+//! fire a little early or late: what is due is decided by the clock alone.
+
+use core::sync::atomic::Ordering;
+
+use super::this_core::{self, Core};
+use super::{clock, cpu, local_apic};
+
+/// What an alarm is for; each core has one of each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Alarm {
+    /// The scheduler's next event.
+    Schedule = 0,
+    /// The end of a subtask's hold of its core.
+    Hold = 1,
+    /// A sign of life, so that no core ever halts without an end in sight.
+    Heartbeat = 2,
+}
+
+/// Sets this core's alarm to time `at_ns`, or to never if `u64::MAX`.
+pub(crate) fn set(alarm: Alarm, at_ns: u64) {
+    let were_enabled = cpu::disable_interrupts();
+    let core = this_core::get();
+    core.alarms[alarm as usize].store(at_ns, Ordering::Relaxed);
+    arm(core);
+    if were_enabled {
+        cpu::enable_interrupts();
+    }
+}
+
+/// Takes an alarm that is due at `now_ns`: reports whether it was, and if so
+/// sets it to never. To be followed by [`arm_earliest`].
+pub(crate) fn take_due(alarm: Alarm, now_ns: u64) -> bool {
+    let slot = &this_core::get().alarms[alarm as usize];
+    let due = slot.load(Ordering::Relaxed) <= now_ns;
+    if due {
+        slot.store(u64::MAX, Ordering::Relaxed);
+    }
+    due
+}
+
+/// Arms this core's timer for its earliest alarm. Interrupts are disabled.
+pub(crate) fn arm_earliest() {
+    arm(this_core::get());
+}
+
+fn arm(core: &Core) {
+    let times = core
+        .alarms
+        .iter()
+        .map(|alarm| alarm.load(Ordering::Relaxed));
+    match times.min() {
+        None | Some(u64::MAX) => local_apic::start_timer(0),
+        Some(at_ns) => {
+            let remaining_ns = at_ns.saturating_sub(clock::now_ns());
+            local_apic::start_timer(clock::apic_ticks(remaining_ns));
+        }
+    }
+}

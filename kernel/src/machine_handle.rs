@@ -1,0 +1,160 @@
+//! The machine as an app sees it.
+
+use core::fmt;
+use core::time::Duration;
+
+use alloc::string::String;
+
+use fass::CommitError;
+use fass::Platform;
+
+use crate::memory::heap;
+use crate::options::{Options, UsageError};
+use crate::platform::KERNEL;
+use crate::run::Run;
+use crate::worker::{self, HEARTBEAT_NS};
+use crate::{console, execution, json, machine};
+
+/// The machine, lent to the app's function for the time of the run.
+#[derive(Debug)]
+pub struct Machine {
+    pub(crate) options: Options<'static>,
+}
+
+/// Why an app ends other than by success.
+#[derive(Debug)]
+pub enum Ending {
+    /// The command line is wrong; QEMU exits with 37.
+    Usage(UsageError),
+    /// The DAGs could not be committed; QEMU exits with 35.
+    Commit(CommitError),
+    /// Something else went wrong, in words; QEMU exits with 35.
+    Failure(String),
+}
+
+impl From<UsageError> for Ending {
+    fn from(error: UsageError) -> Self {
+        Self::Usage(error)
+    }
+}
+
+impl From<CommitError> for Ending {
+    fn from(error: CommitError) -> Self {
+        Self::Commit(error)
+    }
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(error) => error.fmt(f),
+            Self::Commit(error) => error.fmt(f),
+            Self::Failure(message) => f.write_str(message),
+        }
+    }
+}
+
+impl Machine {
+    /// Returns the words of the command line that the kernel left to the app.
+    #[must_use]
+    pub const fn options(&self) -> &Options<'static> {
+        &self.options
+    }
+
+    /// Returns the number of cores that run subtasks.
+    #[must_use]
+    pub fn cores(&self) -> u32 {
+        KERNEL.cores()
+    }
+
+    /// Runs the committed DAGs until each has ended all its jobs.
+    ///
+    /// The calling core takes part. Progress is printed in machine lines of
+    /// kind `progress`, by an idle core.
+    ///
+    /// # Errors
+    ///
+    /// [`Ending::Failure`] if nothing has been committed since the last run.
+    pub fn run(&self) -> Result<Run, Ending> {
+        /// Time for the cores to get ready between now and the first release.
+        const LEAD_NS: u64 = 100_000;
+        let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
+        let total = execution::begin(machine::clock::now_ns() + LEAD_NS).ok_or_else(nothing)?;
+        let allocations_before = heap::usage().allocations;
+        console::defer();
+        execution::arm_next_event();
+        let mut progress = Progress { total, printed: 0 };
+        worker::work(execution::is_finished, || progress.print_when_due());
+        let allocations = heap::usage().allocations - allocations_before;
+        let dropped = console::resume();
+        if dropped > 0 {
+            crate::println!("({dropped} bytes of output did not fit in the buffer)");
+        }
+        Ok(Run::new(execution::end().ok_or_else(nothing)?, allocations))
+    }
+
+    /// Interrupts every core each `period` from now on, beside what scheduling
+    /// needs; 0 for never. For tests of the kernel's own robustness.
+    pub fn set_heartbeat(&self, period: Duration) {
+        let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
+        for core in machine::this_core::all() {
+            core.heartbeat_ns
+                .store(period_ns, core::sync::atomic::Ordering::Relaxed);
+        }
+        let own = if period_ns == 0 {
+            HEARTBEAT_NS
+        } else {
+            period_ns
+        };
+        worker::set_heartbeat(own);
+    }
+
+    /// Returns the timer interrupts that all cores have taken since boot.
+    #[must_use]
+    pub fn timer_interrupts(&self) -> u64 {
+        let counts = machine::this_core::all()
+            .iter()
+            .map(|core| &core.timer_interrupts);
+        counts
+            .map(|count| count.load(core::sync::atomic::Ordering::Relaxed))
+            .sum()
+    }
+
+    /// Prints how much memory the run has needed, as a `memory` machine line.
+    pub fn report_memory(&self) {
+        let usage = heap::usage();
+        crate::println!(
+            "heap: {} KiB at its peak of {} KiB",
+            usage.peak_bytes.div_ceil(1024),
+            usage.capacity_bytes / 1024
+        );
+        json::emit("memory", |line| {
+            line.number("heap_peak_bytes", usage.peak_bytes as u64)
+                .number("heap_bytes", usage.capacity_bytes as u64)
+                .number("allocations", usage.allocations);
+        });
+    }
+}
+
+/// Progress lines, one for each twentieth of the jobs.
+struct Progress {
+    total: u64,
+    printed: u64,
+}
+
+impl Progress {
+    /// Prints how many jobs have ended, if that is a step further and the next
+    /// event leaves time for it.
+    fn print_when_due(&mut self) {
+        const TIME_TO_PRINT_NS: u64 = 1_000_000;
+        let done = execution::jobs_ended();
+        let step = (self.total / 20).max(1);
+        let quiet_until = machine::clock::now_ns() + TIME_TO_PRINT_NS;
+        if done >= self.printed + step && execution::next_event_ns() > quiet_until {
+            self.printed = done;
+            json::emit("progress", |line| {
+                line.number("done", done).number("total", self.total);
+            });
+        }
+    }
+}

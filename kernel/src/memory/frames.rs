@@ -1,0 +1,129 @@
+//! Physical memory in frames of 4 KiB, handed out from the boot memory map.
+//!
+//! A frame that was handed out does not come back: what is taken at boot and at
+//! a commit is meant to stay, and memory that comes and goes is the heap's.
+
+use core::ops::Range;
+
+use boot::{List, MemoryRegion};
+
+/// The size of a frame, in bytes.
+pub(crate) const FRAME: u64 = 4096;
+
+/// Nothing below is handed out: the firmware's, and the trampoline's page.
+const LOWEST: u64 = 1 << 20;
+
+/// The frames that nobody has taken.
+#[derive(Debug)]
+pub(crate) struct Frames {
+    free: List<(u64, u64), 64>,
+    /// The bytes of all usable memory, taken or not.
+    total: u64,
+}
+
+impl Frames {
+    /// Creates the stock from the memory map, less the `taken` range.
+    pub(crate) fn new(map: &[MemoryRegion], taken: &Range<u64>) -> Self {
+        let mut frames = Self {
+            free: List::new((0, 0)),
+            total: 0,
+        };
+        for region in map.iter().filter(|region| region.usable) {
+            frames.total += region.end.saturating_sub(region.start);
+            let start = region.start.max(LOWEST);
+            frames.add(start, region.end.min(taken.start));
+            frames.add(start.max(taken.end), region.end);
+        }
+        frames
+    }
+
+    /// Adds the whole frames of `start..end`, if there are any. What no longer
+    /// fits in the list stays unused.
+    fn add(&mut self, start: u64, end: u64) {
+        let (start, end) = (start.next_multiple_of(FRAME), end / FRAME * FRAME);
+        if start < end {
+            let _ = self.free.push((start, end));
+        }
+    }
+
+    /// Returns the bytes of all usable memory, taken or not.
+    pub(crate) const fn total_bytes(&self) -> u64 {
+        self.total
+    }
+
+    /// Takes `count` adjacent frames and returns the first one's address.
+    pub(crate) fn take(&mut self, count: u64) -> Option<u64> {
+        let bytes = count.checked_mul(FRAME)?;
+        let (start, _) = self
+            .free
+            .as_mut_slice()
+            .iter_mut()
+            .find(|(start, end)| end - *start >= bytes)?;
+        let taken = *start;
+        *start += bytes;
+        Some(taken)
+    }
+
+    /// Takes the upper three quarters of the largest free range, for the heap.
+    pub(crate) fn take_heap(&mut self) -> Option<Range<u64>> {
+        let (start, end) = self
+            .free
+            .as_mut_slice()
+            .iter_mut()
+            .max_by_key(|(start, end)| end - start)?;
+        let middle = (*start + (*end - *start) / 4).next_multiple_of(FRAME);
+        let heap = middle..*end;
+        *end = middle;
+        (!heap.is_empty()).then_some(heap)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIB: u64 = 1 << 20;
+
+    fn region(start: u64, end: u64, usable: bool) -> MemoryRegion {
+        MemoryRegion { start, end, usable }
+    }
+
+    #[test]
+    fn leaves_out_low_memory_the_image_and_what_is_reserved() {
+        let map = [
+            region(0, 640 << 10, true),
+            region(MIB, 4 * MIB, true),
+            region(4 * MIB, 8 * MIB, false),
+        ];
+        let mut frames = Frames::new(&map, &(2 * MIB..3 * MIB));
+        assert_eq!(frames.take(256), Some(MIB));
+        assert_eq!(frames.take(256), Some(3 * MIB));
+        assert_eq!(frames.take(1), None);
+        assert_eq!(frames.total_bytes(), 640 * 1024 + 3 * MIB);
+    }
+
+    #[test]
+    fn takes_whole_frames_only() {
+        let mut frames = Frames::new(
+            &[region(2 * MIB + 1, 2 * MIB + 3 * FRAME - 1, true)],
+            &(0..0),
+        );
+        assert_eq!(frames.take(1), Some(2 * MIB + FRAME));
+        assert_eq!(frames.take(1), None);
+    }
+
+    #[test]
+    fn gives_the_heap_the_most_and_keeps_the_rest() {
+        let mut frames = Frames::new(&[region(4 * MIB, 8 * MIB, true)], &(0..0));
+        assert_eq!(frames.take_heap(), Some(5 * MIB..8 * MIB));
+        assert_eq!(frames.take(256), Some(4 * MIB));
+        assert_eq!(frames.take(1), None);
+    }
+
+    #[test]
+    fn has_nothing_without_a_map() {
+        let mut frames = Frames::new(&[], &(0..0));
+        assert_eq!(frames.take(1), None);
+        assert_eq!(frames.take_heap(), None);
+    }
+}

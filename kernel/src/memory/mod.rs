@@ -1,0 +1,141 @@
+//! Memory: frames, the address space, stacks and the heap.
+//!
+//! Virtual and physical addresses are the same, except for stacks: they live in
+//! a window of their own, so that each can have an absent guard page below it
+//! that catches an overflow at once.
+
+pub(crate) mod frames;
+pub(crate) mod heap;
+mod tlsf;
+
+use core::ops::Range;
+
+use boot::MemoryRegion;
+
+use crate::machine::paging::{Access, MapError, PAGE, PageTable};
+use crate::machine::spinlock::SpinLock;
+use frames::{FRAME, Frames};
+
+/// Where stacks live: 512 GiB, beyond any physical address of ordinary PCs.
+const STACK_WINDOW: u64 = 1 << 39;
+
+/// There is not enough memory for what was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct OutOfMemory;
+
+impl From<MapError> for OutOfMemory {
+    fn from(_: MapError) -> Self {
+        Self
+    }
+}
+
+/// The physical memory and the address space over it.
+#[derive(Debug)]
+struct Memory {
+    frames: Frames,
+    table: PageTable,
+    next_stack: u64,
+}
+
+static MEMORY: SpinLock<Option<Memory>> = SpinLock::new(None);
+
+/// What [`initialize`] found and built.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    /// The page table's root, to be loaded by every core.
+    pub(crate) root_table: u64,
+    /// The bytes of usable memory.
+    pub(crate) total_bytes: u64,
+}
+
+/// Builds the address space and the heap, and switches to it.
+///
+/// # Safety
+///
+/// 1. The boot page table is in use, and `map` is the machine's memory map.
+/// 2. It is called once, by the boot processor, before anything is allocated.
+pub(crate) unsafe fn initialize(map: &[MemoryRegion], device: u64) -> Result<Layout, OutOfMemory> {
+    let mut frames = Frames::new(map, &boot::image::whole());
+    let total_bytes = frames.total_bytes();
+    let heap = frames.take_heap().ok_or(OutOfMemory)?;
+    let mut new_frame = || take_zeroed(&mut frames);
+    // SAFETY: frames are unused and zeroed (`take_zeroed`), in memory that the
+    // boot table maps (condition 1) and `map_all` maps too.
+    let mut table = unsafe { PageTable::new(&mut new_frame) }?;
+    map_all(&mut table, map, device, &mut new_frame)?;
+    let root_table = table.root();
+    // SAFETY: image, data (so the boot stack) and all usable memory are mapped
+    // to where they were.
+    unsafe { crate::machine::cpu::set_page_table(root_table) };
+    // SAFETY: the range was taken from the frames and is mapped as data; by
+    // condition 2 the heap has no memory yet.
+    unsafe { heap::add_memory(heap) };
+    *MEMORY.lock() = Some(Memory {
+        frames,
+        table,
+        next_stack: STACK_WINDOW,
+    });
+    Ok(Layout {
+        root_table,
+        total_bytes,
+    })
+}
+
+/// Maps the image with its rights, all usable memory as data, and one page of a
+/// device's registers.
+fn map_all(
+    table: &mut PageTable,
+    map: &[MemoryRegion],
+    device: u64,
+    new_frame: &mut dyn FnMut() -> Option<u64>,
+) -> Result<(), OutOfMemory> {
+    let image = boot::image::whole();
+    let sections = [
+        (boot::image::rodata(), Access::Constant),
+        (boot::image::text(), Access::Code),
+        (boot::image::data(), Access::Data),
+    ];
+    for (range, access) in sections {
+        table.map(range.clone(), range.start, access, new_frame)?;
+    }
+    for region in map.iter().filter(|region| region.usable) {
+        // Page 0 stays absent, so that a null pointer faults.
+        let start = region.start.max(PAGE).next_multiple_of(PAGE);
+        let end = region.end / PAGE * PAGE;
+        for part in [start..end.min(image.start), start.max(image.end)..end] {
+            if part.start < part.end {
+                table.map(part.clone(), part.start, Access::Data, new_frame)?;
+            }
+        }
+    }
+    table.map(device..device + PAGE, device, Access::Device, new_frame)?;
+    Ok(())
+}
+
+fn take_zeroed(frames: &mut Frames) -> Option<u64> {
+    let frame = frames.take(1)?;
+    let bytes = usize::try_from(FRAME).ok()?;
+    // SAFETY: the frame was just taken, so nobody uses it; usable memory is
+    // identity-mapped and writable under the boot table and under ours.
+    unsafe { core::ptr::write_bytes(frame as *mut u8, 0, bytes) };
+    Some(frame)
+}
+
+/// Creates a stack of at least `bytes` with a guard page below it and returns
+/// its top, which is a multiple of 4096.
+pub(crate) fn new_stack(bytes: u64) -> Result<u64, OutOfMemory> {
+    let mut memory = MEMORY.lock();
+    let Memory {
+        frames,
+        table,
+        next_stack,
+    } = memory.as_mut().ok_or(OutOfMemory)?;
+    let pages = bytes.div_ceil(PAGE);
+    let physical = frames.take(pages).ok_or(OutOfMemory)?;
+    let stack: Range<u64> = *next_stack + PAGE..*next_stack + PAGE + pages * PAGE;
+    table.map(stack.clone(), physical, Access::Data, &mut || {
+        take_zeroed(frames)
+    })?;
+    *next_stack = stack.end;
+    Ok(stack.end)
+}

@@ -1,0 +1,220 @@
+//! The words of the kernel's command line: `key=value`, separated by spaces.
+//!
+//! The kernel takes the words that it knows and leaves the rest to the app,
+//! which states for each of its words what is allowed. A word that nobody takes
+//! is an error: a misspelt option must not run with the default.
+
+use core::cell::Cell;
+use core::fmt;
+use core::ops::RangeInclusive;
+
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// The command line, with a note of which words have been taken.
+#[derive(Debug)]
+pub struct Options<'a> {
+    words: Vec<Word<'a>>,
+}
+
+#[derive(Debug)]
+struct Word<'a> {
+    key: &'a str,
+    value: &'a str,
+    taken: Cell<bool>,
+}
+
+/// A word of the command line is wrong: which one, and what is allowed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UsageError(String);
+
+impl UsageError {
+    /// States what is wrong: the word, and what is allowed.
+    #[must_use]
+    pub fn new(message: impl Into<String>) -> Self {
+        Self(message.into())
+    }
+}
+
+impl fmt::Display for UsageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl core::error::Error for UsageError {}
+
+impl<'a> Options<'a> {
+    /// Splits a command line into words.
+    ///
+    /// # Errors
+    ///
+    /// If a word is not of the form `key=value`, or a key occurs twice.
+    pub fn parse(line: &'a str) -> Result<Self, UsageError> {
+        let mut words = Vec::<Word<'a>>::new();
+        for word in line.split_whitespace() {
+            let Some((key, value)) = word.split_once('=') else {
+                return Err(UsageError(format!("`{word}` is not of the form key=value")));
+            };
+            if words.iter().any(|earlier| earlier.key == key) {
+                return Err(UsageError(format!("`{key}` is given twice; give it once")));
+            }
+            words.push(Word {
+                key,
+                value,
+                taken: Cell::new(false),
+            });
+        }
+        Ok(Self { words })
+    }
+
+    /// Takes the value of `key` as it is, if the key is given.
+    pub fn text(&self, key: &str) -> Option<&'a str> {
+        let word = self.words.iter().find(|word| word.key == key)?;
+        word.taken.set(true);
+        Some(word.value)
+    }
+
+    /// Takes the value of `key` as a whole number, or `default`.
+    ///
+    /// # Errors
+    ///
+    /// If the value is not a whole number within `allowed`.
+    pub fn number(
+        &self,
+        key: &str,
+        allowed: RangeInclusive<u64>,
+        default: u64,
+    ) -> Result<u64, UsageError> {
+        self.text(key)
+            .map_or(Ok(default), |value| parse_number(key, value, &allowed))
+    }
+
+    /// Takes the value of `key` as whole numbers separated by commas, or `default`.
+    ///
+    /// # Errors
+    ///
+    /// If one of them is not a whole number within `allowed`.
+    pub fn numbers(
+        &self,
+        key: &str,
+        allowed: RangeInclusive<u64>,
+        default: &[u64],
+    ) -> Result<Vec<u64>, UsageError> {
+        self.text(key).map_or_else(
+            || Ok(default.to_vec()),
+            |value| {
+                value
+                    .split(',')
+                    .map(|item| parse_number(key, item, &allowed))
+                    .collect()
+            },
+        )
+    }
+
+    /// Takes the value of `key` as one of the names in `choices`, or the first.
+    ///
+    /// # Errors
+    ///
+    /// If the value is not one of them.
+    ///
+    /// # Panics
+    ///
+    /// If there are no choices.
+    pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<T, UsageError> {
+        let Some(value) = self.text(key) else {
+            return Ok(choices[0].1);
+        };
+        let found = choices
+            .iter()
+            .find(|(name, _)| *name == value)
+            .map(|(_, choice)| *choice);
+        found.ok_or_else(|| {
+            let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+            UsageError(format!("`{key}={value}`: allowed are {}", names.join(", ")))
+        })
+    }
+
+    /// Checks that every word has been taken.
+    ///
+    /// # Errors
+    ///
+    /// If one has not: it names the word and the keys that were asked for.
+    pub fn finish(&self, known: &[&str]) -> Result<(), UsageError> {
+        self.words
+            .iter()
+            .find(|word| !word.taken.get())
+            .map_or(Ok(()), |word| {
+                let known = known.join(", ");
+                Err(UsageError(format!(
+                    "`{}` is no option of this app; it knows {known}",
+                    word.key
+                )))
+            })
+    }
+}
+
+fn parse_number(key: &str, value: &str, allowed: &RangeInclusive<u64>) -> Result<u64, UsageError> {
+    value
+        .parse()
+        .ok()
+        .filter(|number| allowed.contains(number))
+        .ok_or_else(|| {
+            let (low, high) = (allowed.start(), allowed.end());
+            UsageError(format!(
+                "`{key}={value}`: allowed are whole numbers from {low} to {high}"
+            ))
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message<T: fmt::Debug>(result: Result<T, UsageError>) -> String {
+        result.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn takes_words_and_falls_back_to_defaults() {
+        let options = Options::parse("jobs=20  policy=edf subtasks=2,4").unwrap();
+        assert_eq!(options.number("jobs", 1..=100, 5), Ok(20));
+        assert_eq!(options.number("seed", 0..=9, 5), Ok(5));
+        assert_eq!(
+            options.choice("policy", &[("static", 1), ("edf", 2)]),
+            Ok(2)
+        );
+        assert_eq!(options.choice("occupy", &[("hold", 1), ("spin", 2)]), Ok(1));
+        assert_eq!(options.numbers("subtasks", 1..=16, &[6]), Ok(vec![2, 4]));
+        assert_eq!(options.finish(&["jobs"]), Ok(()));
+    }
+
+    #[test]
+    fn names_the_word_and_what_is_allowed() {
+        let options = Options::parse("jobs=0 policy=lifo sed=1 subtasks=2,x").unwrap();
+        let wrong = message(options.number("jobs", 1..=100, 5));
+        assert_eq!(wrong, "`jobs=0`: allowed are whole numbers from 1 to 100");
+        let wrong = message(options.choice("policy", &[("static", 1), ("edf", 2)]));
+        assert_eq!(wrong, "`policy=lifo`: allowed are static, edf");
+        let wrong = message(options.numbers("subtasks", 1..=16, &[]));
+        assert_eq!(
+            wrong,
+            "`subtasks=x`: allowed are whole numbers from 1 to 16"
+        );
+        let wrong = message(options.finish(&["jobs", "seed"]));
+        assert_eq!(wrong, "`sed` is no option of this app; it knows jobs, seed");
+    }
+
+    #[test]
+    fn refuses_lines_that_are_not_words() {
+        assert_eq!(
+            message(Options::parse("jobs")),
+            "`jobs` is not of the form key=value"
+        );
+        assert_eq!(
+            message(Options::parse("a=1 a=2")),
+            "`a` is given twice; give it once"
+        );
+    }
+}

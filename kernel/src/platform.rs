@@ -1,0 +1,66 @@
+//! The kernel as the platform that `fass` runs on.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+
+use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+use sched_dag::SchedulerOptions;
+
+use crate::machine::{clock, this_core};
+use crate::{execution, worker};
+
+/// The one kernel, as `fass` sees it.
+pub(crate) struct Kernel {
+    /// Whether instances are ordered by deadline rather than by priority.
+    edf: AtomicBool,
+}
+
+pub(crate) static KERNEL: Kernel = Kernel {
+    edf: AtomicBool::new(false),
+};
+
+impl Kernel {
+    /// Chooses the policy of the commits to come.
+    pub(crate) fn set_policy(&self, policy: Policy) {
+        self.edf.store(policy == Policy::Edf, Ordering::Relaxed);
+    }
+}
+
+impl Platform for Kernel {
+    fn policy(&self) -> Policy {
+        if self.edf.load(Ordering::Relaxed) {
+            Policy::Edf
+        } else {
+            Policy::StaticPriority
+        }
+    }
+
+    fn preemption(&self) -> Preemption {
+        Preemption::Disabled
+    }
+
+    fn cores(&self) -> u32 {
+        u32::try_from(this_core::all().len()).unwrap_or(u32::MAX)
+    }
+
+    fn now_ns(&self) -> u64 {
+        clock::now_ns()
+    }
+
+    fn execute_for(&self, duration: Duration, how: Occupation) {
+        let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        match how {
+            Occupation::Spin => worker::spin(ns),
+            Occupation::Hold => worker::hold(ns),
+        }
+    }
+
+    fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
+        let options = SchedulerOptions {
+            policy: self.policy(),
+            preemption: self.preemption(),
+            cores: self.cores(),
+        };
+        execution::prepare(plan, options)
+    }
+}

@@ -1,0 +1,98 @@
+//! A distribution by its order statistics.
+
+use alloc::vec::Vec;
+
+use crate::json::Object;
+
+/// The samples of one quantity, in nanoseconds.
+#[derive(Clone, Debug)]
+pub struct Distribution {
+    sorted_ns: Vec<u64>,
+}
+
+impl Distribution {
+    /// Orders the samples.
+    #[must_use]
+    pub fn new(samples_ns: impl IntoIterator<Item = u64>) -> Self {
+        let mut sorted_ns: Vec<u64> = samples_ns.into_iter().collect();
+        sorted_ns.sort_unstable();
+        Self { sorted_ns }
+    }
+
+    /// Returns the number of samples.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.sorted_ns.len()
+    }
+
+    /// Returns the smallest sample that at least `percent` per cent of the
+    /// samples do not exceed (nearest rank); 0 without samples.
+    #[must_use]
+    pub fn percentile(&self, percent: usize) -> u64 {
+        let rank = (self.count() * percent).div_ceil(100).max(1);
+        self.sorted_ns
+            .get(rank - 1)
+            .or(self.sorted_ns.last())
+            .copied()
+            .unwrap_or(0)
+    }
+
+    /// Returns the smallest sample, or 0.
+    #[must_use]
+    pub fn min(&self) -> u64 {
+        self.percentile(0)
+    }
+
+    /// Returns the middle sample, or 0.
+    #[must_use]
+    pub fn median(&self) -> u64 {
+        self.percentile(50)
+    }
+
+    /// Returns the sample that 99 per cent do not exceed, or 0.
+    #[must_use]
+    pub fn p99(&self) -> u64 {
+        self.percentile(99)
+    }
+
+    /// Returns the largest sample, or 0.
+    #[must_use]
+    pub fn max(&self) -> u64 {
+        self.percentile(100)
+    }
+
+    /// Writes the fields `min`, `median`, `p99` and `max` of a machine line.
+    pub fn describe(&self, object: &mut Object<'_, '_>) {
+        object
+            .number("min", self.min())
+            .number("median", self.median())
+            .number("p99", self.p99())
+            .number("max", self.max());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn takes_the_nearest_rank() {
+        let hundred = Distribution::new((1..=100).rev());
+        assert_eq!((hundred.min(), hundred.median()), (1, 50));
+        assert_eq!((hundred.p99(), hundred.max()), (99, 100));
+        let three = Distribution::new([30, 10, 20]);
+        assert_eq!(
+            (three.min(), three.median(), three.p99(), three.max()),
+            (10, 20, 30, 30)
+        );
+    }
+
+    #[test]
+    fn has_only_zeros_without_samples() {
+        let none = Distribution::new([]);
+        assert_eq!(
+            (none.count(), none.min(), none.median(), none.max()),
+            (0, 0, 0, 0)
+        );
+    }
+}

@@ -1,0 +1,37 @@
+//! Times as people read them.
+
+use core::fmt;
+
+/// Nanoseconds, shown with four digits or so and a unit: `412 ns`, `1.050 us`,
+/// `25.000 ms`, `1.500 s`. Honours the width of the format string.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ns(pub u64);
+
+impl fmt::Display for Ns {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ns = self.0;
+        let (unit, name) = match ns {
+            0..1_000 => return f.pad(&alloc::format!("{ns} ns")),
+            1_000..1_000_000 => (1_000, "us"),
+            1_000_000..1_000_000_000 => (1_000_000, "ms"),
+            _ => (1_000_000_000, "s"),
+        };
+        let thousandths = (ns % unit) / (unit / 1_000);
+        f.pad(&alloc::format!("{}.{thousandths:03} {name}", ns / unit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chooses_the_unit() {
+        let texts = [0, 999, 1_050, 25_000_000, 1_500_000_000].map(|ns| Ns(ns).to_string());
+        assert_eq!(
+            texts,
+            ["0 ns", "999 ns", "1.050 us", "25.000 ms", "1.500 s"]
+        );
+        assert_eq!(format!("{:>8}", Ns(7)), "    7 ns");
+    }
+}

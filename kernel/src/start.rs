@@ -1,0 +1,159 @@
+//! From the handover by `boot` to the app's function, and its end.
+
+use alloc::vec::Vec;
+
+use boot::BootInfo;
+use boot::acpi::{self, Platform};
+use boot::physical::IdentityMap;
+
+use crate::machine::this_core::{self, Stacks};
+use crate::machine::{clock, cpu, exit, interrupt, legacy, local_apic, processors, serial};
+use crate::machine_handle::{Ending, Machine};
+use crate::memory::{self, OutOfMemory};
+use crate::options::Options;
+use crate::platform::KERNEL;
+use crate::{console, json, panic, println, worker};
+
+/// An app: sets up its DAGs, runs them and reports.
+pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
+
+/// The stack that subtasks run on, in bytes.
+const WORK_STACK: u64 = 64 * 1024;
+/// The stack of an interrupt handler, or of an exception's report, in bytes.
+const HANDLER_STACK: u64 = 16 * 1024;
+
+/// Brings up the machine and runs the app.
+pub(crate) fn start(info: &'static BootInfo, name: &str, app: App) -> ! {
+    serial::initialize();
+    legacy::silence_interrupt_controllers();
+    interrupt::install(interrupt::Handlers {
+        timer: worker::timer_interrupt,
+        wake: worker::wake_interrupt,
+        exception: panic::exception,
+    });
+    let platform = read_platform(info);
+    // SAFETY: 1. `boot` handed over with its table in use and the machine's
+    // map. 2. This is the boot processor's only way, and nothing was allocated.
+    let layout = unsafe { memory::initialize(info.memory.as_slice(), platform.local_apic) };
+    let layout = layout.expect("the machine has too little memory: give it 16 MiB or more");
+    // SAFETY: `memory::initialize` mapped one page of registers there.
+    unsafe { local_apic::set_base(platform.local_apic) };
+    this_core::create(boot_processor_first(&platform));
+    this_core::become_core(local_apic::id());
+    let clock = clock::calibrate(info.entry_tsc, platform.pm_timer).unwrap_or_else(|_| {
+        panic!("no clock of known rate: the machine has neither an ACPI timer nor QEMU's APIC")
+    });
+    // SAFETY: 1. The table identity-maps the image, and all stacks are mapped
+    // in it. 2. The page at 0x8000 is memory below 1 MiB, mapped, and unused.
+    let others = unsafe { processors::start_others(layout.root_table, other_core) };
+    let cores = this_core::all().len();
+    assert!(
+        others as usize + 1 == cores,
+        "only {} of {cores} processors came up",
+        others + 1
+    );
+    cpu::enable_interrupts();
+    worker::set_heartbeat(worker::HEARTBEAT_NS);
+    // A second installation would come from a second boot, which there is not.
+    let _ = fass::install(&KERNEL);
+    let command_line = info.command_line().unwrap_or("(not UTF-8)");
+    json::emit("boot", |line| {
+        line.text("version", env!("CARGO_PKG_VERSION"))
+            .text("app", name)
+            .number("cpus", cores as u64)
+            .number("memory_kib", layout.total_bytes / 1024)
+            .text("clock", clock)
+            .number("ready_ns", clock::now_ns())
+            .text("command_line", command_line);
+    });
+    end(run_app(info, app))
+}
+
+fn read_platform(info: &BootInfo) -> Platform {
+    // SAFETY: 1. Until `memory::initialize` the boot table is in use, which
+    // identity-maps the first 4 GiB, and the view ends with this function.
+    // 2. Nothing writes to the firmware's tables.
+    let memory = unsafe { IdentityMap::new() };
+    acpi::read(&memory, info.rsdp).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Returns what each core needs, the boot processor's first.
+fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u8, Stacks)> {
+    let own = local_apic::id();
+    let others = platform
+        .apic_ids
+        .as_slice()
+        .iter()
+        .copied()
+        .filter(move |id| *id != own);
+    let ids: Vec<u8> = core::iter::once(own).chain(others).collect();
+    ids.into_iter().map(|id| {
+        (
+            id,
+            stacks().expect("each core needs 144 KiB of memory for stacks"),
+        )
+    })
+}
+
+fn stacks() -> Result<Stacks, OutOfMemory> {
+    let small = || memory::new_stack(HANDLER_STACK);
+    Ok(Stacks {
+        work: memory::new_stack(WORK_STACK)?,
+        handler: small()?,
+        exceptions: [small()?, small()?, small()?, small()?],
+    })
+}
+
+/// Where every other core begins: it works until the machine stops.
+extern "C" fn other_core(apic_id: u32) -> ! {
+    let apic_id = u8::try_from(apic_id).expect("APIC ids have 8 bits");
+    this_core::become_core(apic_id);
+    processors::arrive();
+    cpu::enable_interrupts();
+    loop {
+        worker::work(|| false, || {});
+    }
+}
+
+fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
+    let usage = |message: &str| Ending::Usage(crate::options::UsageError::new(message));
+    let line = info
+        .command_line()
+        .map_err(|_| usage("the command line is not UTF-8"))?;
+    let options = Options::parse(line)?;
+    KERNEL.set_policy(options.choice(
+        "policy",
+        &[
+            ("static", fass::Policy::StaticPriority),
+            ("edf", fass::Policy::Edf),
+        ],
+    )?);
+    app(&Machine { options })
+}
+
+/// Prints how the app ended, as the last line, and stops the machine.
+fn end(result: Result<(), Ending>) -> ! {
+    let (status, word) = match &result {
+        Ok(()) => (exit::Status::Success, "success"),
+        Err(Ending::Usage(_)) => (exit::Status::Usage, "usage"),
+        Err(_) => (exit::Status::Failure, "failure"),
+    };
+    if let Err(Ending::Commit(error)) = &result {
+        for fault in error.faults() {
+            json::emit("commit_fault", |line| {
+                line.text("fault", fault.code()).text("message", fault);
+            });
+        }
+    }
+    if let Err(ending) = &result {
+        println!("{ending}");
+    }
+    json::emit("verdict", |line| {
+        line.text("status", word);
+        if let Err(ending) = &result {
+            line.text("reason", ending);
+        }
+    });
+    console::resume();
+    exit::exit(status)
+}
