@@ -7,10 +7,12 @@
 //! is said with its line number, and then nothing is compared.
 //!
 //! - [`lines`]: words and numbers of a reference file, with line numbers;
-//! - [`bounds`]: the analysis at commit.
+//! - [`bounds`]: the analysis at commit;
+//! - [`schedules`]: the scheduler in virtual time.
 
 pub mod bounds;
 pub mod lines;
+pub mod schedules;
 
 use std::process::ExitCode;
 
@@ -28,6 +30,7 @@ const USAGE: &str = "usage: oracle KIND FILE...
 Compares reference cases with what the scheduler and its analysis compute.
 KIND is one of:
   bounds      lengths, widths, response-time bounds and verdicts
+  schedules   starts, finishes, preemptions, response times and misses
 
 Prints the first difference of each failing case, then `N passed, M failed`.
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
@@ -40,20 +43,27 @@ pub fn oracle(words: &[String]) -> ExitCode {
         print!("{USAGE}");
         return ExitCode::SUCCESS;
     }
-    match words.split_first() {
-        Some((kind, files)) if kind == "bounds" && !files.is_empty() => {
-            let bounds = Kind {
+    let Some((kind, files)) = words.split_first() else {
+        return refuse("which kind of reference file?");
+    };
+    match kind.as_str() {
+        "bounds" => run_files(
+            &Kind {
                 parse: bounds::parse,
                 name: |case: &bounds::Case| &case.name,
                 check: bounds::check,
-            };
-            run_files(&bounds, files)
-        }
-        Some((kind, [])) if kind == "bounds" => {
-            refuse("which files? name at least one reference file")
-        }
-        Some((kind, _)) => refuse(&format!("no kind of reference file `{kind}`")),
-        None => refuse("which kind of reference file?"),
+            },
+            files,
+        ),
+        "schedules" => run_files(
+            &Kind {
+                parse: schedules::parse,
+                name: |case: &schedules::Case| &case.name,
+                check: schedules::check,
+            },
+            files,
+        ),
+        _ => refuse(&format!("no kind of reference file `{kind}`")),
     }
 }
 
@@ -63,6 +73,9 @@ fn refuse(reason: &str) -> ExitCode {
 }
 
 fn run_files<Case>(kind: &Kind<Case>, files: &[String]) -> ExitCode {
+    if files.is_empty() {
+        return refuse("which files? name at least one reference file");
+    }
     let mut cases = Vec::new();
     for file in files {
         let text = match std::fs::read_to_string(file) {
