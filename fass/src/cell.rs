@@ -4,9 +4,16 @@
 //!
 //! For our purposes an *edge* is a topic as one of its readers sees it. Each
 //! edge is a ring of J *slots*, J being the number of jobs that the DAG may
-//! have in flight, and job k always uses slot `k mod J`. A ring has exactly one
+//! have in flight, so a job always finds a free slot. A ring has exactly one
 //! [`Writer`] and one [`Reader`]. Neither can be cloned, and everything they do
 //! takes `&mut self`; so at any time at most one thread acts for each side.
+//!
+//! Which slot a job gets carries no meaning; what identifies a value is its job
+//! number. Both ends go round the ring in the order of jobs, so that each looks
+//! at the right slot at once; after a job was cancelled they may look at up to
+//! J. (A slot could be chosen by `k mod J` only if jobs in flight were
+//! consecutive. They are not where an overrun skips releases: with J = 2, jobs
+//! 1 and 3 can be in flight together.)
 //!
 //! A slot holds a value and one atomic word, its *turn*: 0 while the slot is
 //! empty, `k + 1` while it holds the value of job k. One soundness argument
@@ -56,31 +63,35 @@ pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
     });
     let writer = Writer {
         ring: Arc::clone(&ring),
+        next: 0,
     };
-    (writer, Reader { ring })
+    (writer, Reader { ring, next: 0 })
 }
 
 /// The writing end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Writer<T> {
     ring: Arc<Ring<T>>,
+    /// The slot to look at first.
+    next: usize,
 }
 
 /// The reading end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Reader<T> {
     ring: Arc<Ring<T>>,
+    /// The slot to look at first.
+    next: usize,
 }
 
 impl<T> Writer<T> {
-    /// Puts the value of `job` into its slot, or gives the value back if the
-    /// slot still holds another job's (or `job` is `u64::MAX`, which has no turn).
+    /// Puts the value of `job` into a free slot, or gives the value back if all
+    /// are taken (or `job` is `u64::MAX`, which has no turn).
     pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
-        let slot = self.ring.slot(job);
         let Some(turn) = job.checked_add(1) else {
             return Err(value);
         };
-        if slot.turn.load(Ordering::Acquire) != EMPTY_SLOT {
+        let Some(slot) = self.ring.find(&mut self.next, EMPTY_SLOT) else {
             return Err(value);
-        }
+        };
         let place = slot.value.get().cast::<T>();
         // SAFETY: by the turn invariant an empty slot is the writer's alone,
         // and `&mut self` makes us the only thread that acts as the writer.
@@ -91,13 +102,10 @@ impl<T> Writer<T> {
 }
 
 impl<T> Reader<T> {
-    /// Moves the value of `job` out of its slot, or returns `None` if the slot
-    /// does not hold that very job's value.
+    /// Moves the value of `job` out of its slot, or returns `None` if no slot
+    /// holds that very job's value.
     pub(crate) fn take(&mut self, job: u64) -> Option<T> {
-        let slot = self.ring.slot(job);
-        if slot.turn.load(Ordering::Acquire) != job.checked_add(1)? {
-            return None;
-        }
+        let slot = self.ring.find(&mut self.next, job.checked_add(1)?)?;
         let place = slot.value.get().cast::<T>();
         // SAFETY: by the turn invariant a slot with a turn other than 0 is
         // initialised and the reader's alone, and `&mut self` makes us the only
@@ -125,12 +133,20 @@ struct Slot<T> {
 unsafe impl<T: Send> Sync for Ring<T> {}
 
 impl<T> Ring<T> {
-    fn slot(&self, job: u64) -> &Slot<T> {
-        let slots = self.slots.len();
-        // Both conversions are exact: `usize` has at most 64 bits on every
-        // target, and the remainder is below a `usize`.
-        let index = u64::try_from(slots).map_or(job, |slots| job % slots);
-        &self.slots[usize::try_from(index).unwrap_or(0)]
+    /// Finds a slot with the given turn, from slot `next` on and round the ring
+    /// once, and moves `next` behind it. Its look at the turn is an `Acquire`.
+    fn find(&self, next: &mut usize, turn: u64) -> Option<&Slot<T>> {
+        for _ in 0..self.slots.len() {
+            let slot = &self.slots[*next];
+            *next += 1;
+            if *next == self.slots.len() {
+                *next = 0;
+            }
+            if slot.turn.load(Ordering::Acquire) == turn {
+                return Some(slot);
+            }
+        }
+        None
     }
 }
 

@@ -29,14 +29,37 @@ fn a_value_is_found_under_its_own_job_only() {
     let (mut writer, mut reader) = ring(2);
     assert_eq!(reader.take(0), None);
     assert_eq!(writer.put(0, 'a'), Ok(()));
-    assert_eq!(reader.take(2), None, "same slot, other job");
-    assert_eq!(reader.take(1), None, "other slot");
+    assert_eq!(reader.take(2), None, "another job");
+    assert_eq!(reader.take(1), None, "another job");
     assert_eq!(reader.take(0), Some('a'));
     assert_eq!(reader.take(0), None, "taken once");
 }
 
 #[test]
-fn a_full_slot_gives_the_value_back() {
+fn jobs_need_not_be_consecutive() {
+    let (mut writer, mut reader) = ring(2);
+    assert_eq!(writer.put(1, 'a'), Ok(()));
+    assert_eq!(writer.put(3, 'b'), Ok(()), "although 1 = 3 (mod 2)");
+    assert_eq!(reader.take(1), Some('a'));
+    assert_eq!(writer.put(100, 'c'), Ok(()));
+    assert_eq!(reader.take(100), Some('c'));
+    assert_eq!(reader.take(3), Some('b'));
+}
+
+/// A value that is never taken costs its slot and nothing else.
+#[test]
+fn a_forgotten_value_blocks_only_its_slot() {
+    let (mut writer, mut reader) = ring(2);
+    assert_eq!(writer.put(0, 0), Ok(()));
+    for job in 1..10 {
+        assert_eq!(writer.put(job, job), Ok(()));
+        assert_eq!(reader.take(job), Some(job));
+    }
+    assert_eq!(reader.take(0), Some(0));
+}
+
+#[test]
+fn a_full_ring_gives_the_value_back() {
     let (mut writer, mut reader) = ring(2);
     assert_eq!(writer.put(0, 'a'), Ok(()));
     assert_eq!(writer.put(1, 'b'), Ok(()));

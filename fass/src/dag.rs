@@ -233,7 +233,7 @@ impl Dag {
         let draft = self.draft.borrow_mut();
         assert!(
             !draft.is_committed,
-            "DAG `{}` is committed and cannot be changed; build a new DAG and commit that",
+            "dag `{}` is committed and cannot be changed; build a new DAG and commit that",
             draft.spec.name
         );
         draft

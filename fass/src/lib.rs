@@ -62,8 +62,7 @@
 //! # What is guaranteed
 //!
 //! - A function runs when all values of its job have arrived, and gets exactly
-//!   those: no job number is ever off by one, because element i of every topic
-//!   is job i's by construction.
+//!   those: every value carries its job's number and is found by it.
 //! - Nothing a function returns is seen before it has returned, and then all of
 //!   it at once. Sending never waits.
 //! - After the commit the crate allocates nothing, takes no lock and does no
@@ -82,8 +81,8 @@
 //! Top to bottom: [`Dag`] takes registrations; the commit verifies them with
 //! `sched-dag` and makes of each function a [`Body`], one future that is polled
 //! once for each instance; the [`Platform`] gets the [`Plan`] and runs bodies
-//! when its scheduler says so. Values travel in rings with one slot for each job
-//! that may be in flight. The crate names no kernel and needs only `alloc`;
+//! when its scheduler says so. Values travel in rings that have a slot for each
+//! job that may be in flight. The crate names no kernel and needs only `alloc`;
 //! its `unsafe` is in one file, `cell.rs`.
 //!
 //! `docs/paper-map.md` relates the paper's figures 3 and 4 to this code.

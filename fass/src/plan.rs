@@ -77,8 +77,8 @@ impl Body {
     /// - If the function panics. The body cannot be run again.
     /// - If the body panicked before.
     /// - If an input of `job` is missing, because a predecessor is not complete.
-    /// - If a slot of an output is still taken, because a cancelled instance's
-    ///   inputs were not [discarded](Self::discard).
+    /// - If an output finds no free slot, because a cancelled instance's inputs
+    ///   were not [discarded](Self::discard).
     pub fn run(&mut self, job: u64) {
         self.grant(Grant::Run(job));
     }

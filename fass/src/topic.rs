@@ -57,7 +57,7 @@ impl<T: Message> Publisher<T> {
     ///
     /// # Panics
     ///
-    /// If a slot is still taken, which means that the platform cancelled an
+    /// If no slot is free, which means that the platform cancelled an
     /// instance and did not discard its inputs, or let more jobs be in flight
     /// than the plan says.
     pub(crate) fn send(&mut self, job: u64, value: T) {
@@ -77,7 +77,7 @@ impl<T: Message> Publisher<T> {
 fn put<T>(writer: &mut Writer<T>, job: u64, value: T) {
     assert!(
         writer.put(job, value).is_ok(),
-        "an output of job {job} finds its slot taken: the platform cancelled an instance \
+        "an output of job {job} finds no free slot: the platform cancelled an instance \
          without discarding its inputs, or exceeded the jobs in flight"
     );
 }

@@ -76,8 +76,8 @@ pub trait MulSend {
     ///
     /// # Panics
     ///
-    /// When polled, if a slot is still taken: the platform did not discard the
-    /// inputs of a cancelled instance.
+    /// When polled, if no slot is free: the platform did not discard the inputs
+    /// of a cancelled instance.
     fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send;
 }
 

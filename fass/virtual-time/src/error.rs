@@ -3,6 +3,8 @@
 use std::error::Error;
 use std::fmt;
 
+use sched_dag::{DagLabel, SubtaskLabel};
+
 use crate::report::Report;
 
 /// Why a run in virtual time ended early, or could not begin.
@@ -14,15 +16,15 @@ pub enum RunError {
     NothingToRun,
     /// A run to the end was asked for, but this DAG has no end.
     Endless {
-        /// The DAG's name.
-        dag: String,
+        /// The DAG.
+        dag: DagLabel,
     },
     /// A subtask's function panicked. No function runs after it.
     Panicked {
-        /// The DAG's name.
-        dag: String,
-        /// The subtask's name.
-        subtask: String,
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
         /// The job.
         job: u64,
         /// The panic's message.
@@ -32,10 +34,10 @@ pub enum RunError {
     },
     /// An instance would finish after `u64::MAX` nanoseconds.
     TimeOverflow {
-        /// The DAG's name.
-        dag: String,
-        /// The subtask's name.
-        subtask: String,
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
         /// The job.
         job: u64,
     },

@@ -40,7 +40,9 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use fass::{Policy, Preemption};
-pub use sched_dag::{CoreId, DagId, DagStatistics, Instance, JobOutcome, SubtaskId};
+pub use sched_dag::{
+    CoreId, DagId, DagLabel, DagStatistics, Instance, JobOutcome, SubtaskId, SubtaskLabel,
+};
 
 pub use error::RunError;
 pub use event::{Event, EventKind};

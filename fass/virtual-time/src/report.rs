@@ -98,12 +98,21 @@ impl Report {
         line
     }
 
+    /// Returns a DAG's name, or `dag 0`.
     pub(crate) fn dag_name(&self, dag: DagId) -> String {
-        dag_name(&self.task_set, dag)
+        match self.task_set.dag(dag).name() {
+            "" => format!("dag {}", dag.0),
+            name => name.to_owned(),
+        }
     }
 
+    /// Returns the name of an instance's subtask, or `subtask 0`.
     pub(crate) fn subtask_name(&self, instance: Instance) -> String {
-        subtask_name(&self.task_set, instance)
+        let dag = self.task_set.dag(instance.dag);
+        match dag.subtask(instance.subtask).name() {
+            "" => format!("subtask {}", instance.subtask.0),
+            name => name.to_owned(),
+        }
     }
 
     fn find(&self, dag: &str, subtask: &str) -> (DagId, SubtaskId) {
@@ -116,25 +125,8 @@ impl Report {
                     return (dag_id, subtask_id);
                 }
             }
-            panic!("DAG `{dag}` has no subtask `{subtask}`");
+            panic!("dag `{dag}` has no subtask `{subtask}`");
         }
-        panic!("there is no DAG `{dag}`");
-    }
-}
-
-/// Returns a DAG's name, or `dag 0`.
-pub(crate) fn dag_name(task_set: &TaskSet, dag: DagId) -> String {
-    match task_set.dag(dag).name() {
-        "" => format!("dag {}", dag.0),
-        name => name.to_owned(),
-    }
-}
-
-/// Returns the name of an instance's subtask, or `subtask 0`.
-pub(crate) fn subtask_name(task_set: &TaskSet, instance: Instance) -> String {
-    let dag = task_set.dag(instance.dag);
-    match dag.subtask(instance.subtask).name() {
-        "" => format!("subtask {}", instance.subtask.0),
-        name => name.to_owned(),
+        panic!("there is no dag `{dag}`");
     }
 }

@@ -11,14 +11,15 @@ use std::time::Duration;
 use fass::{Body, Plan};
 use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
 use sched_dag::{
-    CoreId, DagId, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions, TaskSet,
+    CoreId, DagId, DagLabel, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions,
+    SubtaskLabel, TaskSet,
 };
 
 use crate::error::RunError;
 use crate::event::EventKind;
 use crate::platform::Machine;
 use crate::recorder::Recorder;
-use crate::report::{Report, dag_name, subtask_name};
+use crate::report::Report;
 
 /// A plan that runs, or can go on running.
 #[derive(Debug)]
@@ -76,8 +77,8 @@ impl Session {
         });
         if let Some((instance, message)) = panic {
             return Err(RunError::Panicked {
-                dag: format!("DAG `{}`", dag_name(&self.task_set, instance.dag)),
-                subtask: format!("subtask `{}`", subtask_name(&self.task_set, instance)),
+                dag: self.dag_label(instance.dag),
+                subtask: self.subtask_label(instance),
                 job: instance.job,
                 message,
                 report: Box::new(self.report()),
@@ -86,8 +87,8 @@ impl Session {
         match end {
             End::Finished | End::TimeReached => Ok(self.report()),
             End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
-                dag: format!("DAG `{}`", dag_name(&self.task_set, instance.dag)),
-                subtask: format!("subtask `{}`", subtask_name(&self.task_set, instance)),
+                dag: self.dag_label(instance.dag),
+                subtask: self.subtask_label(instance),
                 job: instance.job,
             }),
         }
@@ -98,9 +99,25 @@ impl Session {
         match dags.find(|(_, dag)| dag.jobs().is_none()) {
             None => Ok(()),
             Some((dag, _)) => Err(RunError::Endless {
-                dag: format!("DAG `{}`", dag_name(&self.task_set, dag)),
+                dag: self.dag_label(dag),
             }),
         }
+    }
+
+    fn dag_label(&self, id: DagId) -> DagLabel {
+        let name = self.task_set.dag(id).name().to_owned();
+        DagLabel { id, name }
+    }
+
+    fn subtask_label(&self, instance: Instance) -> SubtaskLabel {
+        let id = instance.subtask;
+        let name = self
+            .task_set
+            .dag(instance.dag)
+            .subtask(id)
+            .name()
+            .to_owned();
+        SubtaskLabel { id, name }
     }
 
     fn report(&self) -> Report {

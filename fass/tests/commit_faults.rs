@@ -1,0 +1,193 @@
+//! Every fault that `fass` itself finds, with its text, and that all faults of
+//! all DAGs come at once.
+
+mod support;
+
+use core::time::Duration;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::slice;
+
+use fass::{CommitError, Dag, Fault, SubtaskAttributes, create_dag, finish_create_dags};
+
+const PERIOD: Duration = Duration::from_millis(10);
+
+fn named(name: &str) -> SubtaskAttributes {
+    SubtaskAttributes::named(name)
+}
+
+fn refuse(dags: &[Dag]) -> CommitError {
+    support::install();
+    finish_create_dags(dags).expect_err("the commit is refused")
+}
+
+fn codes(error: &CommitError) -> Vec<&'static str> {
+    error.faults().iter().map(Fault::code).collect()
+}
+
+/// A faultless DAG whose topics carry its name.
+fn faultless(name: &str) -> Dag {
+    let dag = create_dag();
+    dag.name(name);
+    dag.register_periodic_subtask(|| (1,), vec![name], PERIOD, named("source"));
+    dag.register_sink_subtask(|_: (i32,)| (), vec![name], PERIOD, named("sink"));
+    dag
+}
+
+#[test]
+fn arity_faults_name_subtask_and_both_numbers_and_nothing_else_is_blamed() {
+    let dag = create_dag();
+    dag.name("demo");
+    dag.register_periodic_subtask(|| (1, 2_u8), vec!["number"], PERIOD, named("source"));
+    let middle = |(number,): (i32,)| (number,);
+    let inputs = vec!["number", "surplus"];
+    dag.register_subtask(middle, inputs, vec!["next", "surplus"], named("middle"));
+    dag.register_sink_subtask(|_: (i32,)| (), vec!["next"], PERIOD, named("sink"));
+    let error = refuse(&[dag]);
+    let texts: Vec<String> = error.faults().iter().map(ToString::to_string).collect();
+    assert_eq!(
+        texts[..3],
+        [
+            "subtask `source` of dag `demo` returns 2 outputs but lists 1 output topic; \
+             list one topic for each element of its result tuple",
+            "subtask `middle` of dag `demo` takes 1 input but lists 2 input topics; \
+             list one topic for each element of its argument tuple",
+            "subtask `middle` of dag `demo` returns 1 output but lists 2 output topics; \
+             list one topic for each element of its result tuple",
+        ]
+    );
+    // The surplus topic really is written by its own reader; no type is blamed.
+    assert!(!codes(&error).contains(&"type_mismatch"), "{error}");
+}
+
+#[test]
+fn a_duration_beyond_64_bits_of_nanoseconds_is_a_fault_and_never_wraps() {
+    let fits = Duration::from_nanos(u64::MAX);
+    let long = fits + Duration::from_nanos(1);
+    let dag = create_dag();
+    dag.name("slow").offset(long);
+    dag.register_periodic_subtask(|| (1,), vec!["number"], long, named("source").wcet(long));
+    dag.register_sink_subtask(|_: (i32,)| (), vec!["number"], long, named("sink"));
+    let error = refuse(&[dag]);
+    assert_eq!(codes(&error), ["duration_too_long"; 4]);
+    let limit = "give at most 18446744073709551615 ns";
+    let texts: Vec<String> = error.to_string().lines().map(String::from).collect();
+    assert_eq!(
+        texts[0],
+        format!("the offset of dag `slow` is too long; {limit}")
+    );
+    let of = |what, subtask| {
+        format!("the {what} of subtask `{subtask}` of dag `slow` is too long; {limit}")
+    };
+    assert_eq!(texts[1], of("WCET", "source"));
+    assert_eq!(texts[2], of("period", "source"));
+    assert_eq!(texts[3], of("relative deadline", "sink"));
+}
+
+#[test]
+fn two_periods_and_two_deadlines_are_faults() {
+    let dag = faultless("twice");
+    let other = Duration::from_millis(20);
+    dag.register_periodic_subtask(|| (1,), vec!["more"], other, named("second source"));
+    dag.register_sink_subtask(|_: (i32,)| (), vec!["more"], other, named("second sink"));
+    let error = refuse(&[dag]);
+    let codes = codes(&error);
+    for code in [
+        "periods_differ",
+        "deadlines_differ",
+        "several_sources",
+        "several_sinks",
+    ] {
+        assert!(codes.contains(&code), "{code} is missing in:\n{error}");
+    }
+    assert_eq!(
+        error.faults()[0].to_string(),
+        "subtask `second source` gives dag `twice` a period of 20000000 ns where 10000000 ns \
+         were given before; a DAG has one period, make two DAGs or give the same period"
+    );
+    assert_eq!(
+        error.faults()[1].to_string(),
+        "subtask `second sink` gives dag `twice` a relative deadline of 20000000 ns where \
+         10000000 ns were given before; a DAG has one deadline, give the same to every sink"
+    );
+}
+
+#[test]
+fn a_dag_given_twice_is_a_fault() {
+    let dag = faultless("once");
+    let error = refuse(&[dag.clone(), dag]);
+    assert_eq!(
+        error.to_string(),
+        "dag `once` is given twice in one commit; give it once"
+    );
+}
+
+#[test]
+fn a_dag_committed_before_is_a_fault_and_cannot_be_changed() {
+    let dag = faultless("done");
+    drop(support::commit(slice::from_ref(&dag)));
+    let error = refuse(slice::from_ref(&dag));
+    assert_eq!(
+        error.to_string(),
+        "dag `done` is committed already; build a new DAG and commit that"
+    );
+    let late = || dag.register_sink_subtask(|()| (), vec![], PERIOD, named("late"));
+    let payload = catch_unwind(AssertUnwindSafe(late)).expect_err("it panics");
+    assert_eq!(
+        payload.downcast_ref::<String>().map(String::as_str),
+        Some("dag `done` is committed and cannot be changed; build a new DAG and commit that")
+    );
+}
+
+#[test]
+fn a_refused_commit_changes_nothing() {
+    let dag = create_dag();
+    dag.name("unfinished");
+    dag.register_periodic_subtask(|| (1,), vec!["number"], PERIOD, named("source"));
+    let error = refuse(slice::from_ref(&dag));
+    assert_eq!(codes(&error), ["missing_deadline"]);
+    dag.register_sink_subtask(|_: (i32,)| (), vec!["number"], PERIOD, named("sink"));
+    support::run_job(&mut support::commit(&[dag]), 0);
+}
+
+#[test]
+fn a_platform_that_refuses_is_quoted() {
+    support::install();
+    finish_create_dags(&[faultless("first")]).expect("the platform keeps one plan");
+    let error = refuse(&[faultless("second")]);
+    assert_eq!(codes(&error), ["not_launched"]);
+    assert_eq!(
+        error.to_string(),
+        "the platform did not take the plan: a plan is kept already; take it first"
+    );
+}
+
+#[test]
+fn all_faults_of_all_dags_come_at_once() {
+    let committed = faultless("committed");
+    drop(support::commit(slice::from_ref(&committed)));
+    let arity = faultless("arity");
+    arity.register_subtask(|()| (1,), vec![], vec![], named("extra"));
+    let types = create_dag();
+    types.name("types");
+    types.register_periodic_subtask(|| (1_i32,), vec!["value"], PERIOD, named("source"));
+    types.register_sink_subtask(|_: (u64,)| (), vec!["value"], PERIOD, named("sink"));
+    let error = refuse(&[committed, arity, types, create_dag()]);
+    let codes = codes(&error);
+    for code in [
+        "already_committed",
+        "output_arity",
+        "type_mismatch",
+        "no_subtasks",
+    ] {
+        assert!(codes.contains(&code), "{code} is missing in:\n{error}");
+    }
+    assert_eq!(error.to_string().lines().count(), error.faults().len());
+    let text = error.to_string();
+    let mismatch = text
+        .lines()
+        .find(|line| line.contains("`types`"))
+        .unwrap_or_default();
+    for word in ["`source`", "`sink`", "i32", "u64", "`value`"] {
+        assert!(mismatch.contains(word), "{word} is missing in: {mismatch}");
+    }
+}

@@ -1,0 +1,112 @@
+//! No allocation from a job's release to its completion.
+//!
+//! The program's allocator counts this thread's allocations. The DAG has what
+//! could tempt a body to allocate: several inputs and outputs, fan-out, shared
+//! and unique messages, 16 arguments, more than one job in flight, discards.
+
+mod support;
+
+use core::time::Duration;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+use fass::{SubtaskAttributes, Unique, create_dag};
+use support::{commit, run_job};
+
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+#[allow(unsafe_code, reason = "an allocator that counts is only possible so")]
+// SAFETY: every call is passed on unchanged to the system's allocator, which
+// keeps the trait's contract; counting does not allocate.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the caller keeps `alloc`'s conditions, which are the same.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller keeps `dealloc`'s conditions, which are the same.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+type Sixteen = (
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+    u8,
+);
+
+const TOPICS: [&str; 16] = [
+    "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15",
+];
+
+#[test]
+fn a_job_allocates_nothing() {
+    let period = Duration::from_millis(10);
+    let named = SubtaskAttributes::named;
+    let dag = create_dag();
+    dag.in_flight(3);
+    let image = Arc::new([7_u8; 4096]);
+    dag.register_periodic_subtask(
+        move || (Arc::clone(&image), Unique::new([1_u64; 32])),
+        vec!["image", "frame"],
+        period,
+        named("source"),
+    );
+    let wide = |(image, _): (Arc<[u8; 4096]>, Unique<[u64; 32]>)| -> Sixteen {
+        let x = image[0];
+        (x, x, x, x, x, x, x, x, x, x, x, x, x, x, x, x)
+    };
+    dag.register_subtask(wide, vec!["image", "frame"], TOPICS.to_vec(), named("wide"));
+    let narrow = |values: Sixteen| (u64::from(values.15), [0_u8; 100]);
+    dag.register_subtask(
+        narrow,
+        TOPICS.to_vec(),
+        vec!["sum", "rest"],
+        named("narrow"),
+    );
+    dag.register_sink_subtask(
+        |(sum, _, image): (u64, [u8; 100], Arc<[u8; 4096]>)| assert_eq!(sum, u64::from(image[1])),
+        vec!["sum", "rest", "image"],
+        period,
+        named("sink"),
+    );
+    let mut plan = commit(&[dag]);
+
+    let before = ALLOCATIONS.get();
+    for job in 0..1_000 {
+        if job % 10 == 9 {
+            plan.bodies[0][0].run(job);
+            plan.bodies[0][1].discard(job);
+            plan.bodies[0][2].discard(job);
+            plan.bodies[0][3].discard(job);
+        } else {
+            run_job(&mut plan, job);
+        }
+    }
+    assert_eq!(ALLOCATIONS.get() - before, 0);
+    drop(vec![1]);
+    assert!(ALLOCATIONS.get() > before, "the allocator counts");
+}
