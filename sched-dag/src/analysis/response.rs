@@ -62,7 +62,8 @@ pub(super) enum Form {
     /// release, and overlapping jobs of other DAGs stack.
     Sound,
     /// The chain is followed back over the jobs that the job itself can meet
-    /// (`j T < R`), and other DAGs are as narrow as one job: for comparisons.
+    /// (`j T < R`), and other DAGs are as narrow as one job; the deadline is
+    /// no limit. For comparisons.
     Reference,
 }
 
@@ -123,7 +124,7 @@ impl Figures {
                 if index == windows.len() {
                     windows.push(0);
                 }
-                let window = self.window(back, own, interference, windows[index], steps)?;
+                let window = self.window(back, own, interference, windows[index], form, steps)?;
                 windows[index] = window;
                 let offset = u128::from(back) * self.period;
                 largest = largest.max(window.saturating_sub(offset));
@@ -173,11 +174,15 @@ impl Figures {
         own: u128,
         interference: &[Workload],
         start: u128,
+        form: Form,
         steps: &mut u64,
     ) -> Result<u128, Unsolved> {
         let back = u128::from(back);
         let chain = self.length + back * self.largest;
-        let limit = self.deadline + back * self.period;
+        let limit = match form {
+            Form::Sound => self.deadline + back * self.period,
+            Form::Reference => u64::MAX.into(),
+        };
         let Blocking { first, later, .. } = self.blocking;
         let repeats = (self.blocking.chain + back).saturating_sub(1);
         let constant = (back + 1) * self.volume - chain

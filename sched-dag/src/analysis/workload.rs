@@ -17,9 +17,11 @@
 //! - `WE = N volume + min(volume, p max(0, D_k - N T - (D - R)))`.
 //!
 //! The paper has `p = m`. `p = min(m, width)` is a refinement of our own: the
-//! worst case packs each job into a rectangle as wide as the DAG can be at an
-//! instant. Jobs that overlap (`R > T`) stack: up to `ceil(R / T)` of them are
-//! in flight, so `p = min(m, ceil(R / T) width)`; that needs `volume <= m T`.
+//! worst case packs each job into a rectangle as wide as the job can be. It
+//! needs jobs that do not overlap, `R <= T`. Jobs that do are dealt out in turn
+//! to `k = ceil(R / T)` *lanes*: within a lane the period is `k T >= R`, so
+//! nothing overlaps, and the DAG's workload is at most `k` times a lane's, and
+//! at most `min(m, k p) L`.
 //!
 //! Trap: the closed form overshoots `p L` for short windows; hence the cap.
 
@@ -30,9 +32,15 @@ use super::task::Task;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Workload {
     volume: u128,
+    /// The period of a lane.
     period: u128,
     response: u128,
+    /// The most cores that one job uses at an instant.
     parallelism: u128,
+    /// The sequences into which jobs that overlap are dealt out.
+    lanes: u128,
+    /// The most cores that all jobs use at an instant.
+    cap: u128,
     /// No window holds more, whatever its length (EDF's `WE`).
     ceiling: Option<u128>,
 }
@@ -58,15 +66,18 @@ impl Workload {
         cores: u64,
         form: Form,
     ) -> Self {
-        let in_flight = match form {
+        let lanes = match form {
             Form::Sound => u128::from(response_ns.div_ceil(task.period_ns()).max(1)),
             Form::Reference => 1,
         };
+        let parallelism = u128::from(parallelism);
         Self {
             volume: task.volume_ns().into(),
-            period: task.period_ns().into(),
+            period: lanes * u128::from(task.period_ns()),
             response: response_ns.into(),
-            parallelism: (in_flight * u128::from(parallelism)).min(cores.into()),
+            parallelism,
+            lanes,
+            cap: (lanes * parallelism).min(cores.into()),
             ceiling: None,
         }
     }
@@ -94,24 +105,17 @@ impl Workload {
     /// Nothing overflows: times are below 2^64 and parallelism below 2^32, so
     /// every area is below 2^98; the one larger product saturates.
     pub(super) fn at(&self, window_ns: u64) -> Piece {
-        let area = self.parallelism * u128::from(window_ns);
-        let body = self.body(area);
+        let area = self.cap * u128::from(window_ns);
+        let body = self.lane(u128::from(window_ns)).times(self.lanes);
+        let cap = Piece {
+            value: area,
+            slope: self.cap,
+            span: None,
+        };
         let piece = if area <= body.value {
-            // The cap rises as steeply as the body can: it stays below for
-            // as long as the body rises, and until it meets a flat body.
-            let rising = if body.slope == 0 {
-                (body.value - area) / self.parallelism
-            } else {
-                u128::MAX
-            };
-            Piece {
-                value: area,
-                slope: self.parallelism,
-                span: Some(body.span.unwrap_or(u128::MAX).min(rising)),
-            }
-            .or_one_flat_step()
+            cap.below(body)
         } else {
-            body
+            body.below(cap)
         };
         match self.ceiling {
             Some(ceiling) if piece.value >= ceiling => Piece {
@@ -128,10 +132,10 @@ impl Workload {
         }
     }
 
-    /// Returns the closed form for `p L = area`, without the cap.
-    fn body(&self, area: u128) -> Piece {
-        let shift = self.parallelism * self.response;
-        let Some(packed) = (area + shift).checked_sub(self.volume) else {
+    /// Returns the closed form for one lane, without the cap.
+    fn lane(&self, window: u128) -> Piece {
+        let area = self.parallelism * (window + self.response);
+        let Some(packed) = area.checked_sub(self.volume) else {
             return Piece {
                 value: self.volume,
                 slope: 0,
@@ -159,6 +163,26 @@ impl Workload {
 }
 
 impl Piece {
+    /// Returns this piece as far as it surely stays below a higher one.
+    fn below(self, higher: Self) -> Self {
+        let until = match self.slope.checked_sub(higher.slope) {
+            None | Some(0) => u128::MAX,
+            Some(approach) => (higher.value - self.value) / approach,
+        };
+        let spans = [Some(until), self.span, higher.span];
+        let span = spans.into_iter().flatten().min();
+        Self { span, ..self }.or_one_flat_step()
+    }
+
+    /// Returns the sum of so many equal pieces.
+    fn times(self, count: u128) -> Self {
+        Self {
+            value: self.value.saturating_mul(count),
+            slope: self.slope * count,
+            span: self.span,
+        }
+    }
+
     /// Replaces an empty piece by a step of 1 ns without growth: never more
     /// than the workload, which never falls.
     fn or_one_flat_step(self) -> Self {
