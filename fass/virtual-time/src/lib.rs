@@ -3,9 +3,9 @@
 //! For our purposes *virtual time* is a clock that jumps from one event to the
 //! next. The real functions run, with real values on real topics, under the very
 //! scheduler that the kernel uses; only the passing of time is made up: a
-//! function takes no time except where it says so with `fass::execute_for`. An
-//! hour of a DAG's life takes milliseconds, and every run of the same DAGs gives
-//! the same events at the same nanosecond.
+//! function takes no time except where it says so with `fass::execute_for`. A
+//! second of a DAG's life takes about a millisecond, and every run of the same
+//! DAGs gives the same events at the same nanosecond.
 //!
 //! It is the place to test an app: build the DAGs with the app's own code,
 //! commit them, [`run`](VirtualTime::run), and look into the [`Report`].
@@ -25,6 +25,7 @@
 //!   If the instance is preempted in virtual time, its function has long
 //!   returned; `fass::now_ns` inside it counts as if it were not preempted.
 //! - The kernel's own overheads are zero.
+//! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
 mod error;

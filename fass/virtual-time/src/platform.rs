@@ -56,12 +56,15 @@ pub(crate) fn make_current() -> Rc<Machine> {
 }
 
 impl Machine {
-    /// Steps the session to its end or for a duration.
-    pub(crate) fn run(&self, duration: Option<Duration>) -> Result<Report, RunError> {
+    /// Steps the session to its end or for a duration. Meanwhile this machine
+    /// is the thread's, whichever was made last.
+    pub(crate) fn run(self: &Rc<Self>, duration: Option<Duration>) -> Result<Report, RunError> {
         let mut session = self.session.take().ok_or(RunError::NothingToRun)?;
+        let newest = CURRENT.replace(Rc::downgrade(self));
         let result = session.run(self, duration);
+        CURRENT.set(newest);
         // A failed session is not put back: its functions cannot continue.
-        if result.is_ok() {
+        if matches!(result, Ok(_) | Err(RunError::Endless { .. })) {
             self.session.replace(Some(session));
         }
         result

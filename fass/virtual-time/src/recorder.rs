@@ -5,7 +5,7 @@
 //! them belong to: an instant begins with a completion, a release or an expired
 //! deadline, and each of these states its time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use sched_dag::{DagId, Instance, JobOutcome, TaskSet};
@@ -24,6 +24,8 @@ pub(crate) struct Recorder {
     instance_index: BTreeMap<Instance, usize>,
     pub(crate) jobs: Vec<JobRecord>,
     job_index: BTreeMap<(DagId, u64), usize>,
+    /// Jobs whose deadline passed while their release was queued.
+    missed_in_queue: BTreeSet<(DagId, u64)>,
 }
 
 impl Recorder {
@@ -37,6 +39,7 @@ impl Recorder {
             instance_index: BTreeMap::new(),
             jobs: Vec::new(),
             job_index: BTreeMap::new(),
+            missed_in_queue: BTreeSet::new(),
         }
     }
 
@@ -79,8 +82,17 @@ impl Recorder {
             deadline_ns: release_ns.saturating_add(relative_deadline_ns),
             finish_ns: None,
             outcome: None,
-            has_missed: false,
+            has_missed: self.missed_in_queue.remove(&(dag, job)),
         });
+    }
+
+    pub(crate) fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        self.at(deadline_ns, EventKind::DeadlineMissed { dag, job });
+        if self.job_index.contains_key(&(dag, job)) {
+            self.of_job(dag, job, |record| record.has_missed = true);
+        } else {
+            self.missed_in_queue.insert((dag, job));
+        }
     }
 
     pub(crate) fn ready(&mut self, instance: Instance) {

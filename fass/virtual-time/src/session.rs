@@ -260,11 +260,9 @@ impl Observer for Runner<'_> {
     }
 
     fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(deadline_ns, EventKind::DeadlineMissed { dag, job });
-        recorder.of_job(dag, job, |record| record.has_missed = true);
+        if let Some(recorder) = self.recorder() {
+            recorder.deadline_missed(dag, job, deadline_ns);
+        }
     }
 
     fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {

@@ -1,0 +1,236 @@
+//! The rules of the task model, through real functions on real topics.
+
+mod support;
+
+use fass::{Policy, Preemption, SubtaskAttributes, create_dag};
+use support::{commit, diamond, ms, named, pair};
+use virtual_time::{JobOutcome, Report, Rule, VirtualTime};
+
+const MS: u64 = 1_000_000;
+
+#[test]
+fn r1_releases_lie_on_the_nominal_grid() {
+    let machine = VirtualTime::new();
+    let dag = pair("grid", ms(10), ms(10), [ms(3), ms(4)]);
+    dag.offset(ms(5)).jobs(4);
+    commit(&[dag]);
+    let report = machine.run();
+    let starts: Vec<_> = (report.subtask("grid", "source").iter())
+        .map(|record| record.start_ns)
+        .collect();
+    assert_eq!(starts, [5, 15, 25, 35].map(|start| Some(start * MS)));
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn r2_join_waits_for_all_predecessors() {
+    let machine = VirtualTime::new().cores(2);
+    let dag = diamond(ms(100), ms(100), [ms(1), ms(5), ms(20), ms(2)]);
+    dag.jobs(1);
+    commit(&[dag]);
+    let report = machine.run();
+    let join = report.subtask("diamond", "join")[0];
+    assert_eq!(join.ready_ns, 21 * MS);
+    assert_eq!(join.start_ns, Some(21 * MS), "zero join latency");
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn r2_a_subtask_is_sequential_over_its_own_jobs() {
+    let machine = VirtualTime::new().cores(4);
+    // The sink takes 15 ms every 10 ms: it falls behind, but never overlaps.
+    let dag = pair("behind", ms(10), ms(40), [ms(1), ms(15)]);
+    dag.jobs(5).in_flight(8);
+    commit(&[dag]);
+    let report = machine.run();
+    let sinks = report.subtask("behind", "sink");
+    let starts: Vec<_> = sinks.iter().map(|record| record.start_ns).collect();
+    assert_eq!(starts, [1, 16, 31, 46, 61].map(|start| Some(start * MS)));
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn r3_successors_of_one_instance_become_ready_at_one_instant() {
+    let machine = VirtualTime::new().cores(1);
+    let dag = diamond(ms(100), ms(100), [ms(7), ms(5), ms(5), ms(2)]);
+    dag.jobs(1);
+    commit(&[dag]);
+    let report = machine.run();
+    let lines = report.event_lines();
+    assert_eq!(
+        lines,
+        [
+            "0 release diamond[0]",
+            "0 ready source[0]",
+            "0 start source[0] core 0",
+            "7000000 finish source[0] core 0",
+            "7000000 ready left[0]",
+            "7000000 ready right[0]",
+            "7000000 start left[0] core 0",
+            "12000000 finish left[0] core 0",
+            "12000000 start right[0] core 0",
+            "17000000 finish right[0] core 0",
+            "17000000 ready join[0]",
+            "17000000 start join[0] core 0",
+            "19000000 finish join[0] core 0",
+            "19000000 complete diamond[0] met",
+        ]
+    );
+}
+
+#[test]
+fn r4_a_job_meets_its_deadline_up_to_and_including_it() {
+    for (deadline, outcome, misses) in [(7, JobOutcome::Met, 0), (6, JobOutcome::Missed, 1)] {
+        let machine = VirtualTime::new();
+        let dag = pair("edge", ms(10), ms(deadline), [ms(3), ms(4)]);
+        dag.jobs(1);
+        commit(&[dag]);
+        let report = machine.run();
+        assert_eq!(report.jobs[0].outcome, Some(outcome));
+        assert_eq!(report.jobs[0].response_time_ns(), Some(7 * MS));
+        assert_eq!(report.statistics[0].misses, misses);
+        assert_eq!(report.violations(), []);
+    }
+}
+
+#[test]
+fn r5_static_priority_prefers_the_smaller_number_and_preempts() {
+    let run = |preemption| {
+        let machine = (VirtualTime::new().policy(Policy::StaticPriority)).preemption(preemption);
+        let dags = [("low", 0, 20), ("high", 5, 1)].map(|(name, offset, priority)| {
+            let dag = create_dag();
+            dag.name(name).offset(ms(offset)).jobs(1);
+            let attributes = |name: &str| SubtaskAttributes::named(name).priority(priority);
+            dag.register_periodic_subtask(
+                || {
+                    support::execute(ms(10));
+                    (1,)
+                },
+                vec![name],
+                ms(100),
+                attributes("source"),
+            );
+            dag.register_sink_subtask(|_: (i32,)| (), vec![name], ms(100), attributes("sink"));
+            dag
+        });
+        commit(&dags);
+        machine.run()
+    };
+    let report = run(Preemption::Enabled);
+    let low = report.subtask("low", "source")[0];
+    assert_eq!((low.finish_ns, low.preemptions), (Some(20 * MS), 1));
+    assert_eq!(report.subtask("high", "source")[0].finish_ns, Some(15 * MS));
+
+    let report = run(Preemption::Disabled);
+    let low = report.subtask("low", "source")[0];
+    assert_eq!((low.finish_ns, low.preemptions), (Some(10 * MS), 0));
+    assert_eq!(report.subtask("high", "source")[0].start_ns, Some(10 * MS));
+}
+
+#[test]
+fn r5_edf_runs_the_earliest_deadline() {
+    let machine = VirtualTime::new().policy(Policy::Edf);
+    let late = pair("late", ms(100), ms(90), [ms(10), ms(1)]);
+    let soon = pair("soon", ms(100), ms(30), [ms(10), ms(1)]);
+    late.jobs(1);
+    soon.jobs(1);
+    commit(&[late, soon]);
+    let report = machine.run();
+    assert_eq!(report.subtask("soon", "sink")[0].finish_ns, Some(11 * MS));
+    assert_eq!(report.subtask("late", "sink")[0].finish_ns, Some(22 * MS));
+}
+
+#[test]
+fn overlapping_jobs_keep_their_numbers() {
+    // D = 4 T: up to four jobs are in the diamond at once.
+    let machine = VirtualTime::new().cores(4);
+    let dag = diamond(ms(10), ms(40), [ms(9), ms(2), ms(10), ms(10)]);
+    dag.jobs(50);
+    commit(&[dag]);
+    let report = machine.run();
+    assert_eq!(report.statistics[0].completed, 50);
+    assert_eq!(report.statistics[0].misses, 0);
+    let response_times = report.jobs.iter().filter_map(|job| job.response_time_ns());
+    assert!(
+        response_times
+            .max()
+            .is_some_and(|longest| longest > 20 * MS),
+        "they overlap"
+    );
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn a_closure_keeps_its_state_from_job_to_job() {
+    let machine = VirtualTime::new();
+    let (send, receive) = std::sync::mpsc::channel();
+    let dag = create_dag();
+    dag.jobs(4);
+    let mut fibonacci = (0_u32, 1_u32);
+    dag.register_periodic_subtask(
+        move || {
+            fibonacci = (fibonacci.1, fibonacci.0 + fibonacci.1);
+            (fibonacci.0,)
+        },
+        vec!["number"],
+        ms(10),
+        named("source"),
+    );
+    let mut sum = 0;
+    let sink = move |(number,): (u32,)| {
+        sum += number;
+        send.send(sum).expect("the test listens");
+    };
+    dag.register_sink_subtask(sink, vec!["number"], ms(10), named("sink"));
+    commit(&[dag]);
+    machine.run();
+    assert_eq!(receive.try_iter().collect::<Vec<_>>(), [1, 2, 4, 7]);
+}
+
+#[test]
+fn the_same_dags_give_the_same_events() {
+    let run = || {
+        let machine = VirtualTime::new().cores(3);
+        let dag = diamond(ms(10), ms(30), [ms(2), ms(9), ms(12), ms(5)]);
+        dag.jobs(30);
+        let other = pair("other", ms(7), ms(7), [ms(2), ms(1)]);
+        other.jobs(40);
+        commit(&[dag, other]);
+        machine.run().event_lines()
+    };
+    assert_eq!(run(), run());
+}
+
+/// Runs a faultless diamond, forges its report, and returns the rules that the
+/// check finds broken.
+fn broken_by(forge: impl FnOnce(&mut Report)) -> Vec<Rule> {
+    let machine = VirtualTime::new().cores(2);
+    let dag = diamond(ms(100), ms(100), [ms(1), ms(5), ms(20), ms(2)]);
+    dag.jobs(2);
+    commit(&[dag]);
+    let mut report = machine.run();
+    assert_eq!(report.violations(), []);
+    forge(&mut report);
+    report.violations().iter().map(|found| found.rule).collect()
+}
+
+#[test]
+fn the_check_finds_forged_records() {
+    // Instances are in the order of readiness: source, left, right, join.
+    let late_release = |report: &mut Report| report.jobs[1].release_ns += 1;
+    assert!(broken_by(late_release).contains(&Rule::Release));
+    let late_join = |report: &mut Report| {
+        report.instances[3].ready_ns += 1;
+        report.instances[3].start_ns = Some(22 * MS);
+    };
+    assert_eq!(broken_by(late_join), [Rule::AndJoin]);
+    let early_join = |report: &mut Report| report.instances[3].ready_ns -= 1;
+    assert_eq!(broken_by(early_join), [Rule::AndJoin]);
+    let early_start = |report: &mut Report| report.instances[3].start_ns = Some(20 * MS);
+    let rules = broken_by(early_start);
+    assert_eq!(rules, [Rule::CompletionBoundary, Rule::AndJoin]);
+    let lost_finish = |report: &mut Report| report.instances[3].finish_ns = None;
+    assert!(broken_by(lost_finish).contains(&Rule::JobCompletion));
+    let false_miss = |report: &mut Report| report.jobs[0].outcome = Some(JobOutcome::Missed);
+    assert_eq!(broken_by(false_miss), [Rule::JobCompletion]);
+}
