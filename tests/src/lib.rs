@@ -26,6 +26,7 @@
 
 pub mod child;
 pub mod elf;
+pub mod fault_page;
 pub mod guest;
 pub mod image;
 pub mod install;

@@ -35,8 +35,11 @@ pub const KINDS: &[(&str, &[&str])] = &[
         &[
             "subtasks",
             "jobs",
+            "joins",
             "violations",
             "deadline_misses",
+            "allocations",
+            "first_release_ns",
             "join_latency_ns.min",
             "join_latency_ns.median",
             "join_latency_ns.p99",
@@ -51,10 +54,12 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "release_jitter_ns.max",
         ],
     ),
-    ("memory", &[]),
+    ("memory", &["heap_peak_bytes", "heap_bytes", "allocations"]),
     ("commit_fault", &["fault", "message"]),
     ("panic", &["cpu", "place", "message"]),
-    ("verdict", &["status", "reason"]),
+    ("exception", &["cpu", "place", "message"]),
+    ("storm", &["cpus", "interrupts", "rounds", "diverged"]),
+    ("verdict", &["status"]),
 ];
 
 /// A machine line that was understood.

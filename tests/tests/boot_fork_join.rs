@@ -1,0 +1,152 @@
+//! The demo on the bare machine: every join happens, once, after all of its
+//! predecessors; nothing allocates while jobs run; and a deterministic run is
+//! the same run every time.
+
+use harness::protocol::{MachineLine, Status};
+use harness::{Guest, Mode, Outcome};
+
+const JOBS: u64 = 60;
+
+fn demo() -> Guest {
+    Guest::new("fork-join")
+        .cores(8)
+        .word(&format!("jobs={JOBS}"))
+}
+
+/// Checks the demo's lines: one for each N, all jobs joined, no violation.
+fn joins_are_right(outcome: &Outcome, expected: &[u64]) {
+    let lines: Vec<&MachineLine> = outcome.transcript.of_kind("fork_join").collect();
+    let subtasks: Vec<_> = lines
+        .iter()
+        .filter_map(|line| line.number_at("subtasks"))
+        .collect();
+    assert_eq!(subtasks, expected, "{}", outcome.tail());
+    for line in lines {
+        let text = &line.text;
+        assert_eq!(line.number_at("violations"), Some(0), "{text}");
+        assert_eq!(line.number_at("jobs"), Some(JOBS), "{text}");
+        assert_eq!(line.number_at("joins"), Some(JOBS), "{text}");
+        for distribution in ["join_latency_ns", "response_time_ns", "release_jitter_ns"] {
+            let ascending: Vec<_> = ["min", "median", "p99", "max"]
+                .iter()
+                .filter_map(|of| line.number_at(&format!("{distribution}.{of}")))
+                .collect();
+            assert_eq!(ascending.len(), 4, "{distribution} in {text}");
+            assert!(ascending.is_sorted(), "{distribution} in {text}");
+        }
+        // An instance executes for at least 1 ms, so no response is shorter.
+        let shortest = line.number_at("response_time_ns.min");
+        assert!(shortest >= Some(1_000_000), "{text}");
+    }
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn every_job_joins_with_two_four_and_six_subtasks() {
+    joins_are_right(&demo().succeed(), &[2, 4, 6]);
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn every_job_joins_by_earliest_deadline_first() {
+    joins_are_right(&demo().word("policy=edf").succeed(), &[2, 4, 6]);
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn every_job_joins_on_one_processor() {
+    let outcome = demo().cores(1).word("subtasks=2").succeed();
+    joins_are_right(&outcome, &[2]);
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn every_job_joins_in_real_time() {
+    let guest = demo().mode(Mode::Threads).word("subtasks=4");
+    joins_are_right(&guest.succeed(), &[4]);
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn every_job_joins_while_its_subtasks_spin() {
+    let outcome = demo()
+        .cores(4)
+        .word("occupy=spin")
+        .word("subtasks=2")
+        .succeed();
+    joins_are_right(&outcome, &[2]);
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn two_deterministic_runs_print_the_same_bytes() {
+    let run = || demo().word("seed=7").succeed().serial;
+    let (first, second) = (run(), run());
+    let differ = first.lines().zip(second.lines()).find(|(a, b)| a != b);
+    assert_eq!(differ, None);
+    assert_eq!(first.len(), second.len());
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn another_seed_is_another_run() {
+    let run = |seed: &str| demo().word("subtasks=4").word(seed).succeed();
+    let response = |outcome: &Outcome| {
+        let line = outcome.transcript.of_kind("fork_join").next();
+        line.and_then(|line| line.value.get("response_time_ns").cloned())
+    };
+    assert_ne!(response(&run("seed=1")), response(&run("seed=2")));
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn nothing_allocates_while_jobs_run_and_32_mib_suffice() {
+    let outcome = demo().memory_mib(32).succeed();
+    for line in outcome.transcript.of_kind("fork_join") {
+        assert_eq!(line.number_at("allocations"), Some(0), "{}", line.text);
+    }
+    let memory = outcome.transcript.of_kind("memory").last();
+    let memory = memory.unwrap_or_else(|| panic!("no memory line\n{}", outcome.tail()));
+    let peak = memory.number_at("heap_peak_bytes");
+    assert!(peak > Some(0), "{}", memory.text);
+    assert!(peak <= memory.number_at("heap_bytes"), "{}", memory.text);
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn the_first_release_is_within_100_ms_of_the_kernels_entry() {
+    let outcome = demo().word("subtasks=6").succeed();
+    let line = outcome.transcript.of_kind("fork_join").next();
+    let first = line.and_then(|line| line.number_at("first_release_ns"));
+    assert!(
+        first.is_some_and(|ns| ns <= 100_000_000),
+        "{first:?}\n{}",
+        outcome.tail()
+    );
+}
+
+#[test]
+#[ignore = "waits for the image `fork-join`"]
+fn a_wrong_guest_command_line_ends_in_a_usage_error() {
+    for word in [
+        "job=5",
+        "jobs=0",
+        "jobs=many",
+        "policy=rr",
+        "subtasks=0",
+        "subtasks=2,,4",
+        "occupy=wait",
+        "stray",
+    ] {
+        let outcome = Guest::new("fork-join").word(word).end_in(Status::Usage);
+        let reason = outcome.transcript.verdict().expect("checked before").reason;
+        let (key, _) = word.split_once('=').unwrap_or((word, ""));
+        assert!(reason.contains(key), "`{word}` is not named: {reason}");
+        assert_eq!(reason.lines().count(), 1, "{reason}");
+        assert_eq!(
+            outcome.transcript.of_kind("fork_join").count(),
+            0,
+            "half-run"
+        );
+    }
+}

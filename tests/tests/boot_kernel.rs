@@ -1,0 +1,117 @@
+//! What the kernel does when things go wrong or come thick and fast. The
+//! guest is the image `guest-tests`, which runs the test named by the word
+//! `test=NAME` on its command line.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use harness::fault_page::documented_faults;
+use harness::protocol::Status;
+use harness::{Guest, Mode};
+
+fn guest(test: &str) -> Guest {
+    Guest::new("guest-tests").word(&format!("test={test}"))
+}
+
+#[test]
+#[ignore = "waits for the image `guest-tests`"]
+fn a_panic_in_the_kernel_ends_in_failure_and_names_its_place() {
+    for cores in [1, 4] {
+        let outcome = guest("panic").cores(cores).end_in(Status::Failure);
+        let panic = outcome.transcript.of_kind("panic").next();
+        let panic = panic.unwrap_or_else(|| panic!("no panic line\n{}", outcome.tail()));
+        assert_eq!(panic.number_at("cpu"), Some(0), "{}", panic.text);
+        let place = panic.text_at("place").unwrap_or_default();
+        let numbers = place
+            .rsplit(':')
+            .take(2)
+            .all(|part| part.parse::<u32>().is_ok());
+        assert!(place.contains(".rs:") && numbers, "{}", panic.text);
+        assert!(
+            panic
+                .text_at("message")
+                .is_some_and(|text| !text.is_empty())
+        );
+        let verdict = outcome.transcript.verdict().expect("checked before");
+        assert!(!verdict.reason.is_empty());
+    }
+}
+
+#[test]
+#[ignore = "waits for the image `guest-tests`"]
+fn a_panic_in_a_subtask_names_dag_subtask_and_job() {
+    let outcome = guest("subtask_panic").cores(2).end_in(Status::Failure);
+    let panic = outcome.transcript.of_kind("panic").next();
+    let panic = panic.unwrap_or_else(|| panic!("no panic line\n{}", outcome.tail()));
+    for member in ["dag", "subtask", "job"] {
+        assert!(
+            panic.value.get(member).is_some(),
+            "no `{member}`: {}",
+            panic.text
+        );
+    }
+}
+
+#[test]
+#[ignore = "waits for the image `guest-tests`"]
+fn a_processor_exception_ends_in_failure_and_is_named() {
+    for test in [
+        "null_write",
+        "stack_overflow",
+        "write_to_code",
+        "undefined_instruction",
+    ] {
+        let outcome = guest(test).end_in(Status::Failure);
+        assert_eq!(
+            outcome.transcript.of_kind("panic").count(),
+            1,
+            "{test}\n{}",
+            outcome.tail()
+        );
+    }
+}
+
+#[test]
+#[ignore = "waits for the image `guest-tests`"]
+fn every_commit_fault_is_printed_as_documented() {
+    let outcome = guest("commit_faults").succeed();
+    let lines = outcome.transcript.of_kind("commit_fault");
+    let printed: BTreeMap<String, String> = lines
+        .map(|line| {
+            let text = |name| line.text_at(name).unwrap_or_default().to_string();
+            (text("fault"), text("message"))
+        })
+        .collect();
+    assert_eq!(printed, documented_faults().expect("the page"));
+}
+
+/// The timer interrupts that the storm counts, over all processors.
+const INTERRUPTS: u64 = 1_000_000;
+
+fn storm(mode: Mode, cores: u64) {
+    let guest = guest("storm").mode(mode).cores(cores);
+    let guest = guest.word(&format!("interrupts={INTERRUPTS}"));
+    let outcome = guest.limit(Duration::from_secs(300)).succeed();
+    let line = outcome.transcript.of_kind("storm").next();
+    let line = line.unwrap_or_else(|| panic!("no storm line\n{}", outcome.tail()));
+    assert!(
+        line.number_at("interrupts") >= Some(INTERRUPTS),
+        "{}",
+        line.text
+    );
+    assert_eq!(line.number_at("diverged"), Some(0), "{}", line.text);
+    assert!(line.number_at("rounds") > Some(0), "{}", line.text);
+    assert_eq!(line.number_at("cpus"), Some(cores), "{}", line.text);
+}
+
+#[test]
+#[ignore = "waits for the image `guest-tests`"]
+fn a_million_timer_interrupts_leave_every_checksum_alone() {
+    storm(Mode::Deterministic, 4);
+}
+
+#[test]
+#[ignore = "waits for the image `guest-tests`"]
+fn a_storm_of_interrupts_in_real_time_leaves_every_checksum_alone() {
+    storm(Mode::Threads, 2);
+}
