@@ -121,6 +121,9 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         .command_line()
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
+    // What time means is the host's choice and changes nothing here; the word
+    // stands there so that the log shows it.
+    let _ = options.text("mode");
     KERNEL.set_policy(options.choice(
         "policy",
         &[
