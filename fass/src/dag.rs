@@ -39,6 +39,16 @@ pub fn create_dag() -> Dag {
 
 /// A DAG under construction. Clones are handles of the same DAG.
 ///
+/// ```
+/// use fass::{Dag, create_dag};
+///
+/// fn one_shot(name: &str) -> Dag {
+///     let dag = create_dag();
+///     dag.name(name).jobs(1).in_flight(1);
+///     dag
+/// }
+/// ```
+///
 /// # Panics
 ///
 /// Every method panics, at its caller's line, if the DAG has been committed:

@@ -46,10 +46,21 @@ use core::ops::{Deref, DerefMut};
 )]
 pub trait Message: Send + Sized + 'static {
     /// Whether a topic of this type may have several readers.
+    ///
+    /// ```
+    /// use fass::{Message, Unique};
+    /// assert!(i32::CAN_FAN_OUT && !Unique::<i32>::CAN_FAN_OUT);
+    /// ```
     const CAN_FAN_OUT: bool;
 
     /// Makes the value for one more reader, or returns `None` if the type can
     /// only be moved.
+    ///
+    /// ```
+    /// use fass::{Message, Unique};
+    /// assert_eq!(7.for_another_reader(), Some(7));
+    /// assert_eq!(Unique::new(7).for_another_reader(), None);
+    /// ```
     fn for_another_reader(&self) -> Option<Self>;
 }
 

@@ -79,6 +79,12 @@ impl Body {
     /// - If an input of `job` is missing, because a predecessor is not complete.
     /// - If an output finds no free slot, because a cancelled instance's inputs
     ///   were not [discarded](Self::discard).
+    ///
+    /// ```
+    /// fn start(body: &mut fass::Body, instance: sched_dag::Instance) {
+    ///     body.run(instance.job); // then report the completion
+    /// }
+    /// ```
     pub fn run(&mut self, job: u64) {
         self.grant(Grant::Run(job));
     }
@@ -92,6 +98,12 @@ impl Body {
     /// # Panics
     ///
     /// If the body panicked before.
+    ///
+    /// ```
+    /// fn cancelled(body: &mut fass::Body, instance: sched_dag::Instance) {
+    ///     body.discard(instance.job);
+    /// }
+    /// ```
     pub fn discard(&mut self, job: u64) {
         self.grant(Grant::Discard(job));
     }

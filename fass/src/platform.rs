@@ -80,6 +80,17 @@ pub trait Platform: Sync {
 }
 
 /// How a subtask occupies its core in [`execute_for`].
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Occupation, execute_for};
+///
+/// /// A subtask that stands for 3 ms of work.
+/// fn detect((frame,): (u32,)) -> (u32,) {
+///     execute_for(Duration::from_millis(3), Occupation::Hold);
+///     (frame,)
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Occupation {
     /// The processor computes until the time is over.

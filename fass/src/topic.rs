@@ -23,6 +23,13 @@ use crate::gate::Gate;
 use crate::message::Message;
 
 /// The reading end of a topic in one subtask. Made by the commit only.
+///
+/// ```
+/// use fass::{Subscriber, Subscribers, VecToSubs};
+///
+/// fn same<T>(_: fn(T), _: fn(T)) {}
+/// same::<<(i32,) as VecToSubs>::Subs>(|_| (), |_: Subscribers<(Subscriber<i32>,)>| ());
+/// ```
 pub struct Subscriber<T>(Reader<T>);
 
 impl<T> Subscriber<T> {
@@ -49,6 +56,13 @@ impl<T> Subscriber<T> {
 }
 
 /// The writing end of a topic in its one writer. Made by the commit only.
+///
+/// ```
+/// use fass::{Publisher, Publishers, VecToPubs};
+///
+/// fn same<T>(_: fn(T), _: fn(T)) {}
+/// same::<<(i32,) as VecToPubs>::Pubs>(|_| (), |_: Publishers<(Publisher<i32>,)>| ());
+/// ```
 pub struct Publisher<T>(Box<[Writer<T>]>);
 
 impl<T: Message> Publisher<T> {
@@ -157,6 +171,15 @@ impl Wiring {
 
 /// The topic ends of one subtask that [`gen_subs`](crate::VecToSubs::gen_subs)
 /// and [`gen_pubs`](crate::VecToPubs::gen_pubs) draw from. Made by the commit only.
+///
+/// ```
+/// use fass::{Ports, VecToSubs};
+///
+/// /// What the commit does for a subtask's arguments.
+/// fn generate<Args: VecToSubs>(ports: Ports<'_>) -> Args::Subs {
+///     Args::gen_subs(ports)
+/// }
+/// ```
 pub struct Ports<'w> {
     wiring: &'w mut Wiring,
     gate: Gate,

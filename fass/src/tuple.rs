@@ -50,6 +50,12 @@ pub trait MulRecv {
     ///
     /// When polled, if an input is missing: the platform granted an instance
     /// whose predecessors were not complete.
+    ///
+    /// ```
+    /// async fn receive<Subs: fass::MulRecv>(subs: &mut Subs) -> Subs::Items {
+    ///     subs.recv_all().await
+    /// }
+    /// ```
     fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send;
 }
 
@@ -78,6 +84,12 @@ pub trait MulSend {
     ///
     /// When polled, if no slot is free: the platform did not discard the inputs
     /// of a cancelled instance.
+    ///
+    /// ```
+    /// async fn send<Pubs: fass::MulSend>(pubs: &mut Pubs, items: Pubs::Items) {
+    ///     pubs.send_all(items).await;
+    /// }
+    /// ```
     fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send;
 }
 
@@ -119,6 +131,14 @@ pub trait VecToSubs: Sized + Send + 'static {
     fn input_types() -> Vec<MessageType>;
 
     /// Generates the subscribers from a subtask's ports. Called by the commit.
+    ///
+    /// ```
+    /// use fass::{MulRecv, Ports, VecToSubs};
+    ///
+    /// fn subs(ports: Ports<'_>) -> impl MulRecv<Items = (i32, u8)> {
+    ///     <(i32, u8)>::gen_subs(ports)
+    /// }
+    /// ```
     fn gen_subs(ports: Ports<'_>) -> Self::Subs;
 }
 
@@ -166,16 +186,34 @@ pub trait VecToPubs: Sized + Send + 'static {
     fn output_types() -> Vec<MessageType>;
 
     /// Generates the publishers from a subtask's ports. Called by the commit.
+    ///
+    /// ```
+    /// use fass::{MulSend, Ports, VecToPubs};
+    ///
+    /// fn pubs(ports: Ports<'_>) -> impl MulSend<Items = (i32, u8)> {
+    ///     <(i32, u8)>::gen_pubs(ports)
+    /// }
+    /// ```
     fn gen_pubs(ports: Ports<'_>) -> Self::Pubs;
 }
 
 /// The subscribers of a subtask: a tuple of [`Subscriber`]s behind the gate.
+///
+/// ```
+/// fn receives<S: fass::MulRecv<Items = (i32,)>>() {}
+/// receives::<fass::Subscribers<(fass::Subscriber<i32>,)>>();
+/// ```
 pub struct Subscribers<Ends> {
     gate: Gate,
     ends: Ends,
 }
 
 /// The publishers of a subtask: a tuple of [`Publisher`]s behind the gate.
+///
+/// ```
+/// fn sends<P: fass::MulSend<Items = (i32,)>>() {}
+/// sends::<fass::Publishers<(fass::Publisher<i32>,)>>();
+/// ```
 pub struct Publishers<Ends> {
     gate: Gate,
     ends: Ends,
