@@ -22,7 +22,8 @@ pub trait PhysicalMemory {
     }
 }
 
-/// The machine's own memory through the boot identity map: 4 KiB to 4 GiB.
+/// The machine's own memory through the boot identity map: 1 KiB to 4 GiB. (The
+/// first KiB holds the interrupt vectors of real mode; loaders do use the next.)
 #[derive(Clone, Copy, Debug)]
 pub struct IdentityMap(());
 
@@ -42,11 +43,11 @@ impl IdentityMap {
 impl PhysicalMemory for IdentityMap {
     fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
         let end = address.checked_add(u64::try_from(length).ok()?)?;
-        if address < 4096 || end > 1 << 32 {
+        if address < 1024 || end > 1 << 32 {
             return None;
         }
         let start = usize::try_from(address).ok()? as *const u8;
-        // SAFETY: the range lies between 4 KiB and 4 GiB, which conditions 1 and
+        // SAFETY: the range lies between 1 KiB and 4 GiB, which conditions 1 and
         // 2 of `new` make readable and constant.
         Some(unsafe { core::slice::from_raw_parts(start, length) })
     }

@@ -28,7 +28,7 @@ impl ExecutionTimes {
         let choices = u128::from(MOST_NS - LEAST_NS + 1);
         // The high part of the product maps the draw to the range without the
         // bias of a remainder (it is below 2^-38 here).
-        let drawn = u128::from(self.next_u64()) * choices >> 64;
+        let drawn = (u128::from(self.next_u64()) * choices) >> 64;
         Duration::from_nanos(LEAST_NS + u64::try_from(drawn).unwrap_or(0))
     }
 

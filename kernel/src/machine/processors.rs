@@ -8,6 +8,10 @@ use super::{clock, cpu, local_apic, this_core};
 /// counted.
 static ARRIVED: AtomicU32 = AtomicU32::new(0);
 
+/// While processors start, QEMU's counted time may jump to the end of the next
+/// timer, wherever that is: a timer of ours keeps the jumps this short.
+const LONGEST_JUMP_NS: u64 = 2_000;
+
 /// Says that the core which executes this has arrived.
 pub(crate) fn arrive() {
     ARRIVED.fetch_add(1, Ordering::Release);
@@ -31,15 +35,12 @@ pub(crate) unsafe fn start_others(root_table: u64, entry: boot::processors::Entr
         return 0;
     }
     for core in others() {
-        // Under QEMU's instruction counting INIT lets virtual time jump to the
-        // next alarm; this one keeps the jump short, and does no harm elsewhere.
-        local_apic::start_timer(clock::apic_ticks(2_000));
         local_apic::send_init(core.apic_id());
     }
-    local_apic::start_timer(0);
     wait(10_000_000, expected);
     for attempt_ns in [200_000, 100_000_000] {
         for core in others() {
+            local_apic::start_timer(clock::apic_ticks(LONGEST_JUMP_NS));
             local_apic::send_startup(core.apic_id(), boot::processors::startup_vector());
         }
         if wait(attempt_ns, expected) {
@@ -55,7 +56,11 @@ fn wait(ns: u64, expected: u32) -> bool {
     loop {
         let all_here = ARRIVED.load(Ordering::Acquire) >= expected;
         if all_here || clock::now_ns() >= end_ns {
+            local_apic::start_timer(0);
             return all_here;
+        }
+        if local_apic::timer_count() == 0 {
+            local_apic::start_timer(clock::apic_ticks(LONGEST_JUMP_NS));
         }
         cpu::relax();
     }
