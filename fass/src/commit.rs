@@ -8,6 +8,7 @@
 //! 3. *Launch.* The platform takes the plan.
 
 use alloc::rc::Rc;
+use alloc::string::ToString;
 use alloc::vec::Vec;
 
 use sched_dag::{CommitOptions, DagId, DagLabel, DagSpec, Policy, TaskSet, Verified, Warning};
@@ -149,8 +150,17 @@ fn verify(dags: &[Dag], options: CommitOptions) -> Result<Verified, CommitError>
             faults.push(Fault::AlreadyCommitted { dag: label });
             continue;
         }
+        let mut spec = draft.spec_with_known_types();
+        if specs.len() < number && spec.name.is_empty() {
+            // DAGs were left out before it, so the model counts differently.
+            spec.name = number.to_string();
+        }
+        let label = DagLabel {
+            id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
+            name: spec.name.clone(),
+        };
         faults.extend((draft.faults.iter()).map(|fault| fault.clone().in_dag(&label)));
-        specs.push(draft.spec_with_known_types());
+        specs.push(spec);
     }
     // A commit of nothing but repeated DAGs has been told what is wrong.
     if specs.is_empty() && !faults.is_empty() {

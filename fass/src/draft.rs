@@ -122,6 +122,11 @@ impl Draft {
     pub(crate) fn spec_with_known_types(&self) -> DagSpec {
         let mut spec = self.spec.clone();
         let unknown = MessageType::of::<Unknown>().id();
+        let is_arity_fault =
+            |fault: &Fault| matches!(fault, Fault::InputArity { .. } | Fault::OutputArity { .. });
+        if !self.faults.iter().any(is_arity_fault) {
+            return spec;
+        }
         let known: Vec<TopicPort> = (self.spec.subtasks.iter())
             .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs))
             .filter(|port| port.type_id != unknown)

@@ -139,6 +139,24 @@ fn a_dag_committed_before_is_a_fault_and_cannot_be_changed() {
 }
 
 #[test]
+fn a_dag_without_name_is_called_by_its_position_even_after_one_that_is_left_out() {
+    let done = faultless("done first");
+    drop(support::commit(slice::from_ref(&done)));
+    let nameless = create_dag();
+    nameless.register_periodic_subtask(|| (), vec!["surplus"], PERIOD, named("source"));
+    let text = refuse(&[done, nameless]).to_string();
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(
+        lines[1].starts_with("subtask `source` of dag `1` returns 0 outputs"),
+        "{text}"
+    );
+    assert!(
+        lines[2..].iter().all(|line| line.contains("dag `1`")),
+        "{text}"
+    );
+}
+
+#[test]
 fn a_refused_commit_changes_nothing() {
     let dag = create_dag();
     dag.name("unfinished");

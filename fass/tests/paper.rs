@@ -52,6 +52,27 @@ fn figure_3_compiles_and_runs() {
     assert_eq!(received.try_iter().collect::<Vec<_>>(), [(8, 14)]);
 }
 
+/// The figure says functions; named ones do as well as closures.
+#[test]
+fn plain_functions_are_subtasks() {
+    fn source() -> (i32,) {
+        (20,)
+    }
+    fn middle((a,): (i32,)) -> (i32, i32) {
+        (a + 1, a + 2)
+    }
+    fn sink((b, c): (i32, i32)) {
+        assert_eq!((b, c), (21, 22));
+    }
+    let period = Duration::from_millis(100);
+    let dag = create_dag();
+    let attributes = SubtaskAttributes::default;
+    dag.register_periodic_subtask(source, vec!["a"], period, attributes());
+    dag.register_subtask(middle, vec!["a"], vec!["b", "c"], attributes());
+    dag.register_sink_subtask(sink, vec!["b", "c"], period, attributes());
+    support::run_job(&mut support::commit(&[dag]), 0);
+}
+
 /// The bounds of figure 4's `create_subtask`, with its type-level equalities.
 fn accepts_figure_4<F, Args, Ret>(_: F) -> (&'static str, &'static str)
 where

@@ -196,3 +196,31 @@ fn threads_have_machines_of_their_own() {
         );
     }
 }
+
+#[test]
+fn a_chain_of_many_subtasks_runs() {
+    const SUBTASKS: usize = 5_000;
+    let machine = VirtualTime::new().cores(2);
+    let dag = create_dag();
+    dag.name("chain").jobs(2);
+    let topics: Vec<String> = (0..SUBTASKS)
+        .map(|number| format!("topic {number}"))
+        .collect();
+    let period = ms(10_000);
+    dag.register_periodic_subtask(|| (0_usize,), vec![&topics[0]], period, named("source"));
+    for (number, ends) in (1..).zip(topics.windows(2)) {
+        let step = move |(hops,): (usize,)| {
+            execute(ms(1));
+            assert_eq!(hops + 1, number);
+            (number,)
+        };
+        let attributes = named(&format!("step {number}"));
+        dag.register_subtask(step, vec![&ends[0]], vec![&ends[1]], attributes);
+    }
+    let sink = |(hops,): (usize,)| assert_eq!(hops, SUBTASKS - 1);
+    dag.register_sink_subtask(sink, vec![&topics[SUBTASKS - 1]], period, named("sink"));
+    commit(&[dag]);
+    let report = machine.run();
+    assert_eq!(report.jobs[1].response_time_ns(), Some(4_999 * MS));
+    assert_eq!(report.violations(), []);
+}

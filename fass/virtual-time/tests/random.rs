@@ -1,0 +1,154 @@
+//! Random DAGs through real functions: whatever graph, times, cores, policy and
+//! overrun, rules R1-R4 hold and every join meets the values of one job.
+//!
+//! Each case has its seed; a failure prints it, and `case(SEED)` repeats it.
+
+mod support;
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::time::Duration;
+
+use fass::{Dag, OverrunPolicy, Policy, Preemption, create_dag};
+use support::{commit, execute, named};
+use virtual_time::VirtualTime;
+
+const CASES: u64 = 400;
+
+/// A small generator of pseudo-random numbers (xorshift64*; S. Vigna, "An
+/// experimental exploration of Marsaglia's xorshift generators, scrambled",
+/// ACM TOMS 42(4), 2016).
+struct Random(u64);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    /// Returns a number below `limit`.
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let number = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33;
+        usize::try_from(number).expect("31 bits") % limit
+    }
+
+    fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.below(choices.len())]
+    }
+
+    fn micros(&mut self, limit: usize) -> Duration {
+        Duration::from_micros(u64::try_from(self.below(limit)).expect("small"))
+    }
+}
+
+/// Registers a subtask of 1 to 3 inputs and, unless it is the sink, one output.
+fn register(
+    dag: &Dag,
+    inputs: &[String],
+    output: Option<&str>,
+    deadline: Duration,
+    time: Duration,
+) {
+    macro_rules! register {
+        ($($value:ident: $Type:ty),*) => {{
+            let inputs = inputs.iter().map(String::as_str).collect();
+            let meet = move |($($value,)*): ($($Type,)*)| {
+                execute(time);
+                let values = [$($value),*];
+                assert!(values.iter().all(|value| *value == values[0]), "{values:?}");
+                values[0]
+            };
+            match output {
+                Some(topic) => dag.register_subtask(
+                    move |values: ($($Type,)*)| (meet(values),), inputs, vec![topic], named(topic)),
+                None => dag.register_sink_subtask(
+                    move |values: ($($Type,)*)| { meet(values); }, inputs, deadline, named("sink")),
+            }
+        }};
+    }
+    match inputs.len() {
+        1 => register!(a: u64),
+        2 => register!(a: u64, b: u64),
+        _ => register!(a: u64, b: u64, c: u64),
+    }
+}
+
+fn random_dag(random: &mut Random, name: &str) -> Dag {
+    let dag = create_dag();
+    let period = Duration::from_micros(500) + random.micros(1_500);
+    let deadline = period.mul_f64(random.pick(&[0.5, 1.0, 2.5]));
+    let policies = [
+        OverrunPolicy::Queue,
+        OverrunPolicy::Skip,
+        OverrunPolicy::Abort,
+    ];
+    dag.name(name).offset(random.micros(1_000)).jobs(25);
+    dag.overrun(random.pick(&policies));
+    dag.in_flight(random.pick(&[1, 2, 3, 5]));
+    let mut runs = 0_u64;
+    let time = random.micros(200);
+    let source = move || {
+        execute(time);
+        runs += 1;
+        (runs,)
+    };
+    let topic = |number: usize| format!("{name} {number}");
+    dag.register_periodic_subtask(source, vec![&topic(0)], period, named("source"));
+    let mut topics = vec![topic(0)];
+    let mut unread = topics.clone();
+    let inner = random.below(7);
+    while topics.len() <= inner || unread.len() > 3 {
+        // Beyond the wanted number, subtasks only join what nobody has read.
+        let from = if topics.len() <= inner {
+            &topics
+        } else {
+            &unread
+        };
+        let mut inputs: Vec<String> = Vec::new();
+        for _ in 0..=random.below(3).max(usize::from(topics.len() > inner)) {
+            let input = from[random.below(from.len())].clone();
+            if !inputs.contains(&input) {
+                inputs.push(input);
+            }
+        }
+        unread.retain(|topic| !inputs.contains(topic));
+        let output = topic(topics.len());
+        register(&dag, &inputs, Some(&output), deadline, random.micros(600));
+        topics.push(output.clone());
+        unread.push(output);
+    }
+    register(&dag, &unread, None, deadline, random.micros(300));
+    dag
+}
+
+fn case(seed: u64) {
+    let mut random = Random::new(seed);
+    let machine = VirtualTime::new()
+        .cores(random.pick(&[1, 2, 3, 4, 8]))
+        .policy(random.pick(&[Policy::Edf, Policy::StaticPriority]))
+        .preemption(random.pick(&[Preemption::Enabled, Preemption::Disabled]));
+    let names = ["first", "second", "third"];
+    let count = 1 + random.below(names.len());
+    let dags: Vec<Dag> = (names[..count].iter())
+        .map(|name| random_dag(&mut random, name))
+        .collect();
+    commit(&dags);
+    let report = machine.run();
+    let violations = report.violations();
+    assert!(violations.is_empty(), "{}", violations[0]);
+    for statistics in &report.statistics {
+        let ended = statistics.completed + statistics.aborts + statistics.skips;
+        assert_eq!(ended, 25, "{statistics:?}");
+    }
+}
+
+#[test]
+fn random_dags_keep_the_rules() {
+    for seed in 0..CASES {
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(|| case(seed))) {
+            eprintln!("the failing case is `case({seed})`");
+            resume_unwind(panic);
+        }
+    }
+}
