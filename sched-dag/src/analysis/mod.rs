@@ -1,4 +1,55 @@
-//! Draft.
+//! Analysis at commit: will every job meet its deadline?
+//!
+//! [`answer`] gives each DAG of a commit a *bound*: no job of it ever takes
+//! longer from its nominal release to its last finish, whatever the offsets,
+//! with any execution times up to the WCETs. All tests here are *sufficient*:
+//! a DAG without a bound is "not proven", which is not "infeasible". Refusing
+//! what is not proven is the app's choice.
+//!
+//! # The parts
+//!
+//! | module | what | source |
+//! |---|---|---|
+//! | `task`, `graph` | length, volume, bottom levels | |
+//! | `width` | largest antichain, by matching | Dilworth; Hopcroft and Karp |
+//! | `graham`, `long_paths`, `intra_task` | one DAG alone | Graham 1969; He 2022; He 2019 |
+//! | `workload`, `response`, `set` | the shared equation, solved exactly | Melani 2015, extended |
+//! | `melani` | global preemptive, `D <= T` | Melani 2015, width refinement |
+//! | `non_preemptive` | subtasks that keep their core | derived here |
+//! | `pipelined` | overlapping jobs, `D > T` | derived here |
+//! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
+//! | `federated` | dedicated cores, as an offer | Li 2014; Baruah 2015 |
+//! | `judge`, `answer`, `overheads` | the verdict at commit | |
+//!
+//! Each module cites its paper and states its assumptions and the traps that it
+//! avoids. The functions for single tests take [`Task`]s in priority order and
+//! stand for themselves; [`answer`] knows which of them apply.
+//!
+//! # Words
+//!
+//! `m` is the number of cores, `T` the period, `D` the relative deadline, `R` a
+//! response-time bound, `volume` and `length` are as in [`Task`]. A DAG
+//! *outranks* another where its instances win a core over the other's.
+//!
+//! # What is guaranteed
+//!
+//! - *Integers only*: 64-bit times, 128-bit products; divisions round so that
+//!   the result stays a bound, and an overflow is an error or "not proven".
+//! - *No recursion*, and every loop has a limit; a limit reached is "not
+//!   proven" ([`Reason::Limit`]), never a guess. Time is near linear in
+//!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks.
+//! - *Evidence*: the property test in `tests/analysis` simulates thousands of
+//!   random sets and compares each observed response time with its bound.
+//!
+//! # What is not
+//!
+//! - A WCET that is exceeded voids the bounds of every DAG.
+//! - Time that the platform takes is covered as far as [`Overheads`] says.
+//! - The cores must be identical and serve these DAGs only.
+//! - The forms derived here rest on the arguments given in their modules and on
+//!   that evidence, not on a reviewed proof.
+
+mod answer;
 mod bonifaci;
 mod capacity;
 mod closure;
@@ -6,9 +57,11 @@ mod federated;
 mod graham;
 mod graph;
 mod intra_task;
+mod judge;
 mod long_paths;
 mod melani;
 mod non_preemptive;
+mod overheads;
 mod pipelined;
 mod ratio;
 mod refusal;
@@ -18,15 +71,18 @@ mod task;
 mod width;
 mod workload;
 
+pub use answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
 pub use bonifaci::{bonifaci_dm, bonifaci_edf};
 pub use capacity::{gedf_capacity, grm_capacity};
 pub use closure::SUBTASK_LIMIT;
 pub use federated::{Federation, federated, federated_long_paths};
 pub use graham::graham;
 pub use intra_task::{PATH_LIMIT, assign_intra_task, intra_task};
+pub use judge::answer;
 pub use long_paths::{long_paths, long_paths_among, path_list};
 pub use melani::{melani_edf, melani_edf_width, melani_fp, melani_fp_width};
 pub use non_preemptive::{np_safe_edf, np_safe_fp, np_safe_fp_width};
+pub use overheads::Overheads;
 pub use pipelined::{pipelined_fp, pipelined_fp_reference};
 pub use refusal::Refusal;
 pub use task::{Task, TaskError};

@@ -104,6 +104,12 @@ impl Figures {
         }
     }
 
+    /// Accepts no response time beyond so many periods: one more job would meet
+    /// the overrun policy.
+    pub(super) fn allow_in_flight(&mut self, jobs: u32) {
+        self.deadline = self.deadline.min(u128::from(jobs) * self.period);
+    }
+
     /// Returns the least response-time bound that is at least `start_ns`, which
     /// must not exceed the least solution (0 always is right).
     pub(super) fn solve(

@@ -32,6 +32,8 @@ pub(super) struct Set<'a> {
     /// Whether only jobs with deadlines no later count (EDF with `D <= T`).
     pub(super) deadlines_limit: bool,
     pub(super) form: Form,
+    /// Bounds that are known already, by DAG.
+    pub(super) known: Vec<Option<u64>>,
 }
 
 /// What is known about each DAG of a set.
@@ -56,6 +58,7 @@ impl<'a> Set<'a> {
                 .collect(),
             deadlines_limit: false,
             form: Form::Sound,
+            known: alloc::vec![None; tasks.len()],
         }
     }
 
@@ -67,13 +70,13 @@ impl<'a> Set<'a> {
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Solution {
         let mut responses: Vec<Option<u64>> =
-            self.tasks.iter().map(|task| self.alone(task)).collect();
+            (0..self.tasks.len()).map(|dag| self.start(dag)).collect();
         let mut first_failing = None;
         let mut steps = STEP_LIMIT;
         let mut changed = true;
         while changed {
             changed = false;
-            for &dag in order {
+            for &dag in order.iter().filter(|&&dag| self.known[dag].is_none()) {
                 let Some(before) = responses[dag] else {
                     continue;
                 };
@@ -94,7 +97,7 @@ impl<'a> Set<'a> {
             }
         }
         if let Some((_, Unsolved::Limit)) = first_failing
-            && let Some(coarse) = self.from_deadlines(&may_outrank)
+            && let Some(coarse) = self.within_deadlines(&may_outrank)
         {
             responses = coarse;
             first_failing = None;
@@ -105,23 +108,28 @@ impl<'a> Set<'a> {
         }
     }
 
-    /// Returns Graham's bound, below which no solution lies: from there on the
+    /// Returns what is known, or Graham's bound, below which no solution lies: from there on the
     /// workloads only grow.
-    fn alone(&self, task: &Task) -> Option<u64> {
-        graham(task, u32::try_from(self.cores).ok()?)
+    fn start(&self, dag: usize) -> Option<u64> {
+        let graham = || graham(self.tasks[dag], u32::try_from(self.cores).ok()?);
+        self.known[dag].or_else(graham)
     }
 
     /// Tries the deadlines as bounds: if each equation holds with the others'
     /// deadlines, then the least solution lies below, however slowly one
     /// comes near it.
-    fn from_deadlines(
+    fn within_deadlines(
         &self,
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Option<Vec<Option<u64>>> {
-        let deadlines = self.tasks.iter().map(|task| task.relative_deadline_ns());
-        let deadlines: Vec<Option<u64>> = deadlines.map(Some).collect();
+        let deadline = |dag: usize| self.tasks[dag].relative_deadline_ns();
+        let deadlines = (0..self.tasks.len()).map(|dag| self.known[dag].or(Some(deadline(dag))));
+        let deadlines: Vec<Option<u64>> = deadlines.collect();
         let mut steps = STEP_LIMIT;
         let bounds = (0..self.tasks.len()).map(|dag| {
+            if let known @ Some(_) = self.known[dag] {
+                return Some(known);
+            }
             let others = self.interference(dag, &deadlines, &may_outrank)?;
             self.figures[dag]
                 .solve(&others, 0, self.form, &mut steps)

@@ -183,8 +183,9 @@ mod tests {
             for from in (0..count).rev() {
                 for &(_, to) in edges.iter().filter(|edge| edge.0 == from) {
                     reach[from][to] = true;
-                    for after in 0..count {
-                        reach[from][after] |= reach[to][after];
+                    let beyond = reach[to].clone();
+                    for (here, there) in reach[from].iter_mut().zip(beyond) {
+                        *here |= there;
                     }
                 }
             }

@@ -295,3 +295,6 @@ fn at_least_one(line: &Line<'_>, word: &str) -> Result<u32, Malformed> {
         number => Ok(number),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,191 @@
+//! What a commit answers about deadlines.
+
+use alloc::vec::Vec;
+use core::fmt;
+
+use super::overheads::Overheads;
+use super::task::TaskError;
+use crate::ids::{DagId, SubtaskId};
+use crate::policy::{Policy, Preemption};
+
+/// Under what conditions the DAGs will run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// How ready instances are ordered.
+    pub policy: Policy,
+    /// Whether instances of preemptible subtasks may lose their core.
+    pub preemption: Preemption,
+    /// The number of identical cores, all for these DAGs.
+    pub cores: u32,
+    /// Costs of the platform, added to each WCET.
+    pub overheads: Overheads,
+}
+
+/// The response-time bounds of a set of DAGs, as far as they are proven.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// The bound of each DAG, in the order of the commit; `None`: not proven.
+    ///
+    /// A bound stands for itself: DAGs that are not proven do not weaken it.
+    pub bounds: Vec<Option<DagBound>>,
+    /// The first DAG that is not proven, and why; `None` if all are.
+    pub first_failing: Option<NotProven>,
+}
+
+/// A proven response-time bound, at most the relative deadline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DagBound {
+    /// The most time from a job's nominal release to its last finish.
+    pub bound_ns: u64,
+    /// The test that gave it.
+    pub test: Test,
+}
+
+/// The test that gave a bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Test {
+    /// Long paths (He et al. 2022): nothing else can delay this DAG.
+    Alone,
+    /// Intra-task priorities (He et al. 2019): nothing else can delay this DAG.
+    IntraTask,
+    /// Global fixed priorities (Melani et al. 2015, width refinement).
+    FixedPriority,
+    /// Global EDF (Melani et al. 2015, width refinement).
+    Edf,
+    /// Subtasks that keep their core (the safe form).
+    NonPreemptive,
+    /// Jobs that may overlap (the sound form), with either policy.
+    Pipelined,
+    /// Any work-conserving order: all other DAGs count in full.
+    AnyOrder,
+    /// Capacity augmentation for EDF or RM (Li et al. 2014); the bound is the
+    /// deadline itself.
+    Capacity,
+    /// Speed-up tests for EDF or DM (Bonifaci et al. 2013); the bound is the
+    /// deadline itself.
+    SpeedUp,
+}
+
+/// A DAG without a proven bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotProven {
+    /// The DAG.
+    pub dag: DagId,
+    /// Why there is no bound.
+    pub reason: Reason,
+}
+
+/// Why a DAG is not proven to meet its deadlines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// The DAG cannot be analysed: a WCET is missing or numbers overflow.
+    Unknown(TaskError),
+    /// There are no cores.
+    NoCores,
+    /// Certain to miss at WCETs: the longest path is longer than the deadline.
+    LengthBeyondDeadline {
+        /// The length, overheads included.
+        length_ns: u64,
+    },
+    /// Certain to fall behind at WCETs: a subtask needs more than a period.
+    SubtaskBeyondPeriod {
+        /// The subtask.
+        subtask: SubtaskId,
+    },
+    /// Certain to fall behind at WCETs: with this DAG, in order of urgency, the
+    /// DAGs need more than all cores.
+    Overload,
+    /// No test bounds the response time by the deadline. That does not say
+    /// that deadlines will be missed.
+    NoBound,
+    /// As [`NoBound`](Self::NoBound), but with more jobs allowed in flight
+    /// there might be one.
+    InFlightTooFew {
+        /// The most jobs in flight as configured.
+        in_flight: u32,
+    },
+    /// The analysis reached one of its limits on time or size of numbers.
+    Limit,
+}
+
+impl Answer {
+    /// Reports whether every DAG has a bound.
+    #[must_use]
+    pub const fn is_proven(&self) -> bool {
+        self.first_failing.is_none()
+    }
+}
+
+impl Reason {
+    /// Reports whether deadlines will be missed when every instance takes its
+    /// WCET, rather than merely not being proven to be met.
+    #[must_use]
+    pub const fn is_certain(&self) -> bool {
+        matches!(
+            self,
+            Self::LengthBeyondDeadline { .. } | Self::SubtaskBeyondPeriod { .. } | Self::Overload
+        )
+    }
+}
+
+impl fmt::Display for Test {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Alone => "long paths (He et al. 2022)",
+            Self::IntraTask => "intra-task priorities (He et al. 2019)",
+            Self::FixedPriority => "global fixed priorities (Melani et al. 2015)",
+            Self::Edf => "global EDF (Melani et al. 2015)",
+            Self::NonPreemptive => "non-preemptive subtasks",
+            Self::Pipelined => "overlapping jobs",
+            Self::AnyOrder => "any work-conserving order",
+            Self::Capacity => "capacity augmentation (Li et al. 2014)",
+            Self::SpeedUp => "speed-up (Bonifaci et al. 2013)",
+        })
+    }
+}
+
+impl fmt::Display for NotProven {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "dag {} is not proven to meet its deadlines: {}",
+            self.dag.0, self.reason
+        )
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown(error) => error.fmt(f),
+            Self::NoCores => f.write_str("there are no cores; give it at least one"),
+            Self::LengthBeyondDeadline { length_ns } => write!(
+                f,
+                "its longest path alone takes {length_ns} ns, which is more than its relative \
+                 deadline; shorten the path or relax the deadline"
+            ),
+            Self::SubtaskBeyondPeriod { subtask } => write!(
+                f,
+                "subtask {} alone takes more than a period; split it or lengthen the period",
+                subtask.0
+            ),
+            Self::Overload => f.write_str(
+                "up to it, the DAGs need more time than all cores have; \
+                 add cores, lengthen periods or shorten subtasks",
+            ),
+            Self::NoBound => f.write_str(
+                "no test bounds its response time by its relative deadline (it may still \
+                 meet it); add cores, raise its priority or relax the deadline",
+            ),
+            Self::InFlightTooFew { in_flight } => write!(
+                f,
+                "no test bounds its response time by {in_flight} periods, the most jobs \
+                 that it may have in flight; allow more, or relax the load"
+            ),
+            Self::Limit => f.write_str(
+                "the analysis reached a limit; use a coarser unit of time, \
+                 or deadlines of fewer periods",
+            ),
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! The analysis against the scheduler: no observed response exceeds a bound.
+//!
+//! [`accepted_sets_keep_their_bounds`] draws thousands of task sets of every
+//! kind the scheduler knows; whatever DAG has a bound must keep it, with full
+//! and with shortened execution times. A failure prints its seed; run that one
+//! alone with `ANALYSIS_SEED=n ANALYSIS_SETS=1`.
+//!
+//! The other tests are worked examples, and the counterexamples to forms that
+//! look like bounds and are not.
+
+mod random;
+mod simulate;
+mod worked;
+
+use sched_dag::analysis::{Overheads, Reason, Settings, Test, answer};
+use sched_dag::{Policy, Preemption};
+
+use random::{Random, Sample, sample};
+use simulate::{commit, responses, spec};
+
+const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
+const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
+
+fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> Settings {
+    Settings {
+        policy,
+        preemption,
+        cores,
+        overheads: Overheads::default(),
+    }
+}
+
+fn number_from(variable: &str, default: u64) -> u64 {
+    match std::env::var(variable) {
+        Ok(text) => text.parse().expect("a whole number"),
+        Err(_) => default,
+    }
+}
+
+#[test]
+fn accepted_sets_keep_their_bounds() {
+    let first = number_from("ANALYSIS_SEED", 1);
+    let sets = number_from("ANALYSIS_SETS", 12_000);
+    let mut proven_sets = 0_u64;
+    let mut by_test = std::collections::BTreeMap::new();
+    for seed in first..first + sets {
+        let mut random = Random::new(seed);
+        let Sample {
+            specs,
+            policy,
+            preemption,
+            cores,
+        } = sample(&mut random);
+        let options = sched_dag::CommitOptions::new(policy, cores)
+            .with_construction(sched_dag::ConstructionPolicy::any_graph());
+        let Ok(verified) = sched_dag::verify(&specs, &options) else {
+            // A WCET or path beyond the deadline: the commit refuses it.
+            continue;
+        };
+        let task_set = verified.task_set;
+        let answer = answer(&task_set, &settings((policy, preemption), cores));
+        assert_eq!(
+            answer.is_proven(),
+            answer.bounds.iter().all(Option::is_some),
+            "seed {seed}"
+        );
+        if answer.bounds.iter().all(Option::is_none) {
+            continue;
+        }
+        proven_sets += u64::from(answer.is_proven());
+        for bound in answer.bounds.iter().flatten() {
+            *by_test.entry(bound.test.to_string()).or_insert(0_u64) += 1;
+        }
+        let longest = task_set.dags().iter().map(|dag| dag.period_ns()).max();
+        let until = 12 * longest.expect("there is a DAG");
+        let wcet = |instance: sched_dag::Instance| {
+            let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
+            subtask.wcet_ns().expect("every subtask has one")
+        };
+        for shorten in [false, true] {
+            let platform = (policy, preemption, cores);
+            let observed = responses(&task_set, platform, until, |instance| {
+                let full = wcet(instance);
+                if shorten {
+                    random.within(full.div_ceil(2), full)
+                } else {
+                    full
+                }
+            });
+            for (dag, (bound, observed)) in answer.bounds.iter().zip(observed).enumerate() {
+                if let Some(bound) = bound {
+                    let deadline = task_set.dags()[dag].relative_deadline_ns();
+                    assert!(
+                        observed <= bound.bound_ns && bound.bound_ns <= deadline,
+                        "seed {seed}, dag {dag}: observed {observed}, {bound:?}, deadline \
+                         {deadline}, {policy:?} {preemption:?} on {cores} cores: {specs:#?}"
+                    );
+                }
+            }
+        }
+    }
+    println!(
+        "seeds {first}..{}: {proven_sets} sets proven whole; bounds: {by_test:?}",
+        first + sets
+    );
+    if sets >= 10_000 {
+        assert!(
+            proven_sets > 1000,
+            "too few proven sets say little: {proven_sets}"
+        );
+        assert!(by_test.len() >= 7, "some test was never used: {by_test:?}");
+    }
+}
+
+#[test]
+fn e2_and_e3_two_dags() {
+    let specs = [
+        spec(10, 10, &[1, 2, 2, 1], &DIAMOND, 0),
+        spec(
+            20,
+            20,
+            &[1, 3, 3, 3, 1],
+            &[(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)],
+            1,
+        ),
+    ];
+    for (policy, expected) in [(Policy::StaticPriority, [4, 14]), (Policy::Edf, [9, 14])] {
+        let task_set = commit(&specs, policy, 2);
+        let answer = answer(&task_set, &settings((policy, Preemption::Enabled), 2));
+        let bounds: Vec<u64> = answer
+            .bounds
+            .iter()
+            .flatten()
+            .map(|bound| bound.bound_ns)
+            .collect();
+        // Alone, the first DAG has the long-paths bound: 4, where Graham's is 5.
+        assert_eq!(bounds, expected, "{policy:?}");
+        let wcets = [vec![1, 2, 2, 1], vec![1, 3, 3, 3, 1]];
+        let observed = responses(
+            &task_set,
+            (policy, Preemption::Enabled, 2),
+            400,
+            |instance| wcets[instance.dag.index()][instance.subtask.index()],
+        );
+        assert!(
+            observed[0] <= bounds[0] && observed[1] <= bounds[1],
+            "{observed:?}"
+        );
+    }
+}
+
+#[test]
+fn e4_blocking_is_observed_beyond_the_published_bound() {
+    let fork: Vec<(usize, usize)> = (1..6).flat_map(|v| [(0, v), (v, 6)]).collect();
+    let wcets = [vec![1, 3, 3, 1], vec![1, 4, 4, 4, 4, 4, 1]];
+    let mut high = spec(100, 100, &wcets[0], &DIAMOND, 0);
+    high.offset_ns = 2;
+    let specs = [high, spec(100, 100, &wcets[1], &fork, 1)];
+    let kind = (Policy::StaticPriority, Preemption::Disabled);
+    let task_set = commit(&specs, kind.0, 2);
+    let observed = responses(&task_set, (kind.0, kind.1, 2), 100, |instance| {
+        wcets[instance.dag.index()][instance.subtask.index()]
+    });
+    assert_eq!(observed[0], 11);
+    let bound = answer(&task_set, &settings(kind, 2)).bounds[0].unwrap();
+    assert_eq!((bound.bound_ns, bound.test), (14, Test::NonPreemptive));
+}
+
+#[test]
+fn pipelined_counterexamples_are_real_and_not_accepted() {
+    // Values claimed by the reference form: 8 for the second DAG.
+    let mut wide = spec(100, 60, &[3; 6], &[], 1);
+    wide.offset_ns = 20;
+    let chain = spec(10, 30, &[6, 6, 6], &[(0, 1), (1, 2)], 0);
+    let stacked = commit(&[chain, wide], FP.0, 4);
+    let observed = responses(&stacked, (FP.0, FP.1, 4), 200, |instance| {
+        if instance.dag.0 == 0 { 6 } else { 3 }
+    });
+    assert_eq!(observed[1], 9);
+    let bounds = answer(&stacked, &settings(FP, 4)).bounds;
+    assert!(
+        bounds[1].is_some_and(|bound| bound.bound_ns >= 9),
+        "{bounds:?}"
+    );
+
+    // 18 claimed; each burst leaves the second DAG 5 further behind.
+    let burst = spec(1000, 1000, &[5; 4], &[], 0);
+    let full = spec(10, 30, &[1, 10], &[(0, 1)], 1);
+    let behind = commit(&[burst, full], FP.0, 4);
+    let observed = responses(&behind, (FP.0, FP.1, 4), 3500, |instance| {
+        if instance.dag.0 == 0 {
+            5
+        } else {
+            [1, 10][instance.subtask.index()]
+        }
+    });
+    assert!(observed[1] > 18 + 10, "{observed:?}");
+    let failing = answer(&behind, &settings(FP, 4)).first_failing.unwrap();
+    assert_eq!((failing.dag.0, failing.reason), (1, Reason::NoBound));
+}
+
+#[test]
+fn reasons_name_the_first_failing_dag() {
+    let light = spec(100, 100, &[1], &[], 0);
+    let reason = |specs: &[sched_dag::DagSpec], cores| {
+        let task_set = commit(specs, FP.0, cores);
+        answer(&task_set, &settings(FP, cores)).first_failing
+    };
+    assert_eq!(reason(std::slice::from_ref(&light), 1), None);
+
+    let mut unknown = spec(100, 100, &[1], &[], 1);
+    unknown.subtasks[0].wcet_ns = None;
+    let missing = reason(&[light.clone(), unknown], 1).unwrap();
+    assert_eq!(missing.dag.0, 1);
+    assert!(matches!(missing.reason, Reason::Unknown(_)), "{missing}");
+
+    let heavy = spec(100, 100, &[60, 50], &[], 1);
+    let overload = reason(&[light.clone(), heavy], 1).unwrap();
+    assert_eq!((overload.dag.0, overload.reason), (1, Reason::Overload));
+
+    let mut narrow = spec(10, 40, &[8, 8], &[(0, 1)], 1);
+    narrow.in_flight = Some(1);
+    let too_few = reason(&[light.clone(), narrow], 2).unwrap();
+    assert_eq!(too_few.reason, Reason::InFlightTooFew { in_flight: 1 });
+
+    let wide = spec(100, 20, &[10, 10, 10], &[], 1);
+    let no_bound = reason(&[light.clone(), light, wide], 1).unwrap();
+    assert_eq!((no_bound.dag.0, no_bound.reason), (2, Reason::NoBound));
+}
+
+#[test]
+fn overheads_are_charged_to_every_subtask() {
+    let task_set = commit(&[spec(100, 100, &[10, 10], &[(0, 1)], 0)], FP.0, 2);
+    let mut with = settings(FP, 2);
+    with.overheads = Overheads {
+        context_switch_ns: 2,
+        dispatch_ns: 1,
+        interrupt_ns: 3,
+    };
+    assert_eq!(
+        answer(&task_set, &with).bounds[0].unwrap().bound_ns,
+        20 + 2 * 8
+    );
+}

@@ -1,0 +1,134 @@
+//! Worked examples: values from the papers, and schedules that show them.
+
+use sched_dag::analysis::{
+    Task, assign_intra_task, graham, intra_task, long_paths, melani_edf, melani_fp,
+    melani_fp_width, path_list, width,
+};
+use sched_dag::{DagSpec, Policy, Preemption, Priority};
+
+use crate::DIAMOND;
+use crate::simulate::{commit, responses, spec};
+
+fn fork_join() -> Task {
+    let edges: Vec<(usize, usize)> = (1..5).flat_map(|v| [(0, v), (v, 5)]).collect();
+    Task::new(50, 50, vec![2, 6, 5, 4, 3, 1], &edges).expect("well formed")
+}
+
+/// Returns when one job alone finishes, in registration order.
+fn makespan(spec: &DagSpec, cores: u32, preemption: Preemption) -> u64 {
+    let task_set = commit(std::slice::from_ref(spec), Policy::StaticPriority, cores);
+    let subtasks = task_set.dags()[0].subtasks();
+    let platform = (Policy::StaticPriority, preemption, cores);
+    responses(&task_set, platform, 900, |instance| {
+        subtasks[instance.subtask.index()].wcet_ns().expect("given")
+    })[0]
+}
+
+#[test]
+fn e1_and_e11_one_fork_join() {
+    let task = fork_join();
+    assert_eq!((task.length_ns(), task.volume_ns()), (9, 21));
+    assert_eq!(path_list(&task), [9, 5, 4, 3]);
+    let bounds = |bound: fn(&Task, u32) -> Option<u64>| [1, 2, 3, 4].map(|m| bound(&task, m));
+    assert_eq!(bounds(graham), [21, 15, 13, 12].map(Some));
+    assert_eq!(bounds(long_paths), [21, 15, 12, 9].map(Some));
+    assert_eq!(task.bottom_levels(), [9, 7, 6, 5, 4, 1]);
+    assert_eq!(task.by_bottom_level(), [0, 1, 2, 3, 4, 5]);
+    assert_eq!((graham(&task, 0), long_paths(&task, 0)), (None, None));
+}
+
+#[test]
+fn e2_e3_and_e13_melani() {
+    let forks = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
+    let one = Task::new(10, 10, vec![1, 2, 2, 1], &DIAMOND).unwrap();
+    let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
+    assert_eq!(melani_fp(&[&one, &two], 2), Ok(vec![5, 14]));
+    assert_eq!(melani_fp_width(&[&one, &two], 2), Ok(vec![5, 14]));
+    assert_eq!(melani_edf(&[&one, &two], 2), Ok(vec![9, 14]));
+    assert_eq!(width(&fork_join()), Some(4));
+}
+
+#[test]
+fn e5_intra_task_priorities() {
+    let edges = [
+        (0, 1),
+        (0, 3),
+        (0, 4),
+        (1, 2),
+        (1, 4),
+        (2, 7),
+        (3, 4),
+        (4, 5),
+        (4, 6),
+        (4, 7),
+        (5, 7),
+        (6, 7),
+    ];
+    let wcets = [5, 16, 15, 1, 10, 17, 7, 11];
+    let task = Task::new(1000, 1000, wcets.to_vec(), &edges).unwrap();
+    let observed = |order: &[usize]| {
+        let mut spec = spec(1000, 1000, &wcets, &edges, 0);
+        for (rank, &subtask) in (0..).zip(order) {
+            spec.subtasks[subtask].priority = Some(Priority(rank));
+        }
+        makespan(&spec, 2, Preemption::Enabled)
+    };
+    let given = [0, 1, 2, 3, 4, 6, 5, 7];
+    assert_eq!(
+        (observed(&given), intra_task(&task, &given, 2)),
+        (64, Some(70))
+    );
+    let assigned = assign_intra_task(&task).unwrap();
+    assert_eq!(
+        (observed(&assigned), intra_task(&task, &assigned, 2)),
+        (59, Some(65))
+    );
+}
+
+#[test]
+fn e10_upward_ranks_of_heft() {
+    // Times are sums over three processors, so everything is tripled.
+    let wcets = vec![39, 50, 43, 38, 35, 38, 33, 30, 50, 44];
+    let edges = [
+        (0, 1, 18),
+        (0, 2, 12),
+        (0, 3, 9),
+        (0, 4, 11),
+        (0, 5, 14),
+        (1, 7, 19),
+        (1, 8, 16),
+        (2, 6, 23),
+        (3, 7, 27),
+        (3, 8, 23),
+        (4, 8, 13),
+        (5, 7, 15),
+        (6, 9, 17),
+        (7, 9, 11),
+        (8, 9, 13),
+    ];
+    let pairs = edges.map(|(from, to, _)| (from, to));
+    let task = Task::new(1000, 1000, wcets, &pairs).unwrap();
+    let ranks = task.bottom_levels_with(|from, to| {
+        let edge = edges.iter().find(|edge| (edge.0, edge.1) == (from, to));
+        edge.map_or(0, |edge| 3 * edge.2)
+    });
+    // 108, 77, 80, 80, 69, 63.333, 42.667, 35.667, 44.333, 14.667
+    assert_eq!(ranks, [324, 231, 240, 240, 207, 190, 128, 107, 133, 44]);
+}
+
+#[test]
+fn e12_graham_anomalies() {
+    let wcets = [3, 2, 2, 2, 4, 4, 4, 4, 9];
+    let edges = [(0, 8), (3, 4), (3, 5), (3, 6), (3, 7)];
+    let finish = |wcets: &[u64], edges: &[(usize, usize)], cores| {
+        let spec = spec(1000, 1000, wcets, edges, 0);
+        let finish = makespan(&spec, cores, Preemption::Disabled);
+        let task = Task::new(1000, 1000, wcets.to_vec(), edges).unwrap();
+        assert!(Some(finish) <= long_paths(&task, cores));
+        finish
+    };
+    assert_eq!(finish(&wcets, &edges, 3), 12);
+    assert_eq!(finish(&wcets.map(|wcet| wcet - 1), &edges, 3), 13);
+    assert_eq!(finish(&wcets, &edges, 4), 15);
+    assert_eq!(finish(&wcets, &[(0, 8), (3, 6), (3, 7)], 3), 16);
+}
