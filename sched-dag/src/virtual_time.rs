@@ -49,6 +49,12 @@ pub trait Workload: Observer {
     /// for each instance, at its start; 0 is allowed.
     fn execute(&mut self, instance: Instance, now_ns: u64) -> u64;
 
+    /// An instant begins, in which all that follows happens until the next one.
+    /// There may be several at one time.
+    fn instant(&mut self, now_ns: u64) {
+        let _ = now_ns;
+    }
+
     /// The core begins the instance; called before [`execute`](Self::execute).
     fn started(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
         let _ = (instance, core, now_ns);
@@ -182,6 +188,7 @@ impl VirtualTime {
 
     /// Lets one instant happen. An instance that cannot finish is the error.
     fn step(&mut self, now_ns: u64, workload: &mut impl Workload) -> Result<(), Instance> {
+        workload.instant(now_ns);
         let mut moment = self.scheduler.at(now_ns);
         while let Some(((finish_ns, core), index)) = self.finish_times.peek()
             && finish_ns <= now_ns

@@ -52,25 +52,38 @@ impl Scheduler {
         self.judge(dag, observer);
         self.release_waiting(dag, observer);
         while let Some((job, release_ns)) = self.take_due(dag) {
-            self.release_waiting(dag, observer);
-            if !self.is_waiting(dag, job) {
-                continue;
-            }
-            match self.task_set.dag(dag).overrun() {
-                OverrunPolicy::Queue => {}
-                OverrunPolicy::Skip => self.skip_oldest_waiting(dag, observer),
-                OverrunPolicy::Abort => {
-                    self.make_room(dag, observer);
-                    self.release_waiting(dag, observer);
-                }
-            }
-            if self.is_waiting(dag, job) {
-                self.dags[dag.index()].statistics.queued += 1;
-                observer.queued(dag, job, release_ns);
+            self.release_or_overrun(dag, job, release_ns, observer);
+            // Another one is due only if the driver came late. Then deadlines
+            // have passed that were not known of before.
+            self.judge(dag, observer);
+        }
+        self.set_timer(dag);
+    }
+
+    /// Deals with a job that has just become due.
+    fn release_or_overrun(
+        &mut self,
+        dag: DagId,
+        job: u64,
+        release_ns: u64,
+        observer: &mut impl Observer,
+    ) {
+        self.release_waiting(dag, observer);
+        if !self.is_waiting(dag, job) {
+            return;
+        }
+        match self.task_set.dag(dag).overrun() {
+            OverrunPolicy::Queue => {}
+            OverrunPolicy::Skip => self.skip_oldest_waiting(dag, observer),
+            OverrunPolicy::Abort => {
+                self.make_room(dag, observer);
+                self.release_waiting(dag, observer);
             }
         }
-        self.judge(dag, observer);
-        self.set_timer(dag);
+        if self.is_waiting(dag, job) {
+            self.dags[dag.index()].statistics.queued += 1;
+            observer.queued(dag, job, release_ns);
+        }
     }
 
     fn take_due(&mut self, dag: DagId) -> Option<(u64, u64)> {

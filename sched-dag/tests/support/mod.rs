@@ -1,0 +1,205 @@
+//! What the tests share: building DAGs in a line, and a log of all events.
+
+#![allow(dead_code, reason = "each test uses a part of this")]
+
+pub(crate) mod random;
+
+use std::fmt::Write;
+use std::sync::Arc;
+
+use sched_dag::virtual_time::{End, VirtualTime, Workload};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, DagStatistics, Instance, JobOutcome,
+    Observer, OverrunPolicy, Policy, Preemption, Priority, Scheduler, SchedulerOptions, SubtaskId,
+    SubtaskSpec, TaskSet, verify,
+};
+
+/// Options for static priority with preemption.
+pub(crate) const PREEMPTIVE: SchedulerOptions = SchedulerOptions {
+    policy: Policy::StaticPriority,
+    preemption: Preemption::Enabled,
+    cores: 1,
+};
+
+/// Returns a DAG with period, deadline, jobs, priorities of its subtasks, and edges.
+pub(crate) fn dag(
+    period_ns: u64,
+    deadline_ns: u64,
+    jobs: u64,
+    priorities: &[u32],
+    edges: &[(usize, usize)],
+) -> DagSpec {
+    let subtask = |&priority: &u32| SubtaskSpec {
+        priority: Some(Priority(priority)),
+        ..SubtaskSpec::default()
+    };
+    DagSpec {
+        period_ns: Some(period_ns),
+        relative_deadline_ns: Some(deadline_ns),
+        jobs: Some(jobs),
+        in_flight: Some(u32::try_from(jobs).expect("few jobs")),
+        subtasks: priorities.iter().map(subtask).collect(),
+        edges: edges.to_vec(),
+        ..DagSpec::default()
+    }
+}
+
+/// Returns a DAG of one subtask, with room for few jobs in flight.
+pub(crate) fn overrunning(dag: DagSpec, in_flight: u32, overrun: OverrunPolicy) -> DagSpec {
+    DagSpec {
+        in_flight: Some(in_flight),
+        overrun,
+        ..dag
+    }
+}
+
+/// Commits DAGs of any shape.
+pub(crate) fn commit(specs: &[DagSpec], options: SchedulerOptions) -> Arc<TaskSet> {
+    let options = CommitOptions::new(options.policy, options.cores)
+        .with_construction(ConstructionPolicy::any_graph());
+    Arc::new(
+        verify(specs, &options)
+            .expect("the test's DAGs are right")
+            .task_set,
+    )
+}
+
+/// Makes a scheduler for DAGs of any shape.
+pub(crate) fn scheduler(specs: &[DagSpec], options: SchedulerOptions) -> Scheduler {
+    Scheduler::new(commit(specs, options), options)
+}
+
+pub(crate) fn instance(dag: u32, job: u64, subtask: u32) -> Instance {
+    Instance {
+        dag: DagId(dag),
+        job,
+        subtask: SubtaskId(subtask),
+    }
+}
+
+/// Everything that happened, one event a line: time, event, instance as
+/// `dag.job.subtask` or job as `dag.job`.
+pub(crate) struct Log<F> {
+    pub(crate) lines: Vec<String>,
+    now_ns: u64,
+    execution_ns: F,
+}
+
+impl<F: FnMut(Instance) -> u64> Log<F> {
+    pub(crate) fn new(execution_ns: F) -> Self {
+        Self {
+            lines: Vec::new(),
+            now_ns: 0,
+            execution_ns,
+        }
+    }
+
+    fn note(&mut self, event: std::fmt::Arguments<'_>) {
+        let mut line = self.now_ns.to_string();
+        write!(line, " {event}").expect("a string takes all");
+        self.lines.push(line);
+    }
+}
+
+/// Runs DAGs to the end and returns all events and each DAG's counters.
+pub(crate) fn run(
+    specs: &[DagSpec],
+    options: SchedulerOptions,
+    execution_ns: impl FnMut(Instance) -> u64,
+) -> (Vec<String>, Vec<DagStatistics>) {
+    let mut log = Log::new(execution_ns);
+    let mut run = VirtualTime::new(scheduler(specs, options));
+    assert_eq!(run.run(&mut log), End::Finished);
+    assert!(run.scheduler().is_finished());
+    let dags = 0..u32::try_from(specs.len()).expect("few DAGs");
+    let statistics = dags
+        .map(|dag| *run.scheduler().statistics(DagId(dag)))
+        .collect();
+    (log.lines, statistics)
+}
+
+/// Compares events with an expected text, one event a line. Of the events only
+/// those of the kinds that the expected text has are compared.
+#[track_caller]
+pub(crate) fn assert_events(events: &[String], expected: &str) {
+    let expected: Vec<&str> = expected
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect();
+    let kind = |line: &str| line.split(' ').nth(1).map(str::to_owned);
+    let events: Vec<&str> = events
+        .iter()
+        .map(String::as_str)
+        .filter(|event| expected.iter().any(|line| kind(line) == kind(event)))
+        .collect();
+    assert_eq!(events, expected, "\nhappened:\n{}\n", events.join("\n"));
+}
+
+struct Short(Instance);
+
+impl std::fmt::Display for Short {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}.{}", self.0.dag.0, self.0.job, self.0.subtask.0)
+    }
+}
+
+impl<F: FnMut(Instance) -> u64> Observer for Log<F> {
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.note(format_args!("released {}.{job} of {release_ns}", dag.0));
+    }
+
+    fn queued(&mut self, dag: DagId, job: u64, _release_ns: u64) {
+        self.note(format_args!("queued {}.{job}", dag.0));
+    }
+
+    fn skipped(&mut self, dag: DagId, job: u64, _release_ns: u64) {
+        self.note(format_args!("skipped {}.{job}", dag.0));
+    }
+
+    fn ready(&mut self, instance: Instance) {
+        self.note(format_args!("ready {}", Short(instance)));
+    }
+
+    fn cancelled(&mut self, instance: Instance) {
+        self.note(format_args!("cancelled {}", Short(instance)));
+    }
+
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        self.note(format_args!("aborted {}.{job}", dag.0));
+    }
+
+    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        self.note(format_args!("missed {}.{job} of {deadline_ns}", dag.0));
+    }
+
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
+        self.note(format_args!("ended {}.{job} {outcome:?}", dag.0));
+    }
+}
+
+impl<F: FnMut(Instance) -> u64> Workload for Log<F> {
+    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
+        (self.execution_ns)(instance)
+    }
+
+    fn instant(&mut self, now_ns: u64) {
+        self.now_ns = now_ns;
+    }
+
+    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.note(format_args!("start {} on {}", Short(instance), core.0));
+    }
+
+    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.note(format_args!("preempt {} on {}", Short(instance), core.0));
+    }
+
+    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.note(format_args!("resume {} on {}", Short(instance), core.0));
+    }
+
+    fn finished(&mut self, instance: Instance, _core: CoreId, _now_ns: u64) {
+        self.note(format_args!("finish {}", Short(instance)));
+    }
+}
