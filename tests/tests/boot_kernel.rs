@@ -63,7 +63,7 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
     ] {
         let outcome = guest(test).end_in(Status::Failure);
         assert_eq!(
-            outcome.transcript.of_kind("panic").count(),
+            outcome.transcript.of_kind("exception").count(),
             1,
             "{test}\n{}",
             outcome.tail()

@@ -13,49 +13,41 @@ fn boots_with(guest: Guest, cores: u64) {
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn one_processor() {
     boots_with(Guest::new("fork-join"), 1);
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn two_processors() {
     boots_with(Guest::new("fork-join"), 2);
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn four_processors() {
     boots_with(Guest::new("fork-join"), 4);
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn eight_processors() {
     boots_with(Guest::new("fork-join"), 8);
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn sixty_four_processors() {
     boots_with(Guest::new("fork-join").memory_mib(128), 64);
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn four_processors_on_a_q35() {
     boots_with(Guest::new("fork-join").machine(Machine::Q35), 4);
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn four_processors_in_real_time() {
     boots_with(Guest::new("fork-join").mode(Mode::Threads), 4);
 }
 
 #[test]
-#[ignore = "waits for the image `fork-join`"]
 fn four_processors_in_real_time_on_a_q35() {
     let guest = Guest::new("fork-join").mode(Mode::Threads);
     boots_with(guest.machine(Machine::Q35), 4);
