@@ -1,0 +1,276 @@
+//! The reference: the definition, executed unit by unit.
+//!
+//! Nothing here is clever. At each unit of time every question is asked anew
+//! of the facts so far (what was released, has finished, was cancelled), with
+//! the words of the rules: no counters, no queue, no events, nothing shared with
+//! the crate but the names of the policies.
+
+use sched_dag::{OverrunPolicy, Policy, Preemption};
+
+use crate::set::{Dag, Set};
+use crate::{InstanceOutcome, JobOutcome, Outcome};
+
+/// Whether a job that is due was released, skipped, or waits, and has ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    Ahead,
+    Waiting,
+    InFlight,
+    Over,
+}
+
+struct Reference<'a> {
+    set: &'a Set,
+    now_ns: u64,
+    states: Vec<Vec<State>>,
+    executed_ns: Vec<Vec<Vec<u64>>>,
+    outcome: Outcome,
+}
+
+/// An instance as DAG, job and subtask.
+type Place = (usize, usize, usize);
+
+pub(crate) fn simulate(set: &Set) -> Outcome {
+    let per_job = |dag: &Dag| usize::try_from(dag.jobs).expect("few jobs");
+    let mut reference = Reference {
+        set,
+        now_ns: 0,
+        states: set
+            .dags
+            .iter()
+            .map(|dag| vec![State::Ahead; per_job(dag)])
+            .collect(),
+        executed_ns: set
+            .dags
+            .iter()
+            .map(|dag| vec![vec![0; dag.subtasks.len()]; per_job(dag)])
+            .collect(),
+        outcome: Outcome {
+            instances: set
+                .dags
+                .iter()
+                .map(|dag| vec![vec![InstanceOutcome::default(); dag.subtasks.len()]; per_job(dag)])
+                .collect(),
+            jobs: set
+                .dags
+                .iter()
+                .map(|dag| vec![JobOutcome::default(); per_job(dag)])
+                .collect(),
+        },
+    };
+    let mut running: Vec<Place> = Vec::new();
+    while !reference.is_over() {
+        reference.notice_misses();
+        reference.cancel_and_end();
+        reference.release();
+        let selected = reference.select(&running);
+        for &(dag, job, subtask) in &running {
+            let instance = &mut reference.outcome.instances[dag][job][subtask];
+            if instance.finish_ns.is_none() && !selected.contains(&(dag, job, subtask)) {
+                instance.preemptions += 1;
+            }
+        }
+        for &place in &selected {
+            reference.execute(place);
+        }
+        running = selected;
+        reference.now_ns += 1;
+    }
+    reference.outcome
+}
+
+impl Reference<'_> {
+    fn is_over(&self) -> bool {
+        self.states
+            .iter()
+            .flatten()
+            .all(|&state| state == State::Over)
+    }
+
+    fn release_ns(&self, dag: usize, job: usize) -> u64 {
+        self.set.dags[dag].offset_ns + self.set.dags[dag].period_ns * job as u64
+    }
+
+    fn deadline_ns(&self, dag: usize, job: usize) -> u64 {
+        self.release_ns(dag, job) + self.set.dags[dag].deadline_ns
+    }
+
+    /// A job that is not complete at its deadline has missed it.
+    fn notice_misses(&mut self) {
+        for dag in 0..self.states.len() {
+            for job in 0..self.states[dag].len() {
+                let alive = matches!(self.states[dag][job], State::Waiting | State::InFlight)
+                    && self.outcome.jobs[dag][job].aborted_ns.is_none();
+                if alive && self.now_ns == self.deadline_ns(dag, job) + 1 {
+                    self.outcome.jobs[dag][job].missed_ns = Some(self.now_ns);
+                }
+            }
+        }
+    }
+
+    fn has_ended(&self, (dag, job, subtask): Place) -> bool {
+        let instance = self.outcome.instances[dag][job][subtask];
+        instance.finish_ns.is_some() || instance.cancelled_ns.is_some()
+    }
+
+    /// R1 and R2, for an instance that has not ended.
+    fn is_ready(&self, (dag, job, subtask): Place) -> bool {
+        let before = (0..job)
+            .rev()
+            .find(|&before| self.outcome.jobs[dag][before].released_ns.is_some());
+        let predecessors = self.set.dags[dag]
+            .edges
+            .iter()
+            .filter(|edge| edge.1 == subtask);
+        self.states[dag][job] == State::InFlight
+            && !self.has_ended((dag, job, subtask))
+            && predecessors
+                .into_iter()
+                .all(|edge| self.has_ended((dag, job, edge.0)))
+            && before.is_none_or(|before| self.has_ended((dag, before, subtask)))
+    }
+
+    /// Cancels what is ready and not started in aborted jobs, until nothing
+    /// changes, and ends jobs of which all instances have ended.
+    fn cancel_and_end(&mut self) {
+        loop {
+            let mut changed = false;
+            for place in self.all_instances() {
+                let (dag, job, subtask) = place;
+                let aborted = self.outcome.jobs[dag][job].aborted_ns.is_some();
+                let started = self.outcome.instances[dag][job][subtask].start_ns.is_some();
+                if aborted && !started && self.is_ready(place) {
+                    self.outcome.instances[dag][job][subtask].cancelled_ns = Some(self.now_ns);
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        for dag in 0..self.states.len() {
+            for job in 0..self.states[dag].len() {
+                let subtasks = 0..self.set.dags[dag].subtasks.len();
+                if self.states[dag][job] == State::InFlight
+                    && subtasks
+                        .into_iter()
+                        .all(|subtask| self.has_ended((dag, job, subtask)))
+                {
+                    self.states[dag][job] = State::Over;
+                    self.outcome.jobs[dag][job].ended_ns = Some(self.now_ns);
+                }
+            }
+        }
+    }
+
+    fn release(&mut self) {
+        for dag in 0..self.states.len() {
+            self.release_waiting(dag);
+            for job in 0..self.states[dag].len() {
+                if self.release_ns(dag, job) == self.now_ns {
+                    self.states[dag][job] = State::Waiting;
+                    self.release_waiting(dag);
+                    if self.states[dag][job] == State::Waiting {
+                        self.overrun(dag, job);
+                    }
+                }
+            }
+        }
+    }
+
+    fn release_waiting(&mut self, dag: usize) {
+        while let Some(job) = self.first(dag, |state| state == State::Waiting) {
+            let in_flight = usize::try_from(self.set.dags[dag].in_flight).expect("few jobs");
+            let blocked = (0..self.states[dag].len()).any(|other| {
+                self.states[dag][other] == State::InFlight && other + in_flight <= job
+            });
+            if blocked {
+                break;
+            }
+            self.states[dag][job] = State::InFlight;
+            self.outcome.jobs[dag][job].released_ns = Some(self.now_ns);
+        }
+    }
+
+    fn overrun(&mut self, dag: usize, job: usize) {
+        let skip = |reference: &mut Self, job: usize| {
+            reference.states[dag][job] = State::Over;
+            reference.outcome.jobs[dag][job].skipped_ns = Some(reference.now_ns);
+        };
+        match self.set.dags[dag].overrun {
+            OverrunPolicy::Queue => {}
+            OverrunPolicy::Skip => skip(self, job),
+            OverrunPolicy::Abort => {
+                let oldest = (0..self.states[dag].len()).find(|&other| {
+                    self.states[dag][other] == State::InFlight
+                        && self.outcome.jobs[dag][other].aborted_ns.is_none()
+                });
+                if let Some(oldest) = oldest {
+                    self.outcome.jobs[dag][oldest].aborted_ns = Some(self.now_ns);
+                    self.cancel_and_end();
+                } else if let Some(waiting) = self.first(dag, |state| state == State::Waiting) {
+                    skip(self, waiting);
+                }
+                self.release_waiting(dag);
+            }
+        }
+    }
+
+    fn first(&self, dag: usize, is: impl Fn(State) -> bool) -> Option<usize> {
+        self.states[dag].iter().position(|&state| is(state))
+    }
+
+    /// R5: the instances that execute during the next unit.
+    fn select(&self, running: &[Place]) -> Vec<Place> {
+        let cores = self.set.options.cores as usize;
+        let keeps_core = |&(dag, job, subtask): &Place| {
+            !self.has_ended((dag, job, subtask))
+                && (self.set.options.preemption == Preemption::Disabled
+                    || self.set.dags[dag].subtasks[subtask].non_preemptive)
+        };
+        let mut selected: Vec<Place> = running
+            .iter()
+            .filter(|place| keeps_core(place))
+            .copied()
+            .collect();
+        let mut others: Vec<Place> = self
+            .all_instances()
+            .into_iter()
+            .filter(|&place| self.is_ready(place) && !selected.contains(&place))
+            .collect();
+        others.sort_by_key(|&(dag, job, subtask)| {
+            let urgency = match self.set.options.policy {
+                Policy::StaticPriority => u64::from(self.set.dags[dag].subtasks[subtask].priority),
+                Policy::Edf => self.deadline_ns(dag, job),
+            };
+            (urgency, dag, job, subtask)
+        });
+        others.truncate(cores.saturating_sub(selected.len()));
+        selected.extend(others);
+        selected
+    }
+
+    fn execute(&mut self, (dag, job, subtask): Place) {
+        let instance = &mut self.outcome.instances[dag][job][subtask];
+        instance.start_ns.get_or_insert(self.now_ns);
+        self.executed_ns[dag][job][subtask] += 1;
+        if self.executed_ns[dag][job][subtask]
+            == self.set.dags[dag].subtasks[subtask].executions_ns[job]
+        {
+            instance.finish_ns = Some(self.now_ns + 1);
+        }
+    }
+
+    /// Returns the instances of all jobs in flight.
+    fn all_instances(&self) -> Vec<Place> {
+        let mut places = Vec::new();
+        for (dag, states) in self.states.iter().enumerate() {
+            for job in (0..states.len()).filter(|&job| states[job] == State::InFlight) {
+                places.extend(
+                    (0..self.set.dags[dag].subtasks.len()).map(|subtask| (dag, job, subtask)),
+                );
+            }
+        }
+        places
+    }
+}

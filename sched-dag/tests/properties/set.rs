@@ -1,0 +1,212 @@
+//! Random sets of DAGs, in a form that is easy to shrink and to print.
+
+use std::fmt;
+
+use sched_dag::{
+    DagSpec, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec,
+};
+
+use crate::random::Random;
+
+/// One set with all that a run depends on.
+#[derive(Clone)]
+pub(crate) struct Set {
+    pub(crate) options: SchedulerOptions,
+    pub(crate) dags: Vec<Dag>,
+}
+
+#[derive(Clone)]
+pub(crate) struct Dag {
+    pub(crate) period_ns: u64,
+    pub(crate) deadline_ns: u64,
+    pub(crate) offset_ns: u64,
+    pub(crate) jobs: u64,
+    pub(crate) in_flight: u64,
+    pub(crate) overrun: OverrunPolicy,
+    pub(crate) subtasks: Vec<Subtask>,
+    pub(crate) edges: Vec<(usize, usize)>,
+}
+
+#[derive(Clone)]
+pub(crate) struct Subtask {
+    pub(crate) priority: u32,
+    pub(crate) non_preemptive: bool,
+    /// For each job.
+    pub(crate) executions_ns: Vec<u64>,
+}
+
+/// Whether releases may find no room.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Overruns {
+    /// As many jobs as there are may be in flight.
+    Never,
+    /// At most three jobs may be in flight.
+    Often,
+}
+
+pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
+    let cores = if random.chance(5) {
+        64
+    } else {
+        random.between(1, 4)
+    };
+    let options = SchedulerOptions {
+        policy: if random.chance(50) {
+            Policy::Edf
+        } else {
+            Policy::StaticPriority
+        },
+        preemption: if random.chance(75) {
+            Preemption::Enabled
+        } else {
+            Preemption::Disabled
+        },
+        cores: u32::try_from(cores).expect("few cores"),
+    };
+    let dags = (0..random.between(1, 4))
+        .map(|_| draw_dag(random, overruns))
+        .collect();
+    Set { options, dags }
+}
+
+fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
+    let count = random.between(1, 7);
+    let jobs = random.between(1, 6);
+    let longest = random.between(1, 8);
+    let priorities = random.between(0, 6);
+    let often_non_preemptive = if random.chance(30) { 40 } else { 0 };
+    let subtasks: Vec<Subtask> = (0..count)
+        .map(|_| Subtask {
+            priority: u32::try_from(random.between(0, priorities)).expect("few priorities"),
+            non_preemptive: random.chance(often_non_preemptive),
+            executions_ns: (0..jobs).map(|_| random.between(1, longest)).collect(),
+        })
+        .collect();
+    let period_ns = random.between(1, 24);
+    Dag {
+        period_ns,
+        deadline_ns: if random.chance(40) {
+            period_ns
+        } else {
+            random.between(1, 40)
+        },
+        offset_ns: if random.chance(50) {
+            0
+        } else {
+            random.between(0, 20)
+        },
+        jobs,
+        in_flight: if overruns == Overruns::Never {
+            jobs
+        } else {
+            random.between(1, 3)
+        },
+        overrun: match random.between(0, 2) {
+            _ if overruns == Overruns::Never => OverrunPolicy::Queue,
+            0 => OverrunPolicy::Queue,
+            1 => OverrunPolicy::Skip,
+            _ => OverrunPolicy::Abort,
+        },
+        edges: draw_edges(random, subtasks.len()),
+        subtasks,
+    }
+}
+
+/// Draws edges along a random order, so that indices are not sorted by
+/// precedence; transitive and repeated edges occur.
+fn draw_edges(random: &mut Random, count: usize) -> Vec<(usize, usize)> {
+    let mut order: Vec<usize> = (0..count).collect();
+    for position in (1..count).rev() {
+        order.swap(position, random.below(position + 1));
+    }
+    let density = random.between(5, 70);
+    let mut edges = Vec::new();
+    for later in 1..count {
+        for earlier in 0..later {
+            if random.chance(density) {
+                edges.push((order[earlier], order[later]));
+            }
+        }
+    }
+    edges
+}
+
+impl Set {
+    pub(crate) fn specs(&self) -> Vec<DagSpec> {
+        self.dags.iter().map(Dag::spec).collect()
+    }
+}
+
+impl Dag {
+    fn spec(&self) -> DagSpec {
+        let subtask = |subtask: &Subtask| SubtaskSpec {
+            priority: Some(Priority(subtask.priority)),
+            non_preemptive: subtask.non_preemptive,
+            ..SubtaskSpec::default()
+        };
+        DagSpec {
+            period_ns: Some(self.period_ns),
+            relative_deadline_ns: Some(self.deadline_ns),
+            offset_ns: self.offset_ns,
+            in_flight: Some(u32::try_from(self.in_flight).expect("few jobs")),
+            overrun: self.overrun,
+            jobs: Some(self.jobs),
+            subtasks: self.subtasks.iter().map(subtask).collect(),
+            edges: self.edges.clone(),
+            ..DagSpec::default()
+        }
+    }
+}
+
+/// Writes the set in the words of the reference schedules' text form, with what
+/// it cannot say after each line.
+impl fmt::Display for Set {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let SchedulerOptions {
+            policy,
+            preemption,
+            cores,
+        } = self.options;
+        let edf = u8::from(policy == Policy::Edf);
+        let preemptive = u8::from(preemption == Preemption::Enabled);
+        writeln!(
+            f,
+            "case shrunk {cores} {edf} {preemptive} {}",
+            self.dags.len()
+        )?;
+        for dag in &self.dags {
+            writeln!(
+                f,
+                "dag {} {} {} {} {} {}    in_flight {} {:?}",
+                dag.period_ns,
+                dag.deadline_ns,
+                dag.offset_ns,
+                dag.jobs,
+                dag.subtasks.len(),
+                dag.edges.len(),
+                dag.in_flight,
+                dag.overrun
+            )?;
+            for subtask in &dag.subtasks {
+                let longest = subtask.executions_ns.iter().max().unwrap_or(&0);
+                write!(f, "sub {longest} {}", subtask.priority)?;
+                for execution_ns in &subtask.executions_ns {
+                    write!(f, " {execution_ns}")?;
+                }
+                writeln!(
+                    f,
+                    "{}",
+                    if subtask.non_preemptive {
+                        "    non-preemptive"
+                    } else {
+                        ""
+                    }
+                )?;
+            }
+            for (from, to) in &dag.edges {
+                writeln!(f, "edge {from} {to}")?;
+            }
+        }
+        Ok(())
+    }
+}
