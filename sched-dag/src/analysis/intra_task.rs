@@ -32,6 +32,9 @@ pub const PATH_LIMIT: u32 = 4096;
 pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     let count = task.subtask_count();
     let ranks = ranks(task, order)?;
+    if paths(task) > PATH_LIMIT {
+        return None;
+    }
     let closure = Closure::of(task)?;
     let words = closure.words();
     let wcets = task.wcets_ns();
@@ -45,14 +48,8 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
         }
     }
 
-    let mut is_source = vec![true; count];
-    for v in 0..count {
-        for &next in task.successors(v) {
-            is_source[next] = false;
-        }
-    }
+    let is_source = sources(task);
     let mut bound = 0;
-    let mut paths = 0;
     let mut path: Vec<usize> = Vec::new();
     // Next successor to try, by place on the path; unions, by place, in a row.
     let mut tried: Vec<usize> = Vec::new();
@@ -73,10 +70,6 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
                 break;
             };
             if task.successors(last).is_empty() {
-                paths += 1;
-                if paths > PATH_LIMIT {
-                    return None;
-                }
                 let union = &unions[unions.len() - words..];
                 let length: u64 = path.iter().map(|&v| wcets[v]).sum();
                 let parallel = (0..count).filter(|&v| contains(union, v) && !path.contains(&v));
@@ -158,6 +151,31 @@ fn longest_within(task: &Task, eligible: impl Fn(usize) -> bool) -> Option<Vec<u
     Some(path)
 }
 
+/// Returns the number of complete paths, at most `u32::MAX`.
+fn paths(task: &Task) -> u32 {
+    let count = task.subtask_count();
+    let mut onward = vec![0_u32; count];
+    for &v in task.topological_order().iter().rev() {
+        let successors = task.successors(v).iter();
+        let sum = successors.fold(0_u32, |sum, &next| sum.saturating_add(onward[next]));
+        onward[v] = sum.max(1);
+    }
+    let is_source = sources(task);
+    let from_sources = (0..count).filter(|&v| is_source[v]);
+    from_sources.fold(0, |sum, v| sum.saturating_add(onward[v]))
+}
+
+/// Tells for each subtask whether it has no predecessor.
+fn sources(task: &Task) -> Vec<bool> {
+    let mut is_source = vec![true; task.subtask_count()];
+    for v in 0..task.subtask_count() {
+        for &next in task.successors(v) {
+            is_source[next] = false;
+        }
+    }
+    is_source
+}
+
 /// Returns each subtask's place in `order`, if that is a permutation that
 /// respects precedence.
 fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
@@ -205,6 +223,23 @@ mod tests {
         let assigned = assign_intra_task(&task).unwrap();
         assert_eq!(assigned, [0, 1, 3, 4, 5, 2, 6, 7]);
         assert_eq!(intra_task(&task, &assigned, 2), Some(65));
+    }
+
+    #[test]
+    fn too_many_paths_are_counted_not_walked() {
+        // Diamonds in a row: each doubles the number of paths.
+        let row = |diamonds: usize| {
+            let edges: Vec<(usize, usize)> = (0..diamonds)
+                .flat_map(|at| {
+                    [(0, 1), (0, 2), (1, 3), (2, 3)].map(|(a, b)| (3 * at + a, 3 * at + b))
+                })
+                .collect();
+            Task::new(999, 999, vec![1; 3 * diamonds + 1], &edges).unwrap()
+        };
+        let order: Vec<usize> = (0..400).collect();
+        assert_eq!(intra_task(&row(12), &order[..37], 2), Some(31));
+        assert_eq!(intra_task(&row(13), &order[..40], 2), None);
+        assert_eq!(intra_task(&row(100), &order[..301], 2), None);
     }
 
     #[test]
