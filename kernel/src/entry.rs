@@ -98,7 +98,7 @@ macro_rules! memory_functions {
 /// Runs `kernel_main` of the image.
 pub fn start(
     info: &'static BootInfo,
-    name: &str,
+    name: &'static str,
     app: fn(&crate::Machine) -> Result<(), crate::Ending>,
 ) -> ! {
     crate::start::start(info, name, app)

@@ -6,14 +6,15 @@
 //! ```no_run
 //! use kernel::{Ending, Machine};
 //!
-//! fn main(machine: &Machine) -> Result<(), Ending> {
+//! fn app(machine: &Machine) -> Result<(), Ending> {
 //!     machine.options().finish(&[])?;
 //!     // create_dag(), register_*(), finish_create_dags() ...
 //!     let run = machine.run()?;
 //!     kernel::println!("{} violations", run.violations().count());
 //!     Ok(())
 //! }
-//! # // In an app's `main.rs`: kernel::entry!(main);
+//! // In the app's `main.rs`: kernel::entry!(app);
+//! # fn main() {}
 //! ```
 //!
 //! # Principles
@@ -59,3 +60,9 @@ mod worker;
 pub use machine_handle::{Ending, Machine};
 pub use memory::heap::KernelHeap;
 pub use run::Run;
+
+/// Returns the timer interrupts that all cores have taken since boot.
+#[must_use]
+pub fn timer_interrupts() -> u64 {
+    worker::timer_interrupts()
+}

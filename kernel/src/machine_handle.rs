@@ -12,7 +12,7 @@ use crate::memory::heap;
 use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
 use crate::run::Run;
-use crate::worker::{self, HEARTBEAT_NS};
+use crate::worker;
 use crate::{console, execution, json, machine};
 
 /// The machine, lent to the app's function for the time of the run.
@@ -94,30 +94,9 @@ impl Machine {
     }
 
     /// Interrupts every core each `period` from now on, beside what scheduling
-    /// needs; 0 for never. For tests of the kernel's own robustness.
+    /// needs; back to normal if 0. For tests of the kernel's own robustness.
     pub fn set_heartbeat(&self, period: Duration) {
-        let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
-        for core in machine::this_core::all() {
-            core.heartbeat_ns
-                .store(period_ns, core::sync::atomic::Ordering::Relaxed);
-        }
-        let own = if period_ns == 0 {
-            HEARTBEAT_NS
-        } else {
-            period_ns
-        };
-        worker::set_heartbeat(own);
-    }
-
-    /// Returns the timer interrupts that all cores have taken since boot.
-    #[must_use]
-    pub fn timer_interrupts(&self) -> u64 {
-        let counts = machine::this_core::all()
-            .iter()
-            .map(|core| &core.timer_interrupts);
-        counts
-            .map(|count| count.load(core::sync::atomic::Ordering::Relaxed))
-            .sum()
+        worker::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
     }
 
     /// Prints how much memory the run has needed, as a `memory` machine line.

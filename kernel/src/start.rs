@@ -22,8 +22,9 @@ const WORK_STACK: u64 = 64 * 1024;
 /// The stack of an interrupt handler, or of an exception's report, in bytes.
 const HANDLER_STACK: u64 = 16 * 1024;
 
-/// Brings up the machine and runs the app.
-pub(crate) fn start(info: &'static BootInfo, name: &str, app: App) -> ! {
+/// Brings up memory and interrupts, then goes on on the core's own stack: the
+/// boot stack has no guard page.
+pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
     serial::initialize();
     legacy::silence_interrupt_controllers();
     interrupt::install(interrupt::Handlers {
@@ -39,7 +40,36 @@ pub(crate) fn start(info: &'static BootInfo, name: &str, app: App) -> ! {
     // SAFETY: `memory::initialize` mapped one page of registers there.
     unsafe { local_apic::set_base(platform.local_apic) };
     this_core::create(boot_processor_first(&platform));
-    this_core::become_core(local_apic::id());
+    let core = this_core::become_core(local_apic::id());
+    let start = Start {
+        info,
+        name,
+        app,
+        platform,
+        layout,
+    };
+    // SAFETY: `memory::new_stack` mapped the stack for this core alone.
+    unsafe { cpu::continue_on_stack(core.work_stack(), &start, start_cores) }
+}
+
+/// What the boot processor takes along to its own stack.
+struct Start {
+    info: &'static BootInfo,
+    name: &'static str,
+    app: App,
+    platform: Platform,
+    layout: memory::Layout,
+}
+
+/// Measures time, starts the other cores and runs the app.
+extern "C" fn start_cores(start: &Start) -> ! {
+    let Start {
+        info,
+        name,
+        app,
+        platform,
+        layout,
+    } = start;
     let clock = clock::calibrate(info.entry_tsc, platform.pm_timer).unwrap_or_else(|_| {
         panic!("no clock of known rate: the machine has neither an ACPI timer nor QEMU's APIC")
     });
@@ -53,7 +83,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &str, app: App) -> ! {
         others + 1
     );
     cpu::enable_interrupts();
-    worker::set_heartbeat(worker::HEARTBEAT_NS);
+    worker::set_heartbeats(0);
     // A second installation would come from a second boot, which there is not.
     let _ = fass::install(&KERNEL);
     let command_line = info.command_line().unwrap_or("(not UTF-8)");
@@ -66,7 +96,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &str, app: App) -> ! {
             .number("ready_ns", clock::now_ns())
             .text("command_line", command_line);
     });
-    end(run_app(info, app))
+    end(run_app(info, *app))
 }
 
 fn read_platform(info: &BootInfo) -> Platform {

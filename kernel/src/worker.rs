@@ -106,11 +106,26 @@ pub(crate) fn timer_interrupt() {
     timer::arm_earliest();
 }
 
-/// Gives this core a heartbeat each `period_ns`, or none if 0.
-pub(crate) fn set_heartbeat(period_ns: u64) {
-    let core = this_core::get();
-    core.heartbeat_ns.store(period_ns, Ordering::Relaxed);
-    beat(core, clock::now_ns());
+/// Gives every core a heartbeat each `period_ns`; if 0, core 0 its ordinary one
+/// and the others none.
+pub(crate) fn set_heartbeats(period_ns: u64) {
+    for core in this_core::all() {
+        let ordinary_ns = if core.index == 0 { HEARTBEAT_NS } else { 0 };
+        let own_ns = if period_ns == 0 {
+            ordinary_ns
+        } else {
+            period_ns
+        };
+        core.heartbeat_ns.store(own_ns, Ordering::Relaxed);
+        core.wake_up();
+    }
+    beat(this_core::get(), clock::now_ns());
+}
+
+/// Returns the timer interrupts that all cores have taken since boot.
+pub(crate) fn timer_interrupts() -> u64 {
+    let counts = this_core::all().iter().map(|core| &core.timer_interrupts);
+    counts.map(|count| count.load(Ordering::Relaxed)).sum()
 }
 
 fn beat(core: &Core, now_ns: u64) {
@@ -121,10 +136,15 @@ fn beat(core: &Core, now_ns: u64) {
     timer::set(Alarm::Heartbeat, next_ns);
 }
 
-/// Handles another core's wake-up: there is work, or an earlier event to wait for.
+/// Handles another core's wake-up: there is work, an earlier event to wait for,
+/// or another heartbeat.
 pub(crate) fn wake_interrupt() {
-    if this_core::get().index == 0 {
+    let core = this_core::get();
+    if core.index == 0 {
         execution::arm_next_event();
+    }
+    if !timer::is_set(Alarm::Heartbeat) {
+        beat(core, clock::now_ns());
     }
 }
 

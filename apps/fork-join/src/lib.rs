@@ -117,7 +117,7 @@ mod tests {
             fass::finish_create_dags(&[dag]).unwrap();
             let report = machine.run();
             assert_eq!(
-                report.violations().count(),
+                report.violations().len(),
                 0,
                 "N = {parallel}, {cores} cores"
             );

@@ -32,6 +32,31 @@ pub(crate) fn enable_interrupts_and_halt() {
     unsafe { asm!("sti", "hlt") };
 }
 
+/// Continues on another stack, for good.
+///
+/// # Safety
+///
+/// `top` is the upper end of a mapped stack that nobody else uses, a multiple
+/// of 16.
+pub(crate) unsafe fn continue_on_stack<T>(
+    top: u64,
+    argument: &T,
+    function: extern "C" fn(&T) -> !,
+) -> ! {
+    // SAFETY: the caller vouches for the stack. The old one is never returned
+    // to, so what the argument borrows from it stays as it is. `call` aligns
+    // the stack as a function expects it.
+    unsafe {
+        asm!(
+            "mov rsp, {top}", "xor ebp, ebp", "call {function}", "ud2",
+            top = in(reg) top,
+            function = in(reg) function,
+            in("rdi") core::ptr::from_ref(argument),
+            options(noreturn),
+        )
+    }
+}
+
 /// Stops this processor for good.
 pub(crate) fn halt_forever() -> ! {
     loop {

@@ -42,6 +42,11 @@ pub(crate) fn take_due(alarm: Alarm, now_ns: u64) -> bool {
     due
 }
 
+/// Reports whether this core's alarm is set.
+pub(crate) fn is_set(alarm: Alarm) -> bool {
+    this_core::get().alarms[alarm as usize].load(Ordering::Relaxed) != u64::MAX
+}
+
 /// Arms this core's timer for its earliest alarm. Interrupts are disabled.
 pub(crate) fn arm_earliest() {
     arm(this_core::get());

@@ -1,0 +1,118 @@
+//! A million timer interrupts while every core computes.
+//!
+//! One DAG has as many parallel subtasks as there are cores. Each of them
+//! repeats the same floating-point and memory work and compares the result with
+//! the first one's: a register or a byte that an interrupt does not restore
+//! shows as a difference.
+
+use alloc::format;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::hint::black_box;
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+
+use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
+use kernel::{Ending, Machine, json};
+
+/// The time between two interrupts of one core.
+const INTERRUPT_PERIOD: Duration = Duration::from_micros(5);
+
+/// Longer than any storm, so that the one job is never late.
+const PERIOD: Duration = Duration::from_secs(3600);
+
+#[derive(Default)]
+struct Findings {
+    rounds: AtomicU64,
+    diverged: AtomicU64,
+}
+
+/// Runs the storm until `interrupts` have been taken.
+pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    let options = machine.options();
+    let interrupts = options.number("interrupts", 1..=1_000_000_000, 1_000_000)?;
+    options.finish(&["test", "interrupts"])?;
+
+    let findings = Arc::new(Findings::default());
+    let first = kernel::timer_interrupts();
+    finish_create_dags(&[storm_dag(machine.cores(), first + interrupts, &findings)])?;
+    machine.set_heartbeat(INTERRUPT_PERIOD);
+    let run = machine.run()?;
+    machine.set_heartbeat(Duration::ZERO);
+
+    let diverged = findings.diverged.load(Ordering::Relaxed);
+    json::emit("storm", |line| {
+        line.number("interrupts", kernel::timer_interrupts() - first)
+            .number("rounds", findings.rounds.load(Ordering::Relaxed))
+            .number("diverged", diverged)
+            .number("violations", run.violations().count() as u64)
+            .number("cpus", machine.cores());
+    });
+    if diverged > 0 {
+        return Err(Ending::Failure(format!("{diverged} results diverged")));
+    }
+    Ok(())
+}
+
+/// Builds source -> a worker for each core -> a chain of collectors -> sink.
+fn storm_dag(cores: u32, until: u64, findings: &Arc<Findings>) -> Dag {
+    let dag = create_dag();
+    dag.name("storm").jobs(1);
+    let source = SubtaskAttributes::named("start");
+    dag.register_periodic_subtask(|| (0u64,), vec!["collected-0"], PERIOD, source);
+    // Every worker reads the start; the collectors then wait for one after the
+    // other, so any number of cores will do.
+    for core in 0..cores {
+        let findings = findings.clone();
+        let work = move |(start,): (u64,)| (start + compute_until(until, &findings),);
+        let output = format!("work-{core}");
+        let attributes = SubtaskAttributes::named(&format!("worker-{core}"));
+        dag.register_subtask(work, vec!["collected-0"], vec![&output], attributes);
+    }
+    for core in 0..cores {
+        let inputs = [format!("collected-{core}"), format!("work-{core}")];
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        let output = format!("collected-{}", core + 1);
+        let attributes = SubtaskAttributes::named(&format!("collector-{core}"));
+        let add = |(sum, work): (u64, u64)| (sum + work,);
+        dag.register_subtask(add, inputs, vec![&output], attributes);
+    }
+    let last = format!("collected-{cores}");
+    let sink = SubtaskAttributes::named("end");
+    dag.register_sink_subtask(|(_,): (u64,)| (), vec![&last], PERIOD, sink);
+    dag
+}
+
+fn compute_until(interrupts: u64, findings: &Findings) -> u64 {
+    let expected = checksum();
+    let mut rounds = 0;
+    while kernel::timer_interrupts() < interrupts {
+        rounds += 1;
+        if checksum() != expected {
+            findings.diverged.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+    findings.rounds.fetch_add(rounds, Ordering::Relaxed);
+    rounds
+}
+
+/// Sixteen independent sums keep all vector registers in use; the copies keep
+/// string instructions, the direction flag and the red zone in use.
+fn checksum() -> u64 {
+    let mut sums = [0.0f64; 16];
+    for step in 1..=black_box(50u32) {
+        for (lane, sum) in (1u32..).zip(&mut sums) {
+            *sum = (*sum + f64::from(step) / f64::from(lane)) * 0.999_9;
+        }
+    }
+    let mut bytes = [0u8; 256];
+    for (place, sum) in bytes.chunks_exact_mut(8).zip(sums.iter().cycle()) {
+        place.copy_from_slice(&black_box(sum.to_bits()).to_le_bytes());
+    }
+    bytes.copy_within(black_box(3)..200, black_box(50));
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
