@@ -59,10 +59,19 @@ pub fn ensure_qemu() -> Result<(), String> {
     if find_program(PROGRAM).is_some() {
         return Ok(());
     }
-    let plan = plan(|name| find_program(name).is_some(), is_root())?;
+    let mut plan = plan(|name| find_program(name).is_some(), is_root())?;
+    let install = plan.pop();
     for words in plan {
-        eprintln!("QEMU is missing; running: {}", words.join(" "));
-        run(&words)?;
+        // One source of packages that cannot be reached fails the whole update,
+        // and need not be the one with QEMU: the installation will tell.
+        if let Err(why) = run(&words) {
+            eprintln!("{why}");
+        }
+    }
+    if let Some(words) = install {
+        run(&words).map_err(|why| {
+            format!("QEMU could not be installed: {why}; install it by hand and start again")
+        })?;
     }
     match find_program(PROGRAM) {
         Some(_) => Ok(()),
@@ -73,7 +82,7 @@ pub fn ensure_qemu() -> Result<(), String> {
     }
 }
 
-/// Decides on the commands to run, given which programs exist and whether we
+/// Decides on the commands to run, the installation last, given which programs exist and whether we
 /// are root.
 fn plan(exists: impl Fn(&str) -> bool, root: bool) -> Result<Vec<Vec<String>>, String> {
     let manager = MANAGERS.iter().find(|manager| exists(manager.program));
@@ -109,21 +118,17 @@ fn plan(exists: impl Fn(&str) -> bool, root: bool) -> Result<Vec<Vec<String>>, S
 
 fn run(words: &[String]) -> Result<(), String> {
     let line = words.join(" ");
+    eprintln!("QEMU is missing; running: {line}");
     let mut command = Command::new(&words[0]);
     command.args(&words[1..]);
     command.env("DEBIAN_FRONTEND", "noninteractive");
     // Our standard output may be read by a machine.
     command.stdout(Stdio::from(io::stderr()));
-    let failed = |why: String| {
-        format!("QEMU could not be installed: `{line}` {why}; run it by hand and start again")
-    };
-    let status = command
-        .status()
-        .map_err(|error| failed(format!("did not start: {error}")))?;
-    if status.success() {
-        return Ok(());
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("`{line}` failed ({status})")),
+        Err(error) => Err(format!("`{line}` did not start: {error}")),
     }
-    Err(failed(format!("failed ({status})")))
 }
 
 fn is_root() -> bool {

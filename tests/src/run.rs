@@ -22,7 +22,7 @@ use crate::options::{Parsed, Request, UsageError};
 use crate::outcome::{Outcome, boot};
 use crate::probe;
 use crate::protocol::Status;
-use crate::qemu::{Machine, Mode, PROGRAM, Qemu};
+use crate::qemu::{LEAST_MEMORY_MIB, Machine, Mode, PROGRAM, Qemu};
 use crate::system;
 use screen::Screen;
 
@@ -72,6 +72,7 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
     }
     let app = options.text("app").unwrap_or_default().to_string();
     image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
+    let memory_mib = choose_memory(&options)?;
     let program = choose_program(&options)?;
     let log = Log::choose(&options, &app)?;
 
@@ -85,7 +86,7 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
                 .path
         }
     };
-    let qemu = describe(&options, &program, mode);
+    let qemu = describe(&options, &program, mode, memory_mib);
     let limit = limit(&options);
     let mut screen = Screen::new(&options);
     introduce(&screen, &options, &qemu, why);
@@ -93,6 +94,24 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
     Ok(conclude(&outcome, &log, &screen))
+}
+
+/// Settles the memory: the person's choice, or what is usual, and in both
+/// cases enough for the stacks and tables of that many processors.
+fn choose_memory(options: &Parsed) -> Result<u64, Refusal> {
+    let cores = options.number("cores").unwrap_or(1);
+    let least = LEAST_MEMORY_MIB.max((cores * 5).div_ceil(8));
+    let memory_mib = options.number("memory").unwrap_or(least);
+    if memory_mib >= least {
+        return Ok(memory_mib);
+    }
+    if options.is_given("memory") {
+        return Err(Refusal::Usage(format!(
+            "`--memory {memory_mib}`: {cores} cores take at least {least} MiB; \
+             give more, or fewer cores"
+        )));
+    }
+    Ok(least)
 }
 
 /// Finds the QEMU to use, installing one if none is named and none is there.
@@ -133,7 +152,7 @@ fn choose_mode(options: &Parsed, program: &Path) -> Result<(Mode, Option<String>
     }
 }
 
-fn describe(options: &Parsed, program: &Path, mode: Mode) -> Qemu {
+fn describe(options: &Parsed, program: &Path, mode: Mode, memory_mib: u64) -> Qemu {
     let machine = options.text("machine").and_then(Machine::from_name);
     let mut words = vec![format!("mode={mode}")];
     for name in table::GUEST_WORDS {
@@ -145,7 +164,7 @@ fn describe(options: &Parsed, program: &Path, mode: Mode) -> Qemu {
         mode,
         machine: machine.unwrap_or(Machine::Microvm),
         cores: options.number("cores").unwrap_or(1),
-        memory_mib: options.number("memory").unwrap_or(32),
+        memory_mib,
         guest_words: words.join(" "),
         wait_for_debugger: options.is_given("gdb"),
     }

@@ -86,7 +86,8 @@ pub static RUN: Command = Command {
                 most: 65_536,
             },
             default: "32",
-            help: "The guest's memory in MiB.",
+            help: "The guest's memory in MiB; more than 24 cores take more than 16, and more than \
+                   48 get more than the default.",
         },
         Opt {
             name: "mode",

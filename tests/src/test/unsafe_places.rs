@@ -25,6 +25,7 @@ const PLACES: &[(&str, &str)] = &[
         "the symbols that an image must define",
     ),
     ("fass/src/cell.rs", "the job slots' one cell type"),
+    ("fass/tests/no_allocation.rs", "an allocator that counts"),
     ("tests/guest/src/crimes.rs", "what the processor must stop"),
 ];
 
