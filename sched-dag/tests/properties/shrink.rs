@@ -3,6 +3,9 @@
 
 use crate::set::{Dag, Set};
 
+/// One step.
+type Change<'a> = dyn Fn(&mut Set) + 'a;
+
 /// Returns a set for which `fails` holds and holds for no set one step smaller.
 pub(crate) fn shrink(mut set: Set, fails: impl Fn(&Set) -> bool) -> Set {
     while let Some(smaller) = steps(&set).into_iter().find(|smaller| fails(smaller)) {
@@ -14,7 +17,7 @@ pub(crate) fn shrink(mut set: Set, fails: impl Fn(&Set) -> bool) -> Set {
 /// Returns all sets that are one step smaller, the largest steps first.
 fn steps(set: &Set) -> Vec<Set> {
     let mut smaller = Vec::new();
-    let mut add = |change: &dyn Fn(&mut Set)| {
+    let mut add = |change: &Change<'_>| {
         let mut set = set.clone();
         change(&mut set);
         smaller.push(set);
@@ -68,12 +71,7 @@ fn steps(set: &Set) -> Vec<Set> {
 }
 
 /// Adds the steps from a value to the least one and to one less.
-fn lower(
-    add: &mut dyn FnMut(&dyn Fn(&mut Set)),
-    value: u64,
-    least: u64,
-    set_to: impl Fn(&mut Set, u64),
-) {
+fn lower(add: &mut dyn FnMut(&Change<'_>), value: u64, least: u64, set_to: impl Fn(&mut Set, u64)) {
     if value > least {
         add(&|set| set_to(set, least));
         add(&|set| set_to(set, value - 1));

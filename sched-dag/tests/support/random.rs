@@ -1,6 +1,8 @@
 //! A small generator of pseudo-random numbers, so that a seed is all it takes
 //! to repeat a test.
 
+#![allow(dead_code, reason = "each test uses a part of this")]
+
 /// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
 pub(crate) struct Random(u64);
 

@@ -1,0 +1,73 @@
+//! Large commits and runs: no recursion, no quadratic loop.
+
+mod support;
+
+use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SchedulerOptions, SubtaskSpec, verify};
+use support::{PREEMPTIVE, run};
+
+const LARGE: usize = 200_000;
+
+fn large(edges: Vec<(usize, usize)>) -> DagSpec {
+    DagSpec {
+        period_ns: Some(1_000_000),
+        relative_deadline_ns: Some(1_000_000),
+        jobs: Some(1),
+        subtasks: vec![SubtaskSpec::default(); LARGE],
+        edges,
+        ..DagSpec::default()
+    }
+}
+
+#[test]
+fn a_long_chain_is_committed_and_run() {
+    let chain = large((1..LARGE).map(|to| (to - 1, to)).collect());
+    let (events, _) = run(&[chain], PREEMPTIVE, |_| 1);
+    assert_eq!(
+        events.last().map(String::as_str),
+        Some("200000 ended 0.0 Met")
+    );
+}
+
+#[test]
+fn a_wide_fork_is_committed_and_run() {
+    let fork = (1..LARGE - 1).flat_map(|branch| [(0, branch), (branch, LARGE - 1)]);
+    let options = SchedulerOptions {
+        cores: 64,
+        ..PREEMPTIVE
+    };
+    let (events, _) = run(&[large(fork.collect())], options, |_| 1);
+    // 199,998 branches on 64 cores take 3125 rounds.
+    assert_eq!(
+        events.last().map(String::as_str),
+        Some("3127 ended 0.0 Met")
+    );
+}
+
+#[test]
+fn a_huge_cycle_is_found() {
+    let ring = large((0..LARGE).map(|from| (from, (from + 1) % LARGE)).collect());
+    let rejected = verify(&[ring], &CommitOptions::new(Policy::Edf, 1)).expect_err("a ring");
+    let hops = rejected.faults().iter().find_map(|fault| match fault {
+        Fault::Cycle { hops, .. } => Some(hops.len()),
+        _ => None,
+    });
+    assert_eq!(hops, Some(LARGE));
+}
+
+#[test]
+fn a_huge_knot_is_refused_in_bounded_time() {
+    // Every subtask precedes the next three, around: no cycle is short.
+    let knot = (0..LARGE).flat_map(|from| (1..4).map(move |step| (from, (from + step) % LARGE)));
+    let rejected = verify(
+        &[large(knot.collect())],
+        &CommitOptions::new(Policy::Edf, 1),
+    );
+    let faults = rejected.expect_err("a knot").faults().to_vec();
+    assert_eq!(
+        faults
+            .iter()
+            .filter(|fault| fault.code() == "cycle")
+            .count(),
+        1
+    );
+}
