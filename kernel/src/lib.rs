@@ -42,7 +42,6 @@
 extern crate alloc;
 
 pub mod console;
-mod contexts;
 #[doc(hidden)]
 pub mod entry;
 mod execution;
@@ -67,3 +66,8 @@ pub use run::Run;
 pub fn timer_interrupts() -> u64 {
     worker::timer_interrupts()
 }
+
+/// The README's app, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+mod readme {}
