@@ -1,0 +1,305 @@
+//! Close stamps make a set.
+//!
+//! Each topic has a [ring](ring::Ring) of messages in order of arrival. A *search*
+//! walks through them by advancing cursors, always that of the earliest head. The
+//! fronts of all rings may be a *candidate*: the best set that was found so far,
+//! from its earliest to its latest stamp. The *pivot* is the topic that was latest
+//! in the first candidate: once the search passes that message, all sets that
+//! contain it have been seen, so the candidate is emitted. A set is better than the
+//! candidate if it ends only a little later (the age penalty tells how little)
+//! and starts later by more. The numbered steps go on where
+//! [`ExactTime`](crate::ExactTime)'s end; the tests are named after them:
+//!
+//! 5.  Without a candidate all cursors are at the front.
+//! 6.  An arrival is appended, then searched, and only then overflows: the search
+//!     sees one entry more than the queue size.
+//! 7.  An overflow rewinds all cursors and drops the front of the topic's ring,
+//!     which is lossy from then on. If there was a candidate, it is forgotten, and
+//!     the search starts again.
+//! 8.  A pass of the search compares the heads. Of equal stamps the lowest topic is
+//!     the earliest, the highest the latest.
+//! 9.  In every pass all topics but the latest cease to be lossy.
+//! 10. Without a candidate: if the heads are further apart than the longest
+//!     interval, or the latest topic is lossy, the earliest head is dropped.
+//!     Otherwise the heads become the candidate. Only here the interval counts.
+//! 11. With one: if the heads are better, all passed entries are dropped, so that the
+//!     heads become the candidate. The pivot stays.
+//! 12. In both cases the earliest head is passed.
+//! 13. If it was the pivot's, or if any later set would be worse, the candidate is
+//!     emitted.
+//! 14. If a topic has no head then, the search goes on *virtually*: a message yet to
+//!     come is taken to be as early as it can be. That may prove the candidate
+//!     best. Otherwise the search waits for the next arrival.
+//! 15. Emitting takes the fronts of all rings and rewinds all cursors: what was
+//!     passed can be in later sets. The search goes on, so an arrival can emit
+//!     several sets.
+//!
+//! So a set usually waits for a message that comes after it, a candidate lives on
+//! across arrivals, and every topic's messages are used in order of arrival, each
+//! at most once. Those are properties of the original, not to be mended.
+//!
+//! Storage for the queue size plus one messages a topic is reserved at
+//! construction. A pass costs O(topics). An arrival takes at most one pass for each
+//! message held, as every pass moves one, and at most as many virtual ones in each
+//! pass; typically it takes a few.
+
+mod parameters;
+mod ring;
+#[cfg(test)]
+mod tests;
+
+pub use parameters::{AgePenalty, Parameters};
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::{Outlet, Set, Stamped, Synchronizer};
+use ring::Ring;
+
+/// The policy that makes sets of stamps that are close to each other.
+#[derive(Debug)]
+pub struct ApproximateTime<M> {
+    parameters: Parameters,
+    rings: Vec<Ring<M>>,
+    candidate: Option<Candidate>,
+    /// Where the cursors were when a virtual search began.
+    cursors: Vec<usize>,
+    /// The set being emitted; otherwise empty.
+    set: Vec<Stamped<M>>,
+}
+
+/// What a search remembers of its candidate. The candidate itself needs no place:
+/// it is the fronts of all rings.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    earliest_ns: i128,
+    latest_ns: i128,
+    /// The topic that was latest in the first candidate.
+    pivot: usize,
+    pivot_ns: i128,
+}
+
+/// The ends of a set of stamps, and whose they are.
+///
+/// Stamps are compared as `i128`: their differences, and stamps that a lower bound
+/// moves on, do not fit 64 bits.
+#[derive(Clone, Copy, Debug)]
+struct Ends {
+    earliest_ns: i128,
+    earliest: usize,
+    latest_ns: i128,
+    latest: usize,
+}
+
+impl Ends {
+    /// Finds the ends of stamps in the order of their topics (step 8).
+    fn of(stamps_ns: impl Iterator<Item = i128>) -> Option<Self> {
+        let mut stamps_ns = stamps_ns.enumerate();
+        let (_, first_ns) = stamps_ns.next()?;
+        let mut ends = Self {
+            earliest_ns: first_ns,
+            earliest: 0,
+            latest_ns: first_ns,
+            latest: 0,
+        };
+        for (topic, stamp_ns) in stamps_ns {
+            if stamp_ns < ends.earliest_ns {
+                (ends.earliest_ns, ends.earliest) = (stamp_ns, topic);
+            }
+            if stamp_ns >= ends.latest_ns {
+                (ends.latest_ns, ends.latest) = (stamp_ns, topic);
+            }
+        }
+        Some(ends)
+    }
+}
+
+impl<M> ApproximateTime<M> {
+    /// Makes a synchronizer for as many topics as the parameters have.
+    ///
+    /// # Panics
+    ///
+    /// If memory does not suffice for the queue size plus one messages a topic.
+    #[must_use]
+    pub fn new(parameters: Parameters) -> Self {
+        let topics = parameters.lower_bounds_ns.len();
+        let entries = parameters.queue_size.get().saturating_add(1);
+        Self {
+            parameters,
+            rings: (0..topics).map(|_| Ring::with_capacity(entries)).collect(),
+            candidate: None,
+            cursors: vec![0; topics],
+            set: Vec::with_capacity(topics),
+        }
+    }
+
+    /// Searches until a topic has no waiting entry (steps 8 to 15).
+    fn search(&mut self, outlet: &mut dyn Outlet<M>) {
+        while let Some(heads) = self.heads() {
+            for (topic, ring) in self.rings.iter_mut().enumerate() {
+                ring.lossy &= topic == heads.latest;
+            }
+            let candidate = match self.candidate {
+                None if self.is_hopeless(heads) => {
+                    let head = self.rings[heads.earliest].take_front();
+                    if let Some(head) = head {
+                        outlet.dropped(heads.earliest, head);
+                    }
+                    continue;
+                }
+                None => Candidate {
+                    earliest_ns: heads.earliest_ns,
+                    latest_ns: heads.latest_ns,
+                    pivot: heads.latest,
+                    pivot_ns: heads.latest_ns,
+                },
+                Some(candidate) if self.is_better(heads, candidate) => {
+                    self.drop_passed(outlet);
+                    Candidate {
+                        earliest_ns: heads.earliest_ns,
+                        latest_ns: heads.latest_ns,
+                        ..candidate
+                    }
+                }
+                Some(candidate) => candidate,
+            };
+            self.candidate = Some(candidate);
+            self.rings[heads.earliest].advance();
+            if heads.earliest == candidate.pivot
+                || self.rules_out_later_sets(heads.latest_ns, candidate)
+                || (self.heads().is_none() && self.virtual_search(candidate))
+            {
+                self.emit(outlet);
+            }
+        }
+    }
+
+    /// Returns the ends of the heads, or `None` if a topic has no waiting entry.
+    fn heads(&self) -> Option<Ends> {
+        if self.rings.iter().any(|ring| ring.head_ns().is_none()) {
+            return None;
+        }
+        Ends::of(self.rings.iter().filter_map(Ring::head_ns))
+    }
+
+    /// Whether heads cannot be a first candidate (step 10).
+    fn is_hopeless(&self, heads: Ends) -> bool {
+        let interval_ns = heads.latest_ns - heads.earliest_ns;
+        let longest_ns = self.parameters.max_interval_ns;
+        longest_ns.is_some_and(|longest_ns| interval_ns > longest_ns.into())
+            || self.rings[heads.latest].lossy
+    }
+
+    /// Whether heads are better than the candidate (step 11). At a tie they are not.
+    fn is_better(&self, heads: Ends, candidate: Candidate) -> bool {
+        let ends_later_ns = heads.latest_ns - candidate.latest_ns;
+        let starts_later_ns = heads.earliest_ns - candidate.earliest_ns;
+        self.parameters.age_penalty.scaled(ends_later_ns) < starts_later_ns
+    }
+
+    /// Whether no set that ends at `latest_ns` or later can be better than the
+    /// candidate (step 13): as long as the pivot is not passed, it would have to
+    /// start no later than the pivot.
+    fn rules_out_later_sets(&self, latest_ns: i128, candidate: Candidate) -> bool {
+        let ends_later_ns = latest_ns - candidate.latest_ns;
+        self.parameters.age_penalty.scaled(ends_later_ns)
+            >= candidate.pivot_ns - candidate.earliest_ns
+    }
+
+    /// Searches on with the earliest messages that may still come, and returns
+    /// whether that proves the candidate best (step 14). If not, the cursors are
+    /// where they were.
+    fn virtual_search(&mut self, candidate: Candidate) -> bool {
+        for (cursor, ring) in self.cursors.iter_mut().zip(&self.rings) {
+            *cursor = ring.cursor();
+        }
+        while let Some(heads) = self.virtual_heads(candidate) {
+            if self.rules_out_later_sets(heads.latest_ns, candidate) {
+                return true;
+            }
+            if self.is_better(heads, candidate) {
+                break;
+            }
+            // Its head is no virtual one: that would not be before the pivot, and
+            // then one of the two tests above would have held.
+            self.rings[heads.earliest].advance();
+        }
+        for (&cursor, ring) in self.cursors.iter().zip(&mut self.rings) {
+            ring.restore(cursor);
+        }
+        false
+    }
+
+    /// Returns the ends of the heads; where a topic has none, the earliest stamp that
+    /// its next message can have counts.
+    fn virtual_heads(&self, candidate: Candidate) -> Option<Ends> {
+        let lower_bounds_ns = &self.parameters.lower_bounds_ns;
+        let stamps_ns = self.rings.iter().zip(lower_bounds_ns);
+        Ends::of(stamps_ns.map(|(ring, &lower_bound_ns)| {
+            ring.head_ns().unwrap_or_else(|| {
+                let bound_ns = ring
+                    .last_passed_ns()
+                    .map(|passed_ns| passed_ns + i128::from(lower_bound_ns));
+                bound_ns.map_or(candidate.pivot_ns, |ns| ns.max(candidate.pivot_ns))
+            })
+        }))
+    }
+
+    /// Drops all passed entries, so that the heads become the fronts (step 11).
+    fn drop_passed(&mut self, outlet: &mut dyn Outlet<M>) {
+        for (topic, ring) in self.rings.iter_mut().enumerate() {
+            while let Some(passed) = ring.take_passed() {
+                outlet.dropped(topic, passed);
+            }
+        }
+    }
+
+    /// Emits the candidate (step 15).
+    fn emit(&mut self, outlet: &mut dyn Outlet<M>) {
+        self.candidate = None;
+        for ring in &mut self.rings {
+            ring.rewind();
+            self.set.extend(ring.take_front());
+        }
+        outlet.emitted(Set::new(self.set.drain(..)));
+    }
+
+    /// Makes room in a topic's ring (step 7).
+    fn overflow(&mut self, topic: usize, outlet: &mut dyn Outlet<M>) {
+        for ring in &mut self.rings {
+            ring.rewind();
+        }
+        let ring = &mut self.rings[topic];
+        ring.lossy = true;
+        if let Some(front) = ring.take_front() {
+            outlet.dropped(topic, front);
+        }
+        if self.candidate.take().is_some() {
+            self.search(outlet);
+        }
+    }
+}
+
+impl<M> Synchronizer<M> for ApproximateTime<M> {
+    fn topics(&self) -> usize {
+        self.rings.len()
+    }
+
+    fn arrive(&mut self, topic: usize, message: Stamped<M>, outlet: &mut dyn Outlet<M>) {
+        let topics = self.rings.len();
+        assert!(
+            topic < topics,
+            "there is no topic {topic}; there are {topics}, counted from 0"
+        );
+        self.rings[topic].append(message);
+        self.search(outlet);
+        if self.rings[topic].len() > self.parameters.queue_size.get() {
+            self.overflow(topic, outlet);
+        }
+    }
+
+    fn held(&self, topic: usize) -> usize {
+        assert!(topic < self.rings.len(), "there is no topic {topic}");
+        self.rings[topic].len()
+    }
+}
