@@ -1,4 +1,4 @@
-//! The oracle: reference data against the scheduler and its analysis.
+//! The oracle: reference data against the scheduler, its analysis, and the baseline.
 //!
 //! `oracle KIND FILE...` reads reference files and compares each case with what
 //! this project computes. For a failing case the first difference is printed;
@@ -8,11 +8,13 @@
 //!
 //! - [`lines`]: words and numbers of a reference file, with line numbers;
 //! - [`bounds`]: the analysis at commit;
-//! - [`schedules`]: the scheduler in virtual time.
+//! - [`schedules`]: the scheduler in virtual time;
+//! - [`synchronizer`]: the policies of the publish/subscribe baseline.
 
 pub mod bounds;
 pub mod lines;
 pub mod schedules;
+pub mod synchronizer;
 
 use std::process::ExitCode;
 
@@ -27,10 +29,10 @@ struct Kind<Case> {
 
 const USAGE: &str = "usage: oracle KIND FILE...
 
-Compares reference cases with what the scheduler and its analysis compute.
-KIND is one of:
-  bounds      lengths, widths, response-time bounds and verdicts
-  schedules   starts, finishes, preemptions, response times and misses
+Compares reference cases with what this project computes. KIND is one of:
+  bounds        lengths, widths, response-time bounds and verdicts
+  schedules     starts, finishes, preemptions, response times and misses
+  synchronizer  sets that ExactTime and ApproximateTime emit, and what they drop
 
 Prints the first difference of each failing case, then `N passed, M failed`.
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
@@ -60,6 +62,14 @@ pub fn oracle(words: &[String]) -> ExitCode {
                 parse: schedules::parse,
                 name: |case: &schedules::Case| &case.name,
                 check: schedules::check,
+            },
+            files,
+        ),
+        "synchronizer" => run_files(
+            &Kind {
+                parse: synchronizer::parse,
+                name: |case: &synchronizer::Case| &case.name,
+                check: synchronizer::check,
             },
             files,
         ),
