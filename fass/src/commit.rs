@@ -1,11 +1,14 @@
 //! The commit: from drafts to a running plan, or to all that is wrong with them.
 //!
-//! Three steps, each of which either goes through for all DAGs or stops there:
+//! Four steps, each of which either goes through for all DAGs or stops there:
 //!
 //! 1. *Verify.* Every fault of every DAG is collected, ours and the model's. If
 //!    there is one, nothing has happened; the handles are as they were.
-//! 2. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
-//! 3. *Launch.* The platform takes the plan.
+//! 2. *Answer.* The response times are bounded where that can be done, for the
+//!    model that the platform will run. A lacking proof that was demanded ends
+//!    the commit as a fault does.
+//! 3. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
+//! 4. *Launch.* The platform takes the plan.
 
 use alloc::rc::Rc;
 use alloc::string::ToString;
@@ -13,6 +16,7 @@ use alloc::vec::Vec;
 
 use sched_dag::{CommitOptions, DagId, DagLabel, DagSpec, Policy, TaskSet, Verified, Warning};
 
+use crate::answer::{Answer, Answers};
 use crate::dag::Dag;
 use crate::fault::{CommitError, Fault};
 use crate::plan::{Body, Plan};
@@ -24,6 +28,9 @@ use crate::topic::Wiring;
 /// It ends construction: the DAGs can no longer be changed. They are verified
 /// for the platform's policy and cores, with the paper's construction policy:
 /// one source, one sink, one writer a topic.
+///
+/// It also answers about deadlines where WCETs are given; see
+/// [`Commit::answers`].
 ///
 /// # Errors
 ///
@@ -72,11 +79,20 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
     };
     let options = CommitOptions::new(platform.policy(), platform.cores());
     let Verified {
-        task_set, warnings, ..
+        task_set,
+        mut warnings,
+        ..
     } = verify(dags, options)?;
+    let answers = Answers::new(&task_set, platform);
+    let certain = answers.certain_misses();
+    warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
+    let faults = lacking_proofs(dags, &answers);
+    if !faults.is_empty() {
+        return Err(CommitError { faults, warnings });
+    }
     let plan = tie(dags, task_set);
     match platform.launch(plan) {
-        Ok(()) => Ok(Commit { warnings }),
+        Ok(()) => Ok(Commit { warnings, answers }),
         Err(error) => Err(CommitError {
             faults: Vec::from([Fault::NotLaunched(error)]),
             warnings,
@@ -108,6 +124,7 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
 #[non_exhaustive]
 pub struct Commit {
     warnings: Vec<Warning>,
+    answers: Answers,
 }
 
 impl Commit {
@@ -129,6 +146,69 @@ impl Commit {
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
+
+    /// Returns for each DAG, in the order of the commit, a bound of its response
+    /// time and the test that proves it, or why there is none.
+    ///
+    /// Bounds hold for the platform's policy, preemption and cores, with its
+    /// measured overheads added to the WCETs
+    /// ([`Platform::overheads`](crate::Platform::overheads)), and as long as no
+    /// instance executes for longer than its WCET. A DAG that is *not proven*
+    /// may meet its deadlines all the same.
+    ///
+    /// ```
+    /// # use core::time::Duration;
+    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// # let dag = create_dag();
+    /// # let period = Duration::from_millis(10);
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
+    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
+    /// let commit = finish_create_dags(&[dag]).unwrap();
+    /// for answer in commit.answers() {
+    ///     println!("{answer}");
+    /// }
+    /// # assert_eq!(commit.answers().len(), 1);
+    /// ```
+    #[must_use]
+    pub fn answers(&self) -> &[Answer] {
+        &self.answers.of_dags
+    }
+
+    /// Returns the first DAG that is not proven to meet its deadlines: one that
+    /// cannot be analysed, else one that is certain to miss them at its WCETs,
+    /// else the most urgent one for which no test gives a bound. `None` if every
+    /// DAG is proven.
+    ///
+    /// ```
+    /// # use core::time::Duration;
+    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// # let dag = create_dag();
+    /// # dag.name("vision");
+    /// # let period = Duration::from_millis(10);
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
+    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
+    /// let commit = finish_create_dags(&[dag]).unwrap(); // without WCETs
+    /// assert_eq!(commit.first_unproven().unwrap().dag.name, "vision");
+    /// ```
+    #[must_use]
+    pub fn first_unproven(&self) -> Option<&Answer> {
+        self.answers.of_dags.get(self.answers.first_unproven?)
+    }
+}
+
+/// Returns a fault for each DAG that demands a proof and has none.
+fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
+    let demanding =
+        (dags.iter().zip(&answers.of_dags)).filter(|(dag, _)| dag.draft.borrow().demands_proof);
+    let lacking = demanding.filter_map(|(_, answer)| {
+        Some(Fault::NotProven {
+            dag: answer.dag.clone(),
+            unproven: answer.verdict.unproven()?.clone(),
+        })
+    });
+    lacking.collect()
 }
 
 /// Verifies all DAGs, and collects the faults of both crates.

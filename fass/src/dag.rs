@@ -122,6 +122,35 @@ impl Dag {
         self
     }
 
+    /// Demands a proof: the commit is refused unless a test bounds the response
+    /// time of this DAG by its relative deadline.
+    ///
+    /// That needs the WCETs of all its subtasks, and of all DAGs that may delay
+    /// it. Other DAGs of the commit need no proof of their own. Without the
+    /// demand the commit only answers; see [`Commit::answers`](crate::Commit::answers).
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// let dag = create_dag();
+    /// dag.name("brakes").demand_proof();
+    /// let period = Duration::from_millis(10);
+    /// let source = SubtaskAttributes::named("sense").wcet(Duration::from_millis(6));
+    /// dag.register_periodic_subtask(|| (1,), vec!["pedal"], period, source);
+    /// let sink = SubtaskAttributes::named("brake").wcet(Duration::from_millis(6));
+    /// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["pedal"], period, sink);
+    ///
+    /// let error = finish_create_dags(&[dag]).unwrap_err();
+    /// assert_eq!(error.faults()[0].code(), "not_proven");
+    /// ```
+    #[track_caller]
+    pub fn demand_proof(&self) -> &Self {
+        self.open().demands_proof = true;
+        self
+    }
+
     /// Registers the source: a function without arguments that every release
     /// starts, at multiples of `period` after the offset.
     ///

@@ -30,6 +30,8 @@ pub(crate) struct Draft {
     /// What only this crate can find wrong; the DAG's label is still a blank.
     pub(crate) faults: Vec<Fault>,
     pub(crate) is_committed: bool,
+    /// Whether the commit is to be refused unless the deadlines are proven.
+    pub(crate) demands_proof: bool,
 }
 
 /// The type of a topic's end that no function states.

@@ -9,6 +9,7 @@ use core::fmt;
 
 use sched_dag::{DagLabel, SubtaskLabel, Warning};
 
+use crate::answer::Unproven;
 use crate::platform::LaunchError;
 
 /// One reason why a commit was refused.
@@ -106,6 +107,14 @@ pub enum Fault {
         /// The other relative deadline, in nanoseconds.
         second_ns: u64,
     },
+    /// The DAG demands a proof that it meets its deadlines, and there is none.
+    /// Found only where nothing else is wrong.
+    NotProven {
+        /// The DAG.
+        dag: DagLabel,
+        /// Why there is no proof.
+        unproven: Unproven,
+    },
     /// The graph or its attributes are at fault.
     Model(sched_dag::Fault),
     /// The platform did not take the verified plan.
@@ -129,6 +138,7 @@ impl Fault {
             Self::DurationTooLong { .. } => "duration_too_long",
             Self::PeriodsDiffer { .. } => "periods_differ",
             Self::DeadlinesDiffer { .. } => "deadlines_differ",
+            Self::NotProven { .. } => "not_proven",
             Self::Model(fault) => fault.code(),
             Self::NotLaunched(_) => "not_launched",
         }
@@ -144,7 +154,7 @@ impl Fault {
             | Self::DurationTooLong { dag, .. }
             | Self::PeriodsDiffer { dag, .. }
             | Self::DeadlinesDiffer { dag, .. } => dag.clone_from(label),
-            Self::NoPlatform | Self::Model(_) | Self::NotLaunched(_) => {}
+            Self::NoPlatform | Self::NotProven { .. } | Self::Model(_) | Self::NotLaunched(_) => {}
         }
         self
     }
@@ -214,6 +224,10 @@ impl fmt::Display for Fault {
                 f,
                 "{subtask} gives {dag} a relative deadline of {second_ns} ns where {first_ns} ns \
                  were given before; a DAG has one deadline, give the same to every sink"
+            ),
+            Self::NotProven { dag, unproven } => write!(
+                f,
+                "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}"
             ),
             Self::Model(fault) => fault.fmt(f),
             Self::NotLaunched(error) => write!(f, "the platform did not take the plan: {error}"),

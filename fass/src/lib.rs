@@ -68,7 +68,9 @@
 //! - After the commit the crate allocates nothing, takes no lock and does no
 //!   locked read-modify-write. (What functions and their messages' `clone` do
 //!   is theirs.)
-//! - [`finish_create_dags`] reports everything that is wrong at once.
+//! - [`finish_create_dags`] reports everything that is wrong at once. Where
+//!   WCETs are given, it also says by when each DAG's jobs are complete, or that
+//!   it cannot prove it ([`Commit::answers`]).
 //!
 //! # What is not
 //!
@@ -91,6 +93,7 @@
 
 extern crate alloc;
 
+mod answer;
 mod attributes;
 #[allow(unsafe_code, reason = "the one reviewed module that may")]
 mod cell;
@@ -106,6 +109,7 @@ mod subtask;
 mod topic;
 mod tuple;
 
+pub use answer::{Answer, Unproven, Verdict};
 pub use attributes::SubtaskAttributes;
 pub use commit::{Commit, finish_create_dags};
 pub use dag::{Dag, create_dag};
@@ -115,6 +119,7 @@ pub use plan::{Body, Plan};
 pub use platform::{
     AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
 };
+pub use sched_dag::analysis::{Overheads, Reason, Test};
 pub use sched_dag::{OverrunPolicy, Policy, Preemption, Warning};
 pub use topic::{Ports, Publisher, Subscriber};
 pub use tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};

@@ -9,6 +9,7 @@ use alloc::string::String;
 use core::fmt;
 use core::time::Duration;
 
+use sched_dag::analysis::Overheads;
 use sched_dag::{Policy, Preemption};
 
 use crate::cell::SetOnce;
@@ -64,6 +65,27 @@ pub trait Platform: Sync {
 
     /// Returns the number of processors that run subtasks, at least 1.
     fn cores(&self) -> u32;
+
+    /// Returns what the platform's own work costs an instance at most, as
+    /// measured on it. The commit adds it to each WCET before it answers about
+    /// deadlines ([`Commit::answers`](crate::Commit::answers)); it changes
+    /// nothing else. Without measurements, nothing is added: then WCETs have to
+    /// include it.
+    ///
+    /// ```
+    /// use fass::{Overheads, Preemption};
+    ///
+    /// let measured = Overheads {
+    ///     context_switch_ns: 300,
+    ///     dispatch_ns: 900,
+    ///     interrupt_ns: 2_000,
+    /// };
+    /// // Into the instance, out of it, one dispatch, one interrupt to preempt another.
+    /// assert_eq!(measured.of_an_instance_ns(Preemption::Enabled), Some(3_500));
+    /// ```
+    fn overheads(&self) -> Overheads {
+        Overheads::default()
+    }
 
     /// Returns the time since the platform's start, in nanoseconds.
     fn now_ns(&self) -> u64;

@@ -24,7 +24,8 @@
 //! - An instance's function runs at the instant of its start, and all at once.
 //!   If the instance is preempted in virtual time, its function has long
 //!   returned; `fass::now_ns` inside it counts as if it were not preempted.
-//! - The kernel's own overheads are zero.
+//! - The kernel's own overheads are zero. (The commit's answers can include
+//!   them: [`VirtualTime::overheads`].)
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
@@ -40,7 +41,7 @@ mod session;
 use std::rc::Rc;
 use std::time::Duration;
 
-use fass::{Policy, Preemption};
+use fass::{Overheads, Policy, Preemption};
 pub use sched_dag::{
     CoreId, DagId, DagLabel, DagStatistics, Instance, JobOutcome, SubtaskId, SubtaskLabel,
 };
@@ -129,6 +130,15 @@ impl VirtualTime {
     #[must_use = "the machine itself is returned"]
     pub fn preemption(self, preemption: Preemption) -> Self {
         self.machine.preemption.set(preemption);
+        self
+    }
+
+    /// Sets the costs that the commit adds to each WCET before it answers about
+    /// deadlines: those of the machine that the DAGs are meant for. The run
+    /// itself stays without overheads.
+    #[must_use = "the machine itself is returned"]
+    pub fn overheads(self, overheads: Overheads) -> Self {
+        self.machine.overheads.set(overheads);
         self
     }
 

@@ -10,7 +10,7 @@ use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
 
 use crate::error::RunError;
 use crate::report::Report;
@@ -22,6 +22,7 @@ pub(crate) struct Machine {
     pub(crate) cores: Cell<u32>,
     pub(crate) policy: Cell<Policy>,
     pub(crate) preemption: Cell<Preemption>,
+    pub(crate) overheads: Cell<Overheads>,
     /// The time that functions are told: the start of the instance and what it
     /// has executed.
     pub(crate) now_ns: Cell<u64>,
@@ -46,6 +47,7 @@ pub(crate) fn make_current() -> Rc<Machine> {
         cores: Cell::new(1),
         policy: Cell::new(Policy::Edf),
         preemption: Cell::new(Preemption::Enabled),
+        overheads: Cell::new(Overheads::default()),
         now_ns: Cell::new(0),
         executed_ns: Cell::new(None),
         session: RefCell::new(None),
@@ -85,6 +87,10 @@ impl Platform for HostPlatform {
 
     fn cores(&self) -> u32 {
         current().map_or(1, |machine| machine.cores.get())
+    }
+
+    fn overheads(&self) -> Overheads {
+        current().map_or_else(Overheads::default, |machine| machine.overheads.get())
     }
 
     fn now_ns(&self) -> u64 {

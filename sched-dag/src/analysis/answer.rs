@@ -28,6 +28,8 @@ pub struct Answer {
     ///
     /// A bound stands for itself: DAGs that are not proven do not weaken it.
     pub bounds: Vec<Option<DagBound>>,
+    /// Why a DAG has no bound, in the order of the commit; `None`: it has one.
+    pub reasons: Vec<Option<Reason>>,
     /// The first DAG that is not proven, and why; `None` if all are.
     pub first_failing: Option<NotProven>,
 }
@@ -95,6 +97,11 @@ pub enum Reason {
     /// Certain to fall behind at WCETs: with this DAG, in order of urgency, the
     /// DAGs need more than all cores.
     Overload,
+    /// Another DAG, which may delay this one, is not proven itself.
+    DelayedBy {
+        /// The other DAG.
+        dag: DagId,
+    },
     /// No test bounds the response time by the deadline. That does not say
     /// that deadlines will be missed.
     NoBound,
@@ -172,6 +179,11 @@ impl fmt::Display for Reason {
             Self::Overload => f.write_str(
                 "up to it, the DAGs need more time than all cores have; \
                  add cores, lengthen periods or shorten subtasks",
+            ),
+            Self::DelayedBy { dag } => write!(
+                f,
+                "dag {}, which may delay it, is not proven itself; see to that one first",
+                dag.0
             ),
             Self::NoBound => f.write_str(
                 "no test bounds its response time by its relative deadline (it may still \

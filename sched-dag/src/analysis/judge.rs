@@ -29,6 +29,10 @@
 //! priorities inside, or no preemption), the equation counts younger jobs too.
 //! A response time beyond `in_flight` periods would meet the overrun policy;
 //! it does not count as proven.
+//!
+//! A DAG that cannot be analysed, because it lacks a WCET for example, takes
+//! those with it that it may delay, directly or through others. What is left
+//! is analysed without it: whatever it does, it cannot delay these.
 
 use alloc::vec::Vec;
 
@@ -39,11 +43,12 @@ use super::intra_task::intra_task;
 use super::long_paths::long_paths_among;
 use super::melani::{constrained, widths};
 use super::ratio::Ratio;
+use super::relation::{Mixture, Relation};
 use super::response::{Blocking, Unsolved};
-use super::set::{Set, Solution};
+use super::set::{Failure, Set, Solution};
 use super::task::{Task, TaskError};
 use crate::ids::{DagId, SubtaskId};
-use crate::policy::{Policy, Preemption};
+use crate::policy::Policy;
 use crate::task_set::{Dag, TaskSet};
 
 /// The walks' total of subtasks and edges after which no further long paths
@@ -54,109 +59,178 @@ const LONG_PATHS_STEPS: usize = 1 << 17;
 #[must_use]
 pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
     let dags = task_set.dags();
-    let nothing = |dag: usize, reason: Reason| Answer {
-        bounds: dags.iter().map(|_| None).collect(),
-        first_failing: Some(NotProven {
-            dag: dag_id(dag),
-            reason,
-        }),
-    };
-    if settings.cores == 0 && !dags.is_empty() {
-        return nothing(0, Reason::NoCores);
-    }
-    let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
-    let mut tasks = Vec::with_capacity(dags.len());
-    for (index, dag) in dags.iter().enumerate() {
-        let task = overhead
-            .ok_or(TaskError::VolumeOverflow)
-            .and_then(|overhead_ns| Task::from_dag(dag, overhead_ns));
-        match task {
-            Ok(task) => tasks.push(task),
-            Err(error) => return nothing(index, Reason::Unknown(error)),
-        }
-    }
-    let tasks: Vec<&Task> = tasks.iter().collect();
-    let case = Case::new(dags, &tasks, settings);
-    let solution = case.solve();
-    let mut bounds: Vec<Option<DagBound>> = (0..dags.len())
-        .map(|dag| solution.responses[dag].map(|bound_ns| case.bound(dag, bound_ns)))
+    let relation = Relation::new(dags, settings.policy, settings.preemption);
+    let (tasks, mut reasons) = analysable(dags, &relation, settings);
+    let mut bounds: Vec<Option<DagBound>> = dags.iter().map(|_| None).collect();
+    let mut first_failing = first_unknown(&reasons);
+    let members: Vec<usize> = (0..dags.len())
+        .filter(|&dag| reasons[dag].is_none())
         .collect();
-    if let Some(test) = case.vouching_test() {
-        for (bound, task) in bounds.iter_mut().zip(&tasks) {
-            bound.get_or_insert(DagBound {
-                bound_ns: task.relative_deadline_ns(),
-                test,
-            });
-        }
+    let tasks: Vec<&Task> = members
+        .iter()
+        .filter_map(|&dag| tasks[dag].as_ref())
+        .collect();
+    let case = Case::new(dags, &members, &tasks, relation.among(&members), settings);
+    let verdict = case.verdict();
+    for (position, &dag) in members.iter().enumerate() {
+        bounds[dag] = verdict.bounds[position];
+        reasons[dag] = verdict.reasons[position];
     }
-    let first_failing = case.first_failing(&bounds, &solution);
+    if first_failing.is_none() {
+        first_failing = verdict.first_failing;
+    }
     Answer {
         bounds,
+        reasons,
         first_failing,
     }
 }
 
-/// The DAGs of a commit and what follows from their attributes.
+/// Returns the DAGs as the analysis sees them, and for each that cannot be
+/// analysed the reason: its own, or that it may have to wait for such a one.
+fn analysable(
+    dags: &[Dag],
+    relation: &Relation,
+    settings: &Settings,
+) -> (Vec<Option<Task>>, Vec<Option<Reason>>) {
+    let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
+    let mut tasks = Vec::with_capacity(dags.len());
+    let mut reasons = Vec::with_capacity(dags.len());
+    for dag in dags {
+        let task = overhead
+            .ok_or(TaskError::VolumeOverflow)
+            .and_then(|overhead_ns| Task::from_dag(dag, overhead_ns));
+        reasons.push(match &task {
+            _ if settings.cores == 0 => Some(Reason::NoCores),
+            Ok(_) => None,
+            Err(error) => Some(Reason::Unknown(*error)),
+        });
+        tasks.push(task.ok());
+    }
+    let mut unknown: Vec<usize> = (0..dags.len())
+        .filter(|&dag| reasons[dag].is_some())
+        .collect();
+    let mut seen = 0;
+    while let Some(&other) = unknown.get(seen) {
+        seen += 1;
+        for (dag, reason) in reasons.iter_mut().enumerate() {
+            if reason.is_none() && relation.may_delay(other, dag) {
+                *reason = Some(Reason::DelayedBy { dag: dag_id(other) });
+                unknown.push(dag);
+            }
+        }
+    }
+    (tasks, reasons)
+}
+
+/// Returns the first DAG that cannot be analysed for a reason of its own.
+fn first_unknown(reasons: &[Option<Reason>]) -> Option<NotProven> {
+    let own = |reason: &Reason| !matches!(reason, Reason::DelayedBy { .. });
+    let mut unknown = reasons.iter().enumerate().filter_map(|(dag, reason)| {
+        let reason = reason.filter(own)?;
+        let dag = dag_id(dag);
+        Some(NotProven { dag, reason })
+    });
+    unknown.next()
+}
+
+/// The DAGs that can be analysed, and what follows from their attributes.
 struct Case<'a> {
-    dags: &'a [Dag],
+    /// All DAGs of the commit.
+    all: &'a [Dag],
+    /// Those of this case; elsewhere a DAG is a position in this list.
+    members: &'a [usize],
     tasks: &'a [&'a Task],
     settings: &'a Settings,
+    relation: Relation,
     /// The most urgent DAG first.
     order: Vec<usize>,
-    /// Per DAG the most and the least urgent priority, as numbers.
-    priorities: Vec<(u32, u32)>,
-    preemption: Mixture,
     /// Bounds of DAGs that nothing can delay.
     alone: Vec<Option<DagBound>>,
 }
 
-/// Which subtasks can be preempted.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Mixture {
-    All,
-    None,
-    Some,
-}
-
 impl<'a> Case<'a> {
-    fn new(dags: &'a [Dag], tasks: &'a [&'a Task], settings: &'a Settings) -> Self {
-        let priorities: Vec<(u32, u32)> = dags.iter().map(priority_range).collect();
-        let mut order: Vec<usize> = (0..dags.len()).collect();
+    fn new(
+        all: &'a [Dag],
+        members: &'a [usize],
+        tasks: &'a [&'a Task],
+        relation: Relation,
+        settings: &'a Settings,
+    ) -> Self {
+        let mut order: Vec<usize> = (0..members.len()).collect();
         match settings.policy {
-            Policy::StaticPriority => order.sort_by_key(|&dag| (priorities[dag].0, dag)),
-            Policy::Edf => order.sort_by_key(|&dag| (dags[dag].relative_deadline_ns(), dag)),
+            Policy::StaticPriority => order.sort_by_key(|&dag| (relation.most_urgent(dag), dag)),
+            Policy::Edf => order.sort_by_key(|&dag| (tasks[dag].relative_deadline_ns(), dag)),
         }
         let mut case = Self {
-            dags,
+            all,
+            members,
             tasks,
             settings,
+            relation,
             order,
-            priorities,
-            preemption: mixture(dags, settings.preemption),
             alone: Vec::new(),
         };
-        case.alone = (0..dags.len()).map(|dag| case.alone(dag)).collect();
+        case.alone = (0..members.len()).map(|dag| case.alone(dag)).collect();
         case
     }
 
-    /// Reports whether an instance of `other` may win a core that an instance
-    /// of `dag` waits for.
-    fn may_outrank(&self, other: usize, dag: usize) -> bool {
-        other != dag
-            && match (self.settings.policy, self.preemption) {
-                (Policy::Edf, _) | (_, Mixture::Some) => true,
-                (Policy::StaticPriority, _) => {
-                    (self.priorities[other].0, other) < (self.priorities[dag].1, dag)
+    fn dag(&self, dag: usize) -> &'a Dag {
+        &self.all[self.members[dag]]
+    }
+
+    fn id(&self, dag: usize) -> DagId {
+        dag_id(self.members[dag])
+    }
+
+    /// Answers for the DAGs of this case, by their positions in it; names them
+    /// by their positions in the commit.
+    fn verdict(&self) -> Answer {
+        let solution = self.solve();
+        let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
+            .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
+            .collect();
+        if let Some(test) = self.vouching_test() {
+            for (bound, task) in bounds.iter_mut().zip(self.tasks) {
+                bound.get_or_insert(DagBound {
+                    bound_ns: task.relative_deadline_ns(),
+                    test,
+                });
+            }
+        }
+        let mut reasons: Vec<Option<Reason>> = (bounds.iter().enumerate())
+            .map(|(dag, bound)| match bound {
+                Some(_) => None,
+                None => solution.failures[dag].map(|failure| self.reason(dag, failure)),
+            })
+            .collect();
+        let mut first = solution.first_failing.map(|(dag, _)| dag);
+        if reasons.iter().any(Option::is_some) {
+            for (dag, reason) in self.certain().into_iter().rev() {
+                if bounds[dag].is_none() {
+                    reasons[dag] = Some(reason);
+                    first = Some(dag);
                 }
             }
+        }
+        let first_failing = first.and_then(|dag| {
+            let reason = reasons[dag]?;
+            let dag = self.id(dag);
+            Some(NotProven { dag, reason })
+        });
+        Answer {
+            bounds,
+            reasons,
+            first_failing,
+        }
     }
 
     /// Bounds the response time of a DAG that nothing else can delay.
     fn alone(&self, dag: usize) -> Option<DagBound> {
-        let count = self.dags.len();
-        let undisturbed = self.preemption == Mixture::All
-            && !(0..count).any(|other| self.may_outrank(other, dag));
-        if count > 1 && !undisturbed {
+        let preemption = self.relation.preemption;
+        let mut others = (0..self.members.len()).filter(|&other| other != dag);
+        let blocked = preemption != Mixture::All && self.all.len() > 1;
+        if blocked || others.any(|other| self.relation.may_outrank(other, dag)) {
             return None;
         }
         let (task, cores) = (self.tasks[dag], self.settings.cores);
@@ -166,8 +240,8 @@ impl<'a> Case<'a> {
             bound_ns: long_paths_among(task, cores, paths)?,
             test: Test::Alone,
         };
-        if self.preemption == Mixture::All && self.settings.policy == Policy::StaticPriority {
-            let subtasks = self.dags[dag].subtasks();
+        if preemption == Mixture::All && self.settings.policy == Policy::StaticPriority {
+            let subtasks = self.dag(dag).subtasks();
             let mut order: Vec<usize> = (0..subtasks.len()).collect();
             order.sort_by_key(|&subtask| (subtasks[subtask].priority().0, subtask));
             if let Some(bound_ns) = intra_task(task, &order, cores)
@@ -193,15 +267,14 @@ impl<'a> Case<'a> {
             .map(|bound| bound.map(|bound| bound.bound_ns))
             .collect();
         set.deadlines_limit = self.settings.policy == Policy::Edf
-            && self.preemption != Mixture::Some
+            && self.relation.preemption != Mixture::Some
             && constrained(self.tasks, self.settings.cores);
-        let counts_in_full = |other, dag| self.may_outrank(other, dag) && !set.deadlines_limit;
+        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
+        let counts_in_full = |other, dag| may_outrank(other, dag) && !set.deadlines_limit;
         for (dag, figures) in set.figures.iter_mut().enumerate() {
-            let (most, least) = self.priorities[dag];
-            let unequal = self.settings.policy == Policy::StaticPriority && most != least;
-            figures.younger_may_win = unequal || self.preemption != Mixture::All;
-            figures.allow_in_flight(self.dags[dag].in_flight());
-            if self.preemption == Mixture::None {
+            figures.younger_may_win = self.relation.younger_may_win(dag);
+            figures.allow_in_flight(self.dag(dag).in_flight());
+            if self.relation.preemption == Mixture::None {
                 let others = (0..self.tasks.len()).filter(|&other| other != dag);
                 let blocking = others.filter(|&other| !counts_in_full(other, dag));
                 let wcets = blocking.flat_map(|other| self.tasks[other].wcets_ns().iter().copied());
@@ -209,7 +282,7 @@ impl<'a> Case<'a> {
                     Blocking::by(wcets.collect(), self.settings.cores, self.tasks[dag]);
             }
         }
-        set.solve(&self.order, |other, dag| self.may_outrank(other, dag))
+        set.solve(&self.order, may_outrank)
     }
 
     /// Names the test behind a response time of the set's equations.
@@ -220,7 +293,7 @@ impl<'a> Case<'a> {
         let test = if !constrained(self.tasks, self.settings.cores) {
             Test::Pipelined
         } else {
-            match (self.preemption, self.settings.policy) {
+            match (self.relation.preemption, self.settings.policy) {
                 (Mixture::Some, _) => Test::AnyOrder,
                 (Mixture::None, _) => Test::NonPreemptive,
                 (Mixture::All, Policy::StaticPriority) => Test::FixedPriority,
@@ -233,14 +306,14 @@ impl<'a> Case<'a> {
     /// Returns the utilisation test that accepts the whole set, if one does.
     fn vouching_test(&self) -> Option<Test> {
         let (tasks, cores) = (self.tasks, self.settings.cores);
-        if self.preemption != Mixture::All || !constrained(tasks, cores) {
+        if self.relation.preemption != Mixture::All || !constrained(tasks, cores) {
             return None;
         }
         let (capacity, speed_up) = match self.settings.policy {
             Policy::Edf => (gedf_capacity(tasks, cores), bonifaci_edf(tasks, cores)),
             Policy::StaticPriority => {
                 let pairs = || self.order.windows(2).map(|pair| (pair[0], pair[1]));
-                if pairs().any(|(first, second)| self.may_outrank(second, first)) {
+                if pairs().any(|(first, second)| self.relation.may_outrank(second, first)) {
                     return None;
                 }
                 let by = |time: fn(&Task) -> u64| {
@@ -258,38 +331,28 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// Finds the first DAG without a bound: one that is certain to miss, else
-    /// the first at which the equations failed.
-    fn first_failing(&self, bounds: &[Option<DagBound>], solution: &Solution) -> Option<NotProven> {
-        let any_open = bounds.iter().any(Option::is_none);
-        let (dag, reason) = match solution.first_failing {
-            _ if !any_open => return None,
-            Some((dag, why)) => (dag, self.reason(dag, why)),
-            None => return None,
-        };
-        let (dag, reason) = self.certain().unwrap_or((dag, reason));
-        Some(NotProven {
-            dag: dag_id(dag),
-            reason,
-        })
-    }
-
-    fn reason(&self, dag: usize, why: Unsolved) -> Reason {
+    fn reason(&self, dag: usize, failure: Failure) -> Reason {
         let task = self.tasks[dag];
-        let in_flight = self.dags[dag].in_flight();
+        let in_flight = self.dag(dag).in_flight();
         let room = u128::from(in_flight) * u128::from(task.period_ns());
-        match why {
-            Unsolved::Limit => Reason::Limit,
-            Unsolved::BeyondDeadline if room < u128::from(task.relative_deadline_ns()) => {
+        match failure {
+            Failure::Other(other) => Reason::DelayedBy {
+                dag: self.id(other),
+            },
+            Failure::Own(Unsolved::Limit) => Reason::Limit,
+            Failure::Own(Unsolved::BeyondDeadline)
+                if room < u128::from(task.relative_deadline_ns()) =>
+            {
                 Reason::InFlightTooFew { in_flight }
             }
-            Unsolved::BeyondDeadline => Reason::NoBound,
+            Failure::Own(Unsolved::BeyondDeadline) => Reason::NoBound,
         }
     }
 
-    /// Finds the first DAG, by urgency, that cannot keep up at WCETs.
-    fn certain(&self) -> Option<(usize, Reason)> {
-        for &dag in &self.order {
+    /// Finds the DAGs that cannot keep up at WCETs: by urgency those that could
+    /// not even alone, then the first at which the cores do not suffice.
+    fn certain(&self) -> Vec<(usize, Reason)> {
+        let hopeless = |&dag: &usize| {
             let task = self.tasks[dag];
             let length_ns = task.length_ns();
             if length_ns > task.relative_deadline_ns() {
@@ -297,43 +360,25 @@ impl<'a> Case<'a> {
             }
             let ids = (0_u32..).map(SubtaskId).zip(task.wcets_ns());
             let mut long = ids.filter(|&(_, &wcet)| wcet > task.period_ns());
-            if let Some((subtask, _)) = long.next() {
-                return Some((dag, Reason::SubtaskBeyondPeriod { subtask }));
-            }
-        }
+            let (subtask, _) = long.next()?;
+            Some((dag, Reason::SubtaskBeyondPeriod { subtask }))
+        };
+        let mut certain: Vec<(usize, Reason)> = self.order.iter().filter_map(hopeless).collect();
         let cores = u128::from(self.settings.cores);
         let mut used = Vec::new();
         for &dag in &self.order {
             used.push((self.tasks[dag].volume_ns(), self.tasks[dag].period_ns()));
-            let sum = Ratio::sum(used.iter().copied())?;
+            let Some(sum) = Ratio::sum(used.iter().copied()) else {
+                break;
+            };
             if !sum.at_most(cores, 1) {
-                return Some((dag, Reason::Overload));
+                if certain.iter().all(|&(hopeless, _)| hopeless != dag) {
+                    certain.push((dag, Reason::Overload));
+                }
+                break;
             }
         }
-        None
-    }
-}
-
-fn priority_range(dag: &Dag) -> (u32, u32) {
-    let numbers = || dag.subtasks().iter().map(|subtask| subtask.priority().0);
-    (numbers().min().unwrap_or(0), numbers().max().unwrap_or(0))
-}
-
-fn mixture(dags: &[Dag], preemption: Preemption) -> Mixture {
-    let mut subtasks = dags.iter().flat_map(Dag::subtasks);
-    let keeps = |non_preemptive: bool| non_preemptive || preemption == Preemption::Disabled;
-    let Some(first) = subtasks
-        .next()
-        .map(|first| keeps(first.is_non_preemptive()))
-    else {
-        return Mixture::All;
-    };
-    if subtasks.any(|other| keeps(other.is_non_preemptive()) != first) {
-        Mixture::Some
-    } else if first {
-        Mixture::None
-    } else {
-        Mixture::All
+        certain
     }
 }
 

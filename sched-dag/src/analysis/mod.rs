@@ -19,7 +19,7 @@
 //! | `pipelined` | overlapping jobs, `D > T` | derived here |
 //! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
 //! | `federated` | dedicated cores, as an offer | Li 2014; Baruah 2015 |
-//! | `judge`, `answer`, `overheads` | the verdict at commit | |
+//! | `judge`, `relation`, `answer`, `overheads` | the verdict at commit | |
 //!
 //! Each module cites its paper and states its assumptions and the traps that it
 //! avoids. The functions for single tests take [`Task`]s in priority order and
@@ -65,6 +65,7 @@ mod overheads;
 mod pipelined;
 mod ratio;
 mod refusal;
+mod relation;
 mod response;
 mod set;
 mod task;

@@ -43,6 +43,17 @@ pub(super) struct Solution {
     pub(super) responses: Vec<Option<u64>>,
     /// The DAG that failed first, on its own account.
     pub(super) first_failing: Option<(usize, Unsolved)>,
+    /// Why a DAG has no response time, by DAG.
+    pub(super) failures: Vec<Option<Failure>>,
+}
+
+/// Why a DAG has no response-time bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Failure {
+    /// Its own equation has no usable solution.
+    Own(Unsolved),
+    /// This DAG may outrank it and has no bound itself.
+    Other(usize),
 }
 
 impl<'a> Set<'a> {
@@ -72,6 +83,7 @@ impl<'a> Set<'a> {
         let mut responses: Vec<Option<u64>> =
             (0..self.tasks.len()).map(|dag| self.start(dag)).collect();
         let mut first_failing = None;
+        let mut failures = alloc::vec![None; self.tasks.len()];
         let mut steps = STEP_LIMIT;
         let mut changed = true;
         while changed {
@@ -81,17 +93,16 @@ impl<'a> Set<'a> {
                     continue;
                 };
                 let after = match self.interference(dag, &responses, &may_outrank) {
-                    None => None,
-                    Some(others) => {
-                        match self.figures[dag].solve(&others, before, self.form, &mut steps) {
-                            Ok(response) => Some(response),
-                            Err(why) => {
-                                first_failing.get_or_insert((dag, why));
-                                None
-                            }
-                        }
-                    }
+                    Err(other) => Err(Failure::Other(other)),
+                    Ok(others) => self.figures[dag]
+                        .solve(&others, before, self.form, &mut steps)
+                        .map_err(|why| {
+                            first_failing.get_or_insert((dag, why));
+                            Failure::Own(why)
+                        }),
                 };
+                failures[dag] = after.err();
+                let after = after.ok();
                 changed |= after != responses[dag];
                 responses[dag] = after;
             }
@@ -101,10 +112,12 @@ impl<'a> Set<'a> {
         {
             responses = coarse;
             first_failing = None;
+            failures.fill(None);
         }
         Solution {
             responses,
             first_failing,
+            failures,
         }
     }
 
@@ -130,7 +143,7 @@ impl<'a> Set<'a> {
             if let known @ Some(_) = self.known[dag] {
                 return Some(known);
             }
-            let others = self.interference(dag, &deadlines, &may_outrank)?;
+            let others = self.interference(dag, &deadlines, &may_outrank).ok()?;
             self.figures[dag]
                 .solve(&others, 0, self.form, &mut steps)
                 .ok()
@@ -139,25 +152,25 @@ impl<'a> Set<'a> {
         bounds.collect()
     }
 
-    /// Returns the workloads of the DAGs that may outrank `dag`, or `None` if
-    /// one of them has no bound.
+    /// Returns the workloads of the DAGs that may outrank `dag`, or the first of
+    /// these that has no bound.
     fn interference(
         &self,
         dag: usize,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Option<Vec<Workload>> {
+    ) -> Result<Vec<Workload>, usize> {
         let others = (0..self.tasks.len()).filter(|&other| other != dag && may_outrank(other, dag));
         let workloads = others.map(|other| {
             let task = self.tasks[other];
             let workload = Workload::new(
                 task,
-                responses[other]?,
+                responses[other].ok_or(other)?,
                 self.parallelism[other],
                 self.cores,
                 self.form,
             );
-            Some(if self.deadlines_limit {
+            Ok(if self.deadlines_limit {
                 let deadline = self.tasks[dag].relative_deadline_ns();
                 workload.under_edf(task.relative_deadline_ns(), deadline)
             } else {

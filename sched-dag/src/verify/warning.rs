@@ -32,6 +32,14 @@ pub enum Warning {
     },
     /// Two DAGs with one name.
     DuplicateDagName { first: DagLabel, second: DagLabel },
+    /// The analysis is certain that the DAG cannot keep its deadlines when
+    /// every instance takes its WCET. Not from [`verify`](crate::verify), which
+    /// does not analyse, but from whoever does.
+    CertainMiss {
+        dag: DagLabel,
+        /// Why, in words, with the remedy.
+        reason: String,
+    },
 }
 
 impl Warning {
@@ -43,6 +51,7 @@ impl Warning {
             Self::EqualPriorities { .. } => "equal_priorities",
             Self::UnreadSinkValue { .. } => "unread_sink_value",
             Self::DuplicateDagName { .. } => "duplicate_dag_name",
+            Self::CertainMiss { .. } => "certain_miss",
         }
     }
 }
@@ -77,6 +86,9 @@ impl fmt::Display for Warning {
                 "two dags are named `{}` (number {} and {}); rename one",
                 first.name, first.id.0, second.id.0
             ),
+            Self::CertainMiss { dag, reason } => {
+                write!(f, "{dag} cannot keep its deadlines at its WCETs: {reason}")
+            }
         }
     }
 }

@@ -13,7 +13,7 @@ mod simulate;
 mod worked;
 
 use sched_dag::analysis::{Overheads, Reason, Settings, Test, answer};
-use sched_dag::{Policy, Preemption};
+use sched_dag::{DagId, Policy, Preemption};
 
 use random::{Random, Sample, sample};
 use simulate::{commit, responses, spec};
@@ -226,6 +226,51 @@ fn reasons_name_the_first_failing_dag() {
     let wide = spec(100, 20, &[10, 10, 10], &[], 1);
     let no_bound = reason(&[light.clone(), light, wide], 1).unwrap();
     assert_eq!((no_bound.dag.0, no_bound.reason), (2, Reason::NoBound));
+}
+
+#[test]
+fn a_dag_without_wcets_leaves_those_that_it_cannot_delay_proven() {
+    let urgent = spec(100, 100, &[10], &[], 0);
+    let mut unknown = spec(100, 100, &[10], &[], 1);
+    unknown.subtasks[0].wcet_ns = None;
+    let lax = spec(100, 100, &[10], &[], 2);
+    let specs = [urgent, unknown, lax];
+    let reasons = |kind: (Policy, Preemption)| {
+        let task_set = commit(&specs, kind.0, 1);
+        let answer = answer(&task_set, &settings(kind, 1));
+        for (bound, reason) in answer.bounds.iter().zip(&answer.reasons) {
+            assert_ne!(bound.is_some(), reason.is_some());
+        }
+        let first = answer.first_failing.expect("one is unknown");
+        assert_eq!((first.dag.0, Some(first.reason)), (1, answer.reasons[1]));
+        answer.reasons
+    };
+    let delayed = Some(Reason::DelayedBy { dag: DagId(1) });
+    let preemptive = reasons(FP);
+    assert_eq!((preemptive[0], preemptive[2]), (None, delayed));
+    // It may hold a core that the urgent one waits for.
+    let blocked = reasons((Policy::StaticPriority, Preemption::Disabled));
+    assert_eq!((blocked[0], blocked[2]), (delayed, delayed));
+    let edf = reasons((Policy::Edf, Preemption::Enabled));
+    assert_eq!((edf[0], edf[2]), (delayed, delayed));
+}
+
+#[test]
+fn each_dag_without_a_bound_has_its_own_reason() {
+    let wide = spec(100, 20, &[10, 10, 10], &[], 0);
+    let behind_it = spec(100, 100, &[1], &[], 1);
+    let long = spec(100, 10, &[6, 6], &[(0, 1)], 2);
+    let task_set = commit(&[wide, behind_it, long], FP.0, 1);
+    let answer = answer(&task_set, &settings(FP, 1));
+    let length_ns = 12;
+    let expected = [
+        Some(Reason::NoBound),
+        Some(Reason::DelayedBy { dag: DagId(0) }),
+        Some(Reason::LengthBeyondDeadline { length_ns }),
+    ];
+    assert_eq!(answer.reasons, expected);
+    // What is certain to fail comes first.
+    assert_eq!(answer.first_failing.map(|failing| failing.dag.0), Some(2));
 }
 
 #[test]

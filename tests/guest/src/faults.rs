@@ -72,6 +72,7 @@ pub const CASES: &[Case] = &[
         dag.offset(Duration::from_nanos(u64::MAX));
         vec![dag]
     }),
+    ("not_proven", not_proven),
     ("already_committed", already_committed),
 ];
 
@@ -321,6 +322,17 @@ fn priorities_exhausted() -> Vec<Dag> {
     let store = SubtaskAttributes::named("store").priority(u32::MAX);
     given.register_sink_subtask(|(_,): (u32,)| (), vec!["echoes"], PERIOD, store);
     vec![given, sound("lidar", "points")]
+}
+
+/// No number of cores helps a subtask that takes longer than a period.
+fn not_proven() -> Vec<Dag> {
+    let dag = named("lidar");
+    dag.demand_proof();
+    let read = SubtaskAttributes::named("read").wcet(PERIOD / 10);
+    dag.register_periodic_subtask(|| (1_u32,), vec!["points"], PERIOD, read);
+    let store = SubtaskAttributes::named("store").wcet(PERIOD * 2);
+    dag.register_sink_subtask(|(_,): (u32,)| (), vec!["points"], PERIOD * 4, store);
+    vec![dag]
 }
 
 fn already_committed() -> Vec<Dag> {

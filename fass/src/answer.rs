@@ -1,0 +1,295 @@
+//! What the commit answers about deadlines.
+//!
+//! Where WCETs are given, the commit asks `sched_dag::analysis` for the model
+//! that the platform will run: its policy, its preemption, its cores and its
+//! overheads. The answer for a DAG is a *bound*, the most time that any of its
+//! jobs takes from its release to its completion, with the test that proves it;
+//! or that there is no proof, and why. *Not proven* is not *infeasible*: all
+//! tests are sufficient ones.
+//!
+//! # What follows from an answer
+//!
+//! - By itself nothing: DAGs that are not proven are launched as others are.
+//!   Whether a proof is needed is for the app to say, with
+//!   [`Dag::demand_proof`](crate::Dag::demand_proof); then its lack is a fault.
+//! - A DAG that is *certain* to miss its deadlines at its WCETs is launched as
+//!   well, with a warning. A WCET may be far above what instances take, and
+//!   overload has its rules (the overrun policy), so it is no mistake by
+//!   itself. Two exceptions are faults of the model whatever is demanded: the
+//!   WCET of a single subtask beyond the deadline, and times that overflow.
+//! - A DAG without all its WCETs is not analysed, and neither are those that
+//!   it may delay; they are not proven.
+
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use sched_dag::analysis::{self, Reason, Settings, TaskError, Test};
+use sched_dag::{DagId, DagLabel, SubtaskId, SubtaskLabel, TaskSet};
+
+use crate::platform::Platform;
+
+/// What is known at commit about the deadlines of one DAG.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, Verdict, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// let period = Duration::from_millis(10);
+/// let taking = |name, ms| SubtaskAttributes::named(name).wcet(Duration::from_millis(ms));
+/// dag.name("demo");
+/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, taking("source", 2));
+/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, taking("sink", 3));
+///
+/// let commit = finish_create_dags(&[dag]).unwrap();
+/// let answer = &commit.answers()[0];
+/// assert!(matches!(
+///     answer.verdict,
+///     Verdict::Proven { bound, .. } if bound == Duration::from_millis(5)
+/// ));
+/// assert_eq!(
+///     answer.to_string(),
+///     "dag `demo` takes at most 5000000 ns, by long paths (He et al. 2022)"
+/// );
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// The DAG.
+    pub dag: DagLabel,
+    /// What is known.
+    pub verdict: Verdict,
+}
+
+/// Whether a DAG is proven to meet its deadlines.
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Test, Verdict};
+///
+/// let bound = Duration::from_millis(5);
+/// let verdict = Verdict::Proven { bound, test: Test::Edf };
+/// assert_eq!(verdict.bound(), Some(bound));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Every job is complete within a bound, which is at most the deadline, as
+    /// long as no instance takes longer than its WCET.
+    Proven {
+        /// The most time from a job's nominal release to its completion.
+        bound: Duration,
+        /// The test that gave it.
+        test: Test,
+    },
+    /// No test gives a bound.
+    NotProven(Unproven),
+}
+
+/// Why a DAG is not proven to meet its deadlines, with names.
+///
+/// Its `Display` states the fact and what to do about it.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, Verdict, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// let period = Duration::from_millis(10);
+/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
+/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::named("sink"));
+///
+/// let commit = finish_create_dags(&[dag]).unwrap();
+/// let Verdict::NotProven(unproven) = &commit.answers()[0].verdict else {
+///     panic!("nothing is known about its execution times");
+/// };
+/// assert_eq!(
+///     unproven.to_string(),
+///     "subtask `source` has no WCET; give every subtask one to have the dag analysed"
+/// );
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unproven {
+    reason: Reason,
+    /// The subtask that the reason is about.
+    subtask: Option<SubtaskLabel>,
+    /// The other DAG that the reason is about.
+    other: Option<DagLabel>,
+}
+
+impl Verdict {
+    /// Returns the bound, if there is one.
+    ///
+    /// See [`Verdict`].
+    #[must_use]
+    pub const fn bound(&self) -> Option<Duration> {
+        match self {
+            Self::Proven { bound, .. } => Some(*bound),
+            Self::NotProven(_) => None,
+        }
+    }
+
+    /// Returns why there is no bound, if there is none.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{Test, Verdict};
+    ///
+    /// let bound = Duration::from_millis(5);
+    /// assert_eq!(Verdict::Proven { bound, test: Test::Edf }.unproven(), None);
+    /// ```
+    #[must_use]
+    pub const fn unproven(&self) -> Option<&Unproven> {
+        match self {
+            Self::Proven { .. } => None,
+            Self::NotProven(unproven) => Some(unproven),
+        }
+    }
+}
+
+impl Unproven {
+    /// Returns the reason, by which a program may decide.
+    ///
+    /// ```
+    /// use fass::{Reason, Unproven};
+    ///
+    /// fn is_worth_another_core(unproven: &Unproven) -> bool {
+    ///     matches!(unproven.reason(), Reason::NoBound | Reason::Overload)
+    /// }
+    /// ```
+    #[must_use]
+    pub const fn reason(&self) -> Reason {
+        self.reason
+    }
+
+    /// Reports whether deadlines will be missed when every instance takes its
+    /// WCET, rather than merely not being proven to be met.
+    ///
+    /// ```
+    /// use fass::{Answer, Unproven};
+    ///
+    /// fn is_hopeless(answer: &Answer) -> bool {
+    ///     answer.verdict.unproven().is_some_and(Unproven::is_certain)
+    /// }
+    /// ```
+    #[must_use]
+    pub const fn is_certain(&self) -> bool {
+        self.reason.is_certain()
+    }
+
+    fn new(task_set: &TaskSet, dag: DagId, reason: Reason) -> Self {
+        let subtask = match reason {
+            Reason::Unknown(TaskError::MissingWcet { subtask })
+            | Reason::SubtaskBeyondPeriod { subtask } => Some(subtask),
+            _ => None,
+        };
+        let other = match reason {
+            Reason::DelayedBy { dag } => Some(dag),
+            _ => None,
+        };
+        Self {
+            reason,
+            subtask: subtask.map(|subtask| subtask_label(task_set, dag, subtask)),
+            other: other.map(|other| dag_label(task_set, other)),
+        }
+    }
+}
+
+/// The answers of one commit.
+#[derive(Clone, Debug)]
+pub(crate) struct Answers {
+    pub(crate) of_dags: Vec<Answer>,
+    /// The position of the first DAG that fails.
+    pub(crate) first_unproven: Option<usize>,
+}
+
+impl Answers {
+    /// Analyses what a platform will run.
+    pub(crate) fn new(task_set: &TaskSet, platform: &dyn Platform) -> Self {
+        let settings = Settings {
+            policy: platform.policy(),
+            preemption: platform.preemption(),
+            cores: platform.cores(),
+            overheads: platform.overheads(),
+        };
+        let answer = analysis::answer(task_set, &settings);
+        let found = answer.bounds.iter().zip(&answer.reasons);
+        let of_dags = (0..).map(DagId).zip(found).map(|(dag, (bound, reason))| {
+            let verdict = match (bound, reason) {
+                (Some(bound), _) => Verdict::Proven {
+                    bound: Duration::from_nanos(bound.bound_ns),
+                    test: bound.test,
+                },
+                (None, reason) => {
+                    let reason = reason.unwrap_or(Reason::NoBound);
+                    Verdict::NotProven(Unproven::new(task_set, dag, reason))
+                }
+            };
+            let dag = dag_label(task_set, dag);
+            Answer { dag, verdict }
+        });
+        Self {
+            of_dags: of_dags.collect(),
+            first_unproven: answer.first_failing.map(|failing| failing.dag.index()),
+        }
+    }
+
+    /// Returns the warnings that follow: DAG and reason of what is certain.
+    pub(crate) fn certain_misses(&self) -> impl Iterator<Item = (DagLabel, String)> {
+        self.of_dags.iter().filter_map(|answer| {
+            let unproven = answer.verdict.unproven()?;
+            let certain = unproven.is_certain();
+            certain.then(|| (answer.dag.clone(), unproven.to_string()))
+        })
+    }
+}
+
+fn dag_label(task_set: &TaskSet, id: DagId) -> DagLabel {
+    let name = task_set.dag(id).name().into();
+    DagLabel { id, name }
+}
+
+fn subtask_label(task_set: &TaskSet, dag: DagId, id: SubtaskId) -> SubtaskLabel {
+    let name = task_set.dag(dag).subtask(id).name().into();
+    SubtaskLabel { id, name }
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let dag = &self.dag;
+        match &self.verdict {
+            Verdict::Proven { bound, test } => {
+                write!(f, "{dag} takes at most {} ns, by {test}", bound.as_nanos())
+            }
+            Verdict::NotProven(unproven) => {
+                write!(f, "{dag} is not proven to meet its deadlines: {unproven}")
+            }
+        }
+    }
+}
+
+impl fmt::Display for Unproven {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.reason, &self.subtask, &self.other) {
+            (Reason::Unknown(TaskError::MissingWcet { .. }), Some(subtask), _) => write!(
+                f,
+                "{subtask} has no WCET; give every subtask one to have the dag analysed"
+            ),
+            (Reason::SubtaskBeyondPeriod { .. }, Some(subtask), _) => write!(
+                f,
+                "{subtask} alone takes more than a period; split it or lengthen the period"
+            ),
+            (Reason::DelayedBy { .. }, _, Some(other)) => write!(
+                f,
+                "{other}, which may delay it, is not proven itself; see to that one first"
+            ),
+            (reason, _, _) => reason.fmt(f),
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Which DAG may delay which.
+//!
+//! It depends on the policy, on the priorities and on which subtasks can be
+//! preempted, not on any execution time; so it is known also for DAGs that
+//! cannot be analysed. See `judge` for why each case is sound.
+
+use alloc::vec::Vec;
+
+use crate::policy::{Policy, Preemption};
+use crate::task_set::Dag;
+
+/// The relation between the DAGs of a commit, by their positions.
+#[derive(Clone, Debug)]
+pub(super) struct Relation {
+    policy: Policy,
+    pub(super) preemption: Mixture,
+    /// Per DAG the most and the least urgent priority, as numbers.
+    priorities: Vec<(u32, u32)>,
+}
+
+/// Which subtasks can be preempted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mixture {
+    All,
+    None,
+    Some,
+}
+
+impl Relation {
+    pub(super) fn new(dags: &[Dag], policy: Policy, preemption: Preemption) -> Self {
+        Self {
+            policy,
+            preemption: mixture(dags, preemption),
+            priorities: dags.iter().map(priority_range).collect(),
+        }
+    }
+
+    /// Returns the relation between some of the DAGs, by their positions among
+    /// these. The others still are on the machine: what can be preempted stays.
+    pub(super) fn among(&self, members: &[usize]) -> Self {
+        Self {
+            priorities: members.iter().map(|&dag| self.priorities[dag]).collect(),
+            ..*self
+        }
+    }
+
+    /// Reports whether an instance of `other` may win a core that an instance
+    /// of `dag` waits for.
+    pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
+        other != dag
+            && match (self.policy, self.preemption) {
+                (Policy::Edf, _) | (_, Mixture::Some) => true,
+                (Policy::StaticPriority, _) => {
+                    (self.priorities[other].0, other) < (self.priorities[dag].1, dag)
+                }
+            }
+    }
+
+    /// Reports whether `dag` may have to wait for `other`, be it only because
+    /// an instance of `other` keeps its core.
+    pub(super) fn may_delay(&self, other: usize, dag: usize) -> bool {
+        other != dag && (self.preemption != Mixture::All || self.may_outrank(other, dag))
+    }
+
+    /// Returns the number of the most urgent priority in a DAG.
+    pub(super) fn most_urgent(&self, dag: usize) -> u32 {
+        self.priorities[dag].0
+    }
+
+    /// Reports whether a younger job of a DAG may win over an older one.
+    pub(super) fn younger_may_win(&self, dag: usize) -> bool {
+        let (most, least) = self.priorities[dag];
+        let unequal = self.policy == Policy::StaticPriority && most != least;
+        unequal || self.preemption != Mixture::All
+    }
+}
+
+fn priority_range(dag: &Dag) -> (u32, u32) {
+    let numbers = || dag.subtasks().iter().map(|subtask| subtask.priority().0);
+    (numbers().min().unwrap_or(0), numbers().max().unwrap_or(0))
+}
+
+fn mixture(dags: &[Dag], preemption: Preemption) -> Mixture {
+    let mut subtasks = dags.iter().flat_map(Dag::subtasks);
+    let keeps = |non_preemptive: bool| non_preemptive || preemption == Preemption::Disabled;
+    let Some(first) = subtasks
+        .next()
+        .map(|first| keeps(first.is_non_preemptive()))
+    else {
+        return Mixture::All;
+    };
+    if subtasks.any(|other| keeps(other.is_non_preemptive()) != first) {
+        Mixture::Some
+    } else if first {
+        Mixture::None
+    } else {
+        Mixture::All
+    }
+}
