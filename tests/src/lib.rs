@@ -24,6 +24,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bench;
 pub mod child;
 pub mod elf;
 pub mod fault_page;

@@ -30,6 +30,11 @@ const SUBCOMMANDS: &[(&str, &str, Work)] = &[
         "compare reference cases with the scheduler and its analysis",
         harness::oracle::oracle,
     ),
+    (
+        "bench",
+        "measure parts of the project on this host",
+        harness::bench::bench,
+    ),
 ];
 
 fn main() -> ExitCode {

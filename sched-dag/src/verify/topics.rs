@@ -35,6 +35,29 @@ struct End<'a> {
     port: &'a TopicPort,
 }
 
+/// The ends of one topic in one DAG, at most one of each kind a subtask.
+#[derive(Default)]
+struct Sides<'a> {
+    writers: Vec<End<'a>>,
+    readers: Vec<End<'a>>,
+}
+
+impl<'a> Sides<'a> {
+    fn fill(&mut self, ends: &[End<'a>]) {
+        self.writers.clear();
+        self.readers.clear();
+        for end in ends {
+            let side = match end.direction {
+                Direction::Output => &mut self.writers,
+                Direction::Input => &mut self.readers,
+            };
+            if side.last().is_none_or(|last| last.subtask != end.subtask) {
+                side.push(*end);
+            }
+        }
+    }
+}
+
 /// Checks all topics and returns what they say, one entry a DAG.
 pub(super) fn check<'a>(
     specs: &'a [DagSpec],
@@ -43,6 +66,9 @@ pub(super) fn check<'a>(
 ) -> Vec<Topology<'a>> {
     let mut topologies = vec![Topology::default(); specs.len()];
     let (ends, starts) = ends_by_topic(specs);
+    // Filled anew for each topic, so that many topics do not mean as many
+    // allocations.
+    let mut sides = Sides::default();
     for range in starts.windows(2) {
         let ends = &ends[range[0]..range[1]];
         let shared = ends.iter().any(|end| end.dag != ends[0].dag);
@@ -51,7 +77,9 @@ pub(super) fn check<'a>(
         }
         for ends in ends.chunk_by(|one, other| one.dag == other.dag) {
             let topology = &mut topologies[ends[0].dag];
-            check_topic(specs, options, ends, shared, topology, findings);
+            sides.fill(ends);
+            report_duplicates(specs, ends, findings);
+            check_topic(specs, options, &sides, shared, topology, findings);
         }
     }
     topologies
@@ -113,16 +141,16 @@ fn report_shared(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Findings) {
 fn check_topic<'a>(
     specs: &'a [DagSpec],
     options: &CommitOptions,
-    ends: &[End<'a>],
+    sides: &Sides<'a>,
     shared: bool,
     topology: &mut Topology<'a>,
     findings: &mut Findings,
 ) {
-    report_duplicates(specs, ends, findings);
-    let writers = distinct(ends, Direction::Output);
-    let readers = distinct(ends, Direction::Input);
-    let dag = ends[0].dag;
-    let topic = &ends[0].port.topic;
+    let Sides { writers, readers } = sides;
+    let Some(End { dag, port, .. }) = writers.first().or(readers.first()).copied() else {
+        return;
+    };
+    let topic = &port.topic;
     let dag_label = || DagLabel::new(specs, dag);
     let label = |end: &End<'_>| SubtaskLabel::new(&specs[dag], end.subtask);
 
@@ -139,7 +167,7 @@ fn check_topic<'a>(
     match (writers.first(), readers.first()) {
         (Some(writer), None) if !shared => topology.unread.push((writer.subtask, topic)),
         (None, Some(_)) if !shared => {
-            for reader in &readers {
+            for reader in readers {
                 findings.fault(
                     dag,
                     Fault::UnwrittenTopic {
@@ -151,12 +179,13 @@ fn check_topic<'a>(
             }
         }
         (Some(_), Some(_)) => {
-            report_mismatches(specs, &writers, &readers, findings);
-            add_edges(specs, options, &writers, &readers, topology, findings);
+            report_mismatches(specs, writers, readers, findings);
+            add_edges(specs, options, writers, readers, topology, findings);
         }
         _ => {}
     }
-    if readers.len() > 1 && ends.iter().any(|end| !end.port.can_fan_out) {
+    let mut ends = writers.iter().chain(readers);
+    if readers.len() > 1 && ends.any(|end| !end.port.can_fan_out) {
         findings.fault(
             dag,
             Fault::SeveralReaders {
@@ -187,17 +216,6 @@ fn report_duplicates(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Finding
             );
         }
     }
-}
-
-/// Returns the ends of one direction, one a subtask.
-fn distinct<'a>(ends: &[End<'a>], direction: Direction) -> Vec<End<'a>> {
-    let mut found: Vec<End<'a>> = ends
-        .iter()
-        .filter(|end| end.direction == direction)
-        .copied()
-        .collect();
-    found.dedup_by_key(|end| end.subtask);
-    found
 }
 
 /// Compares every reader with the first writer, and every further writer with

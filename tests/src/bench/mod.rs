@@ -1,0 +1,61 @@
+//! Measurements on the host, for people and for machines.
+//!
+//! `bench WHAT` measures one part of the project on this host, in this build,
+//! and prints a table and one JSON object a figure. Absolute times depend on
+//! the host; the figures that have a limit are ratios of times taken in the
+//! same run. The exit code is 0 if all limits hold, 1 if one does not, and 2 for
+//! a refused command line.
+//!
+//! - [`scheduler`]: the commit, and the cost of a dispatched instance.
+
+pub mod scheduler;
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+const USAGE: &str = "usage: bench WHAT
+
+Measures on this host and prints a table and a JSON object for each figure.
+WHAT is one of:
+  scheduler   the commit of a large DAG, and the cost of a dispatched instance
+
+Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.
+";
+
+/// Runs the subcommand.
+#[must_use]
+pub fn bench(words: &[String]) -> ExitCode {
+    if words.iter().any(|word| word == "--help" || word == "-h") {
+        print!("{USAGE}");
+        return ExitCode::SUCCESS;
+    }
+    match words {
+        [] => refuse("measure what?"),
+        [what] if what == "scheduler" => scheduler::run(),
+        [what] => refuse(&format!("nothing to measure is called `{what}`")),
+        [_, unexpected, ..] => refuse(&format!("`{unexpected}` is one word too many")),
+    }
+}
+
+fn refuse(reason: &str) -> ExitCode {
+    eprint!("bench: {reason}\n{USAGE}");
+    ExitCode::from(2)
+}
+
+/// Returns how long `work` takes.
+fn time<T>(work: impl FnOnce() -> T) -> Duration {
+    let start = Instant::now();
+    std::hint::black_box(work());
+    start.elapsed()
+}
+
+/// Returns the median, which a few interrupted rounds do not move.
+fn median(mut durations: Vec<Duration>) -> Duration {
+    durations.sort_unstable();
+    durations[durations.len() / 2]
+}
+
+/// Returns how many times `one` is as long as `other`.
+fn ratio(one: Duration, other: Duration) -> f64 {
+    one.as_secs_f64() / other.as_secs_f64()
+}
