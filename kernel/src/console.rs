@@ -75,9 +75,14 @@ pub fn write(text: fmt::Arguments<'_>) {
     }
 }
 
+/// Reports whether anything waits to be sent.
+pub(crate) fn has_pending() -> bool {
+    PENDING.load(Ordering::Acquire)
+}
+
 /// Sends one byte that waits, if any, and reports whether it did.
 pub(crate) fn send_pending_byte() -> bool {
-    if !PENDING.load(Ordering::Acquire) {
+    if !has_pending() {
         return false;
     }
     let mut buffer = BUFFER.lock();

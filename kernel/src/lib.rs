@@ -42,6 +42,7 @@
 extern crate alloc;
 
 pub mod console;
+mod contexts;
 #[doc(hidden)]
 pub mod entry;
 mod execution;

@@ -84,7 +84,7 @@ impl Machine {
         console::defer();
         execution::arm_next_event();
         let mut progress = Progress { total, printed: 0 };
-        worker::work(execution::is_finished, || progress.print_when_due());
+        worker::wait_in_background(|| progress.print_when_due());
         let allocations = heap::usage().allocations - allocations_before;
         let dropped = console::resume();
         if dropped > 0 {

@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use crate::console::write_in_emergency;
 use crate::machine::fault::Exception;
 use crate::machine::{cpu, exit, local_apic, this_core};
-use crate::{execution, json, worker};
+use crate::{execution, json};
 
 static PANICKING: AtomicBool = AtomicBool::new(false);
 
@@ -55,13 +55,13 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display) -> ! {
         local_apic::send_stop_to_others();
     }
     let index = core.map_or(0, |core| core.index);
-    let instance = core.and_then(worker::running);
+    let instance = core.and_then(execution::running);
     write_in_emergency(format_args!(
         "\nkernel {what} on core {index}: {message}\n  at {place}\n"
     ));
     if let Some(instance) = instance {
         write_in_emergency(format_args!("  in {instance}\n"));
-        execution::try_names(instance.dag, instance.subtask.index(), |dag, subtask| {
+        execution::try_names(instance, |dag, subtask| {
             write_in_emergency(format_args!(
                 "  that is subtask `{subtask}` of DAG `{dag}`\n"
             ));

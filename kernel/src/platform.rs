@@ -13,16 +13,25 @@ use crate::{execution, worker};
 pub(crate) struct Kernel {
     /// Whether instances are ordered by deadline rather than by priority.
     edf: AtomicBool,
+    /// Whether a started instance may lose its core.
+    preemptive: AtomicBool,
 }
 
 pub(crate) static KERNEL: Kernel = Kernel {
     edf: AtomicBool::new(false),
+    preemptive: AtomicBool::new(true),
 };
 
 impl Kernel {
     /// Chooses the policy of the commits to come.
     pub(crate) fn set_policy(&self, policy: Policy) {
         self.edf.store(policy == Policy::Edf, Ordering::Relaxed);
+    }
+
+    /// Chooses whether the runs to come are preemptive.
+    pub(crate) fn set_preemption(&self, preemption: Preemption) {
+        self.preemptive
+            .store(preemption == Preemption::Enabled, Ordering::Relaxed);
     }
 }
 
@@ -36,7 +45,11 @@ impl Platform for Kernel {
     }
 
     fn preemption(&self) -> Preemption {
-        Preemption::Disabled
+        if self.preemptive.load(Ordering::Relaxed) {
+            Preemption::Enabled
+        } else {
+            Preemption::Disabled
+        }
     }
 
     fn cores(&self) -> u32 {

@@ -12,13 +12,11 @@ use crate::machine_handle::{Ending, Machine};
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
 use crate::platform::KERNEL;
-use crate::{console, json, panic, println, worker};
+use crate::{console, contexts, json, panic, println, worker};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
 
-/// The stack that subtasks run on, in bytes.
-const WORK_STACK: u64 = 64 * 1024;
 /// The stack of an interrupt handler, or of an exception's report, in bytes.
 const HANDLER_STACK: u64 = 16 * 1024;
 
@@ -41,6 +39,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     unsafe { local_apic::set_base(platform.local_apic) };
     this_core::create(boot_processor_first(&platform));
     let core = this_core::become_core(local_apic::id());
+    let stack = core.context().stack_top();
     let start = Start {
         info,
         name,
@@ -48,8 +47,8 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         platform,
         layout,
     };
-    // SAFETY: `memory::new_stack` mapped the stack for this core alone.
-    unsafe { cpu::continue_on_stack(core.work_stack(), &start, start_cores) }
+    // SAFETY: the stack is that of the context which this core runs first.
+    unsafe { cpu::continue_on_stack(stack, &start, start_cores) }
 }
 
 /// What the boot processor takes along to its own stack.
@@ -117,18 +116,19 @@ fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u8, Stacks
         .copied()
         .filter(move |id| *id != own);
     let ids: Vec<u8> = core::iter::once(own).chain(others).collect();
-    ids.into_iter().map(|id| {
+    ids.into_iter().zip(0..).map(|(id, index)| {
+        let stacks = stacks(index == 0);
         (
             id,
-            stacks().expect("each core needs 144 KiB of memory for stacks"),
+            stacks.expect("each core needs 144 KiB of memory for stacks"),
         )
     })
 }
 
-fn stacks() -> Result<Stacks, OutOfMemory> {
+fn stacks(is_boot_processor: bool) -> Result<Stacks, OutOfMemory> {
     let small = || memory::new_stack(HANDLER_STACK);
     Ok(Stacks {
-        work: memory::new_stack(WORK_STACK)?,
+        first_context: contexts::create(is_boot_processor)?,
         handler: small()?,
         exceptions: [small()?, small()?, small()?, small()?],
     })
@@ -139,10 +139,7 @@ extern "C" fn other_core(apic_id: u32) -> ! {
     let apic_id = u8::try_from(apic_id).expect("APIC ids have 8 bits");
     this_core::become_core(apic_id);
     processors::arrive();
-    cpu::enable_interrupts();
-    loop {
-        worker::work(|| false, || {});
-    }
+    worker::work()
 }
 
 fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
@@ -159,6 +156,13 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         &[
             ("static", fass::Policy::StaticPriority),
             ("edf", fass::Policy::Edf),
+        ],
+    )?);
+    KERNEL.set_preemption(options.choice(
+        "preemption",
+        &[
+            ("on", fass::Preemption::Enabled),
+            ("off", fass::Preemption::Disabled),
         ],
     )?);
     app(&Machine { options })

@@ -2,91 +2,91 @@
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::{DagId, Instance, SubtaskId};
-
+use crate::execution::{self, Assignment, Work};
+use crate::machine::context::{Context, Parked};
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu};
-use crate::{console, execution};
+use crate::{console, contexts};
 
 /// The time between two signs of life of core 0. Without any alarm anywhere a
 /// virtual machine whose time is virtual would stand still forever.
 pub(crate) const HEARTBEAT_NS: u64 = 1_000_000_000;
 
-/// Runs instances until `is_over` holds while nothing is assigned to this core.
-///
-/// `when_idle` is called each time before the core halts.
-pub(crate) fn work(is_over: impl Fn() -> bool, mut when_idle: impl FnMut()) {
-    let core = this_core::get();
-    let mut next = None;
+/// Makes a context that works, in place of one that is suspended. Interrupts are
+/// disabled.
+pub(crate) fn new_context() -> Parked {
+    let mut context = this_core::take_spare_context().unwrap_or_else(contexts::take);
+    context.restart(work);
+    context
+}
+
+/// Runs what is assigned to the core that it is on, for ever: from one instance
+/// to the next, preempted now and then, on whatever core that may be.
+pub(crate) extern "C" fn work() -> ! {
+    cpu::disable_interrupts();
+    let mut work = execution::find_work();
     loop {
-        next = match next.take().or_else(|| look_for_work(core)) {
-            Some(assignment) => run(core, assignment),
-            None if is_over() => return,
-            None => {
-                when_idle();
-                rest(core);
-                None
+        work = match work {
+            Work::Run(assignment) => run(assignment),
+            Work::Continue(context) => leave_for(context),
+            Work::Rest => {
+                rest(this_core::get());
+                execution::find_work()
             }
         };
     }
 }
 
-fn look_for_work(core: &Core) -> Option<execution::Assignment> {
-    // The flag is cleared first: what is assigned from here on sets it again.
-    core.wake
-        .swap(false, Ordering::AcqRel)
-        .then(|| execution::take_assignment(core.index))?
-}
-
-fn run(core: &Core, mut assignment: execution::Assignment) -> Option<execution::Assignment> {
-    note_running(core, Some(assignment.instance));
+/// Calls a subtask's function, with interrupts enabled meanwhile.
+fn run(mut assignment: Assignment) -> Work {
+    cpu::enable_interrupts();
     let start_ns = clock::now_ns();
     assignment.run();
     let finish_ns = clock::now_ns();
-    note_running(core, None);
-    execution::complete(core.index, assignment, start_ns, finish_ns)
-}
-
-/// Notes for reports of panics which instance runs on this core.
-fn note_running(core: &Core, instance: Option<Instance>) {
-    let fields = instance.map_or([u64::MAX; 3], |instance| {
-        [
-            u64::from(instance.dag.0),
-            instance.job,
-            u64::from(instance.subtask.0),
-        ]
-    });
-    for (place, field) in core.running.iter().zip(fields) {
-        place.store(field, Ordering::Relaxed);
-    }
-}
-
-/// Returns the instance that runs on this core.
-pub(crate) fn running(core: &Core) -> Option<Instance> {
-    let [dag, job, subtask] = core
-        .running
-        .each_ref()
-        .map(|field| field.load(Ordering::Relaxed));
-    Some(Instance {
-        dag: DagId(u32::try_from(dag).ok()?),
-        job,
-        subtask: SubtaskId(u32::try_from(subtask).ok()?),
-    })
-}
-
-/// Sends a byte of waiting text, or else halts until an interrupt.
-fn rest(core: &Core) {
-    if console::send_pending_byte() {
-        return;
-    }
     cpu::disable_interrupts();
-    // With interrupts disabled nothing can be assigned unnoticed between this
-    // check and the halt.
-    if core.wake.load(Ordering::Acquire) {
-        cpu::enable_interrupts();
-    } else {
-        cpu::enable_interrupts_and_halt();
+    execution::complete(assignment, start_ns, finish_ns)
+}
+
+/// Goes on with another context; this one has nothing more to do.
+fn leave_for(context: Parked) -> ! {
+    if let Some(spare) = this_core::take_spare_context() {
+        contexts::give_back(spare);
+    }
+    // SAFETY: 1. This is a worker's own stack, and its loop has interrupts
+    // disabled here. 2. The loop has nothing left but the context, which moves.
+    // 3. The spare context was taken just now.
+    unsafe { this_core::leave_context(context) }
+}
+
+/// Sends waiting text and halts in between, until this core is to look for work.
+/// Interrupts are disabled before and after.
+fn rest(core: &Core) {
+    while !core.wake.swap(false, Ordering::AcqRel) {
+        if console::has_pending() {
+            cpu::enable_interrupts();
+            console::send_pending_byte();
+        } else {
+            cpu::enable_interrupts_and_halt();
+        }
+        cpu::disable_interrupts();
+    }
+}
+
+/// Waits until the run has ended, as the background of core 0: whenever there is
+/// work for the core, this is suspended.
+pub(crate) fn wait_in_background(mut when_idle: impl FnMut()) {
+    while !execution::is_finished() {
+        when_idle();
+        if console::send_pending_byte() {
+            continue;
+        }
+        cpu::disable_interrupts();
+        if execution::is_finished() {
+            cpu::enable_interrupts();
+        } else {
+            cpu::enable_interrupts_and_halt();
+        }
     }
 }
 
@@ -101,7 +101,7 @@ pub(crate) fn timer_interrupt() {
         beat(core, now_ns);
     }
     if timer::take_due(Alarm::Schedule, now_ns) {
-        execution::timer_event(now_ns);
+        execution::interrupt(now_ns, true);
     }
     timer::arm_earliest();
 }
@@ -146,28 +146,61 @@ pub(crate) fn wake_interrupt() {
     if !timer::is_set(Alarm::Heartbeat) {
         beat(core, clock::now_ns());
     }
+    execution::interrupt(clock::now_ns(), false);
 }
 
-/// Keeps this core occupied until `ns` have passed, halted in between.
+/// Occupies the calling instance's core for `ns` of execution, halted in between.
 pub(crate) fn hold(ns: u64) {
-    let end_ns = clock::now_ns().saturating_add(ns);
-    timer::set(Alarm::Hold, end_ns);
-    while clock::now_ns() < end_ns {
+    let executed = Executed::from_now();
+    loop {
         cpu::disable_interrupts();
-        // The alarm is still set unless it was taken meanwhile.
-        if clock::now_ns() < end_ns {
-            cpu::enable_interrupts_and_halt();
-        } else {
+        let left_ns = ns.saturating_sub(executed.ns());
+        if left_ns == 0 {
+            timer::set(Alarm::Hold, u64::MAX);
+            cpu::enable_interrupts();
+            return;
+        }
+        timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
+        // If this is preempted it is here: it then goes round again, on whatever
+        // core it continues, and sets that core's alarm.
+        cpu::enable_interrupts_and_halt();
+    }
+}
+
+/// Occupies the calling instance's core for `ns` of execution, computing.
+pub(crate) fn spin(ns: u64) {
+    let executed = Executed::from_now();
+    while executed.ns() < ns {
+        cpu::relax();
+    }
+}
+
+/// A stopwatch that stands still while its context is suspended.
+struct Executed {
+    context: &'static Context,
+    start_ns: u64,
+    suspended_before_ns: u64,
+}
+
+impl Executed {
+    fn from_now() -> Self {
+        let were_enabled = cpu::disable_interrupts();
+        let context = this_core::get().context();
+        let start_ns = clock::now_ns();
+        if were_enabled {
             cpu::enable_interrupts();
         }
+        Self {
+            context,
+            start_ns,
+            suspended_before_ns: context.suspended_ns(),
+        }
     }
-    timer::set(Alarm::Hold, u64::MAX);
-}
 
-/// Keeps this core computing until `ns` have passed.
-pub(crate) fn spin(ns: u64) {
-    let end_ns = clock::now_ns().saturating_add(ns);
-    while clock::now_ns() < end_ns {
-        cpu::relax();
+    fn ns(&self) -> u64 {
+        let suspended_ns = self.context.suspended_ns() - self.suspended_before_ns;
+        clock::now_ns()
+            .saturating_sub(self.start_ns)
+            .saturating_sub(suspended_ns)
     }
 }

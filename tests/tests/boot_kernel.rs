@@ -107,3 +107,29 @@ fn a_million_timer_interrupts_leave_every_checksum_alone() {
 fn a_storm_of_interrupts_in_real_time_leaves_every_checksum_alone() {
     storm(Mode::Threads, 2, 200_000);
 }
+
+/// Runs DAGs that preempt one another and check themselves.
+fn preemption(mode: Mode, cores: u64, policy: &str) {
+    let guest = guest("preemption").mode(mode).cores(cores);
+    let guest = guest.word(&format!("policy={policy}")).word("ms=1000");
+    let outcome = guest.limit(Duration::from_secs(120)).succeed();
+    let line = outcome.transcript.of_kind("preemption").next();
+    let line = line.unwrap_or_else(|| panic!("no preemption line\n{}", outcome.tail()));
+    assert!(line.number_at("preemptions") >= Some(20), "{}", line.text);
+    assert_eq!(line.number_at("diverged"), Some(0), "{}", line.text);
+    assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+}
+
+#[test]
+fn preempted_instances_lose_nothing() {
+    for cores in [1, 2, 4] {
+        preemption(Mode::Deterministic, cores, "static");
+        preemption(Mode::Deterministic, cores, "edf");
+    }
+}
+
+#[test]
+fn preempted_instances_lose_nothing_in_real_time() {
+    preemption(Mode::Threads, 2, "static");
+    preemption(Mode::Threads, 4, "edf");
+}

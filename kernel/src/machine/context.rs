@@ -1,8 +1,18 @@
-//! Where an interrupted computation is kept.
+//! Computations with stacks of their own, and the way from one to another.
 //!
-//! A *context* is a computation with a stack of its own. While it runs, the
-//! processor's interrupt stack 1 points to the end of its register area, so an
-//! interrupt saves it right there (see `interrupt.s`).
+//! A *context* is a computation with a stack. On each core one context runs.
+//! While it does, the processor's interrupt stack 1 points to the end of its
+//! save area, so an interrupt saves it right there (see `interrupt.s`), and a
+//! handler may then let the core go on with another context instead.
+//!
+//! **Context invariant**: a context's save area and stack belong to the core on
+//! which it runs, or, while it runs nowhere, to the holder of its one
+//! [`Parked`]. So there is never more than one place that touches them.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use alloc::boxed::Box;
 
 /// The general registers as `interrupt.s` and the processor push them.
 #[derive(Debug, Default)]
@@ -32,10 +42,10 @@ pub(crate) struct Registers {
     pub(crate) ss: u64,
 }
 
-/// A context's save area: vector state (x87 and SSE), then registers.
+/// Vector state (x87 and SSE), then registers.
 #[derive(Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Context {
+struct SaveArea {
     vector_state: [u8; 512],
     registers: Registers,
 }
@@ -43,21 +53,126 @@ pub(crate) struct Context {
 const _: () = {
     // `interrupt.s` relies on each of these.
     assert!(size_of::<Registers>() == 22 * 8);
-    assert!(core::mem::offset_of!(Context, registers) == 512);
+    assert!(core::mem::offset_of!(SaveArea, registers) == 512);
     assert!((512 + size_of::<Registers>()).is_multiple_of(16));
 };
 
+/// A computation with a stack of its own.
+#[derive(Debug)]
+pub(crate) struct Context {
+    save_area: UnsafeCell<SaveArea>,
+    stack_top: u64,
+    is_background: bool,
+    /// When it was last suspended, and for how long it has been in all before.
+    suspended_at_ns: AtomicU64,
+    suspended_ns: AtomicU64,
+}
+
+// SAFETY: everything but the save area is constant or atomic, and the save area
+// has one user at a time (context invariant).
+unsafe impl Sync for Context {}
+
 impl Context {
-    /// Creates an empty save area.
-    pub(crate) fn new() -> Self {
-        Self {
-            vector_state: [0; 512],
-            registers: Registers::default(),
-        }
+    /// Returns the address where the processor's interrupt frame has to end.
+    pub(super) fn frame_end(&self) -> u64 {
+        self.registers() as u64 + size_of::<Registers>() as u64
     }
 
-    /// Returns the address where the processor's interrupt frame has to end.
-    pub(crate) fn frame_end(&self) -> u64 {
-        core::ptr::from_ref(&self.registers) as u64 + size_of::<Registers>() as u64
+    /// Returns where `interrupt.s` keeps this context's registers.
+    pub(super) fn registers(&self) -> *mut Registers {
+        self.save_area.get().wrapping_byte_add(512).cast()
+    }
+
+    /// Returns the upper end of the context's stack.
+    pub(crate) const fn stack_top(&self) -> u64 {
+        self.stack_top
+    }
+
+    /// Reports whether this is what its core does when nothing is assigned to it.
+    pub(crate) const fn is_background(&self) -> bool {
+        self.is_background
+    }
+
+    /// Returns for how long the context has been suspended since it was made.
+    pub(crate) fn suspended_ns(&self) -> u64 {
+        self.suspended_ns.load(Ordering::Relaxed)
+    }
+}
+
+/// A context that does not run. Whoever holds it may let it run.
+#[derive(Debug)]
+pub(crate) struct Parked(&'static Context);
+
+impl Parked {
+    /// Makes a context with the stack that grows down from `stack_top`, which
+    /// must be a multiple of 16. It has nothing to do yet.
+    pub(crate) fn new(stack_top: u64, is_background: bool) -> Self {
+        /// The state after FNINIT, and MXCSR's state after reset (Intel SDM 1,
+        /// 8.1.5 and 10.2.3): every exception masked, full precision.
+        const CONTROL: [(usize, [u8; 2]); 2] = [(0, [0x7f, 0x03]), (24, [0x80, 0x1f])];
+        let mut vector_state = [0; 512];
+        for (offset, value) in CONTROL {
+            vector_state[offset..offset + 2].copy_from_slice(&value);
+        }
+        let save_area = SaveArea {
+            vector_state,
+            registers: Registers::default(),
+        };
+        Self(Box::leak(Box::new(Context {
+            save_area: UnsafeCell::new(save_area),
+            stack_top,
+            is_background,
+            suspended_at_ns: AtomicU64::new(0),
+            suspended_ns: AtomicU64::new(0),
+        })))
+    }
+
+    /// Lets the context begin at `entry` with an empty stack, when it next runs.
+    /// Whatever it did before is forgotten.
+    pub(crate) fn restart(&mut self, entry: extern "C" fn() -> !) {
+        const INTERRUPTS_ENABLED: u64 = 1 << 9;
+        let registers = Registers {
+            rip: entry as usize as u64,
+            cs: u64::from(super::descriptors::CODE),
+            rflags: INTERRUPTS_ENABLED,
+            // As after a call: a function expects the stack to be 8 off.
+            rsp: self.0.stack_top - 8,
+            ..Registers::default()
+        };
+        // SAFETY: `&mut self` is the one holder of a context that does not run
+        // (context invariant).
+        unsafe { self.0.registers().write(registers) };
+    }
+
+    /// Notes that the context is suspended from `now_ns` on.
+    pub(crate) fn note_suspended(&self, now_ns: u64) {
+        self.0.suspended_at_ns.store(now_ns, Ordering::Relaxed);
+    }
+
+    /// Notes that the context goes on at `now_ns`.
+    pub(crate) fn note_resumed(&self, now_ns: u64) {
+        let since_ns = now_ns.saturating_sub(self.0.suspended_at_ns.load(Ordering::Relaxed));
+        self.0.suspended_ns.fetch_add(since_ns, Ordering::Relaxed);
+    }
+
+    /// Returns where `interrupt.s` keeps the context's registers.
+    pub(super) fn registers(&self) -> *mut Registers {
+        self.0.registers()
+    }
+
+    /// Gives the context up to a core that is to run it.
+    pub(super) const fn into_context(self) -> &'static Context {
+        self.0
+    }
+
+    /// Takes a context that has just stopped running.
+    ///
+    /// # Safety
+    ///
+    /// The context ran on this core and runs no more, or will not run any
+    /// further than to the switch that the caller is about to make; no other
+    /// `Parked` of it exists.
+    pub(super) const unsafe fn from_context(context: &'static Context) -> Self {
+        Self(context)
     }
 }

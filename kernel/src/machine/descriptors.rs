@@ -8,7 +8,7 @@ use alloc::boxed::Box;
 use super::once::Once;
 
 /// The code segment's selector.
-const CODE: u16 = 0x08;
+pub(super) const CODE: u16 = 0x08;
 /// The task state segment's selector.
 const TASK_STATE: u16 = 0x18;
 
@@ -71,9 +71,25 @@ impl TaskState {
     }
 }
 
+/// Points interrupt stack 1 of a core elsewhere.
+///
+/// # Safety
+///
+/// `task_state` is this core's, which has interrupts disabled, and `top` is the
+/// end of the save area of the context that it runs or is about to run.
+pub(super) unsafe fn set_context_stack(task_state: *mut TaskState, top: u64) {
+    let offset = core::mem::offset_of!(TaskState, interrupt_stacks);
+    let place = task_state.wrapping_byte_add(offset).cast::<u64>();
+    // SAFETY: the place lies within the segment; the processor reads it only
+    // when an interrupt comes (the caller's condition).
+    unsafe { place.write_unaligned(top) };
+}
+
 /// Loads segments for this core, with `task_state` as its interrupt stacks.
-pub(crate) fn load_segments(task_state: &'static TaskState) {
-    let base = core::ptr::from_ref(task_state) as u64;
+///
+/// `task_state` points to a segment that lives forever.
+pub(super) fn load_segments(task_state: *mut TaskState) {
+    let base = task_state as u64;
     let limit = size_of::<TaskState>() as u64 - 1;
     let table: &'static [u64; 5] = Box::leak(Box::new([
         0,

@@ -31,7 +31,8 @@ pub(crate) mod vector {
     pub(crate) const SPURIOUS: u8 = 0xff;
 }
 
-/// What to do at each kind of interrupt.
+/// What to do at each kind of interrupt. A handler may let the core go on with
+/// another context by [`this_core::exchange_context`].
 #[derive(Debug)]
 pub(crate) struct Handlers {
     /// The local timer has fired.
@@ -57,8 +58,8 @@ pub(crate) fn load_table() {
 
 /// Handles one interrupt and returns the registers to resume.
 extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
-    // SAFETY: `interrupt.s` passes the save area of the context it interrupted,
-    // which nobody else uses while that context does not run.
+    // SAFETY: `interrupt.s` passes the registers of the context that this core
+    // was running, which are this core's (context invariant).
     let vector = unsafe { (*registers).vector };
     match (u8::try_from(vector), HANDLERS.get()) {
         (Ok(vector::TIMER), Some(handlers)) => {
@@ -72,7 +73,7 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
         (Ok(vector::SPURIOUS), _) => {}
         _ => local_apic::acknowledge(),
     }
-    registers
+    this_core::get().context().registers()
 }
 
 /// Handles one exception; none is survived yet.

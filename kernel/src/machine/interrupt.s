@@ -69,6 +69,14 @@ exception_common:
     fxsave64 [rsp]
     call {handle_exception}
 
+    jmp resume_registers
+
+# Resumes the context whose register area is at rdi, from anywhere in code that
+# has interrupts disabled and will not go on.
+.global resume_context
+resume_context:
+    mov rax, rdi
+
 # Resumes the context whose register area is at rax.
 resume_registers:
     fxrstor64 [rax - 512]

@@ -28,7 +28,7 @@ pub(crate) unsafe fn start_others(root_table: u64, entry: boot::processors::Entr
     // SAFETY: passed on from the caller.
     unsafe { boot::processors::prepare(root_table, entry) };
     for core in others() {
-        boot::processors::set_stack(core.apic_id(), core.work_stack());
+        boot::processors::set_stack(core.apic_id(), core.context().stack_top());
     }
     let expected = u32::try_from(others().count()).unwrap_or(u32::MAX);
     if expected == 0 {

@@ -5,20 +5,21 @@
 //! [`get`]: everything that changes in it is atomic.
 
 use core::arch::asm;
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
-use super::context::Context;
+use super::context::{Context, Parked, Registers};
 use super::descriptors::{self, TaskState};
 use super::once::Once;
 use super::{cpu, local_apic};
 
-/// The tops of the stacks that a core needs, each with a guard page below.
+/// What a core needs to begin: the tops of stacks, each with a guard page below,
+/// and the context that it runs first.
 #[derive(Debug)]
 pub(crate) struct Stacks {
-    /// Runs what the core does: first its start, then subtasks.
-    pub(crate) work: u64,
+    /// What the core does first.
+    pub(crate) first_context: Parked,
     /// Runs interrupt handlers.
     pub(crate) handler: u64,
     /// Run exceptions: ordinary, double fault, non-maskable, machine check.
@@ -34,8 +35,12 @@ pub(crate) struct Core {
     /// The position among the cores: 0 is the boot processor.
     pub(crate) index: u32,
     apic_id: u8,
-    stacks: Stacks,
-    context: Context,
+    exception_stacks: [u64; 4],
+    task_state: AtomicPtr<TaskState>,
+    /// The context that runs here.
+    context: AtomicPtr<Context>,
+    /// A context that ran here last and has nothing more to do, or null.
+    spare: AtomicPtr<Context>,
     /// Another core has assigned work to this one.
     pub(crate) wake: AtomicBool,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
@@ -60,8 +65,12 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         handler_stack: stacks.handler,
         index,
         apic_id,
-        stacks,
-        context: Context::new(),
+        exception_stacks: stacks.exceptions,
+        task_state: AtomicPtr::new(core::ptr::null_mut()),
+        context: AtomicPtr::new(
+            core::ptr::from_ref(stacks.first_context.into_context()).cast_mut(),
+        ),
+        spare: AtomicPtr::new(core::ptr::null_mut()),
         wake: AtomicBool::new(false),
         alarms: [const { AtomicU64::new(u64::MAX) }; 3],
         timer_interrupts: AtomicU64::new(0),
@@ -80,15 +89,18 @@ pub(crate) fn become_core(apic_id: u8) -> &'static Core {
         .iter()
         .find(|core| core.apic_id == apic_id)
         .expect("only processors that ACPI names are started");
-    let exceptions = core.stacks.exceptions;
+    let [exception, double_fault, non_maskable, machine_check] = core.exception_stacks;
+    let context = core.context().frame_end();
     let tops = [
-        core.context.frame_end(),
-        exceptions[0],
-        exceptions[1],
-        exceptions[2],
-        exceptions[3],
+        context,
+        exception,
+        double_fault,
+        non_maskable,
+        machine_check,
     ];
-    descriptors::load_segments(Box::leak(Box::new(TaskState::new(tops))));
+    let task_state = Box::leak(Box::new(TaskState::new(tops)));
+    core.task_state.store(task_state, Ordering::Relaxed);
+    descriptors::load_segments(core.task_state.load(Ordering::Relaxed));
     let address = core::ptr::from_ref(core) as u64;
     core.this.store(address, Ordering::Relaxed);
     // SAFETY: every 64-bit processor has the register; the value establishes
@@ -122,6 +134,51 @@ pub(crate) fn all() -> &'static [Core] {
     CORES.get().map_or(&[], |cores| cores)
 }
 
+/// Lets this core go on with `next` when the current interrupt's handler
+/// returns, and returns the context that was interrupted.
+///
+/// # Safety
+///
+/// The caller is a handler of a maskable interrupt.
+pub(crate) unsafe fn exchange_context(next: Parked) -> Parked {
+    let last = get().run_next(next);
+    // SAFETY: `interrupt.s` has saved the context and now resumes `next`.
+    unsafe { Parked::from_context(last) }
+}
+
+/// Leaves the context that runs, for good, for `next`. What was left becomes
+/// this core's spare context.
+///
+/// # Safety
+///
+/// 1. The caller runs on a context's own stack, with interrupts disabled.
+/// 2. Nothing that lives on that stack is used any more.
+/// 3. This core's spare context has been taken by [`take_spare_context`].
+pub(crate) unsafe fn leave_context(next: Parked) -> ! {
+    unsafe extern "C" {
+        fn resume_context(registers: *mut Registers) -> !;
+    }
+    let core = get();
+    let registers = next.registers();
+    let last = core.run_next(next);
+    core.spare
+        .store(core::ptr::from_ref(last).cast_mut(), Ordering::Relaxed);
+    // SAFETY: the registers are those of a context that does not run and that
+    // this core has made its own; interrupts are disabled (condition 1).
+    unsafe { resume_context(registers) }
+}
+
+/// Takes the context that was left here last, to be restarted or to be given
+/// away. Interrupts are disabled.
+pub(crate) fn take_spare_context() -> Option<Parked> {
+    let spare = get().spare.swap(core::ptr::null_mut(), Ordering::Relaxed);
+    // SAFETY: a pointer that is not null comes from `leave_context`.
+    let spare = unsafe { spare.as_ref() }?;
+    // SAFETY: this core has left the context for another one: it executes this
+    // on another stack. The swap makes sure that it is taken once.
+    Some(unsafe { Parked::from_context(spare) })
+}
+
 impl Core {
     /// Makes this core look for work, by an interrupt unless it is the core that
     /// executes this.
@@ -132,9 +189,31 @@ impl Core {
         }
     }
 
-    /// Returns the top of the stack that this core works on.
-    pub(crate) const fn work_stack(&self) -> u64 {
-        self.stacks.work
+    /// Returns the context that runs on this core.
+    pub(crate) fn context(&self) -> &'static Context {
+        // SAFETY: the pointer comes from a `&'static Context` (`create`, `run_next`).
+        unsafe { &*self.context.load(Ordering::Relaxed) }
+    }
+
+    /// Notes that this core runs `next` from the coming switch on, and returns
+    /// the context that it has run.
+    fn run_next(&self, next: Parked) -> &'static Context {
+        let last = self.context();
+        let next = next.into_context();
+        self.context
+            .store(core::ptr::from_ref(next).cast_mut(), Ordering::Relaxed);
+        let task_state = self.task_state.load(Ordering::Relaxed);
+        // SAFETY: callers run on this core with interrupts disabled, and are
+        // about to switch to `next`.
+        unsafe { descriptors::set_context_stack(task_state, next.frame_end()) };
+        last
+    }
+
+    /// Notes what runs here, as three numbers.
+    pub(crate) fn note_running(&self, fields: [u64; 3]) {
+        for (place, field) in self.running.iter().zip(fields) {
+            place.store(field, Ordering::Relaxed);
+        }
     }
 
     /// Returns the id that interrupts are addressed to.

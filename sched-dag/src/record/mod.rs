@@ -28,6 +28,8 @@ pub struct InstanceRecord {
     pub core: Option<CoreId>,
     /// How many times its function has returned; more than 1 is a violation.
     pub runs: u32,
+    /// How many times the scheduler has taken its core away.
+    pub preemptions: u32,
 }
 
 /// The times of one job; each `None` until it has happened.
@@ -163,7 +165,8 @@ impl Record {
         )
     }
 
-    fn all_instances<'a>(
+    /// Returns every recorded instance with its times: by DAG, job, subtask.
+    pub fn all_instances<'a>(
         &'a self,
         task_set: &'a TaskSet,
     ) -> impl Iterator<Item = (Instance, &'a InstanceRecord)> {

@@ -226,6 +226,7 @@ mod tests {
                     finish_ns: Some(release + finish),
                     core: None,
                     runs: 1,
+                    preemptions: 0,
                 };
             }
         }

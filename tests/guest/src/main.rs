@@ -5,7 +5,9 @@
 
 extern crate alloc;
 
+mod checksum;
 mod crimes;
+mod preemption;
 mod storm;
 
 use alloc::vec;
@@ -19,11 +21,12 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 8] = [
+const TESTS: [(&str, Test); 9] = [
     ("commit_faults", commit_faults),
     ("panic", |_| panic!("a panic on purpose")),
     ("subtask_panic", subtask_panic),
     ("storm", storm::run),
+    ("preemption", preemption::run),
     ("null_write", |_| crimes::write_to_null()),
     ("stack_overflow", |_| crimes::overflow_the_stack()),
     ("write_to_code", |_| crimes::write_to_code()),

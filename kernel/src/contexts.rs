@@ -1,0 +1,70 @@
+//! The stock of contexts that instances run in.
+//!
+//! A preempted instance keeps its context, stack and all. At any time a core
+//! runs one context and keeps at most one to spare, and each subtask has at most
+//! one suspended instance: so twice the cores and once the subtasks are enough,
+//! and that many are made at a commit, never later. Contexts are never freed;
+//! the next commit uses them again.
+
+use alloc::vec::Vec;
+
+use crate::machine::context::Parked;
+use crate::machine::spinlock::SpinLock;
+use crate::memory::{self, OutOfMemory};
+
+/// The stack of each context, in bytes.
+pub(crate) const STACK_BYTES: u64 = 64 * 1024;
+
+#[derive(Debug)]
+struct Stock {
+    free: Vec<Parked>,
+    /// How many there are, free or not.
+    total: usize,
+}
+
+static STOCK: SpinLock<Stock> = SpinLock::new(Stock {
+    free: Vec::new(),
+    total: 0,
+});
+
+/// Makes a context with a stack of its own.
+pub(crate) fn create(is_background: bool) -> Result<Parked, OutOfMemory> {
+    Ok(Parked::new(memory::new_stack(STACK_BYTES)?, is_background))
+}
+
+/// Makes sure that there are `total` contexts in the stock or in use from it.
+pub(crate) fn provide(total: usize) -> Result<(), OutOfMemory> {
+    let existing = STOCK.lock().total;
+    let missing = total.saturating_sub(existing);
+    // Room for all that can ever be free, so that giving back never allocates.
+    let mut grown = Vec::with_capacity(total.max(existing));
+    for _ in 0..missing {
+        grown.push(create(false)?);
+    }
+    let mut stock = STOCK.lock();
+    grown.append(&mut stock.free);
+    // The old vector is freed after the lock: the heap has a lock of its own.
+    let old = core::mem::replace(&mut stock.free, grown);
+    stock.total += missing;
+    drop(stock);
+    drop(old);
+    Ok(())
+}
+
+/// Takes a context out of the stock.
+///
+/// # Panics
+///
+/// If there is none, which [`provide`]'s rule excludes.
+pub(crate) fn take() -> Parked {
+    STOCK
+        .lock()
+        .free
+        .pop()
+        .expect("contexts are provided at commit")
+}
+
+/// Puts a context that has nothing to do back into the stock.
+pub(crate) fn give_back(context: Parked) {
+    STOCK.lock().free.push(context);
+}

@@ -1,0 +1,105 @@
+//! Many DAGs that preempt one another while every instance checks itself.
+//!
+//! Six fork-join DAGs of different rates share the cores, the faster ones with
+//! the higher priorities. Each instance repeats work whose result it knows: a
+//! register or a byte that a preemption, or a move to another core, does not
+//! restore shows as a difference.
+
+use alloc::format;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+
+use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
+use kernel::{Ending, Machine, json};
+
+use crate::checksum::checksum;
+
+/// The periods in milliseconds; the shortest gets the highest priority.
+const PERIODS_MS: [u64; 6] = [2, 3, 5, 7, 11, 13];
+
+/// How often each instance repeats its work: about 0.2 ms on a host of today.
+const ROUNDS: u32 = 40;
+
+/// Runs the DAGs for `ms` milliseconds of releases.
+pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    let options = machine.options();
+    let ms = options.number("ms", 1..=3_600_000, 500)?;
+    options.finish(&["test", "ms"])?;
+
+    let diverged = Arc::new(AtomicU64::new(0));
+    let dags: Vec<Dag> = (0..)
+        .zip(PERIODS_MS)
+        .map(|(priority, period_ms)| fork_join(priority, period_ms, ms, &diverged))
+        .collect();
+    finish_create_dags(&dags)?;
+    let run = machine.run()?;
+
+    let violations = run.violations().count() as u64;
+    let diverged = diverged.load(Ordering::Relaxed);
+    let instances = || run.record().all_instances(run.task_set());
+    json::emit("preemption", |line| {
+        line.number("instances", instances().count() as u64)
+            .number(
+                "preemptions",
+                instances()
+                    .map(|(_, times)| u64::from(times.preemptions))
+                    .sum::<u64>(),
+            )
+            .number("diverged", diverged)
+            .number("violations", violations)
+            .number("cpus", machine.cores());
+    });
+    if diverged + violations > 0 {
+        let message = format!("{diverged} results diverged, {violations} violations");
+        return Err(Ending::Failure(message));
+    }
+    Ok(())
+}
+
+/// Builds source -> three parallel subtasks -> sink, all of one priority.
+fn fork_join(priority: u32, period_ms: u64, ms: u64, diverged: &Arc<AtomicU64>) -> Dag {
+    let period = Duration::from_millis(period_ms);
+    let dag = create_dag();
+    dag.name(&format!("every-{period_ms}-ms"))
+        .jobs(ms.div_ceil(period_ms))
+        .in_flight(8);
+    let attributes = |name: &str| SubtaskAttributes::named(name).priority(priority);
+    let topic = |name: &str| format!("{period_ms}-{name}");
+    let (start, parts) = (topic("start"), [topic("a"), topic("b"), topic("c")]);
+
+    let mut job = 0u64;
+    let count = move || {
+        job += 1;
+        (job,)
+    };
+    dag.register_periodic_subtask(count, vec![&start], period, attributes("source"));
+    for part in &parts {
+        let diverged = diverged.clone();
+        let work = move |(job,): (u64,)| {
+            compute(&diverged);
+            (job,)
+        };
+        dag.register_subtask(work, vec![&start], vec![part], attributes(part));
+    }
+    let diverged = diverged.clone();
+    let join = move |(a, b, c): (u64, u64, u64)| {
+        compute(&diverged);
+        assert!(a == b && b == c, "a join of the jobs {a}, {b} and {c}");
+    };
+    let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+    dag.register_sink_subtask(join, parts, period, attributes("sink"));
+    dag
+}
+
+fn compute(diverged: &AtomicU64) {
+    let expected = checksum();
+    for _ in 0..ROUNDS {
+        if checksum() != expected {
+            diverged.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
