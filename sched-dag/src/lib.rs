@@ -1,7 +1,81 @@
 //! The DAG task model, its verification at commit, and its scheduler.
 //!
-//! (Essay to be written by the crate's author: words, numbered rules R1-R5,
-//! what is guaranteed and what is not.)
+//! # Words
+//!
+//! A *DAG* is a task: *subtasks*, and *precedence edges* between them that form
+//! no cycle. A subtask without predecessor is a *source*, one without successor
+//! a *sink*. Every *period* T, from an *offset* O on, the DAG releases a *job*:
+//! job k at its *nominal release time* r = O + kT. Job k shall be complete at
+//! its *absolute deadline* r + D, where the *relative deadline* D may be smaller
+//! than, equal to, or larger than T. An *instance* is the part of one job that
+//! one subtask does: one execution of its function.
+//!
+//! An instance is *ready* when nothing but cores holds it back. A *dispatch*
+//! gives cores to ready instances: it *starts* them, or *resumes* those that
+//! were *preempted*. An instance *finishes* when its function has returned, and
+//! a job is *complete* when all its instances have finished; until then, from
+//! its release on, it is *in flight*.
+//!
+//! # The rules
+//!
+//! Each rule has tests that bear its number, in `tests/rules.rs`.
+//!
+//! - **R1, release.** No instance of job k runs before r. The release times are
+//!   those of the nominal grid, whatever delayed the driver or the jobs before.
+//! - **R2, join.** An instance is ready exactly when its job is released, every
+//!   predecessor in the same job has finished, and the same subtask's instance
+//!   in the job released before has finished. So a subtask does one job after
+//!   the other, while jobs of one DAG may overlap as in a pipeline. Nothing else
+//!   delays it; from the last predecessor's finish to being ready no time passes.
+//! - **R3, completion boundary.** All outgoing edges of an instance are released
+//!   at one instant, when it finishes. Nothing that happens within a function
+//!   releases an edge.
+//! - **R4, job completion.** A job finishes when the last of its sinks does. It
+//!   meets its deadline if that is at or before r + D. A miss is noticed when
+//!   the deadline has passed, not when the job ends.
+//! - **R5, dispatch.** With preemption, at every instant the instances with the
+//!   smallest keys run, as many as there are cores; but one of a non-preemptive
+//!   subtask, once started, keeps its core, and without preemption every one
+//!   does. The key under static priority is (priority, DAG, job, subtask), where
+//!   the smaller number is the higher priority; under EDF it is (absolute
+//!   deadline, DAG, job, subtask). It is the same in every comparison. No core
+//!   idles while an instance is ready. At one instant all completions come
+//!   first, then all releases, then one dispatch.
+//!
+//! What happens to a release that finds as many jobs in flight as the DAG may
+//! have is the DAG's [`OverrunPolicy`]; its tests are in `tests/overrun.rs`.
+//!
+//! # The parts, in the order of their use
+//!
+//! 1. [`DagSpec`]: what an app states. It may be wrong in every way.
+//! 2. [`verify`]: finds every fault at once, and makes the [`TaskSet`], which
+//!    has none.
+//! 3. [`analysis`]: bounds on response times, if WCETs are known.
+//! 4. [`Scheduler`]: the rules as a pure state machine. Whoever drives it tells
+//!    it what has happened and when, and carries its [`Decision`]s out: the
+//!    kernel with timers and interrupts, or [`virtual_time`] on the host.
+//! 5. [`record`]: what happened in a run, held against the rules.
+//!
+//! # Who may rely on what
+//!
+//! - *Whoever holds a [`TaskSet`]*: acyclic graphs in the shapes that the
+//!   [`ConstructionPolicy`] allows, indices in range, no period or deadline of 0,
+//!   a number of jobs in flight of at least 1, and, for each job that will be
+//!   due, times that fit 64 bits.
+//! - *A driver*: the scheduler allocates nothing after [`Scheduler::new`]
+//!   (asserted in `tests/allocation.rs`), does not recur, and says in
+//!   [`Scheduler::next_event_ns`] when it needs to be called again.
+//! - *A platform that keeps values on edges*: at most [`Dag::in_flight`] jobs of
+//!   a DAG are in flight, and no two of them have the same number modulo that.
+//!   An instance that was released ends exactly once, by a completion or by
+//!   [`Observer::cancelled`].
+//! - *An app's author*: schedules that, core numbers apart, do not depend on the
+//!   number or the order of a driver's calls, only on their times; with the same
+//!   execution times, the same schedule on every driver.
+//!
+//! Not guaranteed: that deadlines are met (ask [`analysis`]), that execution
+//! times stay below the WCETs stated, or anything about time that a driver
+//! spends itself.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 

@@ -35,14 +35,27 @@ impl Priority {
 }
 
 /// What happens at a release that finds as many jobs in flight as the DAG may have.
+///
+/// With J jobs in flight allowed, the release of job k is *blocked* while job
+/// k - J, or an older one, is in flight: both would use the same slot of every
+/// edge. Unless jobs were skipped, that is to say that J jobs are in flight.
+///
+/// Under every policy jobs are released in the order of their numbers, and a job
+/// that is released late keeps its nominal release time, and so its deadline. A
+/// miss is noticed when the deadline passes, also of a job that still waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum OverrunPolicy {
-    /// The release waits until the oldest job is complete; its nominal release
-    /// time, and so its deadline, stay what they are.
+    /// The release waits until it is not blocked. Any number may wait, in
+    /// constant memory.
     #[default]
     Queue,
-    /// The release does not happen and is counted.
+    /// The release does not happen and is counted. Nothing ever waits.
     Skip,
-    /// The oldest job ends at its next subtask boundary and makes room.
+    /// The oldest job in flight that is not aborted yet is aborted, and the
+    /// release waits until it is not blocked.
+    ///
+    /// An aborted job starts no further instance; what has started goes on, and
+    /// when nothing of it is left, the job is out of flight. If all jobs in
+    /// flight are aborted already, the oldest waiting release is skipped.
     Abort,
 }
