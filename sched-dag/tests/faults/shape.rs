@@ -1,6 +1,6 @@
 //! Faults of the graph as a whole: cycles, sources, sinks, connection.
 
-use sched_dag::{CommitOptions, ConstructionPolicy, Policy, verify};
+use sched_dag::{CommitOptions, ConstructionPolicy, Policy, SubtaskSpec, verify};
 
 use crate::{assert_fault, assert_faults, dag, drive, options, port, subtask};
 
