@@ -39,9 +39,10 @@
 //! at most once. Those are properties of the original, not to be mended.
 //!
 //! Storage for the queue size plus one messages a topic is reserved at
-//! construction. A pass costs O(topics). An arrival takes at most one pass for each
-//! message held, as every pass moves one, and at most as many virtual ones in each
-//! pass; typically it takes a few.
+//! construction. A pass costs O(topics). Between two sets there is at most one pass
+//! for each message held, as each passes or drops one, and then at most as many
+//! virtual ones; an arrival emits at most the queue size plus one sets. Typically an
+//! arrival takes a few passes.
 
 mod parameters;
 mod ring;

@@ -19,7 +19,9 @@
 //!
 //! - [`Synchronizer`], [`Stamped`], [`Outlet`], [`Set`]: what both policies share;
 //! - [`ExactTime`]: equal stamps make a set;
-//! - [`ApproximateTime`], [`Parameters`], [`AgePenalty`]: close stamps make a set.
+//! - [`ApproximateTime`], [`Parameters`], [`AgePenalty`]: close stamps make a set;
+//! - [`workload`]: the paper's workload under a policy, in virtual time;
+//! - [`metrics`]: what the joins of a run amount to.
 //!
 //! It guarantees that every message leaves at most once, that what is held is
 //! bounded by the queue size, and that nothing is allocated after construction
@@ -34,7 +36,9 @@ extern crate alloc;
 
 mod approximate_time;
 mod exact_time;
+pub mod metrics;
 mod synchronizer;
+pub mod workload;
 
 pub use approximate_time::{AgePenalty, ApproximateTime, Parameters};
 pub use exact_time::ExactTime;

@@ -1,0 +1,158 @@
+//! The paper's workload under a policy, in virtual time.
+//!
+//! Every period a source starts a job. Each of N parallel subtasks takes the jobs in
+//! order, one at a time, on a core of its own: it starts a job when that has been
+//! released and the job before is done, executes for a given time, and publishes on
+//! its topic when it finishes. A synchronizer joins the N topics. Inputs of the
+//! parallel subtasks are unbounded, and nothing else takes any time: publications,
+//! the source and the synchronizer itself cost nothing. So what is seen is what the
+//! policy does by its rules, which no implementation of it can better.
+//!
+//! Whatever has the same execution times has the same publications. The result
+//! depends on nothing but the arguments.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::metrics::{Record, RecordedSet};
+use crate::{Outlet, Set, Stamped, Synchronizer};
+
+/// The time between two jobs in the paper's workload, in nanoseconds.
+pub const PERIOD_NS: u64 = 25_000_000;
+
+/// Which time a parallel subtask stamps its messages with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stamping {
+    /// The job's release: the source's stamp is passed on, so that all messages of a
+    /// job carry the same. [`ExactTime`](crate::ExactTime) needs this.
+    Release,
+    /// The publication: every parallel subtask stamps anew when it finishes. The
+    /// paper joins these with [`ApproximateTime`](crate::ApproximateTime).
+    Publication,
+}
+
+/// Runs so many jobs through a synchronizer that holds nothing yet, which joins as
+/// many parallel subtasks as it has topics. `execution_ns` is asked for the
+/// execution time of each (parallel subtask, job) once: the parallel subtasks one
+/// after the other, and for each the jobs in order.
+///
+/// Publications of the same instant arrive in the order of their topics.
+///
+/// ```
+/// use pub_sub::ExactTime;
+/// use pub_sub::workload::{self, Stamping};
+///
+/// let times_ns = |parallel: usize, _job: usize| [3_000_000, 40_000_000][parallel];
+/// let mut exact = ExactTime::new(2, 100);
+/// let record = workload::run(&mut exact, Stamping::Release, 10, times_ns);
+/// assert_eq!(record.same_index_sets(), 10);
+/// assert_eq!(record.cover_delays_ns(), [0; 10]);
+/// ```
+///
+/// # Panics
+///
+/// If a time exceeds what 64 bits of nanoseconds hold.
+pub fn run(
+    synchronizer: &mut dyn Synchronizer<usize>,
+    stamping: Stamping,
+    jobs: usize,
+    execution_ns: impl FnMut(usize, usize) -> u64,
+) -> Record {
+    let topics = synchronizer.topics();
+    let mut record = Record {
+        publications_ns: publications(topics, jobs, execution_ns),
+        sets: Vec::new(),
+    };
+    // The next job that each topic publishes.
+    let mut next = vec![0; topics];
+    while let Some((ready_ns, topic)) = earliest(&record.publications_ns, &next) {
+        let job = next[topic];
+        next[topic] += 1;
+        let stamp_ns = match stamping {
+            Stamping::Release => release_ns(job),
+            Stamping::Publication => ready_ns,
+        };
+        let message = Stamped {
+            stamp_ns,
+            message: job,
+        };
+        let sets = &mut record.sets;
+        synchronizer.arrive(topic, message, &mut Ready { ready_ns, sets });
+    }
+    record
+}
+
+/// Returns when each parallel subtask publishes each job.
+fn publications(
+    topics: usize,
+    jobs: usize,
+    mut execution_ns: impl FnMut(usize, usize) -> u64,
+) -> Vec<Vec<u64>> {
+    let mut subtask = |topic| {
+        let mut finish_ns: u64 = 0;
+        let finishes_ns = (0..jobs).map(|job| {
+            let start_ns = release_ns(job).max(finish_ns);
+            let finished_ns = start_ns.checked_add(execution_ns(topic, job));
+            finish_ns = finished_ns.expect(TOO_LATE);
+            finish_ns
+        });
+        finishes_ns.collect()
+    };
+    (0..topics).map(&mut subtask).collect()
+}
+
+const TOO_LATE: &str = "the run ends after the last time that 64 bits hold; take fewer jobs";
+
+fn release_ns(job: usize) -> u64 {
+    let job = u64::try_from(job).ok();
+    job.and_then(|job| job.checked_mul(PERIOD_NS))
+        .expect(TOO_LATE)
+}
+
+/// Returns the earliest publication that is yet to come, and its topic.
+fn earliest(publications_ns: &[Vec<u64>], next: &[usize]) -> Option<(u64, usize)> {
+    let topics = publications_ns.iter().zip(next).enumerate();
+    topics
+        .filter_map(|(topic, (times_ns, &job))| Some((*times_ns.get(job)?, topic)))
+        .min()
+}
+
+/// Writes down what comes out while one publication is handled.
+struct Ready<'a> {
+    ready_ns: u64,
+    sets: &'a mut Vec<RecordedSet>,
+}
+
+impl Outlet<usize> for Ready<'_> {
+    fn emitted(&mut self, set: Set<'_, usize>) {
+        self.sets.push(RecordedSet {
+            ready_ns: self.ready_ns,
+            indices: set.map(|stamped| stamped.message).collect(),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ExactTime;
+
+    #[test]
+    fn jobs_of_a_parallel_subtask_wait_for_each_other() {
+        let times_ns = |_, job: usize| [60_000_000, 1_000_000, 1_000_000, 1][job];
+        let publications_ns = publications(1, 4, times_ns);
+        assert_eq!(
+            publications_ns,
+            [[60_000_000, 61_000_000, 62_000_000, 75_000_001]]
+        );
+    }
+
+    #[test]
+    fn a_set_is_ready_when_its_last_message_is_published() {
+        let times_ns = |topic: usize, _| [9, 4][topic];
+        let record = run(&mut ExactTime::new(2, 5), Stamping::Release, 2, times_ns);
+        let ready_ns: Vec<_> = record.sets.iter().map(|set| set.ready_ns).collect();
+        assert_eq!(ready_ns, [9, PERIOD_NS + 9]);
+        assert_eq!((record.same_index_sets(), record.missing_joins()), (2, 0));
+    }
+}
