@@ -39,6 +39,7 @@ use alloc::vec::Vec;
 use super::answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
 use super::bonifaci::{bonifaci_dm, bonifaci_edf};
 use super::capacity::{gedf_capacity, grm_capacity};
+use super::closure::SUBTASK_LIMIT;
 use super::intra_task::intra_task;
 use super::long_paths::long_paths_among;
 use super::melani::{constrained, widths};
@@ -240,8 +241,11 @@ impl<'a> Case<'a> {
             bound_ns: long_paths_among(task, cores, paths)?,
             test: Test::Alone,
         };
-        if preemption == Mixture::All && self.settings.policy == Policy::StaticPriority {
-            let subtasks = self.dag(dag).subtasks();
+        let subtasks = self.dag(dag).subtasks();
+        if preemption == Mixture::All
+            && self.settings.policy == Policy::StaticPriority
+            && subtasks.len() <= SUBTASK_LIMIT
+        {
             let mut order: Vec<usize> = (0..subtasks.len()).collect();
             order.sort_by_key(|&subtask| (subtasks[subtask].priority().0, subtask));
             if let Some(bound_ns) = intra_task(task, &order, cores)
