@@ -1,8 +1,9 @@
 //! The life of an instance: ready, started, ended.
 //!
-//! An instance ends by finishing or, in an aborted job, by being cancelled. In
-//! both cases all its outgoing edges are released at that instant (R3), so an
-//! aborted job ends by the same rules as any other, only without running.
+//! An instance ends by finishing, by a fault or, in a job that is aborted or
+//! whose DAG is ended, by being cancelled. In all cases all its outgoing edges
+//! are released at that instant (R3), so such a job ends by the same rules as
+//! any other, only without running.
 
 use super::{DagState, Key, Scheduler, key_of};
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
@@ -24,6 +25,14 @@ pub(super) enum Phase {
 impl Scheduler {
     /// Ends an instance that has started.
     pub(super) fn finish(&mut self, instance: Instance, observer: &mut impl Observer) {
+        self.take_off(instance, "is completed");
+        self.ending.push(instance.subtask);
+        self.spread_ends(instance.dag, observer);
+    }
+
+    /// Takes a started instance from its core, or out of line if it has none.
+    /// `event` says what the driver claims, if the instance has not started.
+    pub(super) fn take_off(&mut self, instance: Instance, event: &str) {
         let Instance { dag, job, subtask } = instance;
         let state = &self.dags[dag.index()];
         let sequence = state.joins.progress(subtask);
@@ -32,11 +41,9 @@ impl Scheduler {
         match self.phases[index] {
             Phase::Running(core) if in_flight => self.cores.free(core),
             Phase::Preempted if in_flight => self.ready.remove(index),
-            _ => panic!("{instance} is completed and has not started; complete each once"),
+            _ => panic!("{instance} {event} and has not started; complete each once, or fail it"),
         }
         self.phases[index] = Phase::Absent;
-        self.ending.push(subtask);
-        self.spread_ends(dag, observer);
     }
 
     /// Releases a source in the job with a sequence number.
@@ -86,7 +93,7 @@ impl Scheduler {
     /// A subtask is in `ending` at most once at a time: its next instance can
     /// only be ready when this one has been taken out. So each round of the
     /// loop ends another instance in flight.
-    fn spread_ends(&mut self, dag: DagId, observer: &mut impl Observer) {
+    pub(super) fn spread_ends(&mut self, dag: DagId, observer: &mut impl Observer) {
         while let Some(subtask) = self.ending.pop() {
             let Self {
                 task_set,
@@ -111,7 +118,7 @@ impl Scheduler {
                     job: jobs.job(sequence).number,
                     subtask: next,
                 };
-                if jobs.is_aborted(sequence) {
+                if jobs.is_cut(sequence) {
                     observer.cancelled(instance);
                     ending.push(next);
                 } else {
@@ -138,6 +145,8 @@ impl Scheduler {
         let job = *state.jobs.job(sequence);
         let outcome = if state.jobs.is_aborted(sequence) {
             JobOutcome::Aborted
+        } else if state.jobs.is_ended() {
+            JobOutcome::DagEnded
         } else if job.missed {
             state.statistics.completed += 1;
             JobOutcome::Missed

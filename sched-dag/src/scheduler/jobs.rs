@@ -33,6 +33,9 @@ pub(super) struct Jobs {
     judged: u64,
     /// The sequence number of the first job in flight that is not aborted.
     pub(super) aborted: u64,
+    /// Whether the DAG is ended: no job is released, and none in flight starts
+    /// a further instance.
+    ended: bool,
     /// The first job that is not due yet.
     next_due: u64,
     /// Its nominal release time; `None`: there is no further job.
@@ -62,6 +65,7 @@ impl Jobs {
             next: 0,
             judged: 0,
             aborted: 0,
+            ended: false,
             next_due: 0,
             next_due_ns: due_ns(dag, 0),
             first_waiting: 0,
@@ -79,11 +83,11 @@ impl Jobs {
     }
 
     /// Reports whether there is neither a job in flight, nor one waiting, nor
-    /// one ahead within the DAG's limit of jobs.
+    /// one ahead: the DAG is ended, or has a limit of jobs and is there.
     pub(super) fn are_over(&self, dag: &Dag) -> bool {
         self.oldest == self.next
             && self.waiting() == 0
-            && dag.jobs().is_some_and(|jobs| self.next_due >= jobs)
+            && (self.ended || dag.jobs().is_some_and(|jobs| self.next_due >= jobs))
     }
 
     pub(super) fn waiting(&self) -> u64 {
@@ -153,6 +157,29 @@ impl Jobs {
 
     pub(super) fn is_aborted(&self, sequence: u64) -> bool {
         sequence < self.aborted
+    }
+
+    /// Reports whether a job starts no further instance: it is aborted, or the
+    /// DAG is ended.
+    pub(super) fn is_cut(&self, sequence: u64) -> bool {
+        self.ended || self.is_aborted(sequence)
+    }
+
+    pub(super) fn is_ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Drops all that waits and all that is ahead, and lets those in flight
+    /// start no further instance. All jobs are judged by that. Returns how many
+    /// were in flight and not aborted, and how many waited.
+    pub(super) fn end_all(&mut self) -> (u64, u64) {
+        let cut_short = self.next - self.aborted.max(self.oldest);
+        let dropped = self.waiting();
+        self.ended = true;
+        self.judged = self.next;
+        self.next_due_ns = None;
+        self.first_waiting = self.next_due;
+        (cut_short, dropped)
     }
 
     /// Takes the oldest job out of flight, all of whose instances have ended.

@@ -10,7 +10,7 @@
 //! dispatch that sees both. The types force this order:
 //!
 //! 1. [`Scheduler::at`] begins the instant and gives a [`Moment`], which takes
-//!    completions;
+//!    completions, and faults and stops, which end a DAG;
 //! 2. [`Moment::release_due`] turns it into a [`Released`], which takes none;
 //! 3. [`Released::dispatch`] ends it with the [`Decision`]s.
 //!
@@ -21,10 +21,12 @@
 //!
 //! - The rules R1 to R5 (see the [crate]), with the key that R5 states.
 //! - Each job ends exactly once, in the order of its DAG's jobs, and each due
-//!   job is released or skipped exactly once.
+//!   job is released, skipped, or dropped with its DAG's end, exactly once.
 //! - Bounded steps: a release costs the sources of its DAG, a completion the
 //!   successors of its subtask, a decision the logarithm of the number of
-//!   subtasks. Beside that an aborted job costs its instances, once. After a
+//!   subtasks. Beside that a job that is aborted or in flight when its DAG is
+//!   ended costs its instances, once; at one instant that is at most the DAG's
+//!   subtasks and edges times the jobs that may be in flight. After a
 //!   pause of the driver, each release and each deadline that has passed
 //!   meanwhile costs its step.
 //!
@@ -37,6 +39,7 @@
 mod cores;
 mod decision;
 mod dispatch;
+mod ending;
 pub(crate) mod heap;
 mod instances;
 mod jobs;
@@ -165,8 +168,8 @@ impl Scheduler {
     }
 
     /// Returns when the driver has to begin the next instant, if nothing
-    /// completes before: at the next release, or when a deadline has passed.
-    /// `None`: only completions are to come, or nothing.
+    /// completes before: at the next release, or when a deadline has passed. An
+    /// ended DAG has neither. `None`: only completions are to come, or nothing.
     #[must_use]
     pub fn next_event_ns(&self) -> Option<u64> {
         self.timers.peek().map(|(event_ns, _)| event_ns)
@@ -182,13 +185,36 @@ impl Scheduler {
         self.cores.running(core).map(Key::instance)
     }
 
-    /// Reports whether all jobs of all DAGs have been released or skipped, and
-    /// none is in flight. Never true if a DAG has no limit of jobs.
+    /// Reports whether every DAG [is over](Self::is_over).
     #[must_use]
     pub fn is_finished(&self) -> bool {
         let dags = self.task_set.dags().iter().zip(&self.dags);
         dags.into_iter()
             .all(|(dag, state)| state.jobs.are_over(dag))
+    }
+
+    /// Reports whether nothing of a DAG is left to be done: no job is in flight,
+    /// and none is to come. A DAG without a limit of jobs is over only once it
+    /// [is ended](Self::is_ended) and what it had started has ended.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn is_over(&self, dag: DagId) -> bool {
+        let state = &self.dags[dag.index()];
+        state.jobs.are_over(self.task_set.dag(dag))
+    }
+
+    /// Reports whether a DAG was ended by [`Moment::fail`] or [`Moment::stop`].
+    /// Instances of it that had started before may still run.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn is_ended(&self, dag: DagId) -> bool {
+        self.dags[dag.index()].jobs.is_ended()
     }
 
     /// Returns a DAG's counters.

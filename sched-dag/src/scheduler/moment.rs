@@ -30,9 +30,36 @@ impl<'s> Moment<'s> {
     ///
     /// # Panics
     ///
-    /// If the instance has not started or has been completed before.
+    /// If the instance has not started or has ended before.
     pub fn complete(&mut self, instance: Instance, observer: &mut impl Observer) {
         self.scheduler.finish(instance, observer);
+    }
+
+    /// Takes note that an instance has ended by a fault, and ends its DAG.
+    ///
+    /// The instance's core is free. From now on the DAG releases no job and
+    /// starts no instance; its instances that have started on other cores, or
+    /// were preempted, are to be completed as ever (the module `ending` states
+    /// the rules). A further instance of an ended DAG may fail, too. As with
+    /// [`complete`](Self::complete), the instance need not run any more in the
+    /// scheduler's eyes. Completions of the same instant should come first, as
+    /// far as they are known: what finished together with the fault counts.
+    ///
+    /// # Panics
+    ///
+    /// If the instance has not started or has ended before.
+    pub fn fail(&mut self, instance: Instance, observer: &mut impl Observer) {
+        self.scheduler.fail(instance, observer);
+    }
+
+    /// Ends a DAG as [`fail`](Self::fail) does, without an instance that has
+    /// failed. Does nothing if the DAG is ended.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    pub fn stop(&mut self, dag: DagId, observer: &mut impl Observer) {
+        self.scheduler.stop(dag, observer);
     }
 
     /// Releases the jobs that are due, and notices deadlines that have passed.

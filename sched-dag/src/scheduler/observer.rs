@@ -30,8 +30,8 @@ pub trait Observer {
         let _ = instance;
     }
 
-    /// The instance will not run, because its job was aborted; what its
-    /// predecessors have sent to it can be dropped.
+    /// The instance will not run, because its job was aborted or its DAG is
+    /// ended; what its predecessors have sent to it can be dropped.
     fn cancelled(&mut self, instance: Instance) {
         let _ = instance;
     }
@@ -39,6 +39,12 @@ pub trait Observer {
     /// Job `job` starts no further instance, to make room for a newer job.
     fn aborted(&mut self, dag: DagId, job: u64) {
         let _ = (dag, job);
+    }
+
+    /// The DAG is ended, by a fault or a stop: it starts no further instance.
+    /// Reported once, before all that follows from it.
+    fn ended(&mut self, dag: DagId) {
+        let _ = dag;
     }
 
     /// The deadline of job `job` has passed, and the job is not complete.
@@ -61,6 +67,8 @@ pub enum JobOutcome {
     Missed,
     /// The job was aborted.
     Aborted,
+    /// The DAG was ended while the job was in flight.
+    DagEnded,
 }
 
 impl Observer for () {}
@@ -88,6 +96,10 @@ impl<O: Observer + ?Sized> Observer for &mut O {
 
     fn aborted(&mut self, dag: DagId, job: u64) {
         (**self).aborted(dag, job);
+    }
+
+    fn ended(&mut self, dag: DagId) {
+        (**self).ended(dag);
     }
 
     fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {

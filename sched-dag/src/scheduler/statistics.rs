@@ -20,6 +20,12 @@ pub struct DagStatistics {
     pub aborts: u64,
     /// Releases that had to wait for an older job to end.
     pub queued: u64,
+    /// Instances that a fault has ended.
+    pub faults: u64,
+    /// Jobs that were in flight when the DAG was ended, without aborted ones.
+    pub cut_short: u64,
+    /// Releases that still waited for an older job when the DAG was ended.
+    pub dropped: u64,
 }
 
 impl DagStatistics {
