@@ -34,6 +34,9 @@ pub use list::List;
 /// The most processors that are told apart: the 8-bit APIC ids, less broadcast.
 pub const MAX_PROCESSORS: usize = 255;
 
+/// The most modules that are noted; loaders in use pass one.
+pub const MAX_MODULES: usize = 4;
+
 /// What is known of the machine when the kernel takes over.
 #[derive(Debug)]
 pub struct BootInfo {
@@ -41,6 +44,8 @@ pub struct BootInfo {
     pub command_line: List<u8, 2048>,
     /// The physical memory map.
     pub memory: List<MemoryRegion, 64>,
+    /// The files that the loader left in memory, in its order.
+    pub modules: List<Module, MAX_MODULES>,
     /// The physical address of the ACPI root pointer, if the loader named it.
     pub rsdp: Option<u64>,
     /// The time stamp counter when Rust code began to run, in ticks.
@@ -56,6 +61,15 @@ pub struct MemoryRegion {
     pub end: u64,
     /// Whether it is ordinary memory that nobody uses.
     pub usable: bool,
+}
+
+/// A file that the loader left in memory: `qemu -initrd FILE`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Module {
+    /// The physical address of its first byte.
+    pub start: u64,
+    /// The physical address after its last byte, above `start`.
+    pub end: u64,
 }
 
 impl BootInfo {

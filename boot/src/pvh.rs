@@ -5,7 +5,7 @@
 //! kernel, which can print, says what it misses.
 
 use crate::physical::PhysicalMemory;
-use crate::{BootInfo, List, MemoryRegion};
+use crate::{BootInfo, List, MemoryRegion, Module};
 
 /// "xEn3" with the top bit of the first letter set.
 const MAGIC: u32 = 0x336e_c578;
@@ -14,6 +14,8 @@ const USABLE: u32 = 1;
 
 mod offset {
     pub(super) const VERSION: u64 = 4;
+    pub(super) const MODULE_COUNT: u64 = 12;
+    pub(super) const MODULES: u64 = 16;
     pub(super) const COMMAND_LINE: u64 = 24;
     pub(super) const RSDP: u64 = 32;
     pub(super) const MEMORY_MAP: u64 = 40;
@@ -23,7 +25,9 @@ mod offset {
 /// Reads the start info at `address` into a [`BootInfo`].
 ///
 /// `entry_tsc` is passed through. A memory map with more than 64 entries is cut
-/// off there, a command line of more than 2048 bytes likewise.
+/// off there, a command line of more than 2048 bytes and a list of more than 4
+/// modules likewise. Where modules lie is the loader's word, which the kernel
+/// compares with the memory map.
 pub fn boot_info(memory: &impl PhysicalMemory, address: u64, entry_tsc: u64) -> BootInfo {
     let mut info = BootInfo {
         command_line: List::new(0),
@@ -32,6 +36,7 @@ pub fn boot_info(memory: &impl PhysicalMemory, address: u64, entry_tsc: u64) -> 
             end: 0,
             usable: false,
         }),
+        modules: List::new(Module { start: 0, end: 0 }),
         rsdp: None,
         entry_tsc,
     };
@@ -40,6 +45,7 @@ pub fn boot_info(memory: &impl PhysicalMemory, address: u64, entry_tsc: u64) -> 
     }
     info.rsdp = memory.u64(address + offset::RSDP).filter(|rsdp| *rsdp != 0);
     read_command_line(memory, address, &mut info);
+    read_modules(memory, address, &mut info);
     if memory
         .u32(address + offset::VERSION)
         .is_some_and(|version| version >= 1)
@@ -61,6 +67,31 @@ fn read_command_line(memory: &impl PhysicalMemory, address: u64, info: &mut Boot
         .take_while(|byte| *byte != 0);
     for byte in text {
         if info.command_line.push(byte).is_err() {
+            return;
+        }
+    }
+}
+
+/// Notes where modules lie. One without a byte, or beyond the last address, is
+/// left out; nothing is read of the modules themselves.
+fn read_modules(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
+    const ENTRY_SIZE: u64 = 32;
+    let (Some(count), Some(list)) = (
+        memory.u32(address + offset::MODULE_COUNT),
+        memory.u64(address + offset::MODULES),
+    ) else {
+        return;
+    };
+    for index in 0..u64::from(count) {
+        let entry = list.checked_add(index * ENTRY_SIZE);
+        let read = |offset| memory.u64(entry?.checked_add(offset)?);
+        let (Some(start), Some(size)) = (read(0), read(8)) else {
+            return;
+        };
+        let Some(end) = start.checked_add(size).filter(|end| *end > start) else {
+            continue;
+        };
+        if info.modules.push(Module { start, end }).is_err() {
             return;
         }
     }
@@ -134,6 +165,54 @@ mod tests {
             usable: true,
         };
         assert_eq!(info.memory.as_slice(), &[region]);
+    }
+
+    /// A start info that names `count` modules in a list at 160, where `entries`
+    /// (start and size of each) stand.
+    fn with_modules(count: u8, entries: &[(u64, u64)]) -> Bytes {
+        let mut bytes = start_info(MAGIC);
+        bytes.0[12] = count;
+        bytes.0[16] = 160;
+        bytes.0.truncate(160);
+        for (start, size) in entries {
+            bytes.0.extend(start.to_le_bytes());
+            bytes.0.extend(size.to_le_bytes());
+            bytes.0.extend([0; 16]); // no command line of its own
+        }
+        bytes
+    }
+
+    fn modules(bytes: &Bytes) -> Vec<(u64, u64)> {
+        let info = boot_info(bytes, 0, 0);
+        let modules = info.modules.as_slice().iter();
+        modules.map(|module| (module.start, module.end)).collect()
+    }
+
+    #[test]
+    fn notes_modules_in_their_order() {
+        let bytes = with_modules(2, &[(0x7000, 0x123), (0x5000, 1)]);
+        assert_eq!(modules(&bytes), [(0x7000, 0x7123), (0x5000, 0x5001)]);
+        assert_eq!(modules(&with_modules(0, &[(0x7000, 1)])), []);
+    }
+
+    #[test]
+    fn leaves_out_modules_that_cannot_be() {
+        let bytes = with_modules(4, &[(0x7000, 0), (u64::MAX - 1, 2), (u64::MAX, 1), (9, 1)]);
+        assert_eq!(modules(&bytes), [(9, 10)]);
+    }
+
+    #[test]
+    fn keeps_what_a_truncated_or_endless_list_of_modules_tells() {
+        let mut bytes = with_modules(2, &[(0x7000, 1), (0x8000, 1)]);
+        bytes.0.truncate(160 + 32 + 15);
+        assert_eq!(modules(&bytes), [(0x7000, 0x7001)]);
+        let bytes = with_modules(255, &[(0x7000, 1)]);
+        assert_eq!(modules(&bytes), [(0x7000, 0x7001)]);
+        let bytes = with_modules(5, &[(1, 1); 5]);
+        assert_eq!(modules(&bytes).len(), crate::MAX_MODULES);
+        let mut bytes = with_modules(1, &[(0x7000, 1)]);
+        bytes.0[16..24].fill(0xff); // the list lies beyond all memory
+        assert_eq!(modules(&bytes), []);
     }
 
     #[test]

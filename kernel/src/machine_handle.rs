@@ -1,5 +1,6 @@
 //! The machine as an app sees it.
 
+use core::cell::Cell;
 use core::fmt;
 use core::time::Duration;
 
@@ -19,6 +20,7 @@ use crate::{console, execution, json, machine};
 #[derive(Debug)]
 pub struct Machine {
     pub(crate) options: Options<'static>,
+    pub(crate) module: Option<&'static [u8]>,
 }
 
 /// Why an app ends other than by success.
@@ -61,6 +63,14 @@ impl Machine {
         &self.options
     }
 
+    /// Returns the file that the loader left in memory (`qemu -initrd FILE`), if
+    /// there is one. It is not copied: memory and the boot's time are the same
+    /// whatever its size.
+    #[must_use]
+    pub const fn module(&self) -> Option<&'static [u8]> {
+        self.module
+    }
+
     /// Returns the number of cores that run subtasks.
     #[must_use]
     pub fn cores(&self) -> u32 {
@@ -79,7 +89,8 @@ impl Machine {
         /// Time for the cores to get ready between now and the first release.
         const LEAD_NS: u64 = 100_000;
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
-        let total = execution::begin(machine::clock::now_ns() + LEAD_NS).ok_or_else(nothing)?;
+        let epoch_ns = machine::clock::now_ns() + LEAD_NS;
+        let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
         let allocations_before = heap::usage().allocations;
         console::defer();
         execution::arm_next_event();
@@ -90,7 +101,11 @@ impl Machine {
         if dropped > 0 {
             crate::println!("({dropped} bytes of output did not fit in the buffer)");
         }
-        Ok(Run::new(execution::end().ok_or_else(nothing)?, allocations))
+        let run = Run::new(execution::end().ok_or_else(nothing)?, allocations, epoch_ns);
+        if self.dumps_trace {
+            trace::dump(&run, self.runs.replace(self.runs.get() + 1));
+        }
+        Ok(run)
     }
 
     /// Interrupts every core each `period` from now on, beside what scheduling

@@ -2,9 +2,9 @@
 
 use alloc::vec::Vec;
 
-use boot::BootInfo;
 use boot::acpi::{self, Platform};
 use boot::physical::IdentityMap;
+use boot::{BootInfo, Module};
 
 use crate::machine::this_core::{self, Stacks};
 use crate::machine::{clock, cpu, exit, interrupt, legacy, local_apic, processors, serial};
@@ -31,9 +31,11 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         exception: panic::exception,
     });
     let platform = read_platform(info);
+    let module = module(info);
     // SAFETY: 1. `boot` handed over with its table in use and the machine's
     // map. 2. This is the boot processor's only way, and nothing was allocated.
-    let layout = unsafe { memory::initialize(info.memory.as_slice(), platform.local_apic) };
+    // 3. `module` made sure of it.
+    let layout = unsafe { memory::initialize(info.memory.as_slice(), module, platform.local_apic) };
     let layout = layout.expect("the machine has too little memory: give it 16 MiB or more");
     // SAFETY: `memory::initialize` mapped one page of registers there.
     unsafe { local_apic::set_base(platform.local_apic) };
@@ -49,6 +51,28 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     };
     // SAFETY: the stack is that of the context which this core runs first.
     unsafe { cpu::continue_on_stack(stack, &start, start_cores) }
+}
+
+/// Returns the first module that the loader left in memory.
+fn module(info: &BootInfo) -> Option<Module> {
+    let module = *info.modules.as_slice().first()?;
+    let (map, image) = (info.memory.as_slice(), boot::image::whole());
+    assert!(
+        memory::lies_in_memory(module, map, &image),
+        "the loader's module at {:#x}..{:#x} is not in free memory; give the machine more memory",
+        module.start,
+        module.end
+    );
+    Some(module)
+}
+
+/// Returns the bytes of the loader's module, once it is mapped.
+fn module_bytes(info: &'static BootInfo) -> Option<&'static [u8]> {
+    let Module { start, end } = module(info)?;
+    let length = usize::try_from(end - start).ok()?;
+    // SAFETY: `memory::initialize` mapped the module as constant at its physical
+    // address, for good, and kept its pages from the frames: nobody writes there.
+    Some(unsafe { core::slice::from_raw_parts(start as *const u8, length) })
 }
 
 /// What the boot processor takes along to its own stack.
@@ -165,7 +189,10 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
             ("off", fass::Preemption::Disabled),
         ],
     )?);
-    app(&Machine { options })
+    app(&Machine {
+        options,
+        module: module_bytes(info),
+    })
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.

@@ -11,7 +11,7 @@ use boot::{List, MemoryRegion};
 pub(crate) const FRAME: u64 = 4096;
 
 /// Nothing below is handed out: the firmware's, and the trampoline's page.
-const LOWEST: u64 = 1 << 20;
+pub(super) const LOWEST: u64 = 1 << 20;
 
 /// The frames that nobody has taken.
 #[derive(Debug)]
@@ -22,8 +22,8 @@ pub(crate) struct Frames {
 }
 
 impl Frames {
-    /// Creates the stock from the memory map, less the `taken` range.
-    pub(crate) fn new(map: &[MemoryRegion], taken: &Range<u64>) -> Self {
+    /// Creates the stock from the memory map, less the `taken` ranges.
+    pub(crate) fn new(map: &[MemoryRegion], taken: &[Range<u64>]) -> Self {
         let mut frames = Self {
             free: List::new((0, 0)),
             total: 0,
@@ -31,8 +31,9 @@ impl Frames {
         for region in map.iter().filter(|region| region.usable) {
             frames.total += region.end.saturating_sub(region.start);
             let start = region.start.max(LOWEST);
-            frames.add(start, region.end.min(taken.start));
-            frames.add(start.max(taken.end), region.end);
+            for free in less(start..region.end, taken) {
+                frames.add(free.start, free.end);
+            }
         }
         frames
     }
@@ -78,7 +79,27 @@ impl Frames {
     }
 }
 
+/// Returns what is left of `whole` without the `taken` ranges, in ascending order.
+pub(super) fn less(whole: Range<u64>, taken: &[Range<u64>]) -> impl Iterator<Item = Range<u64>> {
+    let end = whole.end;
+    let mut start = whole.start;
+    core::iter::from_fn(move || {
+        while start < end {
+            let holes = taken.iter().filter(|hole| hole.end > start);
+            let Some(hole) = holes.min_by_key(|hole| hole.start) else {
+                return Some(core::mem::replace(&mut start, end)..end);
+            };
+            let left = core::mem::replace(&mut start, hole.end)..hole.start.min(end);
+            if left.start < left.end {
+                return Some(left);
+            }
+        }
+        None
+    })
+}
+
 #[cfg(test)]
+#[allow(clippy::single_range_in_vec_init, reason = "one range is meant")]
 mod tests {
     use super::*;
 
@@ -95,7 +116,7 @@ mod tests {
             region(MIB, 4 * MIB, true),
             region(4 * MIB, 8 * MIB, false),
         ];
-        let mut frames = Frames::new(&map, &(2 * MIB..3 * MIB));
+        let mut frames = Frames::new(&map, &[2 * MIB..3 * MIB]);
         assert_eq!(frames.take(256), Some(MIB));
         assert_eq!(frames.take(256), Some(3 * MIB));
         assert_eq!(frames.take(1), None);
@@ -104,25 +125,34 @@ mod tests {
 
     #[test]
     fn takes_whole_frames_only() {
-        let mut frames = Frames::new(
-            &[region(2 * MIB + 1, 2 * MIB + 3 * FRAME - 1, true)],
-            &(0..0),
-        );
+        let mut frames = Frames::new(&[region(2 * MIB + 1, 2 * MIB + 3 * FRAME - 1, true)], &[]);
         assert_eq!(frames.take(1), Some(2 * MIB + FRAME));
         assert_eq!(frames.take(1), None);
     }
 
     #[test]
     fn gives_the_heap_the_most_and_keeps_the_rest() {
-        let mut frames = Frames::new(&[region(4 * MIB, 8 * MIB, true)], &(0..0));
+        let mut frames = Frames::new(&[region(4 * MIB, 8 * MIB, true)], &[]);
         assert_eq!(frames.take_heap(), Some(5 * MIB..8 * MIB));
         assert_eq!(frames.take(256), Some(4 * MIB));
         assert_eq!(frames.take(1), None);
     }
 
     #[test]
+    fn cuts_out_what_is_taken_in_any_order() {
+        let left = |taken: &[Range<u64>]| less(10..20, taken).collect::<Vec<_>>();
+        let all = 10..20;
+        assert_eq!(left(&[]), [all]);
+        assert_eq!(left(&[16..18, 12..14]), [10..12, 14..16, 18..20]);
+        assert_eq!(left(&[5..12, 19..30]), [12..19]);
+        assert_eq!(left(&[11..15, 13..17]), [10..11, 17..20]);
+        assert_eq!(left(&[0..30]), []);
+        assert_eq!(left(&[0..5, 25..30]), [10..20]);
+    }
+
+    #[test]
     fn has_nothing_without_a_map() {
-        let mut frames = Frames::new(&[], &(0..0));
+        let mut frames = Frames::new(&[], &[]);
         assert_eq!(frames.take(1), None);
         assert_eq!(frames.take_heap(), None);
     }

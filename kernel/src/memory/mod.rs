@@ -10,11 +10,11 @@ mod tlsf;
 
 use core::ops::Range;
 
-use boot::MemoryRegion;
+use boot::{MemoryRegion, Module};
 
 use crate::machine::paging::{Access, MapError, PAGE, PageTable};
 use crate::machine::spinlock::SpinLock;
-use frames::{FRAME, Frames};
+use frames::{FRAME, Frames, less};
 
 /// Where stacks live: 512 GiB, beyond any physical address of ordinary PCs.
 const STACK_WINDOW: u64 = 1 << 39;
@@ -54,15 +54,20 @@ pub(crate) struct Layout {
 ///
 /// 1. The boot page table is in use, and `map` is the machine's memory map.
 /// 2. It is called once, by the boot processor, before anything is allocated.
-pub(crate) unsafe fn initialize(map: &[MemoryRegion], device: u64) -> Result<Layout, OutOfMemory> {
-    let mut frames = Frames::new(map, &boot::image::whole());
+/// 3. `module`, if any, [lies in memory](lies_in_memory) by that map.
+pub(crate) unsafe fn initialize(
+    map: &[MemoryRegion],
+    module: Option<Module>,
+    device: u64,
+) -> Result<Layout, OutOfMemory> {
+    let mut frames = Frames::new(map, &[boot::image::whole(), pages_of(module)]);
     let total_bytes = frames.total_bytes();
     let heap = frames.take_heap().ok_or(OutOfMemory)?;
     let mut new_frame = || take_zeroed(&mut frames);
     // SAFETY: frames are unused and zeroed (`take_zeroed`), in memory that the
     // boot table maps (condition 1) and `map_all` maps too.
     let mut table = unsafe { PageTable::new(&mut new_frame) }?;
-    map_all(&mut table, map, device, &mut new_frame)?;
+    map_all(&mut table, map, pages_of(module), device, &mut new_frame)?;
     let root_table = table.root();
     // SAFETY: image, data (so the boot stack) and all usable memory are mapped
     // to where they were.
@@ -81,11 +86,35 @@ pub(crate) unsafe fn initialize(map: &[MemoryRegion], device: u64) -> Result<Lay
     })
 }
 
-/// Maps the image with its rights, all usable memory as data, and one page of a
-/// device's registers.
+/// Returns the whole pages that a module lies in, which nobody else gets.
+fn pages_of(module: Option<Module>) -> Range<u64> {
+    module.map_or(0..0, |module| {
+        module.start / PAGE * PAGE..module.end.next_multiple_of(PAGE)
+    })
+}
+
+/// Reports whether a module lies in one range of usable memory above the first
+/// MiB and apart from the image, where loaders put modules.
+pub(crate) fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range<u64>) -> bool {
+    let fits = |region: &MemoryRegion| {
+        region.usable && region.start <= module.start && module.end <= region.end
+    };
+    // The module's last page is the module's alone, so it has to be whole.
+    let Some(end) = module.end.checked_next_multiple_of(PAGE) else {
+        return false;
+    };
+    module.start < module.end
+        && module.start >= frames::LOWEST
+        && (end <= image.start || module.start / PAGE * PAGE >= image.end)
+        && map.iter().any(fits)
+}
+
+/// Maps the image with its rights, the module as constant, all other usable
+/// memory as data, and one page of a device's registers.
 fn map_all(
     table: &mut PageTable,
     map: &[MemoryRegion],
+    module: Range<u64>,
     device: u64,
     new_frame: &mut dyn FnMut() -> Option<u64>,
 ) -> Result<(), OutOfMemory> {
@@ -98,14 +127,13 @@ fn map_all(
     for (range, access) in sections {
         table.map(range.clone(), range.start, access, new_frame)?;
     }
+    table.map(module.clone(), module.start, Access::Constant, new_frame)?;
     for region in map.iter().filter(|region| region.usable) {
         // Page 0 stays absent, so that a null pointer faults.
         let start = region.start.max(PAGE).next_multiple_of(PAGE);
         let end = region.end / PAGE * PAGE;
-        for part in [start..end.min(image.start), start.max(image.end)..end] {
-            if part.start < part.end {
-                table.map(part.clone(), part.start, Access::Data, new_frame)?;
-            }
+        for part in less(start..end, &[image.clone(), module.clone()]) {
+            table.map(part.clone(), part.start, Access::Data, new_frame)?;
         }
     }
     table.map(device..device + PAGE, device, Access::Device, new_frame)?;
@@ -138,4 +166,40 @@ pub(crate) fn new_stack(bytes: u64) -> Result<u64, OutOfMemory> {
     })?;
     *next_stack = stack.end;
     Ok(stack.end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIB: u64 = 1 << 20;
+
+    #[test]
+    fn believes_a_module_only_where_memory_is_free() {
+        let region = |start, end, usable| MemoryRegion { start, end, usable };
+        let map = [
+            region(0, 640 << 10, true),
+            region(MIB, 8 * MIB, true),
+            region(8 * MIB, 9 * MIB, false),
+            region(9 * MIB, u64::MAX, true),
+        ];
+        let image = 2 * MIB..3 * MIB;
+        let lies = |start, end| lies_in_memory(Module { start, end }, &map, &image);
+        assert!(lies(4 * MIB, 5 * MIB));
+        assert!(lies(MIB, 2 * MIB));
+        assert!(lies(8 * MIB - 1, 8 * MIB));
+        assert!(!lies(64 << 10, 65 << 10), "below the first MiB");
+        assert!(!lies(MIB, 2 * MIB + 1), "into the image");
+        assert!(!lies(3 * MIB - 1, 4 * MIB), "out of the image");
+        assert!(!lies(8 * MIB - 1, 8 * MIB + 1), "into reserved memory");
+        assert!(!lies(4 * MIB, 4 * MIB), "empty");
+        assert!(!lies(u64::MAX - 1, u64::MAX), "at the end of all addresses");
+        assert_eq!(
+            pages_of(Some(Module {
+                start: 5000,
+                end: 8193
+            })),
+            4096..12288
+        );
+    }
 }
