@@ -13,7 +13,7 @@
 //! # What is guaranteed
 //!
 //! - The schedule is the one that rules R1-R5 of the task model prescribe.
-//!   [`Report::violations`] checks R1-R4 over what was recorded.
+//!   [`Report::violations`] checks them over what was recorded.
 //! - Machines belong to threads: tests that run in parallel, each with its own
 //!   [`VirtualTime`], do not disturb one another.
 //!
@@ -42,6 +42,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use fass::{Overheads, Policy, Preemption};
+pub use sched_dag::record::{Rule, Violation};
 pub use sched_dag::{
     CoreId, DagId, DagLabel, DagStatistics, Instance, JobOutcome, SubtaskId, SubtaskLabel,
 };
@@ -51,7 +52,6 @@ pub use event::{Event, EventKind};
 use platform::Machine;
 pub use record::{InstanceRecord, JobRecord};
 pub use report::Report;
-pub use rules::{Rule, Violation};
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///

@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use sched_dag::{DagId, DagStatistics, Instance, SubtaskId, TaskSet};
+use sched_dag::record::Violation;
+use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::event::{Event, EventKind};
 use crate::record::{InstanceRecord, JobRecord};
-use crate::rules::{self, Violation};
+use crate::rules;
 
 /// Everything that happened from the commit to the end of a run.
 #[derive(Clone, Debug)]
@@ -23,6 +24,7 @@ pub struct Report {
     /// The time of the last event.
     pub end_ns: u64,
     pub(crate) task_set: Arc<TaskSet>,
+    pub(crate) options: SchedulerOptions,
 }
 
 impl Report {
@@ -54,8 +56,15 @@ impl Report {
         &self.task_set
     }
 
-    /// Checks rules R1 to R4 of the task model over the records, and returns
-    /// what breaks them: nothing, unless the scheduler is wrong.
+    /// Checks rules R1 to R5 of the task model over what was recorded, and
+    /// returns what breaks them: nothing, unless the scheduler is wrong.
+    ///
+    /// After a panic ([`RunError::Panicked`](crate::RunError::Panicked)) the
+    /// last instant is incomplete, and may seem to break them.
+    ///
+    /// # Panics
+    ///
+    /// If there is no memory for another copy of all times.
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         rules::check(self)

@@ -1,199 +1,104 @@
-//! Rules R1 to R4 of the task model, checked over the records of a run.
+//! Rules R1 to R5 of the task model, checked over a run.
 //!
-//! The check shares nothing with the scheduler: it takes the recorded times and
-//! compares them with what the rules say, rule by rule.
-//!
-//! It is stricter than [`sched_dag::record`], which also judges real machines:
-//! in virtual time an instance is ready *at* the instant that the rules give,
-//! not merely no earlier.
-//!
-//! A release that had to queue counts from when it took place. Where an aborted
-//! job is involved, "ready exactly when" becomes "not ready before", since an
-//! aborted job's instances end without a finish.
+//! The checks are `sched_dag::record`'s, the same that judge a run of the
+//! kernel; here a report is put into their form. Times in virtual time are
+//! exact, so everything has to happen *at* the instant that the rules give, and
+//! at every instant the right instances must run.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
-use sched_dag::{DagId, Instance, JobOutcome};
+use sched_dag::Instance;
+use sched_dag::record::{
+    InstanceRecord, JobRecord, Precision, Record, Stretch, Violation, dispatch_violations,
+    violations,
+};
 
-use crate::record::{InstanceRecord, JobRecord};
+use crate::event::EventKind;
 use crate::report::Report;
 
-/// A rule of the task model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// R1: nothing of a job runs before its release on the nominal grid.
-    Release,
-    /// R2: an instance is ready exactly when all predecessors and its own
-    /// previous job have finished.
-    AndJoin,
-    /// R3: no effect of an instance before its completion.
-    CompletionBoundary,
-    /// R4: a job is complete with its last sink, and meets its deadline then.
-    JobCompletion,
-}
-
-/// A record that breaks a rule.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Violation {
-    /// The rule.
-    pub rule: Rule,
-    /// What was recorded and what the rule wants, with names and times.
-    pub message: String,
-}
-
-impl fmt::Display for Violation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rule = match self.rule {
-            Rule::Release => "R1",
-            Rule::AndJoin => "R2",
-            Rule::CompletionBoundary => "R3",
-            Rule::JobCompletion => "R4",
-        };
-        write!(f, "{rule}: {}", self.message)
-    }
-}
-
-/// Checks all records.
+/// Returns all breaches of the rules in a report.
+///
+/// # Panics
+///
+/// If the record does not fit into memory a second time.
 pub(crate) fn check(report: &Report) -> Vec<Violation> {
-    let check = Check {
-        report,
-        instances: (report.instances.iter())
-            .map(|record| (record.instance, record))
-            .collect(),
-        jobs: (report.jobs.iter())
-            .map(|record| ((record.dag, record.job), record))
-            .collect(),
-    };
-    let mut violations = Vec::new();
-    for job in &report.jobs {
-        check.job(job, &mut violations);
-    }
-    for instance in &report.instances {
-        check.instance(instance, &mut violations);
-    }
-    violations
+    let record = record(report).expect("the report's jobs fit into memory");
+    let stretches = stretches(report);
+    let of_dispatch = dispatch_violations(&report.task_set, &report.options, &record, &stretches);
+    violations(&report.task_set, &record)
+        .chain(of_dispatch)
+        .collect()
 }
 
-struct Check<'r> {
-    report: &'r Report,
-    instances: BTreeMap<Instance, &'r InstanceRecord>,
-    jobs: BTreeMap<(DagId, u64), &'r JobRecord>,
-}
-
-impl Check<'_> {
-    fn job(&self, record: &JobRecord, violations: &mut Vec<Violation>) {
-        let dag = self.report.task_set.dag(record.dag);
-        let name = self.report.dag_name(record.dag);
-        let JobRecord { job, .. } = *record;
-        let grid_ns = dag.offset_ns() + job * dag.period_ns();
-        if record.release_ns != grid_ns || record.released_at_ns < grid_ns {
-            violations.push(Violation {
-                rule: Rule::Release,
-                message: format!(
-                    "job {job} of `{name}` has release {} ns and was released at {} ns; \
-                     the grid says {grid_ns} ns",
-                    record.release_ns, record.released_at_ns
-                ),
-            });
-        }
-        let (Some(finish_ns), Some(outcome)) = (record.finish_ns, record.outcome) else {
-            return;
-        };
-        if outcome == JobOutcome::Aborted {
-            return;
-        }
-        let finishes = (dag.topological_order().iter())
-            .filter(|&&subtask| dag.successors(subtask).is_empty())
-            .map(|&subtask| self.finish_ns(record.dag, job, subtask));
-        let last_sink_ns = (finishes)
-            .reduce(|latest, finish_ns| Some(latest?.max(finish_ns?)))
-            .flatten();
-        if last_sink_ns != Some(finish_ns) {
-            violations.push(Violation {
-                rule: Rule::JobCompletion,
-                message: format!(
-                    "job {job} of `{name}` is complete at {finish_ns} ns, its last sink at \
-                     {last_sink_ns:?}"
-                ),
-            });
-        }
-        let is_met = finish_ns <= record.release_ns.saturating_add(dag.relative_deadline_ns());
-        if is_met != (outcome == JobOutcome::Met) || is_met == record.has_missed {
-            violations.push(Violation {
-                rule: Rule::JobCompletion,
-                message: format!(
-                    "job {job} of `{name}`, complete at {finish_ns} ns with its deadline at {} ns, \
-                     counts as {outcome:?}",
-                    record.deadline_ns
-                ),
-            });
-        }
+/// Returns the report's times as a record, `None` if they do not fit.
+fn record(report: &Report) -> Option<Record> {
+    // Skipped jobs have places, too: job numbers are positions.
+    let mut jobs = vec![0; report.task_set.dags().len()];
+    let of_jobs = report.jobs.iter().map(|of_job| (of_job.dag, of_job.job));
+    let of_instances = report.instances.iter().map(|times| times.instance);
+    for (dag, job) in of_jobs.chain(of_instances.map(|instance| (instance.dag, instance.job))) {
+        jobs[dag.index()] = jobs[dag.index()].max(job + 1);
     }
-
-    fn instance(&self, record: &InstanceRecord, violations: &mut Vec<Violation>) {
-        let instance = record.instance;
-        let Instance { dag, job, subtask } = instance;
-        let name = self.report.subtask_name(instance);
-        let mut push = |rule, message| violations.push(Violation { rule, message });
-        let Some(of_job) = self.jobs.get(&(dag, job)) else {
-            push(
-                Rule::Release,
-                format!("`{name}` is ready in job {job}, which was not released"),
-            );
-            return;
+    let task_set = &report.task_set;
+    let mut record = Record::with_jobs(task_set, Precision::Exact, |dag| jobs[dag.index()])?;
+    for of_job in &report.jobs {
+        *record.job_mut(of_job.dag, of_job.job)? = JobRecord {
+            release_ns: Some(of_job.release_ns),
+            released_ns: Some(of_job.released_at_ns),
+            missed_ns: of_job.has_missed.then_some(of_job.deadline_ns),
+            ended_ns: of_job.finish_ns,
+            outcome: of_job.outcome,
+            ..JobRecord::default()
         };
-        let start_ns = record.start_ns.unwrap_or(u64::MAX);
-        if start_ns < of_job.release_ns {
-            let release_ns = of_job.release_ns;
-            push(
-                Rule::Release,
-                format!("`{name}` starts job {job} at {start_ns} ns, before {release_ns} ns"),
-            );
-        }
-        let mut expected_ns = of_job.released_at_ns;
-        for &predecessor in self.report.task_set.dag(dag).predecessors(subtask) {
-            let finish_ns = self.finish_ns(dag, job, predecessor).unwrap_or(u64::MAX);
-            if start_ns < finish_ns {
-                push(
-                    Rule::CompletionBoundary,
-                    format!(
-                        "`{name}` starts job {job} at {start_ns} ns, while subtask {} finishes \
-                         at {finish_ns} ns",
-                        predecessor.0
-                    ),
-                );
+    }
+    for times in &report.instances {
+        *record.instance_mut(times.instance)? = InstanceRecord {
+            ready_ns: Some(times.ready_ns),
+            start_ns: times.start_ns,
+            finish_ns: times.finish_ns,
+            core: times.core,
+            preemptions: times.preemptions,
+            ..InstanceRecord::default()
+        };
+    }
+    for event in &report.events {
+        match event.kind {
+            EventKind::Aborted { dag, job } => {
+                record.job_mut(dag, job)?.cut_ns = Some(event.time_ns);
             }
-            expected_ns = expected_ns.max(finish_ns);
-        }
-        let mut is_exact = true;
-        // The previous job is the one released before: releases may be skipped.
-        let earlier = self.jobs.range((dag, 0)..(dag, job)).next_back();
-        if let Some((_, previous)) = earlier {
-            is_exact = previous.outcome != Some(JobOutcome::Aborted);
-            let finish_ns = self.finish_ns(dag, previous.job, subtask);
-            expected_ns = expected_ns.max(finish_ns.unwrap_or(if is_exact { u64::MAX } else { 0 }));
-        }
-        let ready_ns = record.ready_ns;
-        if ready_ns < expected_ns || (is_exact && ready_ns > expected_ns) {
-            push(
-                Rule::AndJoin,
-                format!(
-                    "`{name}` is ready in job {job} at {ready_ns} ns; all it waits for has \
-                     happened at {expected_ns} ns"
-                ),
-            );
-        }
-        if start_ns < ready_ns {
-            push(
-                Rule::AndJoin,
-                format!("`{name}` starts job {job} at {start_ns} ns, ready only at {ready_ns} ns"),
-            );
+            EventKind::Finished { instance, .. } => record.instance_mut(instance)?.runs += 1,
+            _ => {}
         }
     }
+    Some(record)
+}
 
-    fn finish_ns(&self, dag: DagId, job: u64, subtask: sched_dag::SubtaskId) -> Option<u64> {
-        let instance = Instance { dag, job, subtask };
-        self.instances.get(&instance)?.finish_ns
+/// Returns when which core ran what. What still runs at the end runs until then.
+fn stretches(report: &Report) -> Vec<Stretch> {
+    let mut open: BTreeMap<Instance, Stretch> = BTreeMap::new();
+    let mut stretches = Vec::new();
+    for event in &report.events {
+        let time_ns = event.time_ns;
+        match event.kind {
+            EventKind::Started { instance, core } | EventKind::Resumed { instance, core } => {
+                let begun = Stretch {
+                    instance,
+                    core,
+                    from_ns: time_ns,
+                    to_ns: report.end_ns,
+                };
+                stretches.extend(open.insert(instance, begun));
+            }
+            EventKind::Preempted { instance, .. } | EventKind::Finished { instance, .. } => {
+                let ended = open.remove(&instance);
+                stretches.extend(ended.map(|begun| Stretch {
+                    to_ns: time_ns,
+                    ..begun
+                }));
+            }
+            _ => {}
+        }
     }
+    stretches.extend(open.into_values());
+    stretches
 }

@@ -130,6 +130,7 @@ impl Session {
             statistics: dags.map(|(dag, _)| *scheduler.statistics(dag)).collect(),
             end_ns: self.recorder.now_ns,
             task_set: Arc::clone(&self.task_set),
+            options: scheduler.options(),
         }
     }
 }

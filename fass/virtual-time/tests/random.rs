@@ -1,5 +1,6 @@
 //! Random DAGs through real functions: whatever graph, times, cores, policy and
-//! overrun, rules R1-R4 hold and every join meets the values of one job.
+//! overrun, rules R1-R5 hold, every join meets the values of one job, and jobs
+//! keep the bounds that the commit has answered.
 //!
 //! Each case has its seed; a failure prints it, and `case(SEED)` repeats it.
 
@@ -8,8 +9,10 @@ mod support;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
-use fass::{Dag, OverrunPolicy, Policy, Preemption, create_dag};
-use support::{commit, execute, named};
+use fass::{
+    Dag, OverrunPolicy, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags,
+};
+use support::execute;
 use virtual_time::VirtualTime;
 
 const CASES: u64 = 400;
@@ -40,6 +43,25 @@ impl Random {
     fn micros(&mut self, limit: usize) -> Duration {
         Duration::from_micros(u64::try_from(self.below(limit)).expect("small"))
     }
+
+    /// Returns an execution time, often enough none.
+    fn time(&mut self, limit: usize) -> Duration {
+        let time = self.micros(limit);
+        self.pick(&[time, time, time, time, Duration::ZERO])
+    }
+
+    /// Returns the attributes of a subtask that takes `time`: its WCET, unless
+    /// the commit would refuse that, and now and then that it keeps its core.
+    fn attributes(&mut self, name: &str, time: Duration, deadline: Duration) -> SubtaskAttributes {
+        let mut attributes = SubtaskAttributes::named(name);
+        if time <= deadline {
+            attributes = attributes.wcet(time);
+        }
+        if self.below(6) == 0 {
+            attributes = attributes.non_preemptive();
+        }
+        attributes
+    }
 }
 
 /// Registers a subtask of 1 to 3 inputs and, unless it is the sink, one output.
@@ -48,7 +70,7 @@ fn register(
     inputs: &[String],
     output: Option<&str>,
     deadline: Duration,
-    time: Duration,
+    (time, attributes): (Duration, SubtaskAttributes),
 ) {
     macro_rules! register {
         ($($value:ident: $Type:ty),*) => {{
@@ -61,9 +83,9 @@ fn register(
             };
             match output {
                 Some(topic) => dag.register_subtask(
-                    move |values: ($($Type,)*)| (meet(values),), inputs, vec![topic], named(topic)),
+                    move |values: ($($Type,)*)| (meet(values),), inputs, vec![topic], attributes),
                 None => dag.register_sink_subtask(
-                    move |values: ($($Type,)*)| { meet(values); }, inputs, deadline, named("sink")),
+                    move |values: ($($Type,)*)| { meet(values); }, inputs, deadline, attributes),
             }
         }};
     }
@@ -87,14 +109,15 @@ fn random_dag(random: &mut Random, name: &str) -> Dag {
     dag.overrun(random.pick(&policies));
     dag.in_flight(random.pick(&[1, 2, 3, 5]));
     let mut runs = 0_u64;
-    let time = random.micros(200);
+    let time = random.time(200);
+    let attributes = random.attributes("source", time, deadline);
     let source = move || {
         execute(time);
         runs += 1;
         (runs,)
     };
     let topic = |number: usize| format!("{name} {number}");
-    dag.register_periodic_subtask(source, vec![&topic(0)], period, named("source"));
+    dag.register_periodic_subtask(source, vec![&topic(0)], period, attributes);
     let mut topics = vec![topic(0)];
     let mut unread = topics.clone();
     let inner = random.below(7);
@@ -114,15 +137,20 @@ fn random_dag(random: &mut Random, name: &str) -> Dag {
         }
         unread.retain(|topic| !inputs.contains(topic));
         let output = topic(topics.len());
-        register(&dag, &inputs, Some(&output), deadline, random.micros(600));
+        let time = random.time(600);
+        let attributes = random.attributes(&output, time, deadline);
+        register(&dag, &inputs, Some(&output), deadline, (time, attributes));
         topics.push(output.clone());
         unread.push(output);
     }
-    register(&dag, &unread, None, deadline, random.micros(300));
+    let time = random.time(300);
+    let attributes = random.attributes("sink", time, deadline);
+    register(&dag, &unread, None, deadline, (time, attributes));
     dag
 }
 
-fn case(seed: u64) {
+/// Runs a case and returns how many of its DAGs were proven.
+fn case(seed: u64) -> usize {
     let mut random = Random::new(seed);
     let machine = VirtualTime::new()
         .cores(random.pick(&[1, 2, 3, 4, 8]))
@@ -133,22 +161,40 @@ fn case(seed: u64) {
     let dags: Vec<Dag> = (names[..count].iter())
         .map(|name| random_dag(&mut random, name))
         .collect();
-    commit(&dags);
+    let commit = finish_create_dags(&dags).unwrap_or_else(|error| panic!("{error}"));
     let report = machine.run();
     let violations = report.violations();
     assert!(violations.is_empty(), "{}", violations[0]);
-    for statistics in &report.statistics {
+    let mut proven = 0;
+    for (statistics, answer) in report.statistics.iter().zip(commit.answers()) {
         let ended = statistics.completed + statistics.aborts + statistics.skips;
         assert_eq!(ended, 25, "{statistics:?}");
+        let Some(bound) = answer.verdict.bound() else {
+            continue;
+        };
+        proven += 1;
+        assert_eq!(statistics.completed - statistics.misses, 25, "{answer}");
+        let of_dag = report.jobs.iter().filter(|job| job.dag == answer.dag.id);
+        for job in of_dag {
+            let taken = job.response_time_ns().map(Duration::from_nanos);
+            assert!(taken <= Some(bound), "{answer}, but {taken:?}");
+        }
     }
+    proven
 }
 
 #[test]
-fn random_dags_keep_the_rules() {
+fn random_dags_keep_the_rules_and_the_bounds() {
+    let mut proven = 0;
     for seed in 0..CASES {
-        if let Err(panic) = catch_unwind(AssertUnwindSafe(|| case(seed))) {
-            eprintln!("the failing case is `case({seed})`");
-            resume_unwind(panic);
+        match catch_unwind(AssertUnwindSafe(|| case(seed))) {
+            Ok(of_case) => proven += of_case,
+            Err(panic) => {
+                eprintln!("the failing case is `case({seed})`");
+                resume_unwind(panic);
+            }
         }
     }
+    println!("{proven} DAGs of {CASES} commits were proven");
+    assert!(proven > 50, "only {proven} bounds were put to the test");
 }

@@ -4,7 +4,7 @@ mod support;
 
 use fass::{Policy, Preemption, SubtaskAttributes, create_dag};
 use support::{commit, diamond, ms, named, pair};
-use virtual_time::{JobOutcome, Report, Rule, VirtualTime};
+use virtual_time::{EventKind, JobOutcome, Report, Rule, VirtualTime};
 
 const MS: u64 = 1_000_000;
 
@@ -211,7 +211,9 @@ fn broken_by(forge: impl FnOnce(&mut Report)) -> Vec<Rule> {
     let mut report = machine.run();
     assert_eq!(report.violations(), []);
     forge(&mut report);
-    report.violations().iter().map(|found| found.rule).collect()
+    (report.violations().iter())
+        .map(virtual_time::Violation::rule)
+        .collect()
 }
 
 #[test]
@@ -223,14 +225,26 @@ fn the_check_finds_forged_records() {
         report.instances[3].ready_ns += 1;
         report.instances[3].start_ns = Some(22 * MS);
     };
+    // A core runs the join before it is ready by its record.
     assert_eq!(broken_by(late_join), [Rule::AndJoin]);
     let early_join = |report: &mut Report| report.instances[3].ready_ns -= 1;
-    assert_eq!(broken_by(early_join), [Rule::AndJoin]);
+    // Then it waits although a core is idle.
+    assert_eq!(broken_by(early_join), [Rule::AndJoin, Rule::Dispatch]);
     let early_start = |report: &mut Report| report.instances[3].start_ns = Some(20 * MS);
     let rules = broken_by(early_start);
-    assert_eq!(rules, [Rule::CompletionBoundary, Rule::AndJoin]);
+    assert_eq!(rules, [Rule::AndJoin, Rule::CompletionBoundary]);
     let lost_finish = |report: &mut Report| report.instances[3].finish_ns = None;
     assert!(broken_by(lost_finish).contains(&Rule::JobCompletion));
     let false_miss = |report: &mut Report| report.jobs[0].outcome = Some(JobOutcome::Missed);
     assert_eq!(broken_by(false_miss), [Rule::JobCompletion]);
+    let idle = |report: &mut Report| {
+        for event in &mut report.events {
+            let is_right = matches!(event.kind, EventKind::Started { instance, .. } if instance.subtask.0 == 2);
+            if is_right {
+                event.time_ns += 1;
+            }
+        }
+    };
+    // In both jobs.
+    assert_eq!(broken_by(idle), [Rule::Dispatch, Rule::Dispatch]);
 }

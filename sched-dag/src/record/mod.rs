@@ -1,18 +1,29 @@
 //! What happened in a run: the times of every job and instance.
 //!
 //! A driver fills a [`Record`] while it runs a task set whose DAGs have a limit
-//! of jobs; all its memory is taken before. Afterwards [`violations`] holds the
-//! record against the model's rules, and reports compute their figures from it.
-//! Times are in nanoseconds on the scheduler's clock.
+//! of jobs; all its memory is taken before. Or it makes one afterwards from what
+//! it has written down. Then [`violations`] holds the record against the model's
+//! rules R1 to R4, [`dispatch_violations`] holds it together with the
+//! [`Stretch`]es in which cores ran against R5, and reports compute their
+//! figures from it. Times are in nanoseconds on the scheduler's clock.
+//!
+//! These two are the only checks of the rules after a run, in virtual time and
+//! in the kernel. They are written from the rules alone and share no code with
+//! the scheduler, so that an error there cannot hide here.
 
+mod check;
+mod dispatch;
 mod violation;
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-pub use violation::{Violation, violations};
+pub use check::violations;
+pub use dispatch::{Stretch, dispatch_violations};
+pub use violation::{Rule, Violation};
 
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
+use crate::scheduler::JobOutcome;
 use crate::task_set::TaskSet;
 
 /// The times of one instance; each `None` until it has happened.
@@ -39,11 +50,33 @@ pub struct JobRecord {
     pub release_ns: Option<u64>,
     /// When the release was carried out.
     pub released_ns: Option<u64>,
+    /// When it was cut, because it was aborted or its DAG was ended: from then
+    /// on it starts no instance.
+    pub cut_ns: Option<u64>,
+    /// When its deadline was seen to have passed without it being complete.
+    pub missed_ns: Option<u64>,
+    /// When no instance of it was left.
+    pub ended_ns: Option<u64>,
+    /// How it ended; `None` if it was in flight at the end of the record.
+    pub outcome: Option<JobOutcome>,
+}
+
+/// How exact the times of a record are, and so how strictly it is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Precision {
+    /// Everything has the very time at which the model lets it happen, as in
+    /// virtual time: later is as wrong as earlier.
+    Exact,
+    /// Times were read from a clock by a machine that itself took time: what it
+    /// has to wait for must have happened *before*, and how much before is its
+    /// latency. Times read on different processors must be comparable.
+    Measured,
 }
 
 /// The times of all jobs of all DAGs.
 #[derive(Clone, Debug)]
 pub struct Record {
+    precision: Precision,
     dags: Vec<DagRecord>,
 }
 
@@ -56,15 +89,30 @@ struct DagRecord {
 }
 
 impl Record {
-    /// Makes an empty record for all jobs of `task_set`. A DAG without a limit
-    /// of jobs gets no room: nothing is recorded of it.
+    /// Makes an empty record of measured times for all jobs of `task_set`. A DAG
+    /// without a limit of jobs gets no room: nothing is recorded of it.
     ///
     /// Returns `None` if the jobs are too many for this machine's memory to
     /// address.
     #[must_use]
     pub fn new(task_set: &TaskSet) -> Option<Self> {
-        let dags = task_set.dags().iter().map(|dag| {
-            let jobs = usize::try_from(dag.jobs().unwrap_or(0)).ok()?;
+        let jobs = |dag| task_set.dag(dag).jobs().unwrap_or(0);
+        Self::with_jobs(task_set, Precision::Measured, jobs)
+    }
+
+    /// Makes an empty record with room for the first `jobs(dag)` jobs of each
+    /// DAG, for runs that end before the DAGs do.
+    ///
+    /// Returns `None` if the jobs are too many for this machine's memory to
+    /// address.
+    #[must_use]
+    pub fn with_jobs(
+        task_set: &TaskSet,
+        precision: Precision,
+        jobs: impl Fn(DagId) -> u64,
+    ) -> Option<Self> {
+        let dags = (0..).map(DagId).zip(task_set.dags()).map(|(id, dag)| {
+            let jobs = usize::try_from(jobs(id)).ok()?;
             let subtasks = dag.subtasks().len();
             let instances = jobs.checked_mul(subtasks)?;
             Some(DagRecord {
@@ -74,6 +122,7 @@ impl Record {
             })
         });
         Some(Self {
+            precision,
             dags: dags.collect::<Option<_>>()?,
         })
     }
@@ -91,6 +140,12 @@ impl Record {
         })
     }
 
+    /// Returns how exact the times are.
+    #[must_use]
+    pub const fn precision(&self) -> Precision {
+        self.precision
+    }
+
     /// Returns the jobs of a DAG.
     ///
     /// # Panics
@@ -99,6 +154,15 @@ impl Record {
     #[must_use]
     pub fn jobs(&self, dag: DagId) -> &[JobRecord] {
         &self.dags[dag.index()].jobs
+    }
+
+    /// Returns one job, `None` if it is not recorded.
+    #[must_use]
+    pub fn job(&self, dag: DagId, job: u64) -> Option<&JobRecord> {
+        self.dags
+            .get(dag.index())?
+            .jobs
+            .get(usize::try_from(job).ok()?)
     }
 
     /// Returns the instances of a job by subtask; empty if it is not recorded.
