@@ -14,7 +14,8 @@ use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
 
-use sched_dag::{CommitOptions, DagId, DagLabel, DagSpec, Policy, TaskSet, Verified, Warning};
+use sched_dag::{CommitOptions, ConstructionPolicy, DagId, DagLabel, DagSpec};
+use sched_dag::{Policy, TaskSet, Verified, Warning};
 
 use crate::answer::{Answer, Answers};
 use crate::dag::Dag;
@@ -64,10 +65,47 @@ use crate::topic::Wiring;
 /// assert_eq!(error.faults()[0].code(), "type_mismatch");
 /// ```
 pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
+    finish_create_dags_with(dags, ConstructionPolicy::paper())
+}
+
+/// Does as [`finish_create_dags`] for other shapes of graph: with several
+/// sources or sinks, or of several parts. Nothing else changes.
+///
+/// All sources of a job become ready at its release; a job is complete when all
+/// its sinks are.
+///
+/// # Errors
+///
+/// As [`finish_create_dags`], except for the shapes that `construction` allows.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{ConstructionPolicy, Count, SubtaskAttributes, create_dag, finish_create_dags_with};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// let period = Duration::from_millis(10);
+/// dag.jobs(2).period(period).relative_deadline(period);
+/// let subtasks = [(); 3].map(|()| dag.register_untyped_subtask(|_| (), SubtaskAttributes::default()));
+/// dag.precede(&subtasks[0], &subtasks[2]).precede(&subtasks[1], &subtasks[2]);
+///
+/// let construction = ConstructionPolicy {
+///     sources: Count::Several,
+///     ..ConstructionPolicy::paper()
+/// };
+/// finish_create_dags_with(&[dag], construction).unwrap();
+/// ```
+pub fn finish_create_dags_with(
+    dags: &[Dag],
+    construction: ConstructionPolicy,
+) -> Result<Commit, CommitError> {
+    let with = |policy, cores| CommitOptions::new(policy, cores).with_construction(construction);
     let Some(platform) = platform::installed() else {
         // What else is wrong does not depend on the platform, except for the
         // attributes; under EDF none is needed.
-        let mut error = match verify(dags, CommitOptions::new(Policy::Edf, 1)) {
+        let mut error = match verify(dags, with(Policy::Edf, 1)) {
             Ok(accepted) => CommitError {
                 faults: Vec::new(),
                 warnings: accepted.warnings,
@@ -77,7 +115,7 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
         error.faults.insert(0, Fault::NoPlatform);
         return Err(error);
     };
-    let options = CommitOptions::new(platform.policy(), platform.cores());
+    let options = with(platform.policy(), platform.cores());
     let Verified {
         task_set,
         mut warnings,

@@ -20,6 +20,7 @@ use crate::fault::Fault;
 use crate::message::MessageType;
 use crate::subtask::{MakeBody, defer};
 use crate::tuple::{VecToPubs, VecToSubs};
+use crate::untyped;
 
 /// A DAG as registered so far.
 #[derive(Default)]
@@ -83,6 +84,38 @@ impl Draft {
         });
         self.make_bodies.push(defer(f));
         subtask
+    }
+
+    /// Adds a subtask without types and returns its position.
+    pub(crate) fn register_untyped<F>(&mut self, f: F, attributes: SubtaskAttributes) -> usize
+    where
+        F: FnMut(u64) + Send + 'static,
+    {
+        let subtask = self.next_label(&attributes);
+        let wcet_ns = attributes
+            .wcet
+            .and_then(|wcet| self.convert(wcet, Some(&subtask), "WCET"));
+        self.spec.subtasks.push(SubtaskSpec {
+            name: attributes.name,
+            wcet_ns,
+            priority: attributes.priority.map(Priority),
+            non_preemptive: attributes.non_preemptive,
+            ..SubtaskSpec::default()
+        });
+        self.make_bodies.push(untyped::defer(f));
+        subtask.id.index()
+    }
+
+    /// Replaces the period, whatever a source said before.
+    pub(crate) fn replace_period(&mut self, period: Duration) {
+        let period_ns = self.convert(period, None, "period");
+        self.spec.period_ns = period_ns.or(self.spec.period_ns);
+    }
+
+    /// Replaces the relative deadline, whatever a sink said before.
+    pub(crate) fn replace_deadline(&mut self, deadline: Duration) {
+        let deadline_ns = self.convert(deadline, None, "relative deadline");
+        self.spec.relative_deadline_ns = deadline_ns.or(self.spec.relative_deadline_ns);
     }
 
     pub(crate) fn set_offset(&mut self, offset: Duration) {

@@ -108,10 +108,11 @@ mod platform;
 mod subtask;
 mod topic;
 mod tuple;
+mod untyped;
 
 pub use answer::{Answer, Unproven, Verdict};
 pub use attributes::SubtaskAttributes;
-pub use commit::{Commit, finish_create_dags};
+pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use dag::{Dag, create_dag};
 pub use fault::{CommitError, Fault};
 pub use message::{Message, MessageType, Unique};
@@ -120,6 +121,7 @@ pub use platform::{
     AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
 };
 pub use sched_dag::analysis::{Overheads, Reason, Test};
-pub use sched_dag::{OverrunPolicy, Policy, Preemption, Warning};
+pub use sched_dag::{ConstructionPolicy, Count, OverrunPolicy, Policy, Preemption, Warning};
 pub use topic::{Ports, Publisher, Subscriber};
 pub use tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
+pub use untyped::Untyped;

@@ -21,6 +21,7 @@ use sched_dag::DagSpec;
 use crate::cell::{Reader, Writer, ring};
 use crate::gate::Gate;
 use crate::message::Message;
+use crate::untyped::Signal;
 
 /// The reading end of a topic in one subtask. Made by the commit only.
 ///
@@ -108,10 +109,13 @@ pub(crate) struct Wiring {
     edges_of_inputs: Vec<Vec<usize>>,
     /// For each subtask the topics of its output ports.
     outputs: Vec<Vec<String>>,
+    /// The edges that carry signals: numbers, predecessors and successors.
+    signals: Vec<(usize, usize, usize)>,
 }
 
 impl Wiring {
-    /// Numbers the edges of a verified DAG, one a reading port.
+    /// Numbers the edges of a verified DAG: one a reading port, then those
+    /// between untyped subtasks.
     pub(crate) fn new(spec: &DagSpec, in_flight: usize) -> Self {
         let mut edges_of_topic = BTreeMap::<String, Vec<usize>>::new();
         let mut edges = 0;
@@ -131,13 +135,36 @@ impl Wiring {
             .map(|subtask| subtask.outputs.iter().map(|port| port.topic.clone()))
             .map(Iterator::collect)
             .collect();
+        let signals: Vec<_> = (edges..)
+            .zip(&spec.edges)
+            .map(|(edge, &(earlier, later))| (edge, earlier, later))
+            .collect();
+        edges += signals.len();
         Self {
             in_flight,
             ends: (0..edges).map(|_| None).collect(),
             edges_of_topic,
             edges_of_inputs,
             outputs,
+            signals,
         }
+    }
+
+    /// Returns the ends of the edges that lead to an untyped subtask, and from it.
+    pub(crate) fn signals(
+        &mut self,
+        subtask: usize,
+    ) -> (Vec<Subscriber<Signal>>, Publisher<Signal>) {
+        let (mut to, mut from) = (Vec::new(), Vec::new());
+        for (edge, earlier, later) in core::mem::take(&mut self.signals) {
+            if later == subtask {
+                to.push(Subscriber(self.reader(edge)));
+            } else if earlier == subtask {
+                from.push(self.writer(edge));
+            }
+            self.signals.push((edge, earlier, later));
+        }
+        (to, Publisher(from.into()))
     }
 
     /// Returns the ends of subtask number `subtask`, to be taken port by port.
