@@ -45,6 +45,11 @@
 //! What happens to a release that finds as many jobs in flight as the DAG may
 //! have is the DAG's [`OverrunPolicy`]; its tests are in `tests/overrun.rs`.
 //!
+//! A DAG can be *ended* before its time, by an instance that [fails](Moment::fail)
+//! or by a [stop](Moment::stop): it starts nothing any more, and the others are
+//! scheduled on. The rules E1 to E8 for that stand in `scheduler/ending.rs`,
+//! their tests in `tests/ending.rs`.
+//!
 //! # The parts, in the order of their use
 //!
 //! 1. [`DagSpec`]: what an app states. It may be wrong in every way.
@@ -67,8 +72,8 @@
 //!   [`Scheduler::next_event_ns`] when it needs to be called again.
 //! - *A platform that keeps values on edges*: at most [`Dag::in_flight`] jobs of
 //!   a DAG are in flight, and no two of them have the same number modulo that.
-//!   An instance that was released ends exactly once, by a completion or by
-//!   [`Observer::cancelled`].
+//!   An instance that was released ends exactly once, by a completion, by a
+//!   failure or by [`Observer::cancelled`].
 //! - *An app's author*: schedules that, core numbers apart, do not depend on the
 //!   number or the order of a driver's calls, only on their times; with the same
 //!   execution times, the same schedule on every driver.

@@ -8,6 +8,9 @@
 //! after the dispatch that started it; another dispatch at the same instant
 //! follows, and so on until nothing happens any more.
 //!
+//! A workload may let an instance fail at the end of its execution time, which
+//! ends its DAG. Of what ends at one instant, completions come before failures.
+//!
 //! After [`VirtualTime::new`] nothing is allocated here.
 //!
 //! ```
@@ -35,6 +38,7 @@
 
 use alloc::boxed::Box;
 use alloc::vec;
+use alloc::vec::Vec;
 
 use crate::ids::{CoreId, Instance};
 use crate::scheduler::heap::IndexedHeap;
@@ -48,6 +52,14 @@ pub trait Workload: Observer {
     /// Returns the execution time of an instance in nanoseconds. Called once
     /// for each instance, at its start; 0 is allowed.
     fn execute(&mut self, instance: Instance, now_ns: u64) -> u64;
+
+    /// Reports whether an instance fails, instead of finishing, when its
+    /// execution time is over: then its DAG is ended. Called once for each
+    /// instance, at its end.
+    fn fails(&mut self, instance: Instance) -> bool {
+        let _ = instance;
+        false
+    }
 
     /// An instant begins, in which all that follows happens until the next one.
     /// There may be several at one time.
@@ -73,6 +85,11 @@ pub trait Workload: Observer {
     /// The instance has finished on the core; called before its successors
     /// become ready.
     fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        let _ = (instance, core, now_ns);
+    }
+
+    /// The instance has failed on the core; called before its DAG is ended.
+    fn failed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
         let _ = (instance, core, now_ns);
     }
 }
@@ -101,6 +118,8 @@ pub struct VirtualTime {
     finish_times: IndexedHeap<(u64, CoreId)>,
     /// What each core executes.
     executing: Box<[Option<Instance>]>,
+    /// What fails at the present instant.
+    failing: Vec<(Instance, CoreId)>,
     /// What is left of each preempted instance, by its subtask's index over all
     /// DAGs.
     remaining_ns: Box<[u64]>,
@@ -112,7 +131,7 @@ pub struct VirtualTime {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum End {
-    /// Every job of every DAG has ended.
+    /// Every job of every DAG has ended; an ended DAG has no further ones.
     Finished,
     /// The next event lies after the time up to which the run should go.
     TimeReached,
@@ -137,6 +156,7 @@ impl VirtualTime {
             scheduler,
             finish_times: IndexedHeap::new(cores),
             executing: vec![None; cores].into_boxed_slice(),
+            failing: Vec::with_capacity(cores),
             remaining_ns: vec![0; subtasks].into_boxed_slice(),
             first_subtasks,
         }
@@ -194,10 +214,19 @@ impl VirtualTime {
             && finish_ns <= now_ns
         {
             self.finish_times.remove(index);
-            if let Some(instance) = self.executing[index].take() {
+            let Some(instance) = self.executing[index].take() else {
+                continue;
+            };
+            if workload.fails(instance) {
+                self.failing.push((instance, core));
+            } else {
                 workload.finished(instance, core, now_ns);
                 moment.complete(instance, workload);
             }
+        }
+        for (instance, core) in self.failing.drain(..) {
+            workload.failed(instance, core, now_ns);
+            moment.fail(instance, workload);
         }
         for &decision in moment.release_due(workload).dispatch() {
             let (core, instance) = (decision.core(), decision.instance());

@@ -8,10 +8,10 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use random::Random;
-use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime, Workload};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, OverrunPolicy, Policy, Preemption,
-    Scheduler, SchedulerOptions, SubtaskSpec, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Observer, OverrunPolicy, Policy,
+    Preemption, Scheduler, SchedulerOptions, SubtaskSpec, verify,
 };
 
 thread_local! {
@@ -101,6 +101,58 @@ fn nothing_is_allocated_from_first_release_to_last_completion() {
             assert!(counted[0].queued > 0 && counted[1].skips > 0 && counted[2].aborts > 0);
         }
     }
+}
+
+/// Random execution times, and a fault now and then.
+struct Failing(Random);
+
+impl Observer for Failing {}
+
+impl Workload for Failing {
+    fn execute(&mut self, _instance: Instance, _now_ns: u64) -> u64 {
+        self.0.between(0, 50)
+    }
+
+    fn fails(&mut self, _instance: Instance) -> bool {
+        self.0.between(0, 2_999) == 0
+    }
+}
+
+#[test]
+fn nothing_is_allocated_when_dags_are_ended() {
+    let mut faults = 0;
+    let mut dropped = 0;
+    for seed in 1..=20 {
+        let mut random = Random::new(seed);
+        let specs = [
+            OverrunPolicy::Queue,
+            OverrunPolicy::Queue,
+            OverrunPolicy::Abort,
+        ]
+        .map(|overrun| dag(&mut random, overrun));
+        let commit_options =
+            CommitOptions::new(Policy::Edf, 4).with_construction(ConstructionPolicy::any_graph());
+        let verified = verify(&specs, &commit_options).expect("right DAGs");
+        let options = SchedulerOptions {
+            policy: Policy::Edf,
+            preemption: Preemption::Enabled,
+            cores: 4,
+        };
+        let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
+
+        let before = ALLOCATIONS.get();
+        let end = run.run(&mut Failing(random));
+        let allocated = ALLOCATIONS.get() - before;
+
+        assert_eq!(end, End::Finished);
+        assert!(run.scheduler().is_finished(), "seed {seed}");
+        assert_eq!(allocated, 0, "seed {seed}");
+        for counted in [0, 1, 2].map(|dag| run.scheduler().statistics(DagId(dag))) {
+            faults += counted.faults;
+            dropped += counted.dropped;
+        }
+    }
+    assert!(faults > 20 && dropped > 0, "{faults} {dropped}");
 }
 
 #[test]

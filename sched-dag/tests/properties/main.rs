@@ -22,12 +22,15 @@ struct Outcome {
     instances: Vec<Vec<Vec<InstanceOutcome>>>,
     /// For each DAG and job.
     jobs: Vec<Vec<JobOutcome>>,
+    /// For each DAG the releases that still waited at its end.
+    dropped: Vec<u64>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct InstanceOutcome {
     start_ns: Option<u64>,
     finish_ns: Option<u64>,
+    failed_ns: Option<u64>,
     cancelled_ns: Option<u64>,
     preemptions: u64,
 }
@@ -39,6 +42,8 @@ struct JobOutcome {
     aborted_ns: Option<u64>,
     ended_ns: Option<u64>,
     missed_ns: Option<u64>,
+    /// Whether the DAG was ended while the job was in flight.
+    is_cut: bool,
 }
 
 /// Returns the first difference between the scheduler and the reference.
@@ -69,7 +74,10 @@ fn difference(set: &Set) -> Option<String> {
             }
         }
     }
-    None
+    (expected.dropped != replayed.dropped).then(|| {
+        let (expected, replayed) = (&expected.dropped, &replayed.dropped);
+        format!("dropped releases:\nexpected {expected:?}\nreplayed {replayed:?}")
+    })
 }
 
 fn number(variable: &str, default: u64) -> u64 {
@@ -106,4 +114,9 @@ fn overruns_are_those_of_the_rules() {
     compare("overruns", 10_000, |random| {
         set::draw(random, set::Overruns::Often)
     });
+}
+
+#[test]
+fn ended_dags_leave_the_others_alone() {
+    compare("ends", 10_000, set::draw_failing);
 }

@@ -56,18 +56,20 @@ pub(crate) fn simulate(set: &Set) -> Outcome {
                 .iter()
                 .map(|dag| vec![JobOutcome::default(); per_job(dag)])
                 .collect(),
+            dropped: vec![0; set.dags.len()],
         },
     };
     let mut running: Vec<Place> = Vec::new();
     while !reference.is_over() {
         reference.notice_misses();
+        reference.end_dags();
         reference.cancel_and_end();
         reference.release();
         let selected = reference.select(&running);
         for &(dag, job, subtask) in &running {
-            let instance = &mut reference.outcome.instances[dag][job][subtask];
-            if instance.finish_ns.is_none() && !selected.contains(&(dag, job, subtask)) {
-                instance.preemptions += 1;
+            let has_ended = reference.has_ended((dag, job, subtask));
+            if !has_ended && !selected.contains(&(dag, job, subtask)) {
+                reference.outcome.instances[dag][job][subtask].preemptions += 1;
             }
         }
         for &place in &selected {
@@ -100,7 +102,7 @@ impl Reference<'_> {
         for dag in 0..self.states.len() {
             for job in 0..self.states[dag].len() {
                 let alive = matches!(self.states[dag][job], State::Waiting | State::InFlight)
-                    && self.outcome.jobs[dag][job].aborted_ns.is_none();
+                    && !self.is_cut(dag, job);
                 if alive && self.now_ns == self.deadline_ns(dag, job) + 1 {
                     self.outcome.jobs[dag][job].missed_ns = Some(self.now_ns);
                 }
@@ -110,7 +112,43 @@ impl Reference<'_> {
 
     fn has_ended(&self, (dag, job, subtask): Place) -> bool {
         let instance = self.outcome.instances[dag][job][subtask];
-        instance.finish_ns.is_some() || instance.cancelled_ns.is_some()
+        instance.finish_ns.is_some()
+            || instance.failed_ns.is_some()
+            || instance.cancelled_ns.is_some()
+    }
+
+    /// Whether a job starts no further instance.
+    fn is_cut(&self, dag: usize, job: usize) -> bool {
+        let job = &self.outcome.jobs[dag][job];
+        job.aborted_ns.is_some() || job.is_cut
+    }
+
+    /// Ends DAGs of which an instance has just failed: what is in flight and
+    /// not complete is cut, the rest does not happen.
+    fn end_dags(&mut self) {
+        for dag in 0..self.states.len() {
+            let instances = self.outcome.instances[dag].iter().flatten();
+            if !instances
+                .into_iter()
+                .any(|instance| instance.failed_ns == Some(self.now_ns))
+            {
+                continue;
+            }
+            for job in 0..self.states[dag].len() {
+                let is_complete = self.outcome.instances[dag][job]
+                    .iter()
+                    .all(|instance| instance.finish_ns.is_some());
+                match self.states[dag][job] {
+                    State::InFlight if is_complete || self.is_cut(dag, job) => {}
+                    State::InFlight => self.outcome.jobs[dag][job].is_cut = true,
+                    State::Waiting => self.outcome.dropped[dag] += 1,
+                    State::Ahead | State::Over => {}
+                }
+                if self.states[dag][job] != State::InFlight {
+                    self.states[dag][job] = State::Over;
+                }
+            }
+        }
     }
 
     /// R1 and R2, for an instance that has not ended.
@@ -130,16 +168,16 @@ impl Reference<'_> {
             && before.is_none_or(|before| self.has_ended((dag, before, subtask)))
     }
 
-    /// Cancels what is ready and not started in aborted jobs, until nothing
+    /// Cancels what is ready and not started in jobs that are cut, until nothing
     /// changes, and ends jobs of which all instances have ended.
     fn cancel_and_end(&mut self) {
         loop {
             let mut changed = false;
             for place in self.all_instances() {
                 let (dag, job, subtask) = place;
-                let aborted = self.outcome.jobs[dag][job].aborted_ns.is_some();
+                let is_cut = self.is_cut(dag, job);
                 let started = self.outcome.instances[dag][job][subtask].start_ns.is_some();
-                if aborted && !started && self.is_ready(place) {
+                if is_cut && !started && self.is_ready(place) {
                     self.outcome.instances[dag][job][subtask].cancelled_ns = Some(self.now_ns);
                     changed = true;
                 }
@@ -167,7 +205,8 @@ impl Reference<'_> {
         for dag in 0..self.states.len() {
             self.release_waiting(dag);
             for job in 0..self.states[dag].len() {
-                if self.release_ns(dag, job) == self.now_ns {
+                if self.states[dag][job] == State::Ahead && self.release_ns(dag, job) == self.now_ns
+                {
                     self.states[dag][job] = State::Waiting;
                     self.release_waiting(dag);
                     if self.states[dag][job] == State::Waiting {
@@ -257,7 +296,12 @@ impl Reference<'_> {
         if self.executed_ns[dag][job][subtask]
             == self.set.dags[dag].subtasks[subtask].executions_ns[job]
         {
-            instance.finish_ns = Some(self.now_ns + 1);
+            let ended_ns = Some(self.now_ns + 1);
+            if self.set.dags[dag].subtasks[subtask].fails_in == Some(job as u64) {
+                instance.failed_ns = ended_ns;
+            } else {
+                instance.finish_ns = ended_ns;
+            }
         }
     }
 

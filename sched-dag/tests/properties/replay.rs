@@ -35,21 +35,27 @@ pub(crate) fn replay(set: &Set) -> Result<Outcome, String> {
             .map(|dag| jobs(dag.jobs).map(|_| JobOutcome::default()).collect())
             .collect(),
         busy: 0,
+        ends: Vec::new(),
         contradiction: None,
     };
     let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), set.options));
     if run.run(&mut record) != End::Finished || !run.scheduler().is_finished() {
         return Err("the run does not finish".to_owned());
     }
-    if let Some(contradiction) = record.contradiction {
+    if let Some(contradiction) = record.contradiction.take() {
         return Err(contradiction);
     }
+    let mut dropped = Vec::new();
     for (dag, jobs) in (0..).zip(&record.jobs) {
-        check_statistics(run.scheduler().statistics(DagId(dag)), jobs)?;
+        let statistics = run.scheduler().statistics(DagId(dag));
+        check_statistics(statistics, jobs)?;
+        record.check_end(run.scheduler(), DagId(dag))?;
+        dropped.push(statistics.dropped);
     }
     Ok(Outcome {
         instances: record.instances,
         jobs: record.jobs,
+        dropped,
     })
 }
 
@@ -63,8 +69,9 @@ fn check_statistics(statistics: &DagStatistics, jobs: &[JobOutcome]) -> Result<(
         (statistics.misses, count(|job| job.missed_ns.is_some())),
         (
             statistics.completed,
-            count(|job| job.ended_ns.is_some() && job.aborted_ns.is_none()),
+            count(|job| job.ended_ns.is_some() && job.aborted_ns.is_none() && !job.is_cut),
         ),
+        (statistics.cut_short, count(|job| job.is_cut)),
     ];
     if counted.iter().all(|(counter, events)| counter == events) {
         Ok(())
@@ -81,6 +88,8 @@ struct Record<'a> {
     instances: Vec<Vec<Vec<InstanceOutcome>>>,
     jobs: Vec<Vec<JobOutcome>>,
     busy: u32,
+    /// The DAGs that were reported as ended.
+    ends: Vec<DagId>,
     contradiction: Option<String>,
 }
 
@@ -92,6 +101,28 @@ impl Record<'_> {
 
     fn job(&mut self, dag: DagId, job: u64) -> &mut JobOutcome {
         &mut self.jobs[dag.index()][usize::try_from(job).expect("few jobs")]
+    }
+
+    /// A DAG is ended, and reported so once, if and only if one of its
+    /// instances has failed; each failure is counted.
+    fn check_end(&self, scheduler: &Scheduler, dag: DagId) -> Result<(), String> {
+        let instances = self.instances[dag.index()].iter().flatten();
+        let faults = instances
+            .filter(|instance| instance.failed_ns.is_some())
+            .count();
+        let reports = self.ends.iter().filter(|&&ended| ended == dag).count();
+        let is_right = scheduler.is_ended(dag) == (faults > 0)
+            && reports == faults.min(1)
+            && scheduler.statistics(dag).faults == faults as u64
+            && scheduler.is_over(dag);
+        if is_right {
+            return Ok(());
+        }
+        Err(format!(
+            "dag {} has {faults} faults and {reports} reported ends, {:?}",
+            dag.0,
+            scheduler.statistics(dag)
+        ))
     }
 
     fn once(&mut self, time: fn(&mut JobOutcome) -> &mut Option<u64>, dag: DagId, job: u64) {
@@ -123,12 +154,21 @@ impl Observer for Record<'_> {
         self.once(|job| &mut job.missed_ns, dag, job);
     }
 
-    fn job_completed(&mut self, dag: DagId, job: u64, _outcome: sched_dag::JobOutcome) {
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: sched_dag::JobOutcome) {
+        self.job(dag, job).is_cut = outcome == sched_dag::JobOutcome::DagEnded;
         self.once(|job| &mut job.ended_ns, dag, job);
     }
 
     fn cancelled(&mut self, instance: Instance) {
-        self.instance(instance).cancelled_ns = Some(self.now_ns);
+        let now_ns = self.now_ns;
+        let cancelled_ns = &mut self.instance(instance).cancelled_ns;
+        if cancelled_ns.replace(now_ns).is_some() {
+            self.contradiction = Some(format!("{instance} is cancelled twice"));
+        }
+    }
+
+    fn ended(&mut self, dag: DagId) {
+        self.ends.push(dag);
     }
 }
 
@@ -136,6 +176,11 @@ impl Workload for Record<'_> {
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
         let subtask = &self.set.dags[instance.dag.index()].subtasks[instance.subtask.index()];
         subtask.executions_ns[usize::try_from(instance.job).expect("few jobs")]
+    }
+
+    fn fails(&mut self, instance: Instance) -> bool {
+        let dag = &self.set.dags[instance.dag.index()];
+        dag.subtasks[instance.subtask.index()].fails_in == Some(instance.job)
     }
 
     fn instant(&mut self, now_ns: u64) {
@@ -161,6 +206,11 @@ impl Workload for Record<'_> {
 
     fn finished(&mut self, instance: Instance, _core: CoreId, now_ns: u64) {
         self.instance(instance).finish_ns = Some(now_ns);
+        self.busy -= 1;
+    }
+
+    fn failed(&mut self, instance: Instance, _core: CoreId, now_ns: u64) {
+        self.instance(instance).failed_ns = Some(now_ns);
         self.busy -= 1;
     }
 }

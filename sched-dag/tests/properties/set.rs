@@ -33,6 +33,8 @@ pub(crate) struct Subtask {
     pub(crate) non_preemptive: bool,
     /// For each job.
     pub(crate) executions_ns: Vec<u64>,
+    /// The job in which it fails at the end of its execution, if it starts.
+    pub(crate) fails_in: Option<u64>,
 }
 
 /// Whether releases may find no room.
@@ -69,6 +71,29 @@ pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
     Set { options, dags }
 }
 
+/// Draws a set in which instances fail, of one DAG at least.
+pub(crate) fn draw_failing(random: &mut Random) -> Set {
+    let overruns = if random.chance(50) {
+        Overruns::Never
+    } else {
+        Overruns::Often
+    };
+    let mut set = draw(random, overruns);
+    let certain = random.below(set.dags.len());
+    for (number, dag) in set.dags.iter_mut().enumerate() {
+        let faults = if number == certain {
+            random.between(1, 3)
+        } else {
+            random.between(0, 4).saturating_sub(3)
+        };
+        for _ in 0..faults {
+            let subtask = random.below(dag.subtasks.len());
+            dag.subtasks[subtask].fails_in = Some(random.between(0, dag.jobs - 1));
+        }
+    }
+    set
+}
+
 fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
     let count = random.between(1, 7);
     let jobs = random.between(1, 6);
@@ -80,6 +105,7 @@ fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
             priority: u32::try_from(random.between(0, priorities)).expect("few priorities"),
             non_preemptive: random.chance(often_non_preemptive),
             executions_ns: (0..jobs).map(|_| random.between(1, longest)).collect(),
+            fails_in: None,
         })
         .collect();
     let period_ns = random.between(1, 24);
@@ -202,6 +228,9 @@ impl fmt::Display for Set {
                         ""
                     }
                 )?;
+                if let Some(job) = subtask.fails_in {
+                    writeln!(f, "    fails in job {job}")?;
+                }
             }
             for (from, to) in &dag.edges {
                 writeln!(f, "edge {from} {to}")?;

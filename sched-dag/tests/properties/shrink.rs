@@ -56,6 +56,9 @@ fn steps(set: &Set) -> Vec<Set> {
             set.dags[dag].period_ns = to
         });
         for subtask in 0..set.dags[dag].subtasks.len() {
+            if set.dags[dag].subtasks[subtask].fails_in.is_some() {
+                add(&|set| set.dags[dag].subtasks[subtask].fails_in = None);
+            }
             for (job, &execution_ns) in set.dags[dag].subtasks[subtask]
                 .executions_ns
                 .iter()

@@ -83,6 +83,8 @@ pub(crate) struct Log<F> {
     pub(crate) lines: Vec<String>,
     now_ns: u64,
     execution_ns: F,
+    /// The instances that fail at the end of their execution.
+    pub(crate) failing: Vec<Instance>,
 }
 
 impl<F: FnMut(Instance) -> u64> Log<F> {
@@ -91,6 +93,7 @@ impl<F: FnMut(Instance) -> u64> Log<F> {
             lines: Vec::new(),
             now_ns: 0,
             execution_ns,
+            failing: Vec::new(),
         }
     }
 
@@ -107,7 +110,18 @@ pub(crate) fn run(
     options: SchedulerOptions,
     execution_ns: impl FnMut(Instance) -> u64,
 ) -> (Vec<String>, Vec<DagStatistics>) {
+    run_failing(specs, options, &[], execution_ns)
+}
+
+/// Runs DAGs to the end as [`run`] does, while some instances fail.
+pub(crate) fn run_failing(
+    specs: &[DagSpec],
+    options: SchedulerOptions,
+    failing: &[Instance],
+    execution_ns: impl FnMut(Instance) -> u64,
+) -> (Vec<String>, Vec<DagStatistics>) {
     let mut log = Log::new(execution_ns);
+    log.failing = failing.to_vec();
     let mut run = VirtualTime::new(scheduler(specs, options));
     assert_eq!(run.run(&mut log), End::Finished);
     assert!(run.scheduler().is_finished());
@@ -169,6 +183,10 @@ impl<F: FnMut(Instance) -> u64> Observer for Log<F> {
         self.note(format_args!("aborted {}.{job}", dag.0));
     }
 
+    fn ended(&mut self, dag: DagId) {
+        self.note(format_args!("end {}", dag.0));
+    }
+
     fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
         self.note(format_args!("missed {}.{job} of {deadline_ns}", dag.0));
     }
@@ -181,6 +199,10 @@ impl<F: FnMut(Instance) -> u64> Observer for Log<F> {
 impl<F: FnMut(Instance) -> u64> Workload for Log<F> {
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
         (self.execution_ns)(instance)
+    }
+
+    fn fails(&mut self, instance: Instance) -> bool {
+        self.failing.contains(&instance)
     }
 
     fn instant(&mut self, now_ns: u64) {
@@ -201,5 +223,9 @@ impl<F: FnMut(Instance) -> u64> Workload for Log<F> {
 
     fn finished(&mut self, instance: Instance, _core: CoreId, _now_ns: u64) {
         self.note(format_args!("finish {}", Short(instance)));
+    }
+
+    fn failed(&mut self, instance: Instance, _core: CoreId, _now_ns: u64) {
+        self.note(format_args!("fail {}", Short(instance)));
     }
 }
