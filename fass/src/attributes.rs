@@ -25,6 +25,7 @@ pub struct SubtaskAttributes {
     pub(crate) name: String,
     pub(crate) priority: Option<u32>,
     pub(crate) wcet: Option<Duration>,
+    pub(crate) budget: Option<Duration>,
     pub(crate) non_preemptive: bool,
 }
 
@@ -69,6 +70,22 @@ impl SubtaskAttributes {
     /// ```
     pub fn wcet(mut self, wcet: Duration) -> Self {
         self.wcet = Some(wcet);
+        self
+    }
+
+    /// Sets the execution budget: an instance that executes longer, preemption
+    /// not counted, is ended by the platform as a fault, and its DAG with it.
+    ///
+    /// Without it the platform may enforce a multiple of the
+    /// [WCET](Self::wcet). At most `u64::MAX` nanoseconds; a longer one is a
+    /// fault at commit. Virtual time does not enforce budgets.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// let attributes = fass::SubtaskAttributes::named("plan").budget(Duration::from_millis(5));
+    /// ```
+    pub fn budget(mut self, budget: Duration) -> Self {
+        self.budget = Some(budget);
         self
     }
 

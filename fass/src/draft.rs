@@ -74,9 +74,13 @@ impl Draft {
         let wcet_ns = attributes
             .wcet
             .and_then(|wcet| self.convert(wcet, Some(&subtask), "WCET"));
+        let budget_ns = attributes
+            .budget
+            .and_then(|budget| self.convert(budget, Some(&subtask), "budget"));
         self.spec.subtasks.push(SubtaskSpec {
             name: attributes.name,
             wcet_ns,
+            budget_ns,
             priority: attributes.priority.map(Priority),
             non_preemptive: attributes.non_preemptive,
             inputs: ports(inputs, &input_types),
@@ -95,9 +99,13 @@ impl Draft {
         let wcet_ns = attributes
             .wcet
             .and_then(|wcet| self.convert(wcet, Some(&subtask), "WCET"));
+        let budget_ns = attributes
+            .budget
+            .and_then(|budget| self.convert(budget, Some(&subtask), "budget"));
         self.spec.subtasks.push(SubtaskSpec {
             name: attributes.name,
             wcet_ns,
+            budget_ns,
             priority: attributes.priority.map(Priority),
             non_preemptive: attributes.non_preemptive,
             ..SubtaskSpec::default()

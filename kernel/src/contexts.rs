@@ -68,3 +68,8 @@ pub(crate) fn take() -> Parked {
 pub(crate) fn give_back(context: Parked) {
     STOCK.lock().free.push(context);
 }
+
+/// Takes note that a context was abandoned with what it ran: it is lost.
+pub(crate) fn lose() {
+    STOCK.lock().total -= 1;
+}

@@ -22,17 +22,24 @@ impl Object<'_, '_> {
 
     /// Writes a field with text.
     pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
-        self.field(name, |out| {
-            use fmt::Write;
-            out.write_char('"')?;
-            write!(Escaped(out), "{value}")?;
-            out.write_char('"')
-        })
+        self.field(name, |out| quoted(value).fmt(out))
     }
 
     /// Writes a field with an object.
     pub fn object(&mut self, name: &str, fields: impl Fn(&mut Object<'_, '_>)) -> &mut Self {
         self.field(name, |out| Fields(&fields).fmt(out))
+    }
+
+    /// Writes a field with a list of values, each of which is JSON already.
+    pub fn list(&mut self, name: &str, values: impl Iterator<Item = impl Display>) -> &mut Self {
+        self.field(name, |out| {
+            out.write_str("[")?;
+            for (index, value) in values.enumerate() {
+                let separator = if index == 0 { "" } else { "," };
+                write!(out, "{separator}{value}")?;
+            }
+            out.write_str("]")
+        })
     }
 
     fn field(
@@ -65,6 +72,15 @@ impl<F: Fn(&mut Object<'_, '_>)> Display for Fields<F> {
         object.result?;
         out.write_str("}")
     }
+}
+
+/// Returns text as a JSON string.
+pub fn quoted(value: impl Display) -> impl Display {
+    fmt::from_fn(move |out| {
+        out.write_str("\"")?;
+        fmt::Write::write_fmt(&mut Escaped(out), format_args!("{value}"))?;
+        out.write_str("\"")
+    })
 }
 
 /// Text inside the quotes of a JSON string (RFC 8259, section 7).
@@ -108,6 +124,19 @@ mod tests {
         });
         let expected = r#"{"kind":"fork_join","jobs":7,"latency_ns":{"min":1,"max":2}}"#;
         assert_eq!(line.to_string(), expected);
+    }
+
+    #[test]
+    fn writes_lists() {
+        let line = line("trace", |object| {
+            object
+                .list("events", ["[1,2]", "[3]"].iter())
+                .list("none", [0; 0].iter());
+        });
+        assert_eq!(
+            line.to_string(),
+            r#"{"kind":"trace","events":[[1,2],[3]],"none":[]}"#
+        );
     }
 
     #[test]

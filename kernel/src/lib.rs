@@ -42,6 +42,7 @@
 extern crate alloc;
 
 pub mod console;
+mod containment;
 mod contexts;
 #[doc(hidden)]
 pub mod entry;
@@ -56,6 +57,7 @@ mod platform;
 pub mod report;
 mod run;
 mod start;
+mod trace;
 mod worker;
 
 pub use machine_handle::{Ending, Machine};

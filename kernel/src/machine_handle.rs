@@ -14,13 +14,17 @@ use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
 use crate::run::Run;
 use crate::worker;
-use crate::{console, execution, json, machine};
+use crate::{console, execution, json, machine, trace};
 
 /// The machine, lent to the app's function for the time of the run.
 #[derive(Debug)]
 pub struct Machine {
     pub(crate) options: Options<'static>,
     pub(crate) module: Option<&'static [u8]>,
+    /// Whether each run's trace is printed after it.
+    pub(crate) dumps_trace: bool,
+    /// How many runs have ended.
+    pub(crate) runs: Cell<u64>,
 }
 
 /// Why an app ends other than by success.

@@ -2,48 +2,42 @@
 //!
 //! The core that panics stops all others first, so the report is not torn
 //! apart and nothing runs on with broken data. A panic during the report ends
-//! the run with what was said so far.
+//! the run with what was said so far. Faults of subtasks do not get here:
+//! `containment` ends their DAG instead.
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::console::write_in_emergency;
+use crate::containment;
+use crate::machine::context::Registers;
 use crate::machine::fault::Exception;
+use crate::machine::interrupt::Interrupted;
 use crate::machine::{cpu, exit, local_apic, this_core};
-use crate::{execution, json};
+use crate::{execution, json, trace};
+
+/// The most recent events of this core that a report shows.
+const EVENTS_SHOWN: usize = 16;
 
 static PANICKING: AtomicBool = AtomicBool::new(false);
 
-/// Reports a panic of Rust code and ends the run.
+/// Ends the subtask that panics, or else the run.
 pub(crate) fn panic(info: &PanicInfo<'_>) -> ! {
-    let place = info.location();
-    let place = fmt::from_fn(|f| match place {
-        Some(place) => write!(f, "{}:{}:{}", place.file(), place.line(), place.column()),
-        None => f.write_str("an unknown place"),
-    });
-    die("panic", &info.message(), &place)
+    containment::end_panicked(info);
+    die("panic", &info.message(), &containment::place_of(info), None)
 }
 
-/// Reports an exception and ends the run.
-pub(crate) fn exception(exception: &Exception<'_>) -> ! {
-    let registers = exception.registers;
-    let message = fmt::from_fn(|f| {
-        write!(f, "{}", exception.name)?;
-        if let Some(address) = exception.address {
-            write!(f, " at address {address:#x}")?;
-        }
-        write!(
-            f,
-            ", error code {:#x}, stack {:#x}",
-            registers.error_code, registers.rsp
-        )
-    });
-    let place = fmt::from_fn(|f| write!(f, "{:#x}", registers.rip));
-    die("exception", &message, &place)
+/// Ends the subtask that caused an exception, or else the run.
+pub(crate) fn exception(exception: &Exception<'_>, interrupted: &mut Interrupted) {
+    if !containment::end_faulty(exception, interrupted) {
+        let registers = exception.registers;
+        let place = fmt::from_fn(|f| write!(f, "{:#x}", registers.rip));
+        die("exception", exception, &place, Some(registers))
+    }
 }
 
-fn die(what: &str, message: &dyn Display, place: &dyn Display) -> ! {
+fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option<&Registers>) -> ! {
     cpu::disable_interrupts();
     if PANICKING.swap(true, Ordering::AcqRel) {
         // Either another core reports already and is about to stop this one, or
@@ -66,6 +60,12 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display) -> ! {
                 "  that is subtask `{subtask}` of DAG `{dag}`\n"
             ));
         });
+    }
+    if let Some(registers) = registers {
+        write_in_emergency(format_args!("{registers}"));
+    }
+    if core.is_some() {
+        write_in_emergency(format_args!("{}", trace::latest(EVENTS_SHOWN)));
     }
     let line = json::line(what, |line| {
         line.number("cpu", index);

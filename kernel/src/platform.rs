@@ -1,6 +1,6 @@
 //! The kernel as the platform that `fass` runs on.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
@@ -15,17 +15,31 @@ pub(crate) struct Kernel {
     edf: AtomicBool,
     /// Whether a started instance may lose its core.
     preemptive: AtomicBool,
+    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
+    budget_factor: AtomicU64,
 }
 
 pub(crate) static KERNEL: Kernel = Kernel {
     edf: AtomicBool::new(false),
     preemptive: AtomicBool::new(true),
+    budget_factor: AtomicU64::new(0),
 };
 
 impl Kernel {
     /// Chooses the policy of the commits to come.
     pub(crate) fn set_policy(&self, policy: Policy) {
         self.edf.store(policy == Policy::Edf, Ordering::Relaxed);
+    }
+
+    /// Chooses the budget of subtasks that have a WCET only, in WCETs; 0 for none.
+    pub(crate) fn set_budget_factor(&self, factor: u64) {
+        self.budget_factor.store(factor, Ordering::Relaxed);
+    }
+
+    /// Returns the budget of a subtask that has a WCET only, if it has one.
+    pub(crate) fn budget_of_wcet(&self, wcet_ns: u64) -> Option<u64> {
+        let factor = self.budget_factor.load(Ordering::Relaxed);
+        (factor > 0).then(|| wcet_ns.saturating_mul(factor))
     }
 
     /// Chooses whether the runs to come are preemptive.

@@ -9,6 +9,7 @@ use crate::execution::Execution;
 pub struct Run {
     execution: Execution,
     allocations: u64,
+    epoch_ns: u64,
 }
 
 impl core::fmt::Debug for Run {
@@ -20,10 +21,11 @@ impl core::fmt::Debug for Run {
 }
 
 impl Run {
-    pub(crate) const fn new(execution: Execution, allocations: u64) -> Self {
+    pub(crate) const fn new(execution: Execution, allocations: u64, epoch_ns: u64) -> Self {
         Self {
             execution,
             allocations,
+            epoch_ns,
         }
     }
 
@@ -44,7 +46,7 @@ impl Run {
     /// kernel's entry.
     #[must_use]
     pub const fn epoch_ns(&self) -> u64 {
-        self.execution.epoch_ns()
+        self.epoch_ns
     }
 
     /// Returns a DAG's counters.

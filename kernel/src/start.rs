@@ -1,10 +1,12 @@
 //! From the handover by `boot` to the app's function, and its end.
 
 use alloc::vec::Vec;
+use core::cell::Cell;
 
 use boot::acpi::{self, Platform};
 use boot::physical::IdentityMap;
 use boot::{BootInfo, Module};
+use fass::{Policy, Preemption};
 
 use crate::machine::this_core::{self, Stacks};
 use crate::machine::{clock, cpu, exit, interrupt, legacy, local_apic, processors, serial};
@@ -12,13 +14,22 @@ use crate::machine_handle::{Ending, Machine};
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
 use crate::platform::KERNEL;
-use crate::{console, contexts, json, panic, println, worker};
+use crate::{console, contexts, json, panic, println, trace, worker};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
 
 /// The stack of an interrupt handler, or of an exception's report, in bytes.
 const HANDLER_STACK: u64 = 16 * 1024;
+
+/// The events that each core's trace keeps, unless the command line says
+/// otherwise: 128 KiB.
+const TRACE_EVENTS: u64 = 4096;
+
+const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
+
+const PREEMPTIONS: [(&str, Preemption); 2] =
+    [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
 
 /// Brings up memory and interrupts, then goes on on the core's own stack: the
 /// boot stack has no guard page.
@@ -29,6 +40,8 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         timer: worker::timer_interrupt,
         wake: worker::wake_interrupt,
         exception: panic::exception,
+        work: worker::work,
+        release: contexts::give_back,
     });
     let platform = read_platform(info);
     let module = module(info);
@@ -163,7 +176,7 @@ extern "C" fn other_core(apic_id: u32) -> ! {
     let apic_id = u8::try_from(apic_id).expect("APIC ids have 8 bits");
     this_core::become_core(apic_id);
     processors::arrive();
-    worker::work()
+    interrupt::begin_work()
 }
 
 fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
@@ -175,23 +188,20 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
     // What time means is the host's choice and changes nothing here; the word
     // stands there so that the log shows it.
     let _ = options.text("mode");
-    KERNEL.set_policy(options.choice(
-        "policy",
-        &[
-            ("static", fass::Policy::StaticPriority),
-            ("edf", fass::Policy::Edf),
-        ],
-    )?);
-    KERNEL.set_preemption(options.choice(
-        "preemption",
-        &[
-            ("on", fass::Preemption::Enabled),
-            ("off", fass::Preemption::Disabled),
-        ],
-    )?);
+    KERNEL.set_policy(options.choice("policy", &POLICIES)?);
+    KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
+    KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
+    let trace_events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
+    let dumps_trace = options.choice("trace", &[("keep", false), ("dump", true)])?;
+    trace::create(
+        this_core::all().len(),
+        usize::try_from(trace_events).unwrap_or(0),
+    );
     app(&Machine {
         options,
         module: module_bytes(info),
+        dumps_trace,
+        runs: Cell::new(0),
     })
 }
 

@@ -4,32 +4,34 @@ use core::sync::atomic::Ordering;
 
 use crate::execution::{self, Assignment, Work};
 use crate::machine::context::{Context, Parked};
+use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu};
-use crate::{console, contexts};
+use crate::{console, containment, contexts};
 
 /// The time between two signs of life of core 0. Without any alarm anywhere a
 /// virtual machine whose time is virtual would stand still forever.
 pub(crate) const HEARTBEAT_NS: u64 = 1_000_000_000;
 
-/// Makes a context that works, in place of one that is suspended. Interrupts are
-/// disabled.
+/// Makes a context that works, in place of one that is suspended or lost.
+/// Interrupts are disabled.
 pub(crate) fn new_context() -> Parked {
     let mut context = this_core::take_spare_context().unwrap_or_else(contexts::take);
-    context.restart(work);
+    context.restart();
     context
 }
 
-/// Runs what is assigned to the core that it is on, for ever: from one instance
-/// to the next, preempted now and then, on whatever core that may be.
-pub(crate) extern "C" fn work() -> ! {
+/// Runs what is assigned to the core that it is on, from one instance to the
+/// next, preempted now and then, on whatever core that may be. Returns the
+/// context that the core is to go on with instead, with interrupts disabled.
+pub(crate) fn work() -> Parked {
     cpu::disable_interrupts();
     let mut work = execution::find_work();
     loop {
         work = match work {
             Work::Run(assignment) => run(assignment),
-            Work::Continue(context) => leave_for(context),
+            Work::Continue(context) => return context,
             Work::Rest => {
                 rest(this_core::get());
                 execution::find_work()
@@ -38,25 +40,17 @@ pub(crate) extern "C" fn work() -> ! {
     }
 }
 
-/// Calls a subtask's function, with interrupts enabled meanwhile.
+/// Calls a subtask's function, with interrupts enabled meanwhile. Start and
+/// finish are stamped with interrupts disabled, so that no preemption can stand
+/// between a stamp and what it says.
 fn run(mut assignment: Assignment) -> Work {
-    cpu::enable_interrupts();
     let start_ns = clock::now_ns();
+    execution::note_start(&assignment, start_ns);
+    cpu::enable_interrupts();
     assignment.run();
-    let finish_ns = clock::now_ns();
     cpu::disable_interrupts();
+    let finish_ns = clock::now_ns();
     execution::complete(assignment, start_ns, finish_ns)
-}
-
-/// Goes on with another context; this one has nothing more to do.
-fn leave_for(context: Parked) -> ! {
-    if let Some(spare) = this_core::take_spare_context() {
-        contexts::give_back(spare);
-    }
-    // SAFETY: 1. This is a worker's own stack, and its loop has interrupts
-    // disabled here. 2. The loop has nothing left but the context, which moves.
-    // 3. The spare context was taken just now.
-    unsafe { this_core::leave_context(context) }
 }
 
 /// Sends waiting text and halts in between, until this core is to look for work.
@@ -91,7 +85,7 @@ pub(crate) fn wait_in_background(mut when_idle: impl FnMut()) {
 }
 
 /// Handles this core's timer interrupt.
-pub(crate) fn timer_interrupt() {
+pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
     core.timer_interrupts.fetch_add(1, Ordering::Relaxed);
     let now_ns = clock::now_ns();
@@ -101,7 +95,10 @@ pub(crate) fn timer_interrupt() {
         beat(core, now_ns);
     }
     if timer::take_due(Alarm::Schedule, now_ns) {
-        execution::interrupt(now_ns, true);
+        execution::interrupt(interrupted, now_ns, true);
+    }
+    if timer::take_due(Alarm::Budget, now_ns) {
+        containment::end_overrun(interrupted, now_ns);
     }
     timer::arm_earliest();
 }
@@ -138,7 +135,7 @@ fn beat(core: &Core, now_ns: u64) {
 
 /// Handles another core's wake-up: there is work, an earlier event to wait for,
 /// or another heartbeat.
-pub(crate) fn wake_interrupt() {
+pub(crate) fn wake_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
     if core.index == 0 {
         execution::arm_next_event();
@@ -146,7 +143,7 @@ pub(crate) fn wake_interrupt() {
     if !timer::is_set(Alarm::Heartbeat) {
         beat(core, clock::now_ns());
     }
-    execution::interrupt(clock::now_ns(), false);
+    execution::interrupt(interrupted, clock::now_ns(), false);
 }
 
 /// Occupies the calling instance's core for `ns` of execution, halted in between.

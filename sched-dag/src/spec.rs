@@ -41,6 +41,9 @@ pub struct SubtaskSpec {
     pub name: String,
     /// The worst-case execution time, if known.
     pub wcet_ns: Option<u64>,
+    /// The execution time beyond which an instance is ended as faulty; `None`:
+    /// the driver's choice. Enforced by the driver, not by the scheduler.
+    pub budget_ns: Option<u64>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,
     /// Whether a started instance keeps its core although preemption is on.

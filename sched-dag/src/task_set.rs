@@ -38,6 +38,7 @@ pub struct Dag {
 pub struct Subtask {
     pub(crate) name: String,
     pub(crate) wcet_ns: Option<u64>,
+    pub(crate) budget_ns: Option<u64>,
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
 }
@@ -169,6 +170,13 @@ impl Subtask {
     #[must_use]
     pub const fn wcet_ns(&self) -> Option<u64> {
         self.wcet_ns
+    }
+
+    /// Returns the execution time beyond which an instance is faulty, if the app
+    /// gave one.
+    #[must_use]
+    pub const fn budget_ns(&self) -> Option<u64> {
+        self.budget_ns
     }
 
     /// Returns the static priority, given or derived from the graph.

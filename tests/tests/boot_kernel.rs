@@ -36,18 +36,34 @@ fn a_panic_in_the_kernel_ends_in_failure_and_names_its_place() {
     }
 }
 
-#[test]
-fn a_panic_in_a_subtask_names_dag_subtask_and_job() {
-    let outcome = guest("subtask_panic").cores(2).end_in(Status::Failure);
-    let panic = outcome.transcript.of_kind("panic").next();
-    let panic = panic.unwrap_or_else(|| panic!("no panic line\n{}", outcome.tail()));
-    for member in ["dag", "subtask", "job"] {
-        assert!(
-            panic.value.get(member).is_some(),
-            "no `{member}`: {}",
-            panic.text
-        );
+/// Every fault that a subtask commits ends its DAG and no other.
+fn faults_are_contained(cores: u64) {
+    let outcome = Guest::new("faults").cores(cores).succeed();
+    let transcript = &outcome.transcript;
+    let verdicts: Vec<_> = transcript.of_kind("containment").collect();
+    assert_eq!(verdicts.len(), 12, "{}", outcome.tail());
+    for line in &verdicts {
+        assert_eq!(line.text_at("verdict"), Some("contained"), "{}", line.text);
     }
+    let faults: Vec<_> = transcript.of_kind("fault").collect();
+    assert_eq!(faults.len(), verdicts.len(), "{}", outcome.tail());
+    for line in faults {
+        assert_eq!(line.text_at("dag_name"), Some("doomed"), "{}", line.text);
+        assert_eq!(
+            line.text_at("subtask_name"),
+            Some("process"),
+            "{}",
+            line.text
+        );
+        assert_eq!(line.number_at("job"), Some(10), "{}", line.text);
+        assert!(line.text_at("place").is_some_and(|place| !place.is_empty()));
+    }
+}
+
+#[test]
+fn faults_of_a_subtask_end_its_dag_alone() {
+    faults_are_contained(1);
+    faults_are_contained(4);
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod watcher;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use alloc::format;
+use alloc::string::String;
 use alloc::sync::Arc;
 
 use fass::{Body, LaunchError, Plan};
@@ -24,9 +25,12 @@ use sched_dag::{
 
 use crate::machine::clock;
 use crate::machine::context::Parked;
+use crate::machine::interrupt::Interrupted;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
+use crate::platform::KERNEL;
+use crate::trace::{self, What};
 use crate::{contexts, worker};
 use core_set::CoreSet;
 use placement::{Next, Placement};
@@ -35,6 +39,8 @@ use watcher::Watcher;
 /// An instance that a core runs, with what it takes.
 pub(crate) struct Assignment {
     pub(crate) instance: Instance,
+    /// The time that it may execute for, `u64::MAX` if for ever.
+    budget_ns: u64,
     body: Body,
 }
 
@@ -55,6 +61,16 @@ pub(crate) enum Work {
     Rest,
 }
 
+/// What a step of the scheduler is about, besides the time.
+enum Event {
+    /// A release or a deadline is due.
+    Time,
+    /// The instance has finished.
+    Completed(Instance),
+    /// The instance was ended by a fault, and its DAG ends with it.
+    Failed(Instance),
+}
+
 /// A run, from its launch until its record is taken.
 pub(crate) struct Execution {
     scheduler: Scheduler,
@@ -62,13 +78,15 @@ pub(crate) struct Execution {
     /// What core 0 does when nothing is assigned to it, while something is.
     background: Option<Parked>,
     pub(crate) record: Record,
-    epoch_ns: u64,
     /// The scheduler's latest time; it never goes back, although clocks of
     /// different cores may be read in another order than they get the lock.
     latest_ns: u64,
 }
 
 static EXECUTION: SpinLock<Option<Execution>> = SpinLock::new(None);
+
+/// Time 0 of the run, on the clock.
+static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// When core 0's timer shall next step the scheduler, on the clock; `u64::MAX`
 /// if never.
@@ -103,7 +121,6 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         placement: Placement::new(plan.bodies, cores),
         background: None,
         record,
-        epoch_ns: u64::MAX,
         latest_ns: 0,
     };
     *EXECUTION.lock() = Some(execution);
@@ -131,7 +148,8 @@ fn new_record(task_set: &TaskSet) -> Result<Record, LaunchError> {
 pub(crate) fn begin(epoch_ns: u64) -> Option<u64> {
     let mut place = EXECUTION.lock();
     let execution = place.as_mut()?;
-    execution.epoch_ns = epoch_ns;
+    EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
+    trace::clear();
     JOBS_ENDED.store(0, Ordering::Relaxed);
     execution.publish();
     let jobs = execution
@@ -177,6 +195,20 @@ pub(crate) fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
     }
 }
 
+/// Returns copies of the names of an instance's DAG and subtask.
+pub(crate) fn names(instance: Instance) -> (String, String) {
+    let place = EXECUTION.lock();
+    let dag = place
+        .as_ref()
+        .map(|execution| execution.task_set().dag(instance.dag));
+    dag.map_or_else(Default::default, |dag| {
+        (
+            dag.name().into(),
+            dag.subtask(instance.subtask).name().into(),
+        )
+    })
+}
+
 /// Returns the instance that a core runs, without the lock.
 pub(crate) fn running(core: &Core) -> Option<Instance> {
     let [dag, job, subtask] = core
@@ -207,6 +239,29 @@ pub(crate) fn find_work() -> Work {
     place.as_mut().map_or(Work::Rest, Execution::find_work)
 }
 
+/// Notes that this core starts its instance. Interrupts are disabled.
+pub(crate) fn note_start(assignment: &Assignment, start_ns: u64) {
+    let budget_end_ns = start_ns.saturating_add(assignment.budget_ns);
+    this_core::get().context().set_budget_end(budget_end_ns);
+    timer::set(Alarm::Budget, budget_end_ns);
+    trace::instance(
+        What::Start,
+        since_epoch(start_ns),
+        here(),
+        assignment.instance,
+    );
+}
+
+/// Converts a time on the clock to the run's time.
+fn since_epoch(time_ns: u64) -> u64 {
+    time_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
+}
+
+/// Returns the core that executes this. Interrupts are disabled.
+fn here() -> CoreId {
+    CoreId(this_core::get().index)
+}
+
 /// Reports that this core has run its instance, and finds what it is to do
 /// next. Interrupts are disabled.
 pub(crate) fn complete(finished: Assignment, start_ns: u64, finish_ns: u64) -> Work {
@@ -214,35 +269,67 @@ pub(crate) fn complete(finished: Assignment, start_ns: u64, finish_ns: u64) -> W
     let Some(execution) = place.as_mut() else {
         return Work::Rest;
     };
-    let here = this_core::get().index;
-    let Assignment { instance, body } = finished;
-    execution.placement.finish(here as usize, instance, body);
-    let epoch_ns = execution.epoch_ns;
+    let here = here();
+    let Assignment { instance, body, .. } = finished;
+    timer::set(Alarm::Budget, u64::MAX);
+    trace::instance(What::Finish, since_epoch(finish_ns), here, instance);
+    execution.placement.finish(here.index(), instance, body);
     if let Some(record) = execution.record.instance_mut(instance) {
-        record.start_ns = Some(start_ns.saturating_sub(epoch_ns));
-        record.finish_ns = Some(finish_ns.saturating_sub(epoch_ns));
-        record.core = Some(CoreId(here));
+        record.start_ns = Some(since_epoch(start_ns));
+        record.finish_ns = Some(since_epoch(finish_ns));
+        record.core = Some(here);
         record.runs += 1;
     }
-    let woken = execution.step(finish_ns, Some(instance));
+    let woken = execution.step(finish_ns, Event::Completed(instance));
     let work = execution.find_work();
     drop(place);
     woken.wake();
     work
 }
 
+/// Returns how long an instance may execute for, `u64::MAX` if for ever.
+pub(crate) fn budget_ns(instance: Instance) -> u64 {
+    EXECUTION
+        .lock()
+        .as_ref()
+        .map_or(u64::MAX, |execution| execution.budget_ns(instance))
+}
+
+/// Ends this core's instance, and with it its DAG, because of a fault. The
+/// context that ran it must not be resumed. Interrupts are disabled.
+pub(crate) fn fail(now_ns: u64) {
+    let mut place = EXECUTION.lock();
+    let Some(execution) = place.as_mut() else {
+        return;
+    };
+    let core = this_core::get();
+    let Some(instance) = execution.placement.lose(core.index as usize) else {
+        return;
+    };
+    trace::instance(
+        What::Ended,
+        since_epoch(now_ns),
+        CoreId(core.index),
+        instance,
+    );
+    note_running(core, None);
+    let woken = execution.step(now_ns, Event::Failed(instance));
+    drop(place);
+    woken.wake();
+}
+
 /// Lets the scheduler take a step if `is_event`, and lets this core follow its
 /// decisions. In an interrupt handler.
-pub(crate) fn interrupt(now_ns: u64, is_event: bool) {
+pub(crate) fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     let mut place = EXECUTION.lock();
     let Some(execution) = place.as_mut() else {
         return;
     };
     let mut woken = CoreSet::default();
     if is_event {
-        woken = execution.step(now_ns, None);
+        woken = execution.step(now_ns, Event::Time);
     }
-    if let Some(waiting) = execution.follow(now_ns) {
+    if let Some(waiting) = execution.follow(interrupted, now_ns) {
         woken.insert(waiting.0);
     }
     drop(place);
@@ -257,36 +344,38 @@ pub(crate) fn arm_next_event() {
 impl Execution {
     /// Makes one step of the scheduler and returns which other cores have to
     /// look at what they should run.
-    fn step(&mut self, now_ns: u64, completed: Option<Instance>) -> CoreSet {
+    fn step(&mut self, now_ns: u64, event: Event) -> CoreSet {
         let here = this_core::get().index;
         let Self {
             scheduler,
             placement,
             record,
-            epoch_ns,
             latest_ns,
             ..
         } = self;
-        *latest_ns = now_ns.saturating_sub(*epoch_ns).max(*latest_ns);
-        let mut watcher = Watcher {
-            record,
-            placement,
-            epoch_ns: *epoch_ns,
-        };
+        *latest_ns = since_epoch(now_ns).max(*latest_ns);
+        let mut watcher = Watcher { record, placement };
         let mut moment = scheduler.at(*latest_ns);
-        if let Some(instance) = completed {
-            moment.complete(instance, &mut watcher);
+        match event {
+            Event::Time => {}
+            Event::Completed(instance) => moment.complete(instance, &mut watcher),
+            Event::Failed(instance) => moment.fail(instance, &mut watcher),
         }
         let mut woken = CoreSet::default();
+        let mut preempted = None;
         for decision in moment.release_due(&mut watcher).dispatch() {
             placement.decide(*decision);
-            if let Decision::Preempt { instance, .. } = decision
-                && let Some(record) = record.instance_mut(*instance)
-            {
-                record.preemptions += 1;
+            let (core, instance) = (decision.core(), decision.instance());
+            if let Decision::Preempt { .. } = decision {
+                preempted = Some(core);
+                if let Some(record) = record.instance_mut(instance) {
+                    record.preemptions += 1;
+                }
+            } else if preempted == Some(core) {
+                trace::instance(What::Request, since_epoch(clock::now_ns()), core, instance);
             }
-            if decision.core().0 != here {
-                woken.insert(decision.core().0);
+            if core.0 != here {
+                woken.insert(core.0);
             }
         }
         let earlier = NEXT_EVENT_NS.load(Ordering::Relaxed);
@@ -302,7 +391,9 @@ impl Execution {
     /// Lets everyone see when the next event is, and whether there is any.
     fn publish(&self) {
         let next = self.scheduler.next_event_ns();
-        let next = next.map_or(u64::MAX, |next| next.saturating_add(self.epoch_ns));
+        let next = next.map_or(u64::MAX, |next| {
+            next.saturating_add(EPOCH_NS.load(Ordering::Relaxed))
+        });
         NEXT_EVENT_NS.store(next, Ordering::Release);
         FINISHED.store(self.scheduler.is_finished(), Ordering::Release);
     }
@@ -312,9 +403,13 @@ impl Execution {
         let core = this_core::get();
         let here = core.index as usize;
         let work = match self.placement.next(here) {
-            Next::Start(instance, body) => Work::Run(Assignment { instance, body }),
+            Next::Start(instance, body) => Work::Run(Assignment {
+                instance,
+                budget_ns: self.budget_ns(instance),
+                body,
+            }),
             Next::Continue(context) => {
-                context.note_resumed(clock::now_ns());
+                self.note_resumed(&context, clock::now_ns());
                 Work::Continue(context)
             }
             // Only core 0 has a background, and only while it does other work.
@@ -327,7 +422,7 @@ impl Execution {
 
     /// Makes the core whose interrupt is being handled leave what it should no
     /// longer run. Returns the core that waits for that, if there is one.
-    fn follow(&mut self, now_ns: u64) -> Option<CoreId> {
+    fn follow(&mut self, interrupted: &mut Interrupted, now_ns: u64) -> Option<CoreId> {
         let core = this_core::get();
         let here = core.index as usize;
         let is_background = core.context().is_background();
@@ -336,20 +431,32 @@ impl Execution {
             return None;
         }
         let suspended = self.placement.detach(here);
+        let mut next_is_new = false;
         let next = match self.placement.take_suspended(here) {
             Some(context) => {
-                context.note_resumed(now_ns);
+                self.note_resumed(&context, now_ns);
                 context
             }
-            None => worker::new_context(),
+            None => {
+                next_is_new = true;
+                worker::new_context()
+            }
         };
         note_running(core, self.placement.current(here));
-        // SAFETY: `interrupt` is called by handlers of maskable interrupts.
-        let last = unsafe { this_core::exchange_context(next) };
+        let last = interrupted.exchange(next);
         match suspended {
             Some(instance) => {
                 last.note_suspended(now_ns);
+                trace::instance(
+                    What::Suspend,
+                    since_epoch(now_ns),
+                    CoreId(core.index),
+                    instance,
+                );
                 timer::set(Alarm::Hold, u64::MAX);
+                if next_is_new {
+                    timer::set(Alarm::Budget, u64::MAX);
+                }
                 self.placement.suspend(instance, last)
             }
             None => {
@@ -359,9 +466,23 @@ impl Execution {
         }
     }
 
-    /// Returns time 0 of the run, on the clock.
-    pub(crate) const fn epoch_ns(&self) -> u64 {
-        self.epoch_ns
+    /// Returns how long an instance may execute for, `u64::MAX` if for ever.
+    fn budget_ns(&self, instance: Instance) -> u64 {
+        let subtask = self.task_set().dag(instance.dag).subtask(instance.subtask);
+        subtask
+            .budget_ns()
+            .or_else(|| KERNEL.budget_of_wcet(subtask.wcet_ns()?))
+            .unwrap_or(u64::MAX)
+    }
+
+    /// Notes that this core's current instance continues in `context`.
+    fn note_resumed(&self, context: &Parked, now_ns: u64) {
+        context.note_resumed(now_ns);
+        timer::set(Alarm::Budget, context.budget_end_ns());
+        let here = here();
+        if let Some(instance) = self.placement.current(here.index()) {
+            trace::instance(What::Resume, since_epoch(now_ns), here, instance);
+        }
     }
 
     /// Returns the scheduler, for its model and its counters.

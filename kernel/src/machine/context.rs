@@ -10,7 +10,8 @@
 //! [`Parked`]. So there is never more than one place that touches them.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::fmt;
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
@@ -42,6 +43,50 @@ pub(crate) struct Registers {
     pub(crate) ss: u64,
 }
 
+impl fmt::Display for Registers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = [
+            [
+                ("rax", self.rax),
+                ("rbx", self.rbx),
+                ("rcx", self.rcx),
+                ("rdx", self.rdx),
+            ],
+            [
+                ("rsi", self.rsi),
+                ("rdi", self.rdi),
+                ("rbp", self.rbp),
+                ("rsp", self.rsp),
+            ],
+            [
+                ("r8", self.r8),
+                ("r9", self.r9),
+                ("r10", self.r10),
+                ("r11", self.r11),
+            ],
+            [
+                ("r12", self.r12),
+                ("r13", self.r13),
+                ("r14", self.r14),
+                ("r15", self.r15),
+            ],
+            [
+                ("rip", self.rip),
+                ("flags", self.rflags),
+                ("vec", self.vector),
+                ("err", self.error_code),
+            ],
+        ];
+        for row in rows {
+            for (name, value) in row {
+                write!(f, "  {name:>5} {value:016x}")?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
 /// Vector state (x87 and SSE), then registers.
 #[derive(Debug)]
 #[repr(C, align(64))]
@@ -66,6 +111,11 @@ pub(crate) struct Context {
     /// When it was last suspended, and for how long it has been in all before.
     suspended_at_ns: AtomicU64,
     suspended_ns: AtomicU64,
+    /// When the execution of what it runs reaches its budget, if it is not
+    /// suspended any more until then.
+    budget_end_ns: AtomicU64,
+    /// Whether what it runs has been found at fault.
+    is_at_fault: AtomicBool,
 }
 
 // SAFETY: everything but the save area is constant or atomic, and the save area
@@ -91,6 +141,22 @@ impl Context {
     /// Reports whether this is what its core does when nothing is assigned to it.
     pub(crate) const fn is_background(&self) -> bool {
         self.is_background
+    }
+
+    /// Lets what the context runs execute until `end_ns`, and no longer.
+    pub(crate) fn set_budget_end(&self, end_ns: u64) {
+        self.budget_end_ns.store(end_ns, Ordering::Relaxed);
+    }
+
+    /// Returns when the budget ends of what the context runs.
+    pub(crate) fn budget_end_ns(&self) -> u64 {
+        self.budget_end_ns.load(Ordering::Relaxed)
+    }
+
+    /// Notes that what the context runs is at fault, and reports whether that was
+    /// known.
+    pub(crate) fn note_fault(&self) -> bool {
+        self.is_at_fault.swap(true, Ordering::Relaxed)
     }
 
     /// Returns for how long the context has been suspended since it was made.
@@ -124,21 +190,24 @@ impl Parked {
             is_background,
             suspended_at_ns: AtomicU64::new(0),
             suspended_ns: AtomicU64::new(0),
+            budget_end_ns: AtomicU64::new(u64::MAX),
+            is_at_fault: AtomicBool::new(false),
         })))
     }
 
-    /// Lets the context begin at `entry` with an empty stack, when it next runs.
+    /// Lets the context begin anew, with an empty stack, when it next runs.
     /// Whatever it did before is forgotten.
-    pub(crate) fn restart(&mut self, entry: extern "C" fn() -> !) {
+    pub(crate) fn restart(&mut self) {
         const INTERRUPTS_ENABLED: u64 = 1 << 9;
         let registers = Registers {
-            rip: entry as usize as u64,
+            rip: super::interrupt::work as *const () as u64,
             cs: u64::from(super::descriptors::CODE),
             rflags: INTERRUPTS_ENABLED,
             // As after a call: a function expects the stack to be 8 off.
             rsp: self.0.stack_top - 8,
             ..Registers::default()
         };
+        self.0.set_budget_end(u64::MAX);
         // SAFETY: `&mut self` is the one holder of a context that does not run
         // (context invariant).
         unsafe { self.0.registers().write(registers) };
@@ -153,6 +222,13 @@ impl Parked {
     pub(crate) fn note_resumed(&self, now_ns: u64) {
         let since_ns = now_ns.saturating_sub(self.0.suspended_at_ns.load(Ordering::Relaxed));
         self.0.suspended_ns.fetch_add(since_ns, Ordering::Relaxed);
+        self.0
+            .set_budget_end(self.0.budget_end_ns().saturating_add(since_ns));
+    }
+
+    /// Returns when the budget ends of what the context runs.
+    pub(crate) fn budget_end_ns(&self) -> u64 {
+        self.0.budget_end_ns()
     }
 
     /// Returns where `interrupt.s` keeps the context's registers.

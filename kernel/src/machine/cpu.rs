@@ -15,6 +15,15 @@ pub(crate) fn disable_interrupts() -> bool {
     flags & (1 << 9) != 0
 }
 
+/// Reports whether interrupts are enabled on this processor.
+pub(crate) fn are_interrupts_enabled() -> bool {
+    let were_enabled = disable_interrupts();
+    if were_enabled {
+        enable_interrupts();
+    }
+    were_enabled
+}
+
 /// Enables interrupts on this processor.
 pub(crate) fn enable_interrupts() {
     // SAFETY: handlers keep all registers of what they interrupt and touch only

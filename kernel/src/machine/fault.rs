@@ -1,12 +1,16 @@
 //! Exceptions: what the processor says about code that cannot go on.
 
+use core::fmt;
+
 use super::context::Registers;
 use super::cpu;
-use super::interrupt::Handlers;
+use super::interrupt::{Handlers, Interrupted};
 
 /// The vector of a non-maskable interrupt: another core stops this one.
 const NON_MASKABLE: u64 = 2;
+const DOUBLE_FAULT: u64 = 8;
 const PAGE_FAULT: u64 = 14;
+const MACHINE_CHECK: u64 = 18;
 
 /// An exception, in words and numbers.
 #[derive(Debug)]
@@ -47,7 +51,11 @@ const NAMES: [&str; 22] = [
 
 /// Passes an exception to its handler, or stops the core if it is the signal to
 /// stop or nobody handles exceptions yet.
-pub(super) fn raise(registers: &Registers, handlers: Option<&Handlers>) -> ! {
+pub(super) fn raise(
+    registers: &Registers,
+    handlers: Option<&Handlers>,
+    interrupted: &mut Interrupted,
+) {
     let vector = registers.vector;
     let Some(handlers) = handlers.filter(|_| vector != NON_MASKABLE) else {
         cpu::halt_forever();
@@ -55,9 +63,34 @@ pub(super) fn raise(registers: &Registers, handlers: Option<&Handlers>) -> ! {
     let name = usize::try_from(vector)
         .ok()
         .and_then(|vector| NAMES.get(vector));
-    (handlers.exception)(&Exception {
+    let exception = Exception {
         name: name.unwrap_or(&"reserved exception"),
         registers,
         address: (vector == PAGE_FAULT).then(cpu::fault_address),
-    })
+    };
+    (handlers.exception)(&exception, interrupted);
+}
+
+impl fmt::Display for Exception<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)?;
+        if let Some(address) = self.address {
+            write!(f, " at address {address:#x}")?;
+        }
+        let Registers {
+            error_code, rsp, ..
+        } = self.registers;
+        write!(f, ", error code {error_code:#x}, stack {rsp:#x}")
+    }
+}
+
+impl Exception<'_> {
+    /// Reports whether it is the fault of the code that ran, rather than of the
+    /// machine or the kernel: that code had interrupts enabled, as no holder of
+    /// a lock and no handler has.
+    pub(crate) fn is_of_interruptible_code(&self) -> bool {
+        const INTERRUPTS_ENABLED: u64 = 1 << 9;
+        let is_contained = !matches!(self.registers.vector, DOUBLE_FAULT | MACHINE_CHECK);
+        is_contained && self.registers.rflags & INTERRUPTS_ENABLED != 0
+    }
 }

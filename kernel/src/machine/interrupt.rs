@@ -6,9 +6,9 @@
 
 use core::arch::global_asm;
 
-use super::context::Registers;
+use super::context::{Parked, Registers};
 use super::once::Once;
-use super::{descriptors, fault, local_apic, this_core};
+use super::{cpu, descriptors, fault, local_apic, this_core};
 
 global_asm!(
     include_str!("interrupt.s"),
@@ -31,16 +31,42 @@ pub(crate) mod vector {
     pub(crate) const SPURIOUS: u8 = 0xff;
 }
 
-/// What to do at each kind of interrupt. A handler may let the core go on with
-/// another context by [`this_core::exchange_context`].
+/// What the machine layer calls.
 #[derive(Debug)]
 pub(crate) struct Handlers {
     /// The local timer has fired.
-    pub(crate) timer: fn(),
+    pub(crate) timer: fn(&mut Interrupted),
     /// Another core asked for attention.
-    pub(crate) wake: fn(),
-    /// The code that was running cannot go on.
-    pub(crate) exception: fn(&fault::Exception<'_>) -> !,
+    pub(crate) wake: fn(&mut Interrupted),
+    /// The code that was running cannot go on. If the handler returns, it has
+    /// exchanged the context.
+    pub(crate) exception: fn(&fault::Exception<'_>, &mut Interrupted),
+    /// What a context that begins anew does; it returns, with interrupts
+    /// disabled, the context to leave it for.
+    pub(crate) work: fn() -> Parked,
+    /// Takes a context that this core has no use for.
+    pub(crate) release: fn(Parked),
+}
+
+/// The proof of being in a handler: the context that was running is saved.
+#[derive(Debug)]
+pub(crate) struct Interrupted(());
+
+impl Interrupted {
+    /// Returns the address of the instruction that was interrupted.
+    pub(crate) fn instruction(&self) -> u64 {
+        let registers = this_core::get().context().registers();
+        // SAFETY: an `Interrupted` exists in handlers only, where the context of
+        // this core is saved and does not change.
+        unsafe { (*registers).rip }
+    }
+
+    /// Lets this core go on with `next` when the handler returns, and returns
+    /// the context that was interrupted.
+    pub(crate) fn exchange(&mut self, next: Parked) -> Parked {
+        // SAFETY: an `Interrupted` exists in handlers only.
+        unsafe { this_core::exchange_context(next) }
+    }
 }
 
 static HANDLERS: Once<Handlers> = Once::new();
@@ -64,11 +90,11 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
     match (u8::try_from(vector), HANDLERS.get()) {
         (Ok(vector::TIMER), Some(handlers)) => {
             local_apic::acknowledge();
-            (handlers.timer)();
+            (handlers.timer)(&mut Interrupted(()));
         }
         (Ok(vector::WAKE), Some(handlers)) => {
             local_apic::acknowledge();
-            (handlers.wake)();
+            (handlers.wake)(&mut Interrupted(()));
         }
         (Ok(vector::SPURIOUS), _) => {}
         _ => local_apic::acknowledge(),
@@ -76,10 +102,32 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
     this_core::get().context().registers()
 }
 
-/// Handles one exception; none is survived yet.
+/// Handles one exception and returns the registers to resume.
 extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
     // SAFETY: `interrupt.s` passes the registers it pushed to the exception's
     // own stack, where nobody else looks.
     let registers = unsafe { &*registers };
-    fault::raise(registers, HANDLERS.get())
+    fault::raise(registers, HANDLERS.get(), &mut Interrupted(()));
+    this_core::get().context().registers()
+}
+
+/// Lets a core begin with its first context.
+pub(crate) fn begin_work() -> ! {
+    work()
+}
+
+/// Where every context begins anew.
+pub(super) extern "C" fn work() -> ! {
+    let handlers = HANDLERS
+        .get()
+        .expect("handlers are installed before any context begins");
+    let next = (handlers.work)();
+    cpu::disable_interrupts();
+    if let Some(spare) = this_core::take_spare_context() {
+        (handlers.release)(spare);
+    }
+    // SAFETY: 1. This function begins a context, and interrupts are disabled.
+    // 2. `work` has returned, so nothing of it is left on the stack.
+    // 3. The spare context was taken just now.
+    unsafe { this_core::leave_context(next) }
 }

@@ -44,7 +44,7 @@ pub(crate) struct Core {
     /// Another core has assigned work to this one.
     pub(crate) wake: AtomicBool,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
-    pub(crate) alarms: [AtomicU64; 3],
+    pub(crate) alarms: [AtomicU64; 4],
     /// The number of timer interrupts taken.
     pub(crate) timer_interrupts: AtomicU64,
     /// The time between two heartbeats of this core, 0 if it has none.
@@ -72,7 +72,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         ),
         spare: AtomicPtr::new(core::ptr::null_mut()),
         wake: AtomicBool::new(false),
-        alarms: [const { AtomicU64::new(u64::MAX) }; 3],
+        alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         timer_interrupts: AtomicU64::new(0),
         heartbeat_ns: AtomicU64::new(0),
         running: [const { AtomicU64::new(u64::MAX) }; 3],
@@ -134,16 +134,33 @@ pub(crate) fn all() -> &'static [Core] {
     CORES.get().map_or(&[], |cores| cores)
 }
 
+unsafe extern "C" {
+    /// Resumes the context with these registers (`interrupt.s`).
+    fn resume_context(registers: *mut Registers) -> !;
+}
+
 /// Lets this core go on with `next` when the current interrupt's handler
 /// returns, and returns the context that was interrupted.
 ///
 /// # Safety
 ///
-/// The caller is a handler of a maskable interrupt.
-pub(crate) unsafe fn exchange_context(next: Parked) -> Parked {
+/// The caller is a handler of an interrupt; or of an exception, then what it
+/// returns must not be resumed.
+pub(super) unsafe fn exchange_context(next: Parked) -> Parked {
     let last = get().run_next(next);
-    // SAFETY: `interrupt.s` has saved the context and now resumes `next`.
+    // SAFETY: the context runs no more: `interrupt.s` now resumes `next`.
     unsafe { Parked::from_context(last) }
+}
+
+/// Leaves the context that runs where it is, for ever, for `next`. Its stack is
+/// never used again, so whatever lies on it stays valid.
+pub(crate) fn abandon_context(next: Parked) -> ! {
+    cpu::disable_interrupts();
+    let registers = next.registers();
+    get().run_next(next);
+    // SAFETY: the registers are those of a context that does not run and that
+    // this core has made its own; interrupts are disabled.
+    unsafe { resume_context(registers) }
 }
 
 /// Leaves the context that runs, for good, for `next`. What was left becomes
@@ -154,10 +171,7 @@ pub(crate) unsafe fn exchange_context(next: Parked) -> Parked {
 /// 1. The caller runs on a context's own stack, with interrupts disabled.
 /// 2. Nothing that lives on that stack is used any more.
 /// 3. This core's spare context has been taken by [`take_spare_context`].
-pub(crate) unsafe fn leave_context(next: Parked) -> ! {
-    unsafe extern "C" {
-        fn resume_context(registers: *mut Registers) -> !;
-    }
+pub(super) unsafe fn leave_context(next: Parked) -> ! {
     let core = get();
     let registers = next.registers();
     let last = core.run_next(next);

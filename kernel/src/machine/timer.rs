@@ -16,6 +16,8 @@ pub(crate) enum Alarm {
     Schedule = 0,
     /// The end of a subtask's hold of its core.
     Hold = 1,
+    /// The end of the running instance's budget.
+    Budget = 3,
     /// A sign of life, so that no core ever halts without an end in sight.
     Heartbeat = 2,
 }

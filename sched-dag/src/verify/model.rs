@@ -98,6 +98,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
+            budget_ns: subtask.budget_ns,
             priority: match ranks.get(index) {
                 Some(rank) => Priority(priority_base + rank),
                 None => subtask.priority.expect("given to all subtasks of the dag"),

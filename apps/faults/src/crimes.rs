@@ -1,0 +1,120 @@
+//! What no subtask may do, done on purpose: the machine must stop each.
+//!
+//! If one of these returned, the protection that it is a test of would be
+//! missing; whoever calls them can tell by [`Unpunished`].
+
+use core::arch::asm;
+use core::hint::black_box;
+
+/// The crime had no consequence, which is the failure of a protection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unpunished;
+
+/// Something that must end the subtask that does it.
+pub type Crime = fn() -> Unpunished;
+
+/// Every crime, by name.
+pub const CRIMES: [(&str, Crime); 12] = [
+    ("panic", panic),
+    ("null_write", write_to_null),
+    ("wild_read", read_wildly),
+    ("non_canonical", read_non_canonical),
+    ("write_to_code", write_to_code),
+    ("write_to_constant", write_to_constant),
+    ("execute_data", execute_data),
+    ("division", divide_by_zero),
+    ("undefined_instruction", execute_undefined),
+    ("stack_overflow", overflow_the_stack),
+    ("endless_loop", loop_for_ever),
+    ("endless_wait", wait_for_ever),
+];
+
+fn panic() -> Unpunished {
+    panic!("a panic on purpose")
+}
+
+/// Writes to address 8, on the page that must be absent.
+fn write_to_null() -> Unpunished {
+    write(8)
+}
+
+/// Writes over a function's code, on a page that must not be writable.
+fn write_to_code() -> Unpunished {
+    write(write as fn(usize) -> Unpunished as usize)
+}
+
+/// Writes over a constant, on a page that must not be writable.
+fn write_to_constant() -> Unpunished {
+    static CONSTANT: u64 = 7;
+    write(core::ptr::from_ref(black_box(&CONSTANT)) as usize)
+}
+
+fn write(address: usize) -> Unpunished {
+    // SAFETY: none; the page table has to prevent it (see the module).
+    unsafe { asm!("mov byte ptr [{}], 0x90", in(reg) address) };
+    Unpunished
+}
+
+/// Reads an address at which nothing is mapped.
+fn read_wildly() -> Unpunished {
+    read(0x7fff_dead_b000)
+}
+
+/// Reads an address that is none: its upper bits do not repeat bit 47.
+fn read_non_canonical() -> Unpunished {
+    read(0x8000_0000_0000_0000)
+}
+
+fn read(address: usize) -> Unpunished {
+    // SAFETY: none; the page table has to prevent it (see the module).
+    unsafe { asm!("mov {0:l}, byte ptr [{0}]", inout(reg) address => _) };
+    Unpunished
+}
+
+/// Calls a return instruction on the stack, on a page that must not execute.
+fn execute_data() -> Unpunished {
+    let code = black_box([0xc3u8; 16]);
+    // SAFETY: none; the page table has to prevent it (see the module).
+    unsafe { asm!("call {}", in(reg) code.as_ptr(), clobber_abi("C")) };
+    Unpunished
+}
+
+/// Divides by zero in an instruction, not in Rust, which would panic.
+fn divide_by_zero() -> Unpunished {
+    // SAFETY: none; the processor has to refuse it (see the module).
+    unsafe { asm!("div ecx", inout("eax") 1 => _, inout("edx") 0 => _, in("ecx") 0) };
+    Unpunished
+}
+
+/// Executes an instruction that is defined to be undefined.
+fn execute_undefined() -> Unpunished {
+    // SAFETY: none; the processor has to refuse it (see the module).
+    unsafe { asm!("ud2") };
+    Unpunished
+}
+
+/// Recurses until the stack's guard page is hit.
+fn overflow_the_stack() -> Unpunished {
+    black_box(sum_down(black_box(u64::MAX)));
+    Unpunished
+}
+
+#[expect(unconditional_recursion, reason = "that is the crime")]
+fn sum_down(number: u64) -> u64 {
+    let frame = black_box([number; 64]);
+    frame[0].wrapping_add(sum_down(number.wrapping_sub(1)))
+}
+
+/// Computes without end.
+fn loop_for_ever() -> Unpunished {
+    while black_box(true) {
+        core::hint::spin_loop();
+    }
+    Unpunished
+}
+
+/// Never returns, and hardly computes.
+fn wait_for_ever() -> Unpunished {
+    fass::execute_for(core::time::Duration::MAX, fass::Occupation::Hold);
+    Unpunished
+}

@@ -1,0 +1,97 @@
+//! Each fault that a subtask can commit, beside a DAG that must not notice.
+//!
+//! Two DAGs run at once. The *healthy* one has a deadline that it meets with
+//! ease. The *doomed* one does the same work until its job [`FATAL_JOB`], in
+//! which its middle subtask commits a crime. What is shown is how many jobs of
+//! the healthy DAG met their deadlines before, while and after that happened.
+
+#![cfg_attr(not(test), no_std)]
+#![deny(unsafe_code)]
+
+extern crate alloc;
+
+#[allow(unsafe_code)]
+pub mod crimes;
+
+use alloc::format;
+use alloc::vec;
+use core::time::Duration;
+
+use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
+
+use crimes::{Crime, Unpunished};
+
+/// The time between two jobs of either DAG, and their relative deadline.
+pub const PERIOD: Duration = Duration::from_millis(10);
+
+/// How long each middle subtask executes.
+const EXECUTION: Duration = Duration::from_millis(2);
+
+/// After this time a middle subtask is at fault.
+pub const BUDGET: Duration = Duration::from_millis(6);
+
+/// The job in which the doomed DAG commits its crime.
+pub const FATAL_JOB: u64 = 10;
+
+/// The jobs of each DAG.
+pub const JOBS: u64 = 30;
+
+/// Builds the DAG that must not notice anything.
+#[must_use]
+pub fn healthy() -> Dag {
+    pipeline("healthy", 0, None)
+}
+
+/// Builds the DAG that commits `crime` in its job [`FATAL_JOB`].
+#[must_use]
+pub fn doomed(crime: Crime) -> Dag {
+    pipeline("doomed", 1, Some(crime))
+}
+
+/// Builds source -> middle -> sink.
+fn pipeline(name: &str, priority: u32, crime: Option<Crime>) -> Dag {
+    let dag = create_dag();
+    dag.name(name).jobs(JOBS);
+    let attributes = |part: &str| SubtaskAttributes::named(part).priority(priority);
+    let topic = |part: &str| format!("{name}-{part}");
+    let (input, output) = (topic("input"), topic("output"));
+
+    let mut next_job = 0u64;
+    let read = move || {
+        let job = next_job;
+        next_job += 1;
+        (job,)
+    };
+    dag.register_periodic_subtask(read, vec![&input], PERIOD, attributes("read"));
+    let process = move |(job,): (u64,)| {
+        fass::execute_for(EXECUTION, Occupation::Hold);
+        if let Some(crime) = crime.filter(|_| job == FATAL_JOB) {
+            let Unpunished = crime();
+        }
+        (job,)
+    };
+    let middle = attributes("process").wcet(EXECUTION).budget(BUDGET);
+    dag.register_subtask(process, vec![&input], vec![&output], middle);
+    dag.register_sink_subtask(
+        |(_,): (u64,)| (),
+        vec![&output],
+        PERIOD,
+        attributes("store"),
+    );
+    dag
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use virtual_time::VirtualTime;
+
+    #[test]
+    fn both_meet_every_deadline_without_a_crime() {
+        let machine = VirtualTime::new().cores(1);
+        fass::finish_create_dags(&[healthy(), pipeline("doomed", 1, None)]).unwrap();
+        let report = machine.run();
+        let misses: u64 = report.statistics.iter().map(|of_dag| of_dag.misses).sum();
+        assert_eq!((report.jobs.len(), misses), (60, 0));
+    }
+}

@@ -1,0 +1,124 @@
+//! Boots into one fault after the other and shows who survives.
+
+#![no_std]
+#![no_main]
+
+extern crate alloc;
+
+use alloc::format;
+
+use fass::finish_create_dags;
+use faults::crimes::{CRIMES, Crime};
+use faults::{FATAL_JOB, JOBS, PERIOD, doomed, healthy};
+use kernel::{Ending, Machine, Run, json, println};
+use sched_dag::DagId;
+
+kernel::entry!(main);
+
+const HEALTHY: DagId = DagId(0);
+const DOOMED: DagId = DagId(1);
+
+/// The jobs of the healthy DAG that overlap the fault: from the fatal job on as
+/// long as an endless loop may take to be ended.
+const DURING: u64 = 2;
+
+fn main(machine: &Machine) -> Result<(), Ending> {
+    let options = machine.options();
+    let only = options.text("fault");
+    options.finish(&["fault"])?;
+    let known = only.is_none_or(|only| CRIMES.iter().any(|(name, _)| *name == only));
+    if !known {
+        let names = CRIMES.map(|(name, _)| name).join(", ");
+        let only = only.unwrap_or_default();
+        return Err(Ending::Usage(kernel::options::UsageError::new(format!(
+            "`fault={only}`: allowed are {names}"
+        ))));
+    }
+    println!(
+        "A healthy DAG and a doomed one, each with {JOBS} jobs of {} ms;",
+        PERIOD.as_millis()
+    );
+    println!("the doomed one is at fault in its job {FATAL_JOB}.");
+    let mut counts = [0; 3];
+    for (name, crime) in CRIMES {
+        if only.is_none_or(|only| only == name) {
+            counts[commit_crime(machine, name, crime)? as usize] += 1;
+        }
+    }
+    let [contained, unclear, harmful] = counts;
+    let tried = contained + unclear + harmful;
+    println!("{contained} of {tried} faults ended their own DAG and harmed no other");
+    if unclear > 0 {
+        println!("{unclear} cannot be judged: the healthy DAG was late even before the fault");
+    }
+    if harmful > 0 {
+        return Err(Ending::Failure(format!(
+            "{harmful} of {tried} faults did harm"
+        )));
+    }
+    Ok(())
+}
+
+/// What a fault did beyond its own DAG.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    /// Nothing.
+    Contained,
+    /// The healthy DAG was late before the fault: the host is too busy to judge.
+    Unclear,
+    /// The healthy DAG was late or incomplete, or the doomed one lived on.
+    Harmful,
+}
+
+/// Runs both DAGs and judges whether only the doomed one was harmed.
+fn commit_crime(machine: &Machine, name: &str, crime: Crime) -> Result<Verdict, Ending> {
+    finish_create_dags(&[healthy(), doomed(crime)])?;
+    let run = machine.run()?;
+    let on_time = |jobs: core::ops::Range<u64>| jobs.filter(|job| is_on_time(&run, *job)).count();
+    let parts = [
+        0..FATAL_JOB,
+        FATAL_JOB..FATAL_JOB + DURING,
+        FATAL_JOB + DURING..JOBS,
+    ];
+    let totals = parts.clone().map(|part| part.count());
+    let [before, during, after] = parts.map(on_time);
+    let healthy_jobs = run.statistics(HEALTHY).completed;
+    let doomed_jobs = run.statistics(DOOMED).completed;
+    let verdict = if healthy_jobs < JOBS || doomed_jobs > FATAL_JOB {
+        Verdict::Harmful
+    } else if [before, during, after] == totals {
+        Verdict::Contained
+    } else if before < totals[0] {
+        Verdict::Unclear
+    } else {
+        Verdict::Harmful
+    };
+    let word = ["contained", "unclear", "harmful"][verdict as usize];
+    println!(
+        "  {name:<22} {word}: healthy jobs on time {before}/{} before, {during}/{} during, \
+         {after}/{} after; {doomed_jobs} doomed jobs completed",
+        totals[0], totals[1], totals[2]
+    );
+    json::emit("containment", |line| {
+        line.text("fault", name)
+            .text("verdict", word)
+            .number("on_time_before", before as u64)
+            .number("on_time_during", during as u64)
+            .number("on_time_after", after as u64)
+            .number("healthy_jobs", healthy_jobs)
+            .number("doomed_jobs", doomed_jobs);
+    });
+    Ok(verdict)
+}
+
+/// Reports whether a job of the healthy DAG met its deadline.
+fn is_on_time(run: &Run, job: u64) -> bool {
+    let deadline_ns = run.task_set().dag(HEALTHY).relative_deadline_ns();
+    let release = run
+        .record()
+        .jobs(HEALTHY)
+        .get(usize::try_from(job).unwrap_or(usize::MAX));
+    release
+        .and_then(|release| Some(run.record().completion_ns(HEALTHY, job)? - release.release_ns?))
+        .is_some_and(|response_ns| response_ns <= deadline_ns)
+}

@@ -1,0 +1,163 @@
+//! Faults of apps, kept from harming anyone else.
+//!
+//! A subtask that panics, causes an exception or exceeds its budget ends its DAG:
+//! what it may have left half done can belong to that DAG alone. The fault is
+//! reported with DAG, subtask, job, core, cause and place, the context that it
+//! happened in is never used again, and all other DAGs go on.
+//!
+//! That is possible because code that may be at fault is told apart by the
+//! interrupt flag: apps run with interrupts enabled, while whoever holds a lock
+//! of the kernel's, or handles an interrupt, has them disabled. A fault there, or
+//! outside any subtask, is the kernel's and ends the run (see `panic`).
+
+use core::fmt::{self, Display};
+use core::panic::PanicInfo;
+
+use sched_dag::Instance;
+
+use crate::machine::fault::Exception;
+use crate::machine::interrupt::Interrupted;
+use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, cpu, this_core};
+use crate::{contexts, execution, json, worker};
+
+/// What happened, as the report says it.
+struct Fault<'a> {
+    cause: &'a str,
+    message: &'a dyn Display,
+    place: &'a dyn Display,
+    address: Option<u64>,
+}
+
+/// Ends the instance that panics, if it is a subtask's; else returns.
+pub(crate) fn end_panicked(info: &PanicInfo<'_>) {
+    if !this_core::is_ready() || !cpu::are_interrupts_enabled() {
+        return;
+    }
+    cpu::disable_interrupts();
+    let core = this_core::get();
+    let context = core.context();
+    let Some(instance) = execution::running(core) else {
+        cpu::enable_interrupts();
+        return;
+    };
+    cpu::enable_interrupts();
+    // From here on the app's own code runs once more, to show the message: what
+    // happens in it is the same instance's fault, without another report.
+    if !context.note_fault() {
+        report(
+            instance,
+            &Fault {
+                cause: "panic",
+                message: &info.message(),
+                place: &place_of(info),
+                address: None,
+            },
+        );
+    }
+    cpu::disable_interrupts();
+    execution::fail(clock::now_ns());
+    contexts::lose();
+    this_core::abandon_context(worker::new_context())
+}
+
+/// Ends the instance that caused an exception, if it is a subtask's, and reports
+/// whether it was.
+pub(crate) fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupted) -> bool {
+    if !exception.is_of_interruptible_code() || !this_core::is_ready() {
+        return false;
+    }
+    let core = this_core::get();
+    let Some(instance) = execution::running(core) else {
+        return false;
+    };
+    if !core.context().note_fault() {
+        let rip = exception.registers.rip;
+        report(
+            instance,
+            &Fault {
+                cause: exception.name,
+                message: exception,
+                place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
+                address: exception.address,
+            },
+        );
+    }
+    end_interrupted(interrupted, clock::now_ns());
+    true
+}
+
+/// Ends this core's instance if its budget is used up.
+pub(crate) fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
+    let core = this_core::get();
+    let context = core.context();
+    let Some(instance) = execution::running(core) else {
+        return;
+    };
+    if context.budget_end_ns() > now_ns {
+        timer::set(Alarm::Budget, context.budget_end_ns());
+        return;
+    }
+    if !context.note_fault() {
+        let budget_ns = execution::budget_ns(instance);
+        let rip = interrupted.instruction();
+        report(
+            instance,
+            &Fault {
+                cause: "budget overrun",
+                message: &fmt::from_fn(|f| write!(f, "executed for more than {budget_ns} ns")),
+                place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
+                address: None,
+            },
+        );
+    }
+    end_interrupted(interrupted, now_ns);
+}
+
+/// Ends this core's instance, whose context a handler has interrupted.
+fn end_interrupted(interrupted: &mut Interrupted, now_ns: u64) {
+    execution::fail(now_ns);
+    contexts::lose();
+    // The context is leaked: what lies on its stack stays valid for ever.
+    let _ = interrupted.exchange(worker::new_context());
+}
+
+/// Returns where a panic was raised, as `file:line:column`.
+pub(crate) fn place_of(info: &PanicInfo<'_>) -> impl Display {
+    let place = info.location();
+    fmt::from_fn(move |f| match place {
+        Some(place) => write!(f, "{}:{}:{}", place.file(), place.line(), place.column()),
+        None => f.write_str("an unknown place"),
+    })
+}
+
+fn report(instance: Instance, fault: &Fault<'_>) {
+    let Fault {
+        cause,
+        message,
+        place,
+        address,
+    } = fault;
+    let core = this_core::get().index;
+    // No lock is held by code that has interrupts enabled.
+    let (dag, subtask) = execution::names(instance);
+    crate::println!(
+        "fault: {cause} in subtask `{subtask}` of DAG `{dag}`, job {}, on core {core}: {message}; \
+         at {place}; the DAG is ended",
+        instance.job
+    );
+    json::emit("fault", |line| {
+        line.text("cause", cause)
+            .number("dag", instance.dag.0)
+            .text("dag_name", &dag)
+            .number("subtask", instance.subtask.0)
+            .text("subtask_name", &subtask)
+            .number("job", instance.job)
+            .number("cpu", core)
+            .text("place", place)
+            .text("message", message);
+        if let Some(address) = address {
+            line.text("address", format_args!("{address:#x}"));
+        }
+    });
+}

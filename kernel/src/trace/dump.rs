@@ -1,0 +1,158 @@
+//! The trace as machine lines; `docs/serial-protocol.md` has the format.
+
+use core::fmt;
+
+use sched_dag::{Dag, OverrunPolicy, SubtaskId};
+
+use super::{Event, WORDS, all_rings};
+use crate::json;
+use crate::machine::this_core;
+use crate::platform::KERNEL;
+use crate::run::Run;
+use fass::{Platform, Policy, Preemption};
+
+/// The most events on one line.
+const EVENTS_A_LINE: usize = 32;
+
+/// Prints the model and the events of a run, the `number`th since boot.
+pub(crate) fn dump(run: &Run, number: u64) {
+    json::emit("trace_begin", |line| {
+        let policy = match KERNEL.policy() {
+            Policy::StaticPriority => "static",
+            Policy::Edf => "edf",
+        };
+        let preemption = match KERNEL.preemption() {
+            Preemption::Enabled => "on",
+            Preemption::Disabled => "off",
+        };
+        line.text("policy", policy)
+            .text("preemption", preemption)
+            .number("cores", KERNEL.cores())
+            .number("run", number);
+    });
+    for (number, dag) in (0u32..).zip(run.task_set().dags()) {
+        dump_dag(number, dag);
+    }
+    for ring in all_rings() {
+        let mut events = ring.iter().peekable();
+        while events.peek().is_some() {
+            let mut batch = [None; EVENTS_A_LINE];
+            for (place, event) in batch.iter_mut().zip(&mut events) {
+                *place = Some(event);
+            }
+            json::emit("trace", |line| {
+                line.list(
+                    "events",
+                    batch.iter().flatten().map(|event| as_json(*event)),
+                );
+            });
+        }
+    }
+    json::emit("trace_end", |line| {
+        line.number(
+            "events",
+            all_rings()
+                .iter()
+                .map(|ring| ring.iter().count() as u64)
+                .sum::<u64>(),
+        )
+        .number(
+            "lost",
+            all_rings().iter().map(|ring| ring.lost()).sum::<u64>(),
+        );
+    });
+}
+
+/// Returns this core's latest `most` events, a line each.
+pub(crate) fn latest(most: usize) -> impl fmt::Display {
+    fmt::from_fn(move |f| {
+        let here = this_core::get().index as usize;
+        let Some(ring) = all_rings().get(here) else {
+            return Ok(());
+        };
+        let count = ring.iter().count();
+        ring.iter()
+            .skip(count.saturating_sub(most))
+            .try_for_each(|event| {
+                let Event {
+                    time_ns,
+                    what,
+                    core,
+                    dag,
+                    job,
+                    subtask,
+                } = event;
+                let (word, core, dag) = (WORDS[what as usize], core.0, dag.0);
+                write!(
+                    f,
+                    "  {time_ns:>12} ns  core {core} {word} dag {dag} job {job}"
+                )?;
+                subtask.map_or(Ok(()), |subtask| write!(f, " subtask {}", subtask.0))?;
+                writeln!(f)
+            })
+    })
+}
+
+fn as_json(event: Event) -> impl fmt::Display {
+    fmt::from_fn(move |f| {
+        let Event {
+            time_ns,
+            what,
+            core,
+            dag,
+            job,
+            subtask,
+        } = event;
+        let word = WORDS[what as usize];
+        write!(f, "[{time_ns},\"{word}\",{},{},{job},", core.0, dag.0)?;
+        match subtask {
+            Some(SubtaskId(subtask)) => write!(f, "{subtask}]"),
+            None => f.write_str("-1]"),
+        }
+    })
+}
+
+fn dump_dag(number: u32, dag: &Dag) {
+    let overrun = match dag.overrun() {
+        OverrunPolicy::Queue => "queue",
+        OverrunPolicy::Skip => "skip",
+        OverrunPolicy::Abort => "abort",
+    };
+    let subtasks = || {
+        dag.subtasks().iter().map(|subtask| {
+            fmt::from_fn(move |f| {
+                let non_preemptive = u8::from(subtask.is_non_preemptive());
+                let priority = subtask.priority().0;
+                write!(
+                    f,
+                    "[{},{priority},{non_preemptive},",
+                    json::quoted(subtask.name())
+                )?;
+                match subtask.wcet_ns() {
+                    Some(wcet_ns) => write!(f, "{wcet_ns}]"),
+                    None => f.write_str("null]"),
+                }
+            })
+        })
+    };
+    let edges = || {
+        (0..)
+            .map(SubtaskId)
+            .take(dag.subtasks().len())
+            .flat_map(move |from| {
+                let successors = dag.successors(from).iter();
+                successors.map(move |to| fmt::from_fn(move |f| write!(f, "[{},{}]", from.0, to.0)))
+            })
+    };
+    json::emit("trace_dag", |line| {
+        line.number("dag", number)
+            .text("name", dag.name())
+            .number("period_ns", dag.period_ns())
+            .number("relative_deadline_ns", dag.relative_deadline_ns())
+            .number("offset_ns", dag.offset_ns())
+            .number("in_flight", dag.in_flight())
+            .text("overrun", overrun)
+            .list("subtasks", subtasks())
+            .list("edges", edges());
+    });
+}

@@ -1,0 +1,145 @@
+//! What happened when: a ring of events for each core, always on.
+//!
+//! An event is four words, written by the core that it happens on, with
+//! interrupts disabled, without a lock. When a ring is full the oldest event
+//! makes way; how many did is counted. After a run the rings are printed as
+//! machine lines if the command line asks for it (`trace=dump`), for
+//! `./scripts/check-trace` to hold against the model's rules.
+//!
+//! Times are nanoseconds since the run's epoch.
+
+mod dump;
+mod ring;
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use alloc::boxed::Box;
+
+use sched_dag::{CoreId, DagId, Instance, SubtaskId};
+
+use crate::machine::once::Once;
+use crate::machine::this_core;
+pub(crate) use dump::{dump, latest};
+use ring::Ring;
+
+/// What has happened. The words of the machine lines are the names in lower case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum What {
+    /// A job is released.
+    Released,
+    /// A job's release waits for an older job to end.
+    Queued,
+    /// A job's release does not happen.
+    Skipped,
+    /// A job starts no further instance.
+    Aborted,
+    /// A job's deadline has passed.
+    Missed,
+    /// No instance of a job is left.
+    Completed,
+    /// All that an instance waits for has happened.
+    Ready,
+    /// An instance will not run.
+    Cancelled,
+    /// A core shall run the instance instead of what it runs.
+    Request,
+    /// The instance's function is called.
+    Start,
+    /// The instance's context leaves the core.
+    Suspend,
+    /// The instance's context continues on the core.
+    Resume,
+    /// The instance's function has returned.
+    Finish,
+    /// The instance was ended by a fault.
+    Ended,
+}
+
+/// The words of the machine lines, by [`What`]'s number.
+const WORDS: [&str; 14] = [
+    "released",
+    "queued",
+    "skipped",
+    "aborted",
+    "missed",
+    "completed",
+    "ready",
+    "cancelled",
+    "request",
+    "start",
+    "suspend",
+    "resume",
+    "finish",
+    "ended",
+];
+
+/// Something that happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Event {
+    pub(crate) time_ns: u64,
+    pub(crate) what: What,
+    pub(crate) core: CoreId,
+    pub(crate) dag: DagId,
+    pub(crate) job: u64,
+    /// `None` for what happens to a whole job.
+    pub(crate) subtask: Option<SubtaskId>,
+}
+
+static RINGS: Once<Box<[Ring]>> = Once::new();
+
+/// Whether events are recorded.
+static ENABLED: AtomicBool = AtomicBool::new(true);
+
+/// Makes a ring of `events` events for each core. With 0 nothing is recorded.
+pub(crate) fn create(cores: usize, events: usize) {
+    ENABLED.store(events > 0, Ordering::Relaxed);
+    // A second call would come from a second boot, which there is not.
+    let _ = RINGS.set((0..cores).map(|_| Ring::new(events)).collect());
+}
+
+/// Records that something happened to an instance, to or for core `core`.
+/// Interrupts are disabled.
+pub(crate) fn instance(what: What, time_ns: u64, core: CoreId, instance: Instance) {
+    let Instance { dag, job, subtask } = instance;
+    record(Event {
+        time_ns,
+        what,
+        core,
+        dag,
+        job,
+        subtask: Some(subtask),
+    });
+}
+
+/// Records that something happened to a job. Interrupts are disabled.
+pub(crate) fn job(what: What, time_ns: u64, dag: DagId, job: u64) {
+    let core = CoreId(this_core::get().index);
+    record(Event {
+        time_ns,
+        what,
+        core,
+        dag,
+        job,
+        subtask: None,
+    });
+}
+
+fn record(event: Event) {
+    if !ENABLED.load(Ordering::Relaxed) {
+        return;
+    }
+    let here = this_core::get().index as usize;
+    if let Some(ring) = RINGS.get().and_then(|rings| rings.get(here)) {
+        ring.push(event);
+    }
+}
+
+/// Forgets all events. To be called while no run is going on.
+pub(crate) fn clear() {
+    all_rings().iter().for_each(Ring::clear);
+}
+
+fn all_rings() -> &'static [Ring] {
+    RINGS.get().map_or(&[], |rings| rings)
+}
