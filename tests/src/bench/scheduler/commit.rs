@@ -8,8 +8,9 @@
 use std::any::TypeId;
 use std::time::Duration;
 
+use sched_dag::analysis::{Overheads, Settings, answer};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, TopicPort, verify,
+    CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskSpec, TopicPort, verify,
 };
 
 use super::super::{median, ratio, time};
@@ -32,7 +33,8 @@ pub(super) struct Figure {
     pub(super) is_limited: bool,
 }
 
-/// Measures the walk, and the commit with edges and with a topic for each edge.
+/// Measures the walk, and the commit with edges, with the answer about deadlines
+/// added, and with a topic for each edge.
 pub(super) fn measure() -> Vec<Figure> {
     let edges = random_edges();
     let by_edges = spec(&edges, false);
@@ -43,10 +45,24 @@ pub(super) fn measure() -> Vec<Figure> {
     let commit = |spec: &DagSpec| {
         verify(std::slice::from_ref(spec), &options).expect("the random DAG is right")
     };
+    let settings = Settings {
+        policy: Policy::StaticPriority,
+        preemption: Preemption::Enabled,
+        cores: 8,
+        overheads: Overheads::default(),
+    };
+    let commit_and_answer = |spec: &DagSpec| {
+        let verified = commit(spec);
+        let answer = answer(&verified.task_set, &settings);
+        assert!(answer.is_proven(), "the DAG has time to spare");
+        (verified, answer)
+    };
     let (mut walks, mut edge_commits, mut topic_commits) = (Vec::new(), Vec::new(), Vec::new());
+    let mut answers = Vec::new();
     for _ in 0..ROUNDS {
         walks.push(time(|| walk(&graph)));
         edge_commits.push(time(|| commit(&by_edges)));
+        answers.push(time(|| commit_and_answer(&by_edges)));
         topic_commits.push(time(|| commit(&by_topics)));
     }
     let walk = median(walks);
@@ -67,6 +83,7 @@ pub(super) fn measure() -> Vec<Figure> {
             is_limited: false,
         },
         figure("commit, edges", edge_commits, true),
+        figure("commit with answer", answers, true),
         figure("commit, a topic an edge", topic_commits, false),
     ]
 }
