@@ -37,7 +37,8 @@
 //!   the result stays a bound, and an overflow is an error or "not proven".
 //! - *No recursion*, and every loop has a limit; a limit reached is "not
 //!   proven" ([`Reason::Limit`]), never a guess. Time is near linear in
-//!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks.
+//!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and
+//!   quadratic in the number of DAGs, each of which may delay each other.
 //! - *Evidence*: the property test in `tests/analysis` simulates thousands of
 //!   random sets and compares each observed response time with its bound.
 //!
