@@ -6,8 +6,7 @@ use core::time::Duration;
 
 use alloc::string::String;
 
-use fass::CommitError;
-use fass::Platform;
+use fass::{CommitError, Platform, Policy, Preemption};
 
 use crate::memory::heap;
 use crate::options::{Options, UsageError};
@@ -81,6 +80,28 @@ impl Machine {
         KERNEL.cores()
     }
 
+    /// Chooses policy and preemption of the commits to come, instead of what the
+    /// command line says.
+    pub fn configure(&self, policy: Policy, preemption: Preemption) {
+        KERNEL.set_policy(policy);
+        KERNEL.set_preemption(preemption);
+    }
+
+    /// Lets events that are less than `window` apart count as one instant in the
+    /// runs to come: the scheduler decides that long after the first of them,
+    /// and has then seen them all. With 0, as at the start, it decides after
+    /// each event at once.
+    ///
+    /// In a model, completions and releases can fall on the same instant, and
+    /// one dispatch sees them all. On a machine they come one after the other,
+    /// however close, and a decision between two of them starts or preempts what
+    /// the model would not. To compare the machine with the model, they have to
+    /// be taken together again. The price is that every decision comes `window`
+    /// later.
+    pub fn set_coincidence(&self, window: Duration) {
+        KERNEL.set_coincidence_ns(u64::try_from(window.as_nanos()).unwrap_or(u64::MAX));
+    }
+
     /// Runs the committed DAGs until each has ended all its jobs.
     ///
     /// The calling core takes part. Progress is printed in machine lines of
@@ -92,8 +113,17 @@ impl Machine {
     pub fn run(&self) -> Result<Run, Ending> {
         /// Time for the cores to get ready between now and the first release.
         const LEAD_NS: u64 = 100_000;
+        self.run_from(machine::clock::now_ns() + LEAD_NS)
+    }
+
+    /// Does as [`run`](Self::run), with the releases counted from `epoch_ns` on
+    /// the clock of [`fass::now_ns`]. If that is past, releases are late.
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](Self::run).
+    pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
-        let epoch_ns = machine::clock::now_ns() + LEAD_NS;
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
         let allocations_before = heap::usage().allocations;
         console::defer();

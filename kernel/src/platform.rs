@@ -15,6 +15,8 @@ pub(crate) struct Kernel {
     edf: AtomicBool,
     /// Whether a started instance may lose its core.
     preemptive: AtomicBool,
+    /// How long a decision waits for further events of the same instant.
+    coincidence_ns: AtomicU64,
     /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
     budget_factor: AtomicU64,
 }
@@ -22,6 +24,7 @@ pub(crate) struct Kernel {
 pub(crate) static KERNEL: Kernel = Kernel {
     edf: AtomicBool::new(false),
     preemptive: AtomicBool::new(true),
+    coincidence_ns: AtomicU64::new(0),
     budget_factor: AtomicU64::new(0),
 };
 
@@ -40,6 +43,17 @@ impl Kernel {
     pub(crate) fn budget_of_wcet(&self, wcet_ns: u64) -> Option<u64> {
         let factor = self.budget_factor.load(Ordering::Relaxed);
         (factor > 0).then(|| wcet_ns.saturating_mul(factor))
+    }
+
+    /// Chooses how long decisions of the runs to come wait for further events of
+    /// the same instant.
+    pub(crate) fn set_coincidence_ns(&self, coincidence_ns: u64) {
+        self.coincidence_ns.store(coincidence_ns, Ordering::Relaxed);
+    }
+
+    /// Returns how long a decision waits for further events of the same instant.
+    pub(crate) fn coincidence_ns(&self) -> u64 {
+        self.coincidence_ns.load(Ordering::Relaxed)
     }
 
     /// Chooses whether the runs to come are preemptive.

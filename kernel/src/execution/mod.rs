@@ -81,6 +81,9 @@ pub(crate) struct Execution {
     /// The scheduler's latest time; it never goes back, although clocks of
     /// different cores may be read in another order than they get the lock.
     latest_ns: u64,
+    /// When the next dispatch is due, on the clock, if it waits for further events
+    /// of the instant in hand.
+    dispatch_due_ns: Option<u64>,
 }
 
 static EXECUTION: SpinLock<Option<Execution>> = SpinLock::new(None);
@@ -122,6 +125,7 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         background: None,
         record,
         latest_ns: 0,
+        dispatch_due_ns: None,
     };
     *EXECUTION.lock() = Some(execution);
     Ok(())
@@ -351,6 +355,7 @@ impl Execution {
             placement,
             record,
             latest_ns,
+            dispatch_due_ns,
             ..
         } = self;
         *latest_ns = since_epoch(now_ns).max(*latest_ns);
@@ -362,6 +367,12 @@ impl Execution {
             Event::Failed(instance) => moment.fail(instance, &mut watcher),
         }
         let mut woken = CoreSet::default();
+        let due_ns = *dispatch_due_ns.get_or_insert(now_ns.saturating_add(KERNEL.coincidence_ns()));
+        if now_ns < due_ns {
+            self.announce(&mut woken);
+            return woken;
+        }
+        *dispatch_due_ns = None;
         let mut preempted = None;
         for decision in moment.release_due(&mut watcher).dispatch() {
             placement.decide(*decision);
@@ -378,14 +389,19 @@ impl Execution {
                 woken.insert(core.0);
             }
         }
+        self.announce(&mut woken);
+        woken
+    }
+
+    /// Publishes the next event, and sees to it that core 0 waits for it.
+    fn announce(&self, woken: &mut CoreSet) {
         let earlier = NEXT_EVENT_NS.load(Ordering::Relaxed);
         self.publish();
-        if here == 0 {
+        if this_core::get().index == 0 {
             arm_next_event();
         } else if NEXT_EVENT_NS.load(Ordering::Relaxed) < earlier || is_finished() {
             woken.insert(0);
         }
-        woken
     }
 
     /// Lets everyone see when the next event is, and whether there is any.
@@ -394,6 +410,7 @@ impl Execution {
         let next = next.map_or(u64::MAX, |next| {
             next.saturating_add(EPOCH_NS.load(Ordering::Relaxed))
         });
+        let next = self.dispatch_due_ns.unwrap_or(next);
         NEXT_EVENT_NS.store(next, Ordering::Release);
         FINISHED.store(self.scheduler.is_finished(), Ordering::Release);
     }
