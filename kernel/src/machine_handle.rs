@@ -2,15 +2,18 @@
 
 use core::cell::Cell;
 use core::fmt;
+use core::panic::Location;
 use core::time::Duration;
 
 use alloc::string::String;
 
 use fass::{CommitError, Platform, Policy, Preemption};
 
+use crate::machine::interrupts_off;
 use crate::memory::heap;
 use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
+use crate::report::Ns;
 use crate::run::Run;
 use crate::worker;
 use crate::{console, execution, json, machine, trace};
@@ -129,13 +132,19 @@ impl Machine {
         console::defer();
         execution::arm_next_event();
         let mut progress = Progress { total, printed: 0 };
+        // What was measured before, while booting and printing, does not count.
+        let _ = interrupts_off::take_longest();
         worker::wait_in_background(|| progress.print_when_due());
+        let longest = interrupts_off::take_longest();
         let allocations = heap::usage().allocations - allocations_before;
         let dropped = console::resume();
         if dropped > 0 {
             crate::println!("({dropped} bytes of output did not fit in the buffer)");
         }
         let run = Run::new(execution::end().ok_or_else(nothing)?, allocations, epoch_ns);
+        if let Some((ticks, place)) = longest {
+            report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
+        }
         if self.dumps_trace {
             trace::dump(&run, self.runs.replace(self.runs.get() + 1));
         }
@@ -162,6 +171,18 @@ impl Machine {
                 .number("allocations", usage.allocations);
         });
     }
+}
+
+/// Prints the longest section of a run without interrupts.
+fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
+    let place = fmt::from_fn(|f| write!(f, "{}:{}", place.file(), place.line()));
+    crate::println!(
+        "longest section without interrupts: {}, from {place}",
+        Ns(longest_ns)
+    );
+    json::emit("interrupts_off", |line| {
+        line.number("longest_ns", longest_ns).text("place", &place);
+    });
 }
 
 /// Progress lines, one for each twentieth of the jobs.

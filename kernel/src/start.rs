@@ -9,7 +9,9 @@ use boot::{BootInfo, Module};
 use fass::{Policy, Preemption};
 
 use crate::machine::this_core::{self, Stacks};
-use crate::machine::{clock, cpu, exit, interrupt, legacy, local_apic, processors, serial};
+use crate::machine::{
+    clock, cpu, exit, interrupt, interrupts_off, legacy, local_apic, processors, serial,
+};
 use crate::machine_handle::{Ending, Machine};
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
@@ -192,6 +194,9 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
     KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
     KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
     let trace_events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
+    if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
+        interrupts_off::enable();
+    }
     let dumps_trace = options.choice("trace", &[("keep", false), ("dump", true)])?;
     trace::create(
         this_core::all().len(),

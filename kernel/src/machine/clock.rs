@@ -31,7 +31,7 @@ pub(crate) struct NoKnownClock;
 /// Returns the time in nanoseconds since the kernel's entry.
 pub(crate) fn now_ns() -> u64 {
     let ticks = cpu::time_stamp().wrapping_sub(BASE.load(Ordering::Relaxed));
-    scale(ticks, NS_PER_TICK.load(Ordering::Relaxed))
+    ticks_to_ns(ticks)
 }
 
 /// Converts nanoseconds to ticks of the local APIC's timer, at least 1; longer
@@ -39,6 +39,11 @@ pub(crate) fn now_ns() -> u64 {
 pub(crate) fn apic_ticks(ns: u64) -> u32 {
     let ticks = scale(ns, APIC_TICKS_PER_NS.load(Ordering::Relaxed));
     u32::try_from(ticks).unwrap_or(u32::MAX).max(1)
+}
+
+/// Converts ticks of the time stamp counter to nanoseconds.
+pub(crate) fn ticks_to_ns(ticks: u64) -> u64 {
+    scale(ticks, NS_PER_TICK.load(Ordering::Relaxed))
 }
 
 /// Multiplies by a factor in 2^-32; saturates after 584 years.

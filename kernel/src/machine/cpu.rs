@@ -5,14 +5,22 @@
 
 use core::arch::asm;
 use core::arch::x86_64::__cpuid;
+use core::panic::Location;
+
+use super::interrupts_off;
 
 /// Disables interrupts on this processor and reports whether they were enabled.
+#[track_caller]
 pub(crate) fn disable_interrupts() -> bool {
     let flags: u64;
     // SAFETY: reads the flags through the stack and clears the interrupt flag,
     // which delays interrupts and changes no memory that Rust knows of.
     unsafe { asm!("pushfq", "pop {}", "cli", out(reg) flags) };
-    flags & (1 << 9) != 0
+    let were_enabled = flags & (1 << 9) != 0;
+    if were_enabled {
+        interrupts_off::begin(Location::caller());
+    }
+    were_enabled
 }
 
 /// Reports whether interrupts are enabled on this processor.
@@ -26,6 +34,7 @@ pub(crate) fn are_interrupts_enabled() -> bool {
 
 /// Enables interrupts on this processor.
 pub(crate) fn enable_interrupts() {
+    interrupts_off::end();
     // SAFETY: handlers keep all registers of what they interrupt and touch only
     // data behind locks or atomics, so an interrupt may come anywhere.
     unsafe { asm!("sti") };
@@ -37,6 +46,7 @@ pub(crate) fn enable_interrupts() {
 /// next instruction, no interrupt that the caller has checked for can slip in
 /// between and leave the processor halted with work to do.
 pub(crate) fn enable_interrupts_and_halt() {
+    interrupts_off::end();
     // SAFETY: as for `enable_interrupts`; halting changes no state.
     unsafe { asm!("sti", "hlt") };
 }

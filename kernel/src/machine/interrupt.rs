@@ -5,10 +5,11 @@
 //! handler stack, and may use locks but must not wait for anything else.
 
 use core::arch::global_asm;
+use core::panic::Location;
 
 use super::context::{Parked, Registers};
 use super::once::Once;
-use super::{cpu, descriptors, fault, local_apic, this_core};
+use super::{cpu, descriptors, fault, interrupts_off, local_apic, this_core};
 
 global_asm!(
     include_str!("interrupt.s"),
@@ -84,6 +85,7 @@ pub(crate) fn load_table() {
 
 /// Handles one interrupt and returns the registers to resume.
 extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
+    interrupts_off::begin(Location::caller());
     // SAFETY: `interrupt.s` passes the registers of the context that this core
     // was running, which are this core's (context invariant).
     let vector = unsafe { (*registers).vector };
@@ -99,6 +101,7 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
         (Ok(vector::SPURIOUS), _) => {}
         _ => local_apic::acknowledge(),
     }
+    interrupts_off::end();
     this_core::get().context().registers()
 }
 

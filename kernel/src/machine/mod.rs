@@ -12,6 +12,7 @@ pub(crate) mod descriptors;
 pub(crate) mod exit;
 pub(crate) mod fault;
 pub(crate) mod interrupt;
+pub(crate) mod interrupts_off;
 pub(crate) mod legacy;
 pub(crate) mod local_apic;
 pub(crate) mod once;

@@ -49,6 +49,7 @@ impl<T> SpinLock<T> {
     /// Waits until the data is free and takes it.
     ///
     /// Must not be called by its holder: that waits forever.
+    #[track_caller]
     pub(crate) fn lock(&self) -> SpinLockGuard<'_, T> {
         let interrupts_were_enabled = cpu::disable_interrupts();
         let ticket = self.next.fetch_add(1, Ordering::Relaxed);
@@ -59,6 +60,7 @@ impl<T> SpinLock<T> {
     }
 
     /// Takes the data if it is free.
+    #[track_caller]
     pub(crate) fn try_lock(&self) -> Option<SpinLockGuard<'_, T>> {
         let interrupts_were_enabled = cpu::disable_interrupts();
         let serving = self.serving.load(Ordering::Acquire);

@@ -11,6 +11,7 @@ use alloc::boxed::Box;
 
 use super::context::{Context, Parked, Registers};
 use super::descriptors::{self, TaskState};
+use super::interrupts_off::Meter;
 use super::once::Once;
 use super::{cpu, local_apic};
 
@@ -49,6 +50,7 @@ pub(crate) struct Core {
     pub(crate) timer_interrupts: AtomicU64,
     /// The time between two heartbeats of this core, 0 if it has none.
     pub(crate) heartbeat_ns: AtomicU64,
+    interrupts_off: Meter,
     /// What runs here, in the words of whoever sets it; for reports of panics.
     pub(crate) running: [AtomicU64; 3],
 }
@@ -75,6 +77,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         timer_interrupts: AtomicU64::new(0),
         heartbeat_ns: AtomicU64::new(0),
+        interrupts_off: Meter::new(),
         running: [const { AtomicU64::new(u64::MAX) }; 3],
     });
     // A second call would come from a second boot, which there is not.
@@ -228,6 +231,11 @@ impl Core {
         for (place, field) in self.running.iter().zip(fields) {
             place.store(field, Ordering::Relaxed);
         }
+    }
+
+    /// Returns what this core has measured of its sections without interrupts.
+    pub(super) const fn meter(&self) -> &Meter {
+        &self.interrupts_off
     }
 
     /// Returns the id that interrupts are addressed to.
