@@ -6,8 +6,9 @@ use fass::Body;
 use sched_dag::record::Record;
 use sched_dag::{DagId, Instance, JobOutcome, Observer};
 
+use super::JOBS_ENDED;
+use super::events::{here, since_epoch};
 use super::placement::Placement;
-use super::{JOBS_ENDED, here, since_epoch};
 use crate::machine::clock;
 use crate::machine::context::Parked;
 use crate::trace::{self, What};

@@ -24,9 +24,14 @@ const PLACES: &[(&str, &str)] = &[
         "kernel/src/entry.rs",
         "the symbols that an image must define",
     ),
+    (
+        "kernel/src/start.rs",
+        "the entry's way up to the first safe state",
+    ),
     ("fass/src/cell.rs", "the job slots' one cell type"),
     ("fass/tests/no_allocation.rs", "an allocator that counts"),
-    ("tests/guest/src/crimes.rs", "what the processor must stop"),
+    ("sched-dag/tests/allocation.rs", "an allocator that counts"),
+    ("apps/faults/src/crimes.rs", "what the processor must stop"),
 ];
 
 /// Finds `unsafe` outside its places.

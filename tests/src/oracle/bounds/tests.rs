@@ -1,3 +1,5 @@
+//! The public cases and examples, and files that are wrong.
+
 use super::{check, parse};
 
 const FILE: &str = include_str!("../../../oracle/bounds.txt");

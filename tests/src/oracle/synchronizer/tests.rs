@@ -1,3 +1,5 @@
+//! The public cases, and files and expectations that are wrong.
+
 use super::{check, parse};
 
 const PUBLIC: &str = include_str!("../../../oracle/synchronizer.txt");

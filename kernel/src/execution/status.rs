@@ -1,0 +1,84 @@
+//! What the rest of the kernel may ask about the run.
+
+use core::sync::atomic::Ordering;
+
+use alloc::string::String;
+
+use sched_dag::{DagId, Instance, SubtaskId};
+
+use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS};
+use crate::machine::this_core::Core;
+
+/// Reports whether all jobs of the run have ended.
+pub(crate) fn is_finished() -> bool {
+    FINISHED.load(Ordering::Acquire)
+}
+
+/// Returns how many jobs have ended in this run.
+pub(crate) fn jobs_ended() -> u64 {
+    JOBS_ENDED.load(Ordering::Relaxed)
+}
+
+/// Returns when core 0's timer shall next step the scheduler.
+pub(crate) fn next_event_ns() -> u64 {
+    NEXT_EVENT_NS.load(Ordering::Acquire)
+}
+
+/// Calls `with` with the names of an instance's DAG and subtask, if they can be
+/// had without waiting.
+pub(crate) fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
+    let place = EXECUTION.try_lock();
+    let Some(execution) = place.as_ref().and_then(|execution| execution.as_ref()) else {
+        return;
+    };
+    let dag = execution.task_set().dags().get(instance.dag.index());
+    let subtask = dag.and_then(|dag| dag.subtasks().get(instance.subtask.index()));
+    if let (Some(dag), Some(subtask)) = (dag, subtask) {
+        with(dag.name(), subtask.name());
+    }
+}
+
+/// Returns copies of the names of an instance's DAG and subtask.
+pub(crate) fn names(instance: Instance) -> (String, String) {
+    let place = EXECUTION.lock();
+    let dag = place
+        .as_ref()
+        .map(|execution| execution.task_set().dag(instance.dag));
+    dag.map_or_else(Default::default, |dag| {
+        (
+            dag.name().into(),
+            dag.subtask(instance.subtask).name().into(),
+        )
+    })
+}
+
+/// Returns the instance that a core runs, without the lock.
+pub(crate) fn running(core: &Core) -> Option<Instance> {
+    let [dag, job, subtask] = core
+        .running
+        .each_ref()
+        .map(|field| field.load(Ordering::Relaxed));
+    Some(Instance {
+        dag: DagId(u32::try_from(dag).ok()?),
+        job,
+        subtask: SubtaskId(u32::try_from(subtask).ok()?),
+    })
+}
+
+/// Notes which instance a core runs, for [`running`].
+pub(super) fn note_running(core: &Core, instance: Option<Instance>) {
+    core.note_running(instance.map_or([u64::MAX; 3], |instance| {
+        [
+            u64::from(instance.dag.0),
+            instance.job,
+            u64::from(instance.subtask.0),
+        ]
+    }));
+}
+/// Returns how long an instance may execute for, `u64::MAX` if for ever.
+pub(crate) fn budget_ns(instance: Instance) -> u64 {
+    EXECUTION
+        .lock()
+        .as_ref()
+        .map_or(u64::MAX, |execution| execution.budget_ns(instance))
+}
