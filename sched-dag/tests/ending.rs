@@ -154,6 +154,23 @@ fn e3_and_e4_what_is_ready_is_cancelled_and_what_has_started_ends() {
 }
 
 #[test]
+fn e3_what_is_ready_is_cancelled_at_once() {
+    // On one core subtask 2 is ready and waits while subtask 1 runs and fails.
+    let (events, _) = run_failing(&[diamond(3)], PREEMPTIVE, &[instance(0, 0, 1)], |_| 2);
+    assert_events(
+        &events,
+        "0 ready 0.0.0
+         2 ready 0.0.1
+         2 ready 0.0.2
+         4 fail 0.0.1
+         4 end 0
+         4 cancelled 0.0.2
+         4 cancelled 0.0.3
+         4 ended 0.0 DagEnded",
+    );
+}
+
+#[test]
 fn e3_instances_of_all_jobs_in_flight_are_cancelled_once() {
     // The second subtask takes 25, so at 27 the jobs 1 and 2 wait for it.
     let spec = dag(10, 100, 9, &[0, 1, 2], &[(0, 1), (1, 2)]);

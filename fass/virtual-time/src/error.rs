@@ -19,7 +19,9 @@ pub enum RunError {
         /// The DAG.
         dag: DagLabel,
     },
-    /// A subtask's function panicked. No function runs after it.
+    /// A subtask's function panicked, and the machine was not told to
+    /// [contain](crate::VirtualTime::contain_panics) that. No function runs
+    /// after it.
     Panicked {
         /// The DAG.
         dag: DagLabel,

@@ -35,10 +35,14 @@ pub enum EventKind {
     Resumed { instance: Instance, core: CoreId },
     /// An instance finished.
     Finished { instance: Instance, core: CoreId },
-    /// An instance will not run, because its job was aborted.
+    /// An instance has ended by a panic of its function.
+    Failed { instance: Instance, core: CoreId },
+    /// An instance will not run, because its job was aborted or its DAG ended.
     Cancelled { instance: Instance },
     /// A job starts no further instance.
     Aborted { dag: DagId, job: u64 },
+    /// A DAG was ended by a panic; it starts no further instance.
+    DagEnded { dag: DagId },
     /// A job's deadline passed before the job was complete.
     DeadlineMissed { dag: DagId, job: u64 },
     /// No instance of a job is left.
@@ -62,8 +66,10 @@ impl EventKind {
             Self::Preempted { .. } => "preempt",
             Self::Resumed { .. } => "resume",
             Self::Finished { .. } => "finish",
+            Self::Failed { .. } => "fail",
             Self::Cancelled { .. } => "cancel",
             Self::Aborted { .. } => "abort",
+            Self::DagEnded { .. } => "end",
             Self::DeadlineMissed { .. } => "miss",
             Self::JobCompleted { .. } => "complete",
         }

@@ -14,6 +14,8 @@
 //!
 //! - The schedule is the one that rules R1-R5 of the task model prescribe.
 //!   [`Report::violations`] checks them over what was recorded.
+//! - A panic in a function fails the run, so that a test fails with it. With
+//!   [`VirtualTime::contain_panics`] it ends its DAG instead, and is reported.
 //! - Machines belong to threads: tests that run in parallel, each with its own
 //!   [`VirtualTime`], do not disturb one another.
 //!
@@ -50,7 +52,7 @@ pub use sched_dag::{
 pub use error::RunError;
 pub use event::{Event, EventKind};
 use platform::Machine;
-pub use record::{InstanceRecord, JobRecord};
+pub use record::{InstanceRecord, JobRecord, PanicRecord};
 pub use report::Report;
 
 /// A machine in virtual time, belonging to the thread that makes it.
@@ -139,6 +141,44 @@ impl VirtualTime {
     #[must_use = "the machine itself is returned"]
     pub fn overheads(self, overheads: Overheads) -> Self {
         self.machine.overheads.set(overheads);
+        self
+    }
+
+    /// Lets a panic in a function end its DAG only, as a fault does on the
+    /// kernel's machine, instead of failing the run.
+    ///
+    /// The instance fails when it has executed what it had executed up to the
+    /// panic; from then on its DAG starts nothing, and the other DAGs go on.
+    /// [`Report::panics`] has every panic: a test that means none has to look
+    /// there, because an assertion inside a function panics, too.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new().contain_panics();
+    /// let dags = ["healthy", "faulty"].map(|name| {
+    ///     let dag = create_dag();
+    ///     dag.name(name).jobs(4);
+    ///     let period = Duration::from_millis(10);
+    ///     let attributes = SubtaskAttributes::named("source");
+    ///     dag.register_periodic_subtask(|| (1,), vec![name], period, attributes);
+    ///     let sink = move |(_,): (i32,)| assert!(name == "healthy", "no sink");
+    ///     let attributes = SubtaskAttributes::named("sink");
+    ///     dag.register_sink_subtask(sink, vec![name], period, attributes);
+    ///     dag
+    /// });
+    /// finish_create_dags(&dags).unwrap();
+    ///
+    /// let report = machine.run();
+    /// assert_eq!(report.panics[0].message, "no sink");
+    /// assert_eq!(report.statistics[0].completed, 4);
+    /// assert_eq!(report.statistics[1].cut_short, 1);
+    /// ```
+    #[must_use = "the machine itself is returned"]
+    pub fn contain_panics(self) -> Self {
+        self.machine.contains_panics.set(true);
         self
     }
 

@@ -23,6 +23,8 @@ pub(crate) struct Machine {
     pub(crate) policy: Cell<Policy>,
     pub(crate) preemption: Cell<Preemption>,
     pub(crate) overheads: Cell<Overheads>,
+    /// Whether a panic of a function ends its DAG only.
+    pub(crate) contains_panics: Cell<bool>,
     /// The time that functions are told: the start of the instance and what it
     /// has executed.
     pub(crate) now_ns: Cell<u64>,
@@ -48,6 +50,7 @@ pub(crate) fn make_current() -> Rc<Machine> {
         policy: Cell::new(Policy::Edf),
         preemption: Cell::new(Preemption::Enabled),
         overheads: Cell::new(Overheads::default()),
+        contains_panics: Cell::new(false),
         now_ns: Cell::new(0),
         executed_ns: Cell::new(None),
         session: RefCell::new(None),

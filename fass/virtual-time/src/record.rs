@@ -13,6 +13,8 @@ pub struct InstanceRecord {
     pub start_ns: Option<u64>,
     /// When it finished, if it did.
     pub finish_ns: Option<u64>,
+    /// When it ended by a panic of its function, if it did.
+    pub failed_ns: Option<u64>,
     /// How long it executes in all, once it has begun.
     pub execution_ns: u64,
     /// The core on which it began.
@@ -48,4 +50,13 @@ impl JobRecord {
     pub fn response_time_ns(&self) -> Option<u64> {
         self.finish_ns.map(|finish_ns| finish_ns - self.release_ns)
     }
+}
+
+/// A panic that was contained: it ended its DAG, and the run went on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PanicRecord {
+    /// The instance whose function panicked.
+    pub instance: Instance,
+    /// The panic's message.
+    pub message: String,
 }

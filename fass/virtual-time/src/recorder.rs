@@ -11,7 +11,7 @@ use std::sync::Arc;
 use sched_dag::{DagId, Instance, JobOutcome, TaskSet};
 
 use crate::event::{Event, EventKind};
-use crate::record::{InstanceRecord, JobRecord};
+use crate::record::{InstanceRecord, JobRecord, PanicRecord};
 
 /// Writes down what happens.
 #[derive(Debug)]
@@ -23,6 +23,8 @@ pub(crate) struct Recorder {
     pub(crate) instances: Vec<InstanceRecord>,
     instance_index: BTreeMap<Instance, usize>,
     pub(crate) jobs: Vec<JobRecord>,
+    /// The contained panics.
+    pub(crate) panics: Vec<PanicRecord>,
     job_index: BTreeMap<(DagId, u64), usize>,
     /// Jobs whose deadline passed while their release was queued.
     missed_in_queue: BTreeSet<(DagId, u64)>,
@@ -38,6 +40,7 @@ impl Recorder {
             instances: Vec::new(),
             instance_index: BTreeMap::new(),
             jobs: Vec::new(),
+            panics: Vec::new(),
             job_index: BTreeMap::new(),
             missed_in_queue: BTreeSet::new(),
         }
@@ -103,6 +106,7 @@ impl Recorder {
             ready_ns: self.now_ns,
             start_ns: None,
             finish_ns: None,
+            failed_ns: None,
             execution_ns: 0,
             core: None,
             preemptions: 0,

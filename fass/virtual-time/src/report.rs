@@ -7,7 +7,7 @@ use sched_dag::record::Violation;
 use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::event::{Event, EventKind};
-use crate::record::{InstanceRecord, JobRecord};
+use crate::record::{InstanceRecord, JobRecord, PanicRecord};
 use crate::rules;
 
 /// Everything that happened from the commit to the end of a run.
@@ -17,6 +17,9 @@ pub struct Report {
     pub instances: Vec<InstanceRecord>,
     /// The jobs that were released, in that order.
     pub jobs: Vec<JobRecord>,
+    /// The panics that were [contained](crate::VirtualTime::contain_panics), in
+    /// the order in which their functions ran; none without containment.
+    pub panics: Vec<PanicRecord>,
     /// All events in the order in which they happened.
     pub events: Vec<Event>,
     /// The scheduler's counters, one set for each DAG.
@@ -71,7 +74,8 @@ impl Report {
     }
 
     /// Returns the events as lines such as `5000000 start sink[0] core 1`:
-    /// time, verb, name with the job in brackets, and what else there is.
+    /// time, verb, name with the job in brackets, and what else there is. The end
+    /// of a DAG has no job.
     ///
     /// For tests that compare whole sequences in words.
     #[must_use]
@@ -82,6 +86,7 @@ impl Report {
     fn line(&self, event: &Event) -> String {
         let mut line = format!("{} {} ", event.time_ns, event.kind.verb());
         let (name, job, more) = match event.kind {
+            EventKind::DagEnded { dag } => return line + &self.dag_name(dag),
             EventKind::Released { dag, job }
             | EventKind::Queued { dag, job }
             | EventKind::Skipped { dag, job }
@@ -97,7 +102,8 @@ impl Report {
             EventKind::Started { instance, core }
             | EventKind::Preempted { instance, core }
             | EventKind::Resumed { instance, core }
-            | EventKind::Finished { instance, core } => {
+            | EventKind::Finished { instance, core }
+            | EventKind::Failed { instance, core } => {
                 let core = format!(" core {}", core.0);
                 (self.subtask_name(instance), instance.job, core)
             }

@@ -7,11 +7,11 @@
 
 use std::collections::BTreeMap;
 
-use sched_dag::Instance;
 use sched_dag::record::{
     InstanceRecord, JobRecord, Precision, Record, Stretch, Violation, dispatch_violations,
     violations,
 };
+use sched_dag::{Instance, JobOutcome};
 
 use crate::event::EventKind;
 use crate::report::Report;
@@ -56,6 +56,7 @@ fn record(report: &Report) -> Option<Record> {
             ready_ns: Some(times.ready_ns),
             start_ns: times.start_ns,
             finish_ns: times.finish_ns,
+            failed_ns: times.failed_ns,
             core: times.core,
             preemptions: times.preemptions,
             ..InstanceRecord::default()
@@ -66,6 +67,15 @@ fn record(report: &Report) -> Option<Record> {
             EventKind::Aborted { dag, job } => {
                 record.job_mut(dag, job)?.cut_ns = Some(event.time_ns);
             }
+            EventKind::DagEnded { dag } => {
+                let of_dag = report.jobs.iter().filter(|of_job| of_job.dag == dag);
+                for of_job in of_dag.filter(|of_job| was_cut_short(of_job.outcome)) {
+                    record
+                        .job_mut(dag, of_job.job)?
+                        .cut_ns
+                        .get_or_insert(event.time_ns);
+                }
+            }
             EventKind::Finished { instance, .. } => record.instance_mut(instance)?.runs += 1,
             _ => {}
         }
@@ -73,7 +83,13 @@ fn record(report: &Report) -> Option<Record> {
     Some(record)
 }
 
-/// Returns when which core ran what. What still runs at the end runs until then.
+/// Reports whether a job of a DAG that was ended was in flight then: such a job
+/// ends as that, or has not ended yet.
+fn was_cut_short(outcome: Option<JobOutcome>) -> bool {
+    matches!(outcome, None | Some(JobOutcome::DagEnded))
+}
+
+/// Returns when which core ran what. What still runs at the end has no end.
 fn stretches(report: &Report) -> Vec<Stretch> {
     let mut open: BTreeMap<Instance, Stretch> = BTreeMap::new();
     let mut stretches = Vec::new();
@@ -85,11 +101,13 @@ fn stretches(report: &Report) -> Vec<Stretch> {
                     instance,
                     core,
                     from_ns: time_ns,
-                    to_ns: report.end_ns,
+                    to_ns: u64::MAX,
                 };
                 stretches.extend(open.insert(instance, begun));
             }
-            EventKind::Preempted { instance, .. } | EventKind::Finished { instance, .. } => {
+            EventKind::Preempted { instance, .. }
+            | EventKind::Finished { instance, .. }
+            | EventKind::Failed { instance, .. } => {
                 let ended = open.remove(&instance);
                 stretches.extend(ended.map(|begun| Stretch {
                     to_ns: time_ns,

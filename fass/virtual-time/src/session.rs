@@ -18,6 +18,7 @@ use sched_dag::{
 use crate::error::RunError;
 use crate::event::EventKind;
 use crate::platform::Machine;
+use crate::record::PanicRecord;
 use crate::recorder::Recorder;
 use crate::report::Report;
 
@@ -75,7 +76,7 @@ impl Session {
             End::TimeReached => until_ns,
             End::Finished | End::TimeOverflow(_) => self.recorder.now_ns,
         });
-        if let Some((instance, message)) = panic {
+        if let Some(PanicRecord { instance, message }) = panic {
             return Err(RunError::Panicked {
                 dag: self.dag_label(instance.dag),
                 subtask: self.subtask_label(instance),
@@ -126,6 +127,7 @@ impl Session {
         Report {
             instances: self.recorder.instances.clone(),
             jobs: self.recorder.jobs.clone(),
+            panics: self.recorder.panics.clone(),
             events: self.recorder.events.clone(),
             statistics: dags.map(|(dag, _)| *scheduler.statistics(dag)).collect(),
             end_ns: self.recorder.now_ns,
@@ -140,14 +142,22 @@ struct Runner<'s> {
     machine: &'s Machine,
     bodies: &'s mut [Vec<Body>],
     recorder: &'s mut Recorder,
-    /// The instance whose function panicked, and the message. The driver cannot
-    /// be stopped, so from here on nothing runs and nothing is recorded.
-    panic: Option<(Instance, String)>,
+    /// The panic that fails the run. The driver cannot be stopped, so from here
+    /// on nothing runs and nothing is recorded.
+    panic: Option<PanicRecord>,
 }
 
 impl Runner<'_> {
     fn body(&mut self, instance: Instance) -> &mut Body {
         &mut self.bodies[instance.dag.index()][instance.subtask.index()]
+    }
+
+    /// Reports whether the instance's subtask has panicked, in whatever job. Its
+    /// body then takes no call any more; what was sent to it stays in its slots.
+    fn has_panicked(&self, instance: Instance) -> bool {
+        let Instance { dag, subtask, .. } = instance;
+        let mut panics = self.recorder.panics.iter();
+        panics.any(|panic| panic.instance.dag == dag && panic.instance.subtask == subtask)
     }
 
     /// Returns the recorder, unless the run has failed.
@@ -172,13 +182,23 @@ impl Workload for Runner<'_> {
         if let Err(payload) = result {
             let message = (payload.downcast_ref::<String>().map(String::as_str))
                 .or_else(|| payload.downcast_ref::<&str>().copied())
-                .unwrap_or("(a payload that is no text)");
-            self.panic = Some((instance, message.to_owned()));
-            return 0;
+                .unwrap_or("(a payload that is no text)")
+                .to_owned();
+            let panic = PanicRecord { instance, message };
+            if !machine.contains_panics.get() {
+                self.panic = Some(panic);
+                return 0;
+            }
+            self.recorder.panics.push(panic);
         }
         self.recorder
             .of(instance, |record| record.execution_ns = executed_ns);
         executed_ns
+    }
+
+    fn fails(&mut self, instance: Instance) -> bool {
+        let mut panics = self.recorder.panics.iter();
+        panics.any(|panic| panic.instance == instance)
     }
 
     fn started(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
@@ -213,6 +233,14 @@ impl Workload for Runner<'_> {
         };
         recorder.at(now_ns, EventKind::Finished { instance, core });
         recorder.of(instance, |record| record.finish_ns = Some(now_ns));
+    }
+
+    fn failed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        let Some(recorder) = self.recorder() else {
+            return;
+        };
+        recorder.at(now_ns, EventKind::Failed { instance, core });
+        recorder.of(instance, |record| record.failed_ns = Some(now_ns));
     }
 }
 
@@ -250,7 +278,15 @@ impl Observer for Runner<'_> {
         self.recorder.now(EventKind::Cancelled { instance });
         // Functions run at the start of their instances, so whatever the
         // predecessors will ever send has been sent.
-        self.body(instance).discard(instance.job);
+        if !self.has_panicked(instance) {
+            self.body(instance).discard(instance.job);
+        }
+    }
+
+    fn ended(&mut self, dag: DagId) {
+        if let Some(recorder) = self.recorder() {
+            recorder.now(EventKind::DagEnded { dag });
+        }
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {

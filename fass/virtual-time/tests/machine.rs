@@ -224,3 +224,15 @@ fn a_chain_of_many_subtasks_runs() {
     assert_eq!(report.jobs[1].response_time_ns(), Some(4_999 * MS));
     assert_eq!(report.violations(), []);
 }
+
+#[test]
+fn what_still_runs_at_the_end_of_a_report_breaks_no_rule() {
+    let machine = VirtualTime::new().cores(2);
+    let first = pair("first", ms(20), ms(20), [ms(9), ms(1)]);
+    let second = pair("second", ms(20), ms(20), [ms(4), ms(9)]);
+    first.jobs(1);
+    second.jobs(1);
+    commit(&[first, second]);
+    assert_eq!(machine.run_for(ms(6)).violations(), []);
+    assert_eq!(machine.run().violations(), []);
+}

@@ -31,7 +31,8 @@ pub struct Stretch {
     pub core: CoreId,
     /// When it started or continued.
     pub from_ns: u64,
-    /// When it finished or was preempted, or the end of the record.
+    /// When it finished, failed or was preempted; `u64::MAX` if none of that had
+    /// happened at the end of the record.
     pub to_ns: u64,
 }
 
@@ -127,8 +128,11 @@ impl Sweep<'_> {
             };
             let of_job = self.record.job(instance.dag, instance.job);
             let gone_ns = match times.start_ns {
-                // One that a fault ended does not finish; its job ends with it.
-                Some(_) => times.finish_ns.or(of_job.and_then(|job| job.ended_ns)),
+                // One that a fault ended does not finish. If the fault's time is
+                // not recorded, it is gone with its job at the latest.
+                Some(_) => {
+                    (times.finish_ns.or(times.failed_ns)).or(of_job.and_then(|job| job.ended_ns))
+                }
                 None => of_job.and_then(|job| job.cut_ns),
             };
             add(ready_ns, gone_ns, instance, What::IsEligible, What::IsGone);
@@ -141,7 +145,8 @@ impl Sweep<'_> {
                 to_ns,
             } = *stretch;
             let (begins, ends) = (What::Runs(core), What::Stops(core));
-            add(from_ns, Some(to_ns), instance, begins, ends);
+            let to_ns = Some(to_ns).filter(|&to_ns| to_ns < u64::MAX);
+            add(from_ns, to_ns, instance, begins, ends);
         }
         changes.sort_unstable();
         changes
@@ -204,7 +209,10 @@ impl Sweep<'_> {
     /// Reports whether an instance executed for no time at this instant.
     fn is_several_dispatches(&self, now_ns: u64) -> bool {
         let mut times = self.record.all_instances(self.task_set);
-        times.any(|(_, times)| times.start_ns == Some(now_ns) && times.finish_ns == Some(now_ns))
+        times.any(|(_, times)| {
+            let gone_ns = times.finish_ns.or(times.failed_ns);
+            times.start_ns == Some(now_ns) && gone_ns == Some(now_ns)
+        })
     }
 
     fn keeps_core(&self, instance: Instance) -> bool {

@@ -35,6 +35,8 @@ pub struct InstanceRecord {
     pub start_ns: Option<u64>,
     /// When its function had returned.
     pub finish_ns: Option<u64>,
+    /// When a fault had ended it instead; `None` also if that is not recorded.
+    pub failed_ns: Option<u64>,
     /// The core on which it finished.
     pub core: Option<CoreId>,
     /// How many times its function has returned; more than 1 is a violation.

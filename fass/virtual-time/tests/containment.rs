@@ -1,0 +1,156 @@
+//! A panic that is contained ends its DAG, and nothing else.
+
+mod support;
+
+use fass::{Dag, create_dag};
+use support::{commit, diamond, execute, ms, named, pair};
+use virtual_time::{Instance, JobOutcome, Report, VirtualTime};
+
+const MS: u64 = 1_000_000;
+
+/// A chain of three whose middle panics in job 2, after 2 of its 3 ms.
+fn faulty() -> Dag {
+    let dag = create_dag();
+    dag.name("faulty").jobs(10);
+    dag.register_periodic_subtask(|| (1,), vec!["raw"], ms(10), named("source"));
+    let mut frames = 0;
+    let middle = move |(value,): (i32,)| {
+        execute(ms(2));
+        frames += 1;
+        assert!(frames != 3, "frame 2 is broken");
+        execute(ms(1));
+        (value,)
+    };
+    dag.register_subtask(middle, vec!["raw"], vec!["fine"], named("middle"));
+    let sink = |_: (i32,)| execute(ms(1));
+    dag.register_sink_subtask(sink, vec!["fine"], ms(10), named("sink"));
+    dag
+}
+
+fn healthy() -> Dag {
+    let dag = pair("healthy", ms(5), ms(5), [ms(1), ms(1)]);
+    dag.jobs(30);
+    dag
+}
+
+/// Returns the instances of one DAG with their starts and finishes.
+fn schedule(report: &Report, dag: u32) -> Vec<(Instance, Option<u64>, Option<u64>)> {
+    let records = report.instances.iter();
+    records
+        .filter(|record| record.instance.dag.0 == dag)
+        .map(|record| (record.instance, record.start_ns, record.finish_ns))
+        .collect()
+}
+
+#[test]
+fn a_contained_panic_ends_its_dag_at_the_time_of_the_panic() {
+    let machine = VirtualTime::new().contain_panics();
+    commit(&[faulty()]);
+    let report = machine.run();
+    let lines = report.event_lines();
+    let job_2 = lines
+        .iter()
+        .position(|line| line == "20000000 release faulty[2]");
+    assert_eq!(
+        lines[job_2.expect("job 2 is released")..],
+        [
+            "20000000 release faulty[2]",
+            "20000000 ready source[2]",
+            "20000000 start source[2] core 0",
+            "20000000 finish source[2] core 0",
+            "20000000 ready middle[2]",
+            "20000000 start middle[2] core 0",
+            "22000000 fail middle[2] core 0",
+            "22000000 end faulty",
+            "22000000 cancel sink[2]",
+            "22000000 complete faulty[2] dagended",
+        ]
+    );
+    assert_eq!(report.panics.len(), 1);
+    assert_eq!(report.panics[0].message, "frame 2 is broken");
+    let failed = (report.instance(report.panics[0].instance)).expect("it was ready");
+    assert_eq!((failed.failed_ns, failed.finish_ns), (Some(22 * MS), None));
+    assert_eq!(failed.execution_ns, 2 * MS);
+    assert_eq!(report.jobs[2].outcome, Some(JobOutcome::DagEnded));
+    let counted = report.statistics[0];
+    assert_eq!((counted.released, counted.completed), (3, 2));
+    assert_eq!((counted.faults, counted.cut_short), (1, 1));
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn the_other_dags_go_on() {
+    let alone = VirtualTime::new().cores(2);
+    commit(&[healthy()]);
+    let alone = alone.run();
+    let machine = VirtualTime::new().cores(2).contain_panics();
+    commit(&[healthy(), faulty()]);
+    let report = machine.run();
+    assert_eq!(report.panics.len(), 1);
+    assert_eq!(schedule(&report, 0), schedule(&alone, 0));
+    let counted = report.statistics[0];
+    assert_eq!((counted.completed, counted.misses), (30, 0));
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn a_branch_that_has_started_runs_to_its_end() {
+    let machine = VirtualTime::new().cores(2).contain_panics();
+    let dag = diamond(ms(20), ms(20), [ms(1), ms(9), ms(4), ms(1)]);
+    dag.jobs(2);
+    let panicking = create_dag();
+    panicking.name("branches").jobs(2);
+    panicking.register_periodic_subtask(|| (1,), vec!["start"], ms(20), named("source"));
+    let long = |(value,): (i32,)| {
+        execute(ms(9));
+        (value,)
+    };
+    panicking.register_subtask(long, vec!["start"], vec!["long"], named("long"));
+    let broken = |(value,): (i32,)| {
+        execute(ms(4));
+        assert!(value > 1, "too small");
+        (value,)
+    };
+    panicking.register_subtask(broken, vec!["start"], vec!["broken"], named("broken"));
+    let join = |_: (i32, i32)| panic!("it never starts");
+    panicking.register_sink_subtask(join, vec!["long", "broken"], ms(20), named("join"));
+    commit(&[panicking, dag]);
+    // Up to an instant between the panic and the end of the other branch.
+    let report = machine.run_for(ms(6));
+    assert_eq!(report.statistics[0].faults, 1);
+    assert_eq!(report.violations(), []);
+    let report = machine.run();
+    let long = report.subtask("branches", "long");
+    assert_eq!((long.len(), long[0].finish_ns), (1, Some(9 * MS)));
+    assert_eq!(report.subtask("branches", "join"), []);
+    assert_eq!(report.jobs[0].finish_ns, Some(9 * MS));
+    assert_eq!(report.statistics[1].completed, 2);
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn values_that_wait_for_a_broken_body_do_no_harm() {
+    // The source runs ahead: when the sink panics, later jobs' values are in its
+    // slots, and its body can no longer drop them.
+    let machine = VirtualTime::new().cores(2).contain_panics();
+    let dag = create_dag();
+    dag.name("ahead").jobs(8).in_flight(4);
+    dag.register_periodic_subtask(|| (1,), vec!["number"], ms(10), named("source"));
+    let sink = |_: (i32,)| {
+        execute(ms(25));
+        panic!("slow and wrong");
+    };
+    dag.register_sink_subtask(sink, vec!["number"], ms(10), named("sink"));
+    commit(&[dag]);
+    let first = machine.run_for(ms(12));
+    assert_eq!(first.panics.len(), 1, "its function has run");
+    assert_eq!(first.statistics[0].faults, 0, "its time is not over");
+    let report = machine.run();
+    assert_eq!(report.end_ns, 25 * MS);
+    let counted = report.statistics[0];
+    assert_eq!(
+        (counted.released, counted.cut_short, counted.faults),
+        (3, 3, 1)
+    );
+    assert_eq!(report.violations(), []);
+}
