@@ -56,6 +56,7 @@ mod panic;
 mod platform;
 pub mod report;
 mod run;
+mod settings;
 mod start;
 mod trace;
 mod worker;

@@ -136,22 +136,20 @@ impl<'a> Options<'a> {
         })
     }
 
-    /// Checks that every word has been taken.
+    /// Checks that every word has been taken; `known` are the app's keys.
     ///
     /// # Errors
     ///
-    /// If one has not: it names the word and the keys that were asked for.
+    /// If one has not: it names the word and the keys that there are.
     pub fn finish(&self, known: &[&str]) -> Result<(), UsageError> {
-        self.words
-            .iter()
-            .find(|word| !word.taken.get())
-            .map_or(Ok(()), |word| {
-                let known = known.join(", ");
-                Err(UsageError(format!(
-                    "`{}` is no option of this app; it knows {known}",
-                    word.key
-                )))
-            })
+        let Some(word) = self.words.iter().find(|word| !word.taken.get()) else {
+            return Ok(());
+        };
+        let (own, kernels) = (known.join(", "), crate::settings::WORDS.join(", "));
+        Err(UsageError(format!(
+            "`{}` is no option; there are {own}, and for every app {kernels}",
+            word.key
+        )))
     }
 }
 
@@ -203,7 +201,11 @@ mod tests {
             "`subtasks=x`: allowed are whole numbers from 1 to 16"
         );
         let wrong = message(options.finish(&["jobs", "seed"]));
-        assert_eq!(wrong, "`sed` is no option of this app; it knows jobs, seed");
+        assert_eq!(
+            wrong,
+            "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
+             budget_factor, overheads_ns, trace, trace_events, measure, mode"
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
 use sched_dag::SchedulerOptions;
 
 use crate::machine::{clock, this_core};
@@ -19,6 +19,8 @@ pub(crate) struct Kernel {
     coincidence_ns: AtomicU64,
     /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
     budget_factor: AtomicU64,
+    /// What a commit adds to WCETs: context switch, dispatch, interrupt.
+    overheads_ns: [AtomicU64; 3],
 }
 
 pub(crate) static KERNEL: Kernel = Kernel {
@@ -26,12 +28,26 @@ pub(crate) static KERNEL: Kernel = Kernel {
     preemptive: AtomicBool::new(true),
     coincidence_ns: AtomicU64::new(0),
     budget_factor: AtomicU64::new(0),
+    overheads_ns: [const { AtomicU64::new(0) }; 3],
 };
 
 impl Kernel {
     /// Chooses the policy of the commits to come.
     pub(crate) fn set_policy(&self, policy: Policy) {
         self.edf.store(policy == Policy::Edf, Ordering::Relaxed);
+    }
+
+    /// Chooses what the commits to come add to WCETs.
+    pub(crate) fn set_overheads(&self, overheads: Overheads) {
+        let Overheads {
+            context_switch_ns,
+            dispatch_ns,
+            interrupt_ns,
+        } = overheads;
+        let values = [context_switch_ns, dispatch_ns, interrupt_ns];
+        for (place, value) in self.overheads_ns.iter().zip(values) {
+            place.store(value, Ordering::Relaxed);
+        }
     }
 
     /// Chooses the budget of subtasks that have a WCET only, in WCETs; 0 for none.
@@ -82,6 +98,18 @@ impl Platform for Kernel {
 
     fn cores(&self) -> u32 {
         u32::try_from(this_core::all().len()).unwrap_or(u32::MAX)
+    }
+
+    fn overheads(&self) -> Overheads {
+        let [context_switch_ns, dispatch_ns, interrupt_ns] = self
+            .overheads_ns
+            .each_ref()
+            .map(|value| value.load(Ordering::Relaxed));
+        Overheads {
+            context_switch_ns,
+            dispatch_ns,
+            interrupt_ns,
+        }
     }
 
     fn now_ns(&self) -> u64 {

@@ -6,32 +6,20 @@ use core::cell::Cell;
 use boot::acpi::{self, Platform};
 use boot::physical::IdentityMap;
 use boot::{BootInfo, Module};
-use fass::{Policy, Preemption};
 
 use crate::machine::this_core::{self, Stacks};
-use crate::machine::{
-    clock, cpu, exit, interrupt, interrupts_off, legacy, local_apic, processors, serial,
-};
+use crate::machine::{clock, cpu, exit, interrupt, legacy, local_apic, processors, serial};
 use crate::machine_handle::{Ending, Machine};
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
 use crate::platform::KERNEL;
-use crate::{console, contexts, json, panic, println, trace, worker};
+use crate::{console, contexts, json, panic, println, settings, trace, worker};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
 
 /// The stack of an interrupt handler, or of an exception's report, in bytes.
 const HANDLER_STACK: u64 = 16 * 1024;
-
-/// The events that each core's trace keeps, unless the command line says
-/// otherwise: 128 KiB.
-const TRACE_EVENTS: u64 = 4096;
-
-const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
-
-const PREEMPTIONS: [(&str, Preemption); 2] =
-    [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
 
 /// Brings up memory and interrupts, then goes on on the core's own stack: the
 /// boot stack has no guard page.
@@ -187,25 +175,12 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         .command_line()
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
-    // What time means is the host's choice and changes nothing here; the word
-    // stands there so that the log shows it.
-    let _ = options.text("mode");
-    KERNEL.set_policy(options.choice("policy", &POLICIES)?);
-    KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
-    KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
-    let trace_events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
-    if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
-        interrupts_off::enable();
-    }
-    let dumps_trace = options.choice("trace", &[("keep", false), ("dump", true)])?;
-    trace::create(
-        this_core::all().len(),
-        usize::try_from(trace_events).unwrap_or(0),
-    );
+    let tracing = settings::apply(&options)?;
+    trace::create(this_core::all().len(), tracing.events);
     app(&Machine {
         options,
         module: module_bytes(info),
-        dumps_trace,
+        dumps_trace: tracing.dump,
         runs: Cell::new(0),
     })
 }

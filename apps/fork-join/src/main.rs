@@ -62,7 +62,7 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
         "occupy",
         &[("hold", Occupation::Hold), ("spin", Occupation::Spin)],
     )?;
-    options.finish(&["subtasks", "jobs", "seed", "occupy", "policy"])?;
+    options.finish(&["subtasks", "jobs", "seed", "occupy"])?;
     let parallel = subtasks
         .into_iter()
         .filter_map(|parallel| usize::try_from(parallel).ok());

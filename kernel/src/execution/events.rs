@@ -88,6 +88,10 @@ pub(crate) fn fail(now_ns: u64) {
         instance,
     );
     note_running(core, None);
+    if let Some(record) = execution.record.instance_mut(instance) {
+        record.failed_ns = Some(since_epoch(now_ns));
+        record.core = Some(CoreId(core.index));
+    }
     let woken = execution.step(now_ns, Event::Failed(instance));
     drop(place);
     woken.wake();

@@ -1,0 +1,83 @@
+//! The kernel's own words of the command line, which every app has.
+//!
+//! | word | meaning | default |
+//! | --- | --- | --- |
+//! | `policy=static\|edf` | how ready instances are ordered | `static` |
+//! | `preemption=on\|off` | whether a started instance may lose its core | `on` |
+//! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
+//! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
+//! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
+//! | `trace_events=N` | how many events each core keeps; 0: none | 4096 |
+//! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
+//! | `mode=...` | the host's name for what time means; ignored | |
+
+use alloc::format;
+
+use fass::{Overheads, Policy, Preemption};
+
+use crate::machine::interrupts_off;
+use crate::options::{Options, UsageError};
+use crate::platform::KERNEL;
+
+/// The words, for messages.
+pub(crate) const WORDS: [&str; 8] = [
+    "policy",
+    "preemption",
+    "budget_factor",
+    "overheads_ns",
+    "trace",
+    "trace_events",
+    "measure",
+    "mode",
+];
+
+const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
+
+const PREEMPTIONS: [(&str, Preemption); 2] =
+    [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
+
+/// 128 KiB a core.
+const TRACE_EVENTS: u64 = 4096;
+
+/// What the words say about tracing; all else is set where it belongs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tracing {
+    /// How many events each core keeps.
+    pub(crate) events: usize,
+    /// Whether each run's trace is printed after it.
+    pub(crate) dump: bool,
+}
+
+/// Takes the kernel's words and does what they say.
+pub(crate) fn apply(options: &Options<'_>) -> Result<Tracing, UsageError> {
+    KERNEL.set_policy(options.choice("policy", &POLICIES)?);
+    KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
+    KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
+    KERNEL.set_overheads(overheads(options)?);
+    if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
+        interrupts_off::enable();
+    }
+    // What time means is the host's choice and changes nothing here; the word
+    // stands there so that the log shows it.
+    let _ = options.text("mode");
+    let events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
+    Ok(Tracing {
+        events: usize::try_from(events).unwrap_or(0),
+        dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
+    })
+}
+
+fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {
+    let numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
+    let [context_switch_ns, dispatch_ns, interrupt_ns] = numbers[..] else {
+        return Err(UsageError::new(format!(
+            "`overheads_ns` has {} numbers; give three: context switch, dispatch, interrupt",
+            numbers.len()
+        )));
+    };
+    Ok(Overheads {
+        context_switch_ns,
+        dispatch_ns,
+        interrupt_ns,
+    })
+}
