@@ -24,7 +24,7 @@ use sched_dag::analysis::{
     melani_fp, melani_fp_width, np_safe_fp, pipelined_fp_reference, width,
 };
 
-use super::lines::{Line, Lines, Malformed};
+use replay::lines::{Line, Lines, Malformed};
 
 /// One task set with the values expected of it.
 #[derive(Debug)]

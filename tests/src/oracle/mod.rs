@@ -6,19 +6,17 @@
 //! if some did, and 2 if a file could not be read as what it should be, which
 //! is said with its line number, and then nothing is compared.
 //!
-//! - [`lines`]: words and numbers of a reference file, with line numbers;
 //! - [`bounds`]: the analysis at commit;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline.
 
 pub mod bounds;
-pub mod lines;
 pub mod schedules;
 pub mod synchronizer;
 
 use std::process::ExitCode;
 
-use lines::Malformed;
+use replay::lines::Malformed;
 
 /// One kind of reference file: how to read its cases and how to check one.
 struct Kind<Case> {

@@ -3,7 +3,7 @@
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions};
 
-use super::{Case, CaseDag, InstanceTimes, JobTimes};
+use ::replay::{Case, CaseDag, InstanceTimes, JobTimes};
 
 /// More cores than these are only simulated if there are as many subtasks: of
 /// each subtask at most one instance runs at a time.

@@ -6,8 +6,8 @@ use std::num::NonZeroUsize;
 
 use pub_sub::{AgePenalty, Parameters};
 
-use super::super::lines::{Line, Lines, Malformed};
 use super::{Arrival, Case, Departures, Policy};
+use ::replay::lines::{Line, Lines, Malformed};
 
 /// Reserved storage grows with the topics whatever the arrivals are, so a number
 /// that no trace can need is refused before it is reserved.

@@ -5,9 +5,12 @@
 //! [`Malformed`] with the number of its line, so that a broken file is never
 //! taken for a failing implementation.
 
-use std::fmt;
-use std::num::IntErrorKind;
-use std::str::FromStr;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+use core::num::IntErrorKind;
+use core::str::FromStr;
 
 /// What is wrong with a reference file, and on which line, counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,7 +35,7 @@ pub struct Line<'a> {
 /// The records of a file, one after the other.
 #[derive(Clone, Debug)]
 pub struct Lines<'a> {
-    rest: std::iter::Enumerate<std::str::Lines<'a>>,
+    rest: core::iter::Enumerate<core::str::Lines<'a>>,
     last: usize,
 }
 
@@ -119,14 +122,14 @@ impl Line<'_> {
     /// # Errors
     ///
     /// [`Malformed`] if the word is no number or too large a one.
-    pub fn number<T: FromStr<Err = std::num::ParseIntError>>(
+    pub fn number<T: FromStr<Err = core::num::ParseIntError>>(
         &self,
         word: &str,
     ) -> Result<T, Malformed> {
         if !word.bytes().all(|byte| byte.is_ascii_digit()) {
             return Err(self.malformed(format!("`{word}` is not a whole number")));
         }
-        word.parse().map_err(|error: std::num::ParseIntError| {
+        word.parse().map_err(|error: core::num::ParseIntError| {
             self.malformed(match error.kind() {
                 IntErrorKind::PosOverflow => format!("`{word}` is too large here"),
                 _ => format!("`{word}` is not a whole number"),
@@ -139,7 +142,7 @@ impl Line<'_> {
     /// # Errors
     ///
     /// As [`exactly`](Self::exactly) and [`number`](Self::number).
-    pub fn numbers<T: FromStr<Err = std::num::ParseIntError>>(
+    pub fn numbers<T: FromStr<Err = core::num::ParseIntError>>(
         &self,
         count: usize,
     ) -> Result<Vec<T>, Malformed> {
@@ -154,7 +157,7 @@ impl fmt::Display for Malformed {
     }
 }
 
-impl std::error::Error for Malformed {}
+impl core::error::Error for Malformed {}
 
 #[cfg(test)]
 mod tests {

@@ -1,15 +1,20 @@
 //! Reading reference schedules, strictly: whatever is not as the format says
 //! is refused with its line.
 
-use std::sync::Arc;
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::ToString;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
 
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, Priority, SubtaskSpec, TaskSet,
     verify,
 };
 
-use super::super::lines::{Line, Lines, Malformed};
-use super::{Case, CaseDag, InstanceTimes, JobTimes};
+use crate::case::{Case, CaseDag, InstanceTimes, JobTimes};
+use crate::lines::{Line, Lines, Malformed};
 
 /// Reads all cases of a file.
 ///
@@ -59,7 +64,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
             before.first_instance + before.jobs * before.subtasks
         });
         let (spec, dag) = parse_dag(&line, lines, first_instance)?;
-        commit(&line, std::slice::from_ref(&spec), &options)?;
+        commit(&line, core::slice::from_ref(&spec), &options)?;
         specs.push(spec);
         dags.push(dag);
     }

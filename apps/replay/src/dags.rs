@@ -1,0 +1,130 @@
+//! From a case to DAGs that execute for its times.
+//!
+//! Every instance holds its core for the case's execution time, in units of a
+//! chosen length. In the reference nothing but execution takes time, and every
+//! event falls on a whole unit. On the machine a start comes a little after its
+//! unit, for the scheduler, the switch and the interrupt take time too; along a
+//! chain of instances that would add up until it is a unit. So, as WCETs do, the
+//! execution times *include* what the kernel took: an instance executes up to
+//! the end of its last unit, counted from the whole unit that is nearest to its
+//! start. What the kernel takes after the start (preempting and resuming it) is
+//! not made up for.
+//!
+//! An instance further stops a *guard* before the end of its last unit: in the
+//! reference, completions of an instant come before its releases, and a deadline
+//! at the instant of the completion is met.
+
+use alloc::format;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+
+use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
+use sched_dag::SubtaskId;
+
+use crate::case::Case;
+
+/// How the times of a case become times of the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scale {
+    /// The length of a unit, in nanoseconds, at least 1.
+    pub unit_ns: u64,
+    /// How long before the end of its last unit an instance stops executing.
+    pub guard_ns: u64,
+}
+
+/// Time 0 of a run, on the clock of [`fass::now_ns`], to be set before it.
+#[derive(Clone, Debug, Default)]
+pub struct Epoch(Arc<AtomicU64>);
+
+impl Epoch {
+    /// Sets time 0.
+    pub fn set(&self, ns: u64) {
+        self.0.store(ns, Ordering::Relaxed);
+    }
+
+    fn elapsed_ns(&self) -> u64 {
+        fass::now_ns().saturating_sub(self.0.load(Ordering::Relaxed))
+    }
+}
+
+impl Scale {
+    /// Returns how long an instance of `units` executes if it starts `start_ns`
+    /// after time 0.
+    #[must_use]
+    pub fn execution_ns(self, start_ns: u64, units: u64) -> u64 {
+        let first = start_ns.saturating_add(self.unit_ns / 2) / self.unit_ns;
+        let end_ns = first.saturating_add(units).saturating_mul(self.unit_ns);
+        end_ns
+            .saturating_sub(self.guard_ns)
+            .saturating_sub(start_ns)
+    }
+
+    fn duration(self, units: u64) -> Result<Duration, String> {
+        let ns = self.unit_ns.checked_mul(units);
+        ns.map(Duration::from_nanos).ok_or_else(|| {
+            format!(
+                "{units} units of {} ns are more than 64 bits hold; choose a shorter unit",
+                self.unit_ns
+            )
+        })
+    }
+}
+
+/// Builds the case's DAGs, to be committed with any shape of graph allowed.
+/// `epoch` is to be set before they run.
+///
+/// # Errors
+///
+/// In words: a time of the case is too long at this scale.
+pub fn build(case: &Case, scale: Scale, epoch: &Epoch) -> Result<Vec<Dag>, String> {
+    let dags = case.task_set.dags().iter().zip(&case.dags).enumerate();
+    dags.map(|(number, (model, times))| {
+        let dag = create_dag();
+        dag.name(&format!("{number}"))
+            .period(scale.duration(model.period_ns())?)
+            .relative_deadline(scale.duration(model.relative_deadline_ns())?)
+            .offset(scale.duration(model.offset_ns())?)
+            .jobs(u64::try_from(times.jobs).unwrap_or(u64::MAX))
+            .in_flight(model.in_flight());
+        let subtasks: Vec<_> = (model.subtasks().iter().zip(&times.executions_ns))
+            .map(|(subtask, executions)| {
+                let (executions, epoch) = (executions.clone(), epoch.clone());
+                let execute = move |job| {
+                    let units = usize::try_from(job).map_or(0, |job| executions[job]);
+                    let ns = scale.execution_ns(epoch.elapsed_ns(), units);
+                    fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
+                };
+                let attributes = SubtaskAttributes::default().priority(subtask.priority().0);
+                dag.register_untyped_subtask(execute, attributes)
+            })
+            .collect();
+        for (later, id) in subtasks.iter().zip((0..).map(SubtaskId)) {
+            for earlier in model.predecessors(id) {
+                dag.precede(&subtasks[earlier.index()], later);
+            }
+        }
+        Ok(dag)
+    })
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn execution_ends_at_whole_units_less_the_guard() {
+        let scale = Scale {
+            unit_ns: 1000,
+            guard_ns: 10,
+        };
+        assert_eq!(scale.execution_ns(5000, 2), 1990);
+        assert_eq!(scale.execution_ns(5040, 2), 1950); // 40 ns were the kernel's
+        assert_eq!(scale.execution_ns(4990, 2), 2000); // an early predecessor
+        assert_eq!(scale.execution_ns(5500, 1), 1490); // no longer near unit 5
+        assert_eq!(scale.execution_ns(u64::MAX, 1), 0);
+    }
+}

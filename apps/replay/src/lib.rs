@@ -1,0 +1,27 @@
+//! Reference schedules, run on the machine.
+//!
+//! A *case* is a set of DAGs with the execution time of every instance, and the
+//! one schedule that the task model gives them ([`Case`]). The app runs cases
+//! one after the other and prints what happened; the host tool compares
+//! (`./scripts/oracle schedules --in-kernel`), and also reads the cases with the
+//! code here ([`parse()`]).
+//!
+//! - [`lines`]: words and numbers of a reference file, with line numbers;
+//! - [`Case`], [`parse()`]: what a case says, read strictly;
+//! - [`build`]: DAGs that execute for its times.
+//!
+//! The code here knows no kernel: the tests run it in virtual time.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+mod case;
+mod dags;
+pub mod lines;
+mod parse;
+
+pub use case::{Case, CaseDag, InstanceTimes, JobTimes};
+pub use dags::{Epoch, Scale, build};
+pub use parse::parse;

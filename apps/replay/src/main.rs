@@ -1,0 +1,131 @@
+//! Runs the reference schedules in the loader's file, and prints what happened.
+//!
+//! Words of the command line: `unit_us` is the length of a unit of the cases'
+//! time; `guard_us` is how much before the end of its last unit an instance
+//! stops; events less than `window_us` apart count as one instant. Without the
+//! latter two they are a 500th and a 100th of a unit. Policy and preemption are
+//! the cases'; so are the cores, which have to be the machine's.
+
+#![no_std]
+#![no_main]
+
+extern crate alloc;
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use fass::{ConstructionPolicy, finish_create_dags_with};
+use kernel::{Ending, Machine, Run, json, println};
+use replay::{Case, Epoch, Scale, build, parse};
+use sched_dag::{DagId, JobOutcome};
+
+kernel::entry!(main);
+
+/// How many instances or jobs a machine line lists at most.
+const ROWS_A_LINE: usize = 32;
+
+fn main(machine: &Machine) -> Result<(), Ending> {
+    let options = machine.options();
+    let unit_us = options.number("unit_us", 1..=10_000_000, 10_000)?;
+    let guard_us = options.number("guard_us", 0..=unit_us / 4, unit_us / 500)?;
+    let window_us = options.number("window_us", 0..=unit_us / 4, unit_us / 100)?;
+    options.finish(&["unit_us", "guard_us", "window_us"])?;
+    let scale = Scale {
+        unit_ns: unit_us * 1000,
+        guard_ns: guard_us * 1000,
+    };
+    machine.set_coincidence(Duration::from_micros(window_us));
+    for case in &cases(machine)? {
+        run(machine, case, scale)?;
+    }
+    machine.report_memory();
+    Ok(())
+}
+
+/// Reads the loader's file.
+fn cases(machine: &Machine) -> Result<Vec<Case>, Ending> {
+    let usage = |message: String| Ending::Usage(kernel::options::UsageError::new(message));
+    let module = machine.module().ok_or_else(|| {
+        usage("no file of reference schedules; give one with `qemu -initrd FILE`".to_string())
+    })?;
+    let text = core::str::from_utf8(module)
+        .map_err(|error| usage(format!("the file of reference schedules: {error}")))?;
+    parse(text).map_err(|malformed| usage(format!("reference schedules: {malformed}")))
+}
+
+fn run(machine: &Machine, case: &Case, scale: Scale) -> Result<(), Ending> {
+    /// Time for the cores to get ready.
+    const LEAD_NS: u64 = 1_000_000;
+    let in_case = |message: String| Ending::Failure(format!("case {}: {message}", case.name));
+    if case.cores != machine.cores() {
+        let (wanted, here) = (case.cores, machine.cores());
+        return Err(in_case(format!(
+            "it is for {wanted} cores, here are {here}"
+        )));
+    }
+    machine.configure(case.policy, case.preemption);
+    let epoch = Epoch::default();
+    let dags = build(case, scale, &epoch).map_err(in_case)?;
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
+    let epoch_ns = fass::now_ns() + LEAD_NS;
+    epoch.set(epoch_ns);
+    let run = machine.run_from(epoch_ns)?;
+    print(case, &run);
+    Ok(())
+}
+
+/// Prints what happened to every instance and job.
+fn print(case: &Case, run: &Run) {
+    let record = run.record();
+    let violations = run
+        .violations()
+        .inspect(|violation| println!("violation: {violation}"))
+        .count();
+    json::emit("replay", |line| {
+        line.text("case", &case.name)
+            .number("cores", case.cores)
+            .number("violations", violations as u64)
+            .number("allocations", run.allocations());
+    });
+    let absent = u64::MAX; // no time of a run
+    let instances = record
+        .all_instances(run.task_set())
+        .map(|(instance, times)| {
+            format!(
+                "[{},{},{},{},{},{}]",
+                instance.dag.0,
+                instance.job,
+                instance.subtask.0,
+                times.start_ns.unwrap_or(absent),
+                times.finish_ns.unwrap_or(absent),
+                times.preemptions
+            )
+        });
+    print_rows("replay_instances", instances);
+    let jobs = (0..case.dags.len()).flat_map(|number| {
+        let dag = DagId(u32::try_from(number).unwrap_or(u32::MAX));
+        (0..).zip(record.jobs(dag)).map(move |(job, times)| {
+            format!(
+                "[{number},{job},{},{},{}]",
+                times.release_ns.unwrap_or(absent),
+                record.completion_ns(dag, job).unwrap_or(absent),
+                u8::from(times.outcome != Some(JobOutcome::Met))
+            )
+        })
+    });
+    print_rows("replay_jobs", jobs);
+}
+
+fn print_rows(kind: &str, mut rows: impl Iterator<Item = String>) {
+    loop {
+        let some: Vec<String> = rows.by_ref().take(ROWS_A_LINE).collect();
+        if some.is_empty() {
+            return;
+        }
+        json::emit(kind, |line| {
+            line.list("rows", some.iter());
+        });
+    }
+}
