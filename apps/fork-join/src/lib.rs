@@ -36,6 +36,14 @@ pub const RELATIVE_DEADLINE: Duration = Duration::from_millis(100);
 /// The longest time that a parallel subtask executes for.
 pub const WCET: Duration = Duration::from_millis(50);
 
+/// The longest time that the source or the sink executes for, with much room:
+/// they only count.
+pub const WCET_OF_ENDS: Duration = Duration::from_millis(1);
+
+/// After this time any subtask is at fault. Generous, because on a busy host a
+/// virtual processor can lose its core to others for long.
+pub const BUDGET: Duration = Duration::from_millis(500);
+
 /// The most parallel subtasks: the sink's arguments are a tuple.
 pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
 
@@ -74,7 +82,9 @@ impl Workload {
             next_job += 1;
             (job,)
         };
-        let attributes = SubtaskAttributes::named("source");
+        let attributes = SubtaskAttributes::named("source")
+            .wcet(WCET_OF_ENDS)
+            .budget(BUDGET);
         dag.register_periodic_subtask(source, vec!["job"], PERIOD, attributes);
 
         for branch in 0..self.parallel {
@@ -84,7 +94,8 @@ impl Workload {
                 fass::execute_for(times.next_time(), occupation);
                 (job,)
             };
-            let attributes = SubtaskAttributes::named(&format!("parallel-{branch}")).wcet(WCET);
+            let attributes = SubtaskAttributes::named(&format!("parallel-{branch}"));
+            let attributes = attributes.wcet(WCET).budget(BUDGET);
             let output = format!("part-{branch}");
             dag.register_subtask(execute, vec!["job"], vec![&output], attributes);
         }

@@ -35,7 +35,9 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     for workload in &workloads {
         println!("N = {}: {} jobs ...", workload.parallel, workload.jobs);
         let (dag, joins) = workload.build();
-        finish_create_dags(&[dag])?;
+        for answer in finish_create_dags(&[dag])?.answers() {
+            println!("  {answer}");
+        }
         let run = machine.run()?;
         let figures = Figures::new(workload.parallel, &run, &joins);
         figures.emit();

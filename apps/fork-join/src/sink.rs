@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use fass::{Dag, SubtaskAttributes};
 
-use crate::RELATIVE_DEADLINE;
+use crate::{BUDGET, RELATIVE_DEADLINE, WCET_OF_ENDS};
 
 /// How many joins the sink has seen.
 #[derive(Clone, Debug, Default)]
@@ -65,7 +65,9 @@ pub(crate) fn register(dag: &Dag, parallel: usize, joins: &Joins) {
         .collect();
     let topics: Vec<&str> = names.iter().map(String::as_str).collect();
     let joins = joins.clone();
-    let attributes = SubtaskAttributes::named("sink");
+    let attributes = SubtaskAttributes::named("sink")
+        .wcet(WCET_OF_ENDS)
+        .budget(BUDGET);
     register_for! { dag, parallel, topics, joins, attributes;
         1: a;
         2: a b;
