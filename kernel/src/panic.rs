@@ -12,9 +12,9 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use crate::console::write_in_emergency;
 use crate::containment;
 use crate::machine::context::Registers;
-use crate::machine::fault::Exception;
+use crate::machine::fault::{self, Exception};
 use crate::machine::interrupt::Interrupted;
-use crate::machine::{cpu, exit, local_apic, this_core};
+use crate::machine::{cpu, exit, this_core};
 use crate::{execution, json, trace};
 
 /// The most recent events of this core that a report shows.
@@ -46,7 +46,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
     }
     let core = this_core::is_ready().then(this_core::get);
     if core.is_some() {
-        local_apic::send_stop_to_others();
+        fault::stop_others();
     }
     let index = core.map_or(0, |core| core.index);
     let instance = core.and_then(execution::running);

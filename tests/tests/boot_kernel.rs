@@ -73,6 +73,9 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
         "stack_overflow",
         "write_to_code",
         "undefined_instruction",
+        "nmi",
+        "machine_check",
+        "double_fault",
     ] {
         let outcome = guest(test).end_in(Status::Failure);
         assert_eq!(

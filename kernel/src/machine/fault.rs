@@ -1,12 +1,14 @@
 //! Exceptions: what the processor says about code that cannot go on.
 
 use core::fmt;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::context::Registers;
-use super::cpu;
 use super::interrupt::{Handlers, Interrupted};
+use super::{cpu, local_apic};
 
-/// The vector of a non-maskable interrupt: another core stops this one.
+/// The non-maskable interrupt: another core stops this one, or the board has
+/// something terrible to say.
 const NON_MASKABLE: u64 = 2;
 const DOUBLE_FAULT: u64 = 8;
 const PAGE_FAULT: u64 = 14;
@@ -49,6 +51,15 @@ const NAMES: [&str; 22] = [
     "control protection exception",
 ];
 
+/// Whether non-maskable interrupts are this kernel's own signal to stop.
+static STOPPING: AtomicBool = AtomicBool::new(false);
+
+/// Stops all other cores, for good.
+pub(crate) fn stop_others() {
+    STOPPING.store(true, Ordering::Release);
+    local_apic::send_stop_to_others();
+}
+
 /// Passes an exception to its handler, or stops the core if it is the signal to
 /// stop or nobody handles exceptions yet.
 pub(super) fn raise(
@@ -57,7 +68,8 @@ pub(super) fn raise(
     interrupted: &mut Interrupted,
 ) {
     let vector = registers.vector;
-    let Some(handlers) = handlers.filter(|_| vector != NON_MASKABLE) else {
+    let is_stopped = vector == NON_MASKABLE && STOPPING.load(Ordering::Acquire);
+    let Some(handlers) = handlers.filter(|_| !is_stopped) else {
         cpu::halt_forever();
     };
     let name = usize::try_from(vector)
@@ -90,7 +102,10 @@ impl Exception<'_> {
     /// a lock and no handler has.
     pub(crate) fn is_of_interruptible_code(&self) -> bool {
         const INTERRUPTS_ENABLED: u64 = 1 << 9;
-        let is_contained = !matches!(self.registers.vector, DOUBLE_FAULT | MACHINE_CHECK);
+        let is_contained = !matches!(
+            self.registers.vector,
+            NON_MASKABLE | DOUBLE_FAULT | MACHINE_CHECK
+        );
         is_contained && self.registers.rflags & INTERRUPTS_ENABLED != 0
     }
 }

@@ -6,10 +6,9 @@
 extern crate alloc;
 
 mod checksum;
+mod kernel_crimes;
 mod preemption;
 mod storm;
-
-use alloc::format;
 
 use faults::crimes::{CRIMES, Unpunished};
 use kernel::{Ending, Machine, json};
@@ -19,13 +18,21 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 8] = [
+const TESTS: [(&str, Test); 11] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
     ("stack_overflow", crime),
     ("write_to_code", crime),
     ("undefined_instruction", crime),
+    ("nmi", |_| unpunished(kernel_crimes::raise_nmi())),
+    ("machine_check", |_| {
+        unpunished(kernel_crimes::raise_machine_check())
+    }),
+    (
+        "double_fault",
+        |_| unpunished(kernel_crimes::fault_doubly()),
+    ),
     ("preemption", preemption::run),
     ("storm", storm::run),
 ];
@@ -51,11 +58,10 @@ fn commit_faults(machine: &Machine) -> Result<(), Ending> {
 /// Commits the crime that the test is named after, outside any subtask.
 fn crime(machine: &Machine) -> Result<(), Ending> {
     let name = machine.options().text("test");
-    if let Some((name, crime)) = CRIMES.iter().find(|(crime, _)| Some(*crime) == name) {
-        let Unpunished = crime();
-        return Err(Ending::Failure(format!(
-            "the crime `{name}` was not stopped"
-        )));
-    }
-    Ok(())
+    let crime = CRIMES.iter().find(|(crime, _)| Some(*crime) == name);
+    crime.map_or(Ok(()), |(_, crime)| unpunished(crime()))
+}
+
+fn unpunished(Unpunished: Unpunished) -> Result<(), Ending> {
+    Err(Ending::Failure("the crime was not stopped".into()))
 }

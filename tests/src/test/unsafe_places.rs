@@ -32,6 +32,10 @@ const PLACES: &[(&str, &str)] = &[
     ("fass/tests/no_allocation.rs", "an allocator that counts"),
     ("sched-dag/tests/allocation.rs", "an allocator that counts"),
     ("apps/faults/src/crimes.rs", "what the processor must stop"),
+    (
+        "tests/guest/src/kernel_crimes.rs",
+        "what the kernel must report",
+    ),
 ];
 
 /// Finds `unsafe` outside its places.

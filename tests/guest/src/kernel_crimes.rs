@@ -1,0 +1,47 @@
+//! What brings down the kernel itself, done on purpose: it must end in a report.
+
+use core::arch::asm;
+
+use faults::crimes::Unpunished;
+
+/// Raises the non-maskable interrupt that no core has sent.
+pub(crate) fn raise_nmi() -> Unpunished {
+    // SAFETY: none; the kernel has to report it (see the module).
+    unsafe { asm!("int 2") };
+    Unpunished
+}
+
+/// Raises a machine check.
+pub(crate) fn raise_machine_check() -> Unpunished {
+    // SAFETY: none; the kernel has to report it (see the module).
+    unsafe { asm!("int 18") };
+    Unpunished
+}
+
+/// Takes away the stack of exceptions, and causes one: delivering it faults, too.
+pub(crate) fn fault_doubly() -> Unpunished {
+    // The task state segment's base is spread over its descriptor, at offset
+    // 0x18 of the table; its IST 2 is at offset 44 (Intel SDM 3, 7.2.3, 7.7).
+    // SAFETY: none; the kernel has to report it (see the module).
+    unsafe {
+        asm!(
+            "sub rsp, 16",
+            "sgdt [rsp]",
+            "mov {table}, [rsp + 2]",
+            "mov {base}, [{table} + 0x18 + 8]",
+            "shl {base}, 32",
+            "mov {part:e}, dword ptr [{table} + 0x18 + 2]",
+            "and {part:e}, 0xffffff",
+            "or {base}, {part}",
+            "movzx {part:e}, byte ptr [{table} + 0x18 + 7]",
+            "shl {part:e}, 24",
+            "or {base}, {part}",
+            "mov qword ptr [{base} + 44], 0",
+            "ud2",
+            table = out(reg) _,
+            base = out(reg) _,
+            part = out(reg) _,
+        );
+    };
+    Unpunished
+}
