@@ -69,6 +69,13 @@ pub(crate) fn give_back(context: Parked) {
     STOCK.lock().free.push(context);
 }
 
+/// Returns how many contexts there are in all for instances, and how many of
+/// them are in the stock.
+pub(crate) fn count() -> (usize, usize) {
+    let stock = STOCK.lock();
+    (stock.total, stock.free.len())
+}
+
 /// Takes note that a context was abandoned with what it ran: it is lost.
 pub(crate) fn lose() {
     STOCK.lock().total -= 1;

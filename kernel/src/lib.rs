@@ -61,7 +61,7 @@ mod start;
 mod trace;
 mod worker;
 
-pub use machine_handle::{Ending, Machine};
+pub use machine_handle::{Ending, Machine, Resources};
 pub use memory::heap::KernelHeap;
 pub use run::Run;
 

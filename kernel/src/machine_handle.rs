@@ -16,7 +16,7 @@ use crate::platform::KERNEL;
 use crate::report::Ns;
 use crate::run::Run;
 use crate::worker;
-use crate::{console, execution, json, machine, trace};
+use crate::{console, contexts, execution, json, machine, trace};
 
 /// The machine, lent to the app's function for the time of the run.
 #[derive(Debug)]
@@ -27,6 +27,18 @@ pub struct Machine {
     pub(crate) dumps_trace: bool,
     /// How many runs have ended.
     pub(crate) runs: Cell<u64>,
+}
+
+/// What of the machine's memory is in use while nothing runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resources {
+    /// The bytes of the heap that are in use.
+    pub heap_bytes: usize,
+    /// The contexts, each with a stack, that there are for instances. (Those in
+    /// which faults have ended instances are lost and no longer count.)
+    pub contexts: usize,
+    /// How many of these can be taken: while nothing runs, all.
+    pub contexts_free: usize,
 }
 
 /// Why an app ends other than by success.
@@ -155,6 +167,21 @@ impl Machine {
     /// needs; back to normal if 0. For tests of the kernel's own robustness.
     pub fn set_heartbeat(&self, period: Duration) {
         worker::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
+    }
+
+    /// Returns what is in use and what is free between two runs: the same after
+    /// equal work, unless something leaks.
+    #[must_use]
+    pub fn resources(&self) -> Resources {
+        let (contexts, in_stock) = contexts::count();
+        let spare = machine::this_core::all()
+            .iter()
+            .filter(|core| core.has_spare());
+        Resources {
+            heap_bytes: heap::usage().in_use_bytes,
+            contexts,
+            contexts_free: in_stock + spare.count(),
+        }
     }
 
     /// Prints how much memory the run has needed, as a `memory` machine line.

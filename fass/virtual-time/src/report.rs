@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use sched_dag::record::Violation;
+use sched_dag::record::{Record, Violation};
 use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::event::{Event, EventKind};
@@ -57,6 +57,17 @@ impl Report {
     #[must_use]
     pub fn task_set(&self) -> &TaskSet {
         &self.task_set
+    }
+
+    /// Returns the times in the form in which the kernel has them after a run,
+    /// so that the same code can evaluate both.
+    ///
+    /// # Panics
+    ///
+    /// If there is no memory for another copy of all times.
+    #[must_use]
+    pub fn record(&self) -> Record {
+        rules::record(self).expect("the report's jobs fit into memory")
     }
 
     /// Checks rules R1 to R5 of the task model over what was recorded, and

@@ -31,7 +31,7 @@ pub(crate) fn check(report: &Report) -> Vec<Violation> {
 }
 
 /// Returns the report's times as a record, `None` if they do not fit.
-fn record(report: &Report) -> Option<Record> {
+pub(crate) fn record(report: &Report) -> Option<Record> {
     // Skipped jobs have places, too: job numbers are positions.
     let mut jobs = vec![0; report.task_set.dags().len()];
     let of_jobs = report.jobs.iter().map(|of_job| (of_job.dag, of_job.job));

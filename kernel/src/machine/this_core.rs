@@ -226,6 +226,11 @@ impl Core {
         last
     }
 
+    /// Reports whether this core keeps a spare context.
+    pub(crate) fn has_spare(&self) -> bool {
+        !self.spare.load(Ordering::Relaxed).is_null()
+    }
+
     /// Notes what runs here, as three numbers.
     pub(crate) fn note_running(&self, fields: [u64; 3]) {
         for (place, field) in self.running.iter().zip(fields) {
