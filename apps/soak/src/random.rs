@@ -1,0 +1,87 @@
+//! Random numbers: the same for the same seed, everywhere.
+//!
+//! The generator is SplitMix64 (Steele, Lea, Flood, OOPSLA 2014,
+//! doi 10.1145/2660193.2660195). Its `n`th number is a function of the seed and
+//! of `n` alone, which [`nth`] gives without the ones before: what one job draws
+//! does not depend on which jobs before it were skipped.
+
+use core::ops::RangeInclusive;
+
+const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// A sequence of random numbers.
+#[derive(Clone, Debug)]
+pub(crate) struct Random {
+    state: u64,
+}
+
+impl Random {
+    /// Starts the sequence of `seed`.
+    pub(crate) const fn new(seed: u64) -> Self {
+        Self { state: seed }
+    }
+
+    /// Draws any number.
+    pub(crate) fn next(&mut self) -> u64 {
+        let number = nth(self.state, 0);
+        self.state = self.state.wrapping_add(INCREMENT);
+        number
+    }
+
+    /// Draws a number from `range`, each with the same probability.
+    pub(crate) fn within(&mut self, range: RangeInclusive<u64>) -> u64 {
+        scale(self.next(), range)
+    }
+
+    /// Draws an index into a list of `length` items, which is not empty.
+    pub(crate) fn index(&mut self, length: usize) -> usize {
+        let last = (length as u64).saturating_sub(1);
+        usize::try_from(self.within(0..=last)).unwrap_or(0)
+    }
+
+    /// Is true once in `count` times.
+    pub(crate) fn once_in(&mut self, count: u64) -> bool {
+        self.within(1..=count) == 1
+    }
+}
+
+/// Returns number `n` of the sequence of `seed`, counted from 0.
+pub(crate) const fn nth(seed: u64, n: u64) -> u64 {
+    let mut mixed = seed.wrapping_add(INCREMENT.wrapping_mul(n.wrapping_add(1)));
+    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed ^ (mixed >> 31)
+}
+
+/// Maps a number of 64 bits to a range: the high part of the product has not
+/// the bias of a remainder.
+pub(crate) fn scale(number: u64, range: RangeInclusive<u64>) -> u64 {
+    let (least, most) = range.into_inner();
+    let choices = u128::from(most.saturating_sub(least)) + 1;
+    let drawn = (u128::from(number) * choices) >> 64;
+    least + u64::try_from(drawn).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nth_number_needs_not_those_before() {
+        let mut random = Random::new(7);
+        let drawn: Vec<_> = (0..100).map(|_| random.next()).collect();
+        assert!((0..).zip(&drawn).all(|(n, &number)| nth(7, n) == number));
+    }
+
+    #[test]
+    fn draws_every_number_of_a_range() {
+        let mut random = Random::new(1);
+        let mut seen = [false; 5];
+        for _ in 0..1000 {
+            seen[random.index(5)] = true;
+            assert!((3..=4).contains(&random.within(3..=4)));
+        }
+        assert_eq!(seen, [true; 5]);
+        assert_eq!(scale(u64::MAX, 0..=u64::MAX), u64::MAX);
+    }
+}
