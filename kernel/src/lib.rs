@@ -46,8 +46,10 @@ mod containment;
 mod contexts;
 #[doc(hidden)]
 pub mod entry;
+mod event;
 mod execution;
 pub mod json;
+mod lock;
 mod machine;
 mod machine_handle;
 mod memory;
@@ -61,6 +63,8 @@ mod start;
 mod trace;
 mod worker;
 
+pub use event::Event;
+pub use lock::Lock;
 pub use machine_handle::{Ending, Machine, Resources};
 pub use memory::heap::KernelHeap;
 pub use run::Run;
