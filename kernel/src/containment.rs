@@ -94,6 +94,7 @@ pub(crate) fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
     let Some(instance) = execution::running(core) else {
         return;
     };
+    // The alarm may have been set for an instance before this one.
     if context.budget_end_ns() > now_ns {
         timer::set(Alarm::Budget, context.budget_end_ns());
         return;

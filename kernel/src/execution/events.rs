@@ -27,7 +27,7 @@ pub(crate) fn find_work() -> Work {
 pub(crate) fn note_start(assignment: &Assignment, start_ns: u64) {
     let budget_end_ns = start_ns.saturating_add(assignment.budget_ns);
     this_core::get().context().set_budget_end(budget_end_ns);
-    timer::set(Alarm::Budget, budget_end_ns);
+    timer::set_no_later(Alarm::Budget, budget_end_ns);
     trace::instance(
         What::Start,
         since_epoch(start_ns),
@@ -55,7 +55,6 @@ pub(crate) fn complete(finished: Assignment, start_ns: u64, finish_ns: u64) -> W
     };
     let here = here();
     let Assignment { instance, body, .. } = finished;
-    timer::set(Alarm::Budget, u64::MAX);
     trace::instance(What::Finish, since_epoch(finish_ns), here, instance);
     execution.placement.finish(here.index(), instance, body);
     if let Some(record) = execution.record.instance_mut(instance) {

@@ -121,16 +121,12 @@ impl Execution {
             return None;
         }
         let suspended = self.placement.detach(here);
-        let mut next_is_new = false;
         let next = match self.placement.take_suspended(here) {
             Some(context) => {
                 self.note_resumed(&context, now_ns);
                 context
             }
-            None => {
-                next_is_new = true;
-                worker::new_context()
-            }
+            None => worker::new_context(),
         };
         note_running(core, self.placement.current(here));
         let last = interrupted.exchange(next);
@@ -144,9 +140,6 @@ impl Execution {
                     instance,
                 );
                 timer::set(Alarm::Hold, u64::MAX);
-                if next_is_new {
-                    timer::set(Alarm::Budget, u64::MAX);
-                }
                 self.placement.suspend(instance, last)
             }
             None => {
@@ -168,7 +161,7 @@ impl Execution {
     /// Notes that this core's current instance continues in `context`.
     fn note_resumed(&self, context: &Parked, now_ns: u64) {
         context.note_resumed(now_ns);
-        timer::set(Alarm::Budget, context.budget_end_ns());
+        timer::set_no_later(Alarm::Budget, context.budget_end_ns());
         let here = here();
         if let Some(instance) = self.placement.current(here.index()) {
             trace::instance(What::Resume, since_epoch(now_ns), here, instance);

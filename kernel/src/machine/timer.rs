@@ -26,10 +26,21 @@ pub(crate) enum Alarm {
 pub(crate) fn set(alarm: Alarm, at_ns: u64) {
     let were_enabled = cpu::disable_interrupts();
     let core = this_core::get();
-    core.alarms[alarm as usize].store(at_ns, Ordering::Relaxed);
-    arm(core);
+    // Writing the timer costs a virtual machine an exit: only if there is need.
+    if core.alarms[alarm as usize].swap(at_ns, Ordering::Relaxed) != at_ns {
+        arm(core);
+    }
     if were_enabled {
         cpu::enable_interrupts();
+    }
+}
+
+/// Makes sure that this core's alarm is not later than `at_ns`. It may be
+/// earlier: for an alarm whose handler looks at the clock again, that costs an
+/// interrupt now and then instead of a write of the timer each time.
+pub(crate) fn set_no_later(alarm: Alarm, at_ns: u64) {
+    if this_core::get().alarms[alarm as usize].load(Ordering::Relaxed) > at_ns {
+        set(alarm, at_ns);
     }
 }
 
