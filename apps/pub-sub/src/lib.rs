@@ -20,6 +20,8 @@
 //! - [`Synchronizer`], [`Stamped`], [`Outlet`], [`Set`]: what both policies share;
 //! - [`ExactTime`]: equal stamps make a set;
 //! - [`ApproximateTime`], [`Parameters`], [`AgePenalty`]: close stamps make a set;
+//! - [`graph`], [`executor`]: topics, subscriptions and callbacks, and the workers that
+//!   execute them: what the synchronizers run in;
 //! - [`workload`]: the paper's workload under a policy, in virtual time;
 //! - [`metrics`]: what the joins of a run amount to.
 //!
@@ -36,6 +38,8 @@ extern crate alloc;
 
 mod approximate_time;
 mod exact_time;
+pub mod executor;
+pub mod graph;
 pub mod metrics;
 mod synchronizer;
 pub mod workload;

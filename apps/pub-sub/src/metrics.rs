@@ -83,21 +83,38 @@ impl Record {
     /// publication of the index to the first set that covers it.
     #[must_use]
     pub fn cover_delays_ns(&self) -> Vec<u64> {
-        let mut sets = self.sets.iter().peekable();
-        let mut delays_ns = Vec::with_capacity(self.sets.len());
-        for (index, published_ns) in self.last_publications_ns().enumerate() {
+        let covering = self.covering_sets().into_iter();
+        let pairs = covering.zip(self.last_publications_ns());
+        pairs
+            .map(|(set, published_ns)| self.sets[set].ready_ns.saturating_sub(published_ns))
+            .collect()
+    }
+
+    /// Returns for each index that a set covers the position of the first such set. If
+    /// no set covers an index, none covers a later one.
+    #[must_use]
+    pub fn covering_sets(&self) -> Vec<usize> {
+        let mut covering = Vec::new();
+        let mut position = 0;
+        for index in 0..self.last_publications_ns().count() {
             // What does not cover this index covers no later one.
-            while sets.next_if(|set| !set.covers(index)).is_some() {}
-            let Some(set) = sets.peek() else {
+            while self
+                .sets
+                .get(position)
+                .is_some_and(|set| !set.covers(index))
+            {
+                position += 1;
+            }
+            if position == self.sets.len() {
                 break;
-            };
-            delays_ns.push(set.ready_ns.saturating_sub(published_ns));
+            }
+            covering.push(position);
         }
-        delays_ns
+        covering
     }
 
     /// Returns the last publication of each index, by index.
-    fn last_publications_ns(&self) -> impl Iterator<Item = u64> {
+    pub fn last_publications_ns(&self) -> impl Iterator<Item = u64> {
         let indices = self.publications_ns.iter().map(Vec::len).min();
         (0..indices.unwrap_or(0)).filter_map(|index| {
             let topics = self.publications_ns.iter();
@@ -145,6 +162,7 @@ mod tests {
             [13 - 12, 44 - 20, 44 - 35],
             "nothing covers index 3"
         );
+        assert_eq!(record().covering_sets(), [0, 1, 1]);
     }
 
     #[test]

@@ -1,0 +1,286 @@
+//! Topics, timers and subscriptions with their callbacks, as data.
+//!
+//! Some words. A *callback* is what an app wants done when a *timer* is due or when a
+//! *subscription* has a message. A *topic* hands what is published on it to all its
+//! subscriptions, each of which queues up to its *depth* and then drops the oldest
+//! (`KEEP_LAST` in ROS 2). A *group* is callbacks that exclude each other (a mutually
+//! exclusive callback group; in ROS 2 all callbacks of one node by default). A
+//! *worker* is whoever executes callbacks; several share a graph.
+//!
+//! Callbacks of a group never overlap, so they can own state in common: a group is
+//! one value of a type that implements [`Callbacks`]. A worker [takes](Graph::take)
+//! the value out of the graph, calls it while the graph is free for others, and
+//! [gives it back](Graph::give_back); meanwhile nobody else can. No lock is needed
+//! for that state, and when all is over [`Graph::into_callbacks`] returns it.
+//!
+//! What is ready is taken in this order, as in ROS 2: timers before subscriptions,
+//! each in the order of their registration. Also as in ROS 2, a timer that is served
+//! more than a period late skips what it has missed, and nothing makes the order
+//! fair: an earlier registration wins as long as it is ready. Unlike there, a worker
+//! looks anew each time instead of working off what was ready when it looked.
+//!
+//! It guarantees that a group's callbacks do not overlap, that a subscription's
+//! messages come in the order of their publication, that dropped ones are counted,
+//! and that nothing is allocated after registration. There is no clock here: times
+//! are given.
+
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+
+/// A topic of a [`Graph`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TopicId(usize);
+
+/// A group of a [`Graph`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroupId(usize);
+
+/// A group's callbacks, with the state that they share.
+pub trait Callbacks<M> {
+    /// Executes one of them. Publishing is allowed anywhere in it.
+    fn call(&mut self, call: Call<M>, context: &dyn Context<M>);
+}
+
+impl<M, F: FnMut(Call<M>, &dyn Context<M>)> Callbacks<M> for F {
+    fn call(&mut self, call: Call<M>, context: &dyn Context<M>) {
+        self(call, context);
+    }
+}
+
+/// Why a callback is executed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Call<M> {
+    /// A timer of the group was due at this time.
+    Timer {
+        /// The time in nanoseconds.
+        due_ns: u64,
+    },
+    /// A subscription of the group has this message.
+    Message {
+        /// The topic on which it was published.
+        topic: TopicId,
+        /// The message.
+        message: M,
+    },
+}
+
+/// What a callback can do besides computing.
+pub trait Context<M> {
+    /// Returns the time in nanoseconds.
+    fn now_ns(&self) -> u64;
+
+    /// Publishes a message, at once.
+    ///
+    /// # Panics
+    ///
+    /// If the graph has no such topic.
+    fn publish(&self, topic: TopicId, message: M);
+
+    /// Lets all workers end when they have executed what they are at.
+    fn shut_down(&self);
+}
+
+/// Topics, groups, timers and subscriptions that belong together. `M` is the type of
+/// all messages, `C` of all groups' callbacks.
+#[derive(Debug)]
+pub struct Graph<M, C> {
+    /// For each topic its subscriptions.
+    topics: Vec<Vec<usize>>,
+    /// Each group's callbacks, unless a worker has them.
+    groups: Vec<Option<C>>,
+    timers: Vec<Timer>,
+    subscriptions: Vec<Subscription<M>>,
+    is_shut_down: bool,
+}
+
+#[derive(Debug)]
+struct Timer {
+    group: usize,
+    next_ns: u64,
+    period_ns: u64,
+}
+
+#[derive(Debug)]
+struct Subscription<M> {
+    topic: TopicId,
+    group: usize,
+    queue: VecDeque<M>,
+    depth: usize,
+    dropped: u64,
+}
+
+/// What a worker is to do.
+#[derive(Debug)]
+pub enum Next<M, C> {
+    /// Call these callbacks and give them back.
+    Call(GroupId, C, Call<M>),
+    /// Look again when something was published or given back, or at this time;
+    /// `u64::MAX` is never.
+    WaitUntil(u64),
+    /// Nothing more: the graph was shut down.
+    End,
+}
+
+impl<M, C> Default for Graph<M, C> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<M, C> Graph<M, C> {
+    /// Makes an empty graph.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            topics: Vec::new(),
+            groups: Vec::new(),
+            timers: Vec::new(),
+            subscriptions: Vec::new(),
+            is_shut_down: false,
+        }
+    }
+
+    /// Adds a topic.
+    pub fn add_topic(&mut self) -> TopicId {
+        self.topics.push(Vec::new());
+        TopicId(self.topics.len() - 1)
+    }
+
+    /// Adds a group with its callbacks.
+    pub fn add_group(&mut self, callbacks: C) -> GroupId {
+        self.groups.push(Some(callbacks));
+        GroupId(self.groups.len() - 1)
+    }
+
+    /// Adds a timer to a group: due first at `first_ns`, then each `period_ns`.
+    ///
+    /// # Panics
+    ///
+    /// If the period is 0.
+    pub fn add_timer(&mut self, group: GroupId, first_ns: u64, period_ns: u64) {
+        assert!(period_ns > 0, "a timer's period is at least 1 ns");
+        self.timers.push(Timer {
+            group: group.0,
+            next_ns: first_ns,
+            period_ns,
+        });
+    }
+
+    /// Subscribes a group to a topic, with a queue of `depth` messages.
+    ///
+    /// # Panics
+    ///
+    /// If the depth is 0 or there is no such topic.
+    pub fn subscribe(&mut self, group: GroupId, topic: TopicId, depth: usize) {
+        assert!(depth > 0, "a subscription queues at least 1 message");
+        self.topics[topic.0].push(self.subscriptions.len());
+        self.subscriptions.push(Subscription {
+            topic,
+            group: group.0,
+            queue: VecDeque::with_capacity(depth),
+            depth,
+            dropped: 0,
+        });
+    }
+
+    /// Publishes a message: queues it in each of the topic's subscriptions.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such topic.
+    pub fn publish(&mut self, topic: TopicId, message: M)
+    where
+        M: Clone,
+    {
+        for &index in &self.topics[topic.0] {
+            self.subscriptions[index].push(message.clone());
+        }
+    }
+
+    /// Returns what is ready and takes it, or says what to wait for.
+    pub fn take(&mut self, now_ns: u64) -> Next<M, C> {
+        if self.is_shut_down {
+            return Next::End;
+        }
+        for timer in self.timers.iter_mut().filter(|timer| timer.is_due(now_ns)) {
+            if let Some(callbacks) = self.groups[timer.group].take() {
+                let due_ns = timer.serve(now_ns);
+                return Next::Call(GroupId(timer.group), callbacks, Call::Timer { due_ns });
+            }
+        }
+        for subscription in &mut self.subscriptions {
+            let group = &mut self.groups[subscription.group];
+            if group.is_some()
+                && let Some(message) = subscription.queue.pop_front()
+                && let Some(callbacks) = group.take()
+            {
+                let topic = subscription.topic;
+                let call = Call::Message { topic, message };
+                return Next::Call(GroupId(subscription.group), callbacks, call);
+            }
+        }
+        // A timer that is due has a busy group: who gives that back will see it.
+        let to_come = self.timers.iter().filter(|timer| !timer.is_due(now_ns));
+        let next_ns = to_come.map(|timer| timer.next_ns).min();
+        Next::WaitUntil(next_ns.unwrap_or(u64::MAX))
+    }
+
+    /// Takes a group's callbacks back, and returns whether another callback of the
+    /// group waits for that.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such group.
+    pub fn give_back(&mut self, group: GroupId, callbacks: C, now_ns: u64) -> bool {
+        self.groups[group.0] = Some(callbacks);
+        let mut timers = self.timers.iter();
+        let mut subscriptions = self.subscriptions.iter();
+        timers.any(|timer| timer.group == group.0 && timer.is_due(now_ns))
+            || subscriptions.any(|one| one.group == group.0 && !one.queue.is_empty())
+    }
+
+    /// Lets nothing be taken any more.
+    pub fn shut_down(&mut self) {
+        self.is_shut_down = true;
+    }
+
+    /// Returns how many messages the subscriptions have dropped, all together.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.subscriptions.iter().map(|one| one.dropped).sum()
+    }
+
+    /// Returns the callbacks of all groups, in order; those that a worker has are
+    /// missing.
+    pub fn into_callbacks(self) -> impl Iterator<Item = C> {
+        self.groups.into_iter().flatten()
+    }
+}
+
+impl Timer {
+    const fn is_due(&self, now_ns: u64) -> bool {
+        self.next_ns <= now_ns
+    }
+
+    /// Moves on to the next time that is not past, and returns when it was due.
+    fn serve(&mut self, now_ns: u64) -> u64 {
+        let due_ns = self.next_ns;
+        let behind = now_ns.saturating_sub(due_ns.saturating_add(self.period_ns));
+        let periods = 1 + behind.div_ceil(self.period_ns);
+        self.next_ns = due_ns.saturating_add(self.period_ns.saturating_mul(periods));
+        due_ns
+    }
+}
+
+impl<M> Subscription<M> {
+    fn push(&mut self, message: M) {
+        if self.queue.len() == self.depth {
+            self.queue.pop_front();
+            self.dropped += 1;
+        }
+        self.queue.push_back(message);
+    }
+}
+
+#[cfg(test)]
+mod tests;
