@@ -153,6 +153,8 @@ pub struct Qemu {
     pub memory_mib: u64,
     /// The guest's command line.
     pub guest_words: String,
+    /// A file to leave in the guest's memory.
+    pub module: Option<PathBuf>,
     /// Wait for a debugger on TCP port 1234 before the first instruction.
     pub wait_for_debugger: bool,
 }
@@ -167,6 +169,7 @@ impl Default for Qemu {
             cores: 1,
             memory_mib: 32,
             guest_words: String::new(),
+            module: None,
             wait_for_debugger: false,
         }
     }
@@ -183,6 +186,9 @@ impl Qemu {
         arguments.extend(["-m".into(), format!("{}M", self.memory_mib)]);
         arguments.extend(["-kernel".into(), image.display().to_string()]);
         arguments.extend(["-append".into(), self.guest_words.clone()]);
+        if let Some(module) = &self.module {
+            arguments.extend(["-initrd".into(), module.display().to_string()]);
+        }
         // A comma would end the file's name in QEMU's syntax unless doubled.
         let serial = serial.display().to_string().replace(',', ",,");
         arguments.extend(["-serial".into(), format!("file:{serial}")]);
@@ -246,6 +252,7 @@ mod tests {
             assert!(line.contains(part), "`{part}` is not in `{line}`");
         }
         assert!(!line.contains("-gdb"));
+        assert!(!line.contains("-initrd"));
     }
 
     #[test]

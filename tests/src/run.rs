@@ -166,6 +166,7 @@ fn describe(options: &Parsed, program: &Path, mode: Mode, memory_mib: u64) -> Qe
         cores: options.number("cores").unwrap_or(1),
         memory_mib,
         guest_words: words.join(" "),
+        module: None,
         wait_for_debugger: options.is_given("gdb"),
     }
 }

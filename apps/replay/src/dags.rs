@@ -5,14 +5,15 @@
 //! event falls on a whole unit. On the machine a start comes a little after its
 //! unit, for the scheduler, the switch and the interrupt take time too; along a
 //! chain of instances that would add up until it is a unit. So, as WCETs do, the
-//! execution times *include* what the kernel took: an instance executes up to
-//! the end of its last unit, counted from the whole unit that is nearest to its
-//! start. What the kernel takes after the start (preempting and resuming it) is
-//! not made up for.
+//! execution times *include* what the kernel took: each unit of execution lasts
+//! up to the end of a whole unit of time, counted from the one nearest to its
+//! start. Only what the kernel takes while a unit of execution is under way, by
+//! preempting and resuming it, makes that unit end later (or earlier, if it was
+//! suspended later than it was resumed).
 //!
-//! An instance further stops a *guard* before the end of its last unit: in the
-//! reference, completions of an instant come before its releases, and a deadline
-//! at the instant of the completion is met.
+//! A unit of execution further ends a *guard* before the unit of time does: in
+//! the reference, completions of an instant come before its releases, and a
+//! deadline at the instant of the completion is met.
 
 use alloc::format;
 use alloc::string::String;
@@ -31,7 +32,7 @@ use crate::case::Case;
 pub struct Scale {
     /// The length of a unit, in nanoseconds, at least 1.
     pub unit_ns: u64,
-    /// How long before the end of its last unit an instance stops executing.
+    /// How long before the end of a unit of time a unit of execution ends.
     pub guard_ns: u64,
 }
 
@@ -51,12 +52,12 @@ impl Epoch {
 }
 
 impl Scale {
-    /// Returns how long an instance of `units` executes if it starts `start_ns`
-    /// after time 0.
+    /// Returns how long a unit of execution lasts that starts `start_ns` after
+    /// time 0.
     #[must_use]
-    pub fn execution_ns(self, start_ns: u64, units: u64) -> u64 {
-        let first = start_ns.saturating_add(self.unit_ns / 2) / self.unit_ns;
-        let end_ns = first.saturating_add(units).saturating_mul(self.unit_ns);
+    pub fn unit_from(self, start_ns: u64) -> u64 {
+        let nearest = start_ns.saturating_add(self.unit_ns / 2) / self.unit_ns;
+        let end_ns = nearest.saturating_add(1).saturating_mul(self.unit_ns);
         end_ns
             .saturating_sub(self.guard_ns)
             .saturating_sub(start_ns)
@@ -94,8 +95,10 @@ pub fn build(case: &Case, scale: Scale, epoch: &Epoch) -> Result<Vec<Dag>, Strin
                 let (executions, epoch) = (executions.clone(), epoch.clone());
                 let execute = move |job| {
                     let units = usize::try_from(job).map_or(0, |job| executions[job]);
-                    let ns = scale.execution_ns(epoch.elapsed_ns(), units);
-                    fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
+                    for _ in 0..units {
+                        let ns = scale.unit_from(epoch.elapsed_ns());
+                        fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
+                    }
                 };
                 let attributes = SubtaskAttributes::default().priority(subtask.priority().0);
                 dag.register_untyped_subtask(execute, attributes)
@@ -116,15 +119,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn execution_ends_at_whole_units_less_the_guard() {
+    fn a_unit_of_execution_ends_a_guard_before_a_unit_of_time() {
         let scale = Scale {
             unit_ns: 1000,
             guard_ns: 10,
         };
-        assert_eq!(scale.execution_ns(5000, 2), 1990);
-        assert_eq!(scale.execution_ns(5040, 2), 1950); // 40 ns were the kernel's
-        assert_eq!(scale.execution_ns(4990, 2), 2000); // an early predecessor
-        assert_eq!(scale.execution_ns(5500, 1), 1490); // no longer near unit 5
-        assert_eq!(scale.execution_ns(u64::MAX, 1), 0);
+        assert_eq!(scale.unit_from(5000), 990);
+        assert_eq!(scale.unit_from(5040), 950); // 40 ns were the kernel's
+        assert_eq!(scale.unit_from(4990), 1000); // the unit before ended early
+        assert_eq!(scale.unit_from(5500), 1490); // nearer to 6 than to 5
+        assert_eq!(scale.unit_from(u64::MAX), 0);
     }
 }

@@ -1,8 +1,8 @@
 //! Runs the reference schedules in the loader's file, and prints what happened.
 //!
 //! Words of the command line: `unit_us` is the length of a unit of the cases'
-//! time; `guard_us` is how much before the end of its last unit an instance
-//! stops; events less than `window_us` apart count as one instant. Without the
+//! time; `guard_us` is how much before the end of a unit of time a unit of
+//! execution ends; events less than `window_us` apart count as one instant. Without the
 //! latter two they are a 500th and a 100th of a unit. Policy and preemption are
 //! the cases'; so are the cores, which have to be the machine's.
 
@@ -27,6 +27,7 @@ kernel::entry!(main);
 const ROWS_A_LINE: usize = 32;
 
 fn main(machine: &Machine) -> Result<(), Ending> {
+    let cases = cases(machine)?;
     let options = machine.options();
     let unit_us = options.number("unit_us", 1..=10_000_000, 10_000)?;
     let guard_us = options.number("guard_us", 0..=unit_us / 4, unit_us / 500)?;
@@ -37,7 +38,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         guard_ns: guard_us * 1000,
     };
     machine.set_coincidence(Duration::from_micros(window_us));
-    for case in &cases(machine)? {
+    for case in &cases {
         run(machine, case, scale)?;
     }
     machine.report_memory();

@@ -8,9 +8,11 @@
 //!
 //! - [`bounds`]: the analysis at commit;
 //! - [`schedules`]: the scheduler in virtual time;
+//! - [`in_kernel`]: the same cases on the bare machine;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline.
 
 pub mod bounds;
+pub mod in_kernel;
 pub mod schedules;
 pub mod synchronizer;
 
@@ -30,6 +32,7 @@ const USAGE: &str = "usage: oracle KIND FILE...
 Compares reference cases with what this project computes. KIND is one of:
   bounds        lengths, widths, response-time bounds and verdicts
   schedules     starts, finishes, preemptions, response times and misses
+                With --in-kernel on the bare machine; see schedules --in-kernel --help
   synchronizer  sets that ExactTime and ApproximateTime emit, and what they drop
 
 Prints the first difference of each failing case, then `N passed, M failed`.
@@ -39,13 +42,17 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 /// Runs the subcommand.
 #[must_use]
 pub fn oracle(words: &[String]) -> ExitCode {
-    if words.iter().any(|word| word == "--help" || word == "-h") {
+    let on_machine = words.iter().any(|word| word == "--in-kernel");
+    if !on_machine && words.iter().any(|word| word == "--help" || word == "-h") {
         print!("{USAGE}");
         return ExitCode::SUCCESS;
     }
     let Some((kind, files)) = words.split_first() else {
         return refuse("which kind of reference file?");
     };
+    if kind == "schedules" && files.iter().any(|word| word == "--in-kernel") {
+        return in_kernel::command(files);
+    }
     match kind.as_str() {
         "bounds" => run_files(
             &Kind {

@@ -1,0 +1,125 @@
+//! Booting the app `replay` with cases, as few times as will do.
+
+use std::fs;
+use std::path::Path;
+
+use replay::{Case, Epoch, build};
+
+use super::compare::compare;
+use super::transcript::read;
+use super::{Judged, Settings};
+use crate::outcome::{Outcome, boot};
+use crate::qemu::Qemu;
+use crate::{image, install, system};
+
+/// The most cases of one boot: the guest has them all in memory.
+const MOST_CASES: usize = 64;
+
+/// The guest's memory.
+const MEMORY_MIB: u64 = 64;
+
+/// Runs cases in the kernel, in boots of one number of cores each, and compares.
+/// `texts` are the cases' records, one text a case.
+///
+/// # Errors
+///
+/// In words: there is no QEMU, no image, or a file cannot be written.
+pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<Judged>, String> {
+    install::ensure_qemu()?;
+    let image = image::build("replay").map_err(|error| error.to_string())?;
+    let mut by_cores: Vec<(&Case, &str)> =
+        cases.iter().zip(texts.iter().map(String::as_str)).collect();
+    by_cores.sort_by_key(|(case, _)| case.cores);
+    let mut judged = Vec::with_capacity(cases.len());
+    for group in by_cores.chunk_by(|(a, _), (b, _)| a.cores == b.cores) {
+        let mut waiting = group;
+        while let Some((first, _)) = waiting.first() {
+            // What cannot be told in nanoseconds would end the whole boot.
+            if let Err(reason) = build(first, settings.scale(), &Epoch::default()) {
+                judged.push(verdict(first, Err(reason)));
+                waiting = &waiting[1..];
+                continue;
+            }
+            let fits = |(case, _): &&(&Case, &str)| {
+                build(case, settings.scale(), &Epoch::default()).is_ok()
+            };
+            let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
+            let outcome = boot_with(&image.path, &waiting[..count], settings)?;
+            let before = judged.len();
+            judged.extend(judge(&outcome, &waiting[..count], settings));
+            waiting = &waiting[judged.len() - before..];
+        }
+    }
+    Ok(judged)
+}
+
+fn verdict(case: &Case, outcome: Result<super::Deviation, String>) -> Judged {
+    Judged {
+        name: case.name.clone(),
+        cores: case.cores,
+        outcome,
+    }
+}
+
+fn boot_with(
+    image: &Path,
+    cases: &[(&Case, &str)],
+    settings: &Settings,
+) -> Result<Outcome, String> {
+    let log = system::new_log("replay")?;
+    let module = log.with_extension("cases");
+    let text: String = cases.iter().map(|(_, text)| *text).collect();
+    fs::write(&module, text)
+        .map_err(|error| format!("cannot write `{}`: {error}", module.display()))?;
+    let Settings {
+        mode,
+        machine,
+        unit_us,
+        guard_us,
+        window_us,
+        ..
+    } = *settings;
+    let qemu = Qemu {
+        mode,
+        machine,
+        cores: cases.first().map_or(1, |(case, _)| case.cores.into()),
+        memory_mib: MEMORY_MIB,
+        guest_words: format!(
+            "mode={mode} unit_us={unit_us} guard_us={guard_us} window_us={window_us}"
+        ),
+        module: Some(module.clone()),
+        ..Qemu::default()
+    };
+    let only_cases: Vec<&Case> = cases.iter().map(|(case, _)| *case).collect();
+    let outcome = boot(&qemu, image, &log, settings.limit(&only_cases), |_| {});
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_file(&module);
+    outcome
+}
+
+/// Judges the cases that ran and, if the guest did not get through, the one that
+/// ended it; what comes after that has not been run.
+fn judge(outcome: &Outcome, cases: &[(&Case, &str)], settings: &Settings) -> Vec<Judged> {
+    let mut judged = Vec::with_capacity(cases.len());
+    let ending = outcome.judge().err();
+    for (case, _) in cases {
+        let Some(ran) = read(&outcome.transcript, case) else {
+            let why = ending.map_or("it printed nothing about it".into(), |fault| fault.reason);
+            let log = outcome.log.display();
+            judged.push(verdict(
+                case,
+                Err(format!("did not run: {why}; the serial log is {log}")),
+            ));
+            return judged;
+        };
+        judged.push(verdict(case, compare(case, &ran, settings)));
+    }
+    match (ending, judged.last_mut()) {
+        (Some(fault), Some(last)) if last.outcome.is_ok() => last.outcome = Err(fault.reason),
+        (None, _) => {
+            let _ = fs::remove_file(&outcome.log);
+        }
+        _ => {}
+    }
+    judged
+}

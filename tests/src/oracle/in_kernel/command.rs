@@ -1,0 +1,242 @@
+//! `oracle schedules --in-kernel`: its command line and what it prints.
+
+use std::process::ExitCode;
+
+use replay::Case;
+use replay::lines::Malformed;
+
+use super::{Deviation, Judged, Settings, run};
+use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::oracle::schedules;
+use crate::qemu::{MOST_CORES, Machine, Mode};
+
+/// The table of the command. The files are taken out before it is consulted.
+static IN_KERNEL: Command = Command {
+    invocation: "./scripts/oracle schedules --in-kernel FILE...",
+    about: "Runs reference schedules on the bare machine in QEMU and compares.",
+    positional: None,
+    options: &[
+        Opt {
+            name: "in-kernel",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "On the machine, not in virtual time on the host.",
+        },
+        Opt {
+            name: "cores-up-to",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: MOST_CORES,
+            },
+            default: "64",
+            help: "Leave out the cases for more cores.",
+        },
+        Opt {
+            name: "unit-us",
+            short: None,
+            takes: Takes::Number {
+                least: 100,
+                most: 10_000_000,
+            },
+            default: "10000",
+            help: "The length of a unit of time in microseconds.",
+        },
+        Opt {
+            name: "window-us",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: 2_500_000,
+            },
+            default: "",
+            help: "Events less than this apart count as one instant; a 100th of a unit.",
+        },
+        Opt {
+            name: "guard-us",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: 2_500_000,
+            },
+            default: "",
+            help: "How much before a unit's end execution in it ends; a 500th of a unit.",
+        },
+        Opt {
+            name: "tolerance",
+            short: None,
+            takes: Takes::Number { least: 1, most: 49 },
+            default: "2",
+            help: "How far starts and finishes may be from the reference, in percent of a unit.",
+        },
+        Opt {
+            name: "mode",
+            short: None,
+            takes: Takes::OneOf(Mode::NAMES),
+            default: "deterministic",
+            help: "What time means; see ./scripts/run --help.",
+        },
+        Opt {
+            name: "machine",
+            short: None,
+            takes: Takes::OneOf(Machine::NAMES),
+            default: "microvm",
+            help: "The board that QEMU imitates.",
+        },
+    ],
+    notes: "\
+Each case runs with its number of cores, its policy, and preemption as it says.
+Compared are start, finish and preemptions of every instance, and release, finish
+and miss of every job. Printed are the first difference of each failing case, a
+line for each number of cores, and `N passed, M failed`.
+
+The window and the tolerance are there because a machine takes time and its
+events come one after the other, where the reference has them at one instant. In
+the modes threads and kvm a unit takes its real time, and has to be far longer
+than the host's noise.
+
+Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
+",
+};
+
+/// Runs the command with the words after `schedules`.
+pub(in crate::oracle) fn command(words: &[String]) -> ExitCode {
+    let (options, files) = take_files(words);
+    let refuse = |reason: &str| {
+        eprintln!("oracle: {reason}");
+        ExitCode::from(2)
+    };
+    let options = match IN_KERNEL.parse(&options) {
+        Ok(Request::Work(options)) => options,
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => return refuse(&error.to_string()),
+    };
+    let settings = settings(&options);
+    let most_us = settings.unit_us / 4;
+    if settings.window_us > most_us || settings.guard_us > most_us {
+        return refuse(&format!(
+            "the window and the guard may be a quarter of a unit at most, here {most_us} us"
+        ));
+    }
+    let (mut cases, mut texts) = match read(&files) {
+        Ok(read) => read,
+        Err(reason) => return refuse(&reason),
+    };
+    let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
+    let all = cases.len();
+    let mut keeps = cases.iter().map(|case| u64::from(case.cores) <= most_cores);
+    let keeps: Vec<bool> = keeps.by_ref().collect();
+    let mut keep = keeps.iter();
+    cases.retain(|_| keep.next().copied().unwrap_or(false));
+    let mut keep = keeps.iter();
+    texts.retain(|_| keep.next().copied().unwrap_or(false));
+    if cases.len() < all {
+        let left_out = all - cases.len();
+        println!("{left_out} cases for more than {most_cores} cores are left out");
+    }
+    match run(&cases, &texts, &settings) {
+        Ok(judged) => ExitCode::from(u8::from(report(&judged, &settings) > 0)),
+        Err(reason) => {
+            eprintln!("oracle: {reason}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Parts the words that name files from the options and their values.
+fn take_files(words: &[String]) -> (Vec<String>, Vec<String>) {
+    let takes_value = |word: &str| {
+        let known = IN_KERNEL.options.iter().filter(|option| {
+            !matches!(option.takes, Takes::Nothing) && word.strip_prefix("--") == Some(option.name)
+        });
+        known.count() > 0
+    };
+    let (mut options, mut files) = (Vec::new(), Vec::new());
+    let mut is_value = false;
+    for word in words {
+        let is_option = is_value || word.starts_with('-');
+        is_value = !is_value && takes_value(word);
+        let list = if is_option { &mut options } else { &mut files };
+        list.push(word.clone());
+    }
+    (options, files)
+}
+
+fn settings(options: &Parsed) -> Settings {
+    let usual = Settings::for_unit(options.number("unit-us").unwrap_or(10_000));
+    let mode = options.text("mode").and_then(Mode::from_name);
+    let machine = options.text("machine").and_then(Machine::from_name);
+    let number = |name: &str, usual| options.number(name).unwrap_or(usual);
+    Settings {
+        mode: mode.unwrap_or(usual.mode),
+        machine: machine.unwrap_or(usual.machine),
+        guard_us: number("guard-us", usual.guard_us),
+        window_us: number("window-us", usual.window_us),
+        tolerance_percent: number("tolerance", usual.tolerance_percent),
+        ..usual
+    }
+}
+
+/// Reads the cases of all files, each also as text.
+fn read(files: &[String]) -> Result<(Vec<Case>, Vec<String>), String> {
+    if files.is_empty() {
+        return Err("which files? name at least one file of reference schedules".into());
+    }
+    let (mut cases, mut texts) = (Vec::new(), Vec::new());
+    for file in files {
+        let text = std::fs::read_to_string(file)
+            .map_err(|error| format!("cannot read {file}: {error}"))?;
+        let parsed = schedules::parse(&text)
+            .map_err(|Malformed { line, reason }| format!("{file}:{line}: {reason}"))?;
+        cases.extend(parsed);
+        texts.extend(texts_of_cases(&text));
+    }
+    Ok((cases, texts))
+}
+
+/// Takes a well-formed file apart, one text a case.
+#[must_use]
+pub fn texts_of_cases(text: &str) -> Vec<String> {
+    let mut texts: Vec<String> = Vec::new();
+    for line in text.lines() {
+        if line.split_whitespace().next() == Some("case") {
+            texts.push(String::new());
+        }
+        if let Some(last) = texts.last_mut() {
+            last.push_str(line);
+            last.push('\n');
+        }
+    }
+    texts
+}
+
+/// Prints what became of the cases and returns how many failed.
+fn report(judged: &[Judged], settings: &Settings) -> usize {
+    for case in judged {
+        if let Err(difference) = &case.outcome {
+            println!("{}: {difference}", case.name);
+        }
+    }
+    let passed = |cases: &[Judged]| cases.iter().filter(|case| case.outcome.is_ok()).count();
+    for group in judged.chunk_by(|a, b| a.cores == b.cores) {
+        let deviations = group.iter().filter_map(|case| case.outcome.clone().ok());
+        let of_all = deviations.reduce(Deviation::and).unwrap_or_default();
+        println!(
+            "{} cores: {} of {} passed; starts and finishes from {:+} to {:+} us of the reference, \
+             units of {} us",
+            group[0].cores,
+            passed(group),
+            group.len(),
+            of_all.earliest_ns / 1000,
+            of_all.latest_ns / 1000,
+            settings.unit_us,
+        );
+    }
+    let failed = judged.len() - passed(judged);
+    println!("{} passed, {failed} failed", passed(judged));
+    failed
+}

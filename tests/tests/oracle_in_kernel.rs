@@ -1,0 +1,57 @@
+//! The kernel against reference schedules: the public cases for up to four
+//! cores run on the bare machine as the reference says, and where they do not,
+//! the first difference is named.
+
+use harness::oracle::in_kernel::{Settings, run, texts_of_cases};
+use harness::oracle::schedules::{Case, parse};
+
+const PUBLIC: &str = include_str!("../oracle/schedules.txt");
+
+/// Ten milliseconds: idle time is skipped, so a long unit costs nothing.
+const UNIT_US: u64 = 10_000;
+
+/// Returns the public cases that `keep` keeps, and their texts.
+fn cases(keep: impl Fn(&Case) -> bool) -> (Vec<Case>, Vec<String>) {
+    let cases = parse(PUBLIC).expect("the file is well formed");
+    let texts = texts_of_cases(PUBLIC);
+    assert_eq!(cases.len(), texts.len());
+    cases
+        .into_iter()
+        .zip(texts)
+        .filter(|(case, _)| keep(case))
+        .unzip()
+}
+
+#[test]
+fn the_machine_reproduces_the_public_schedules() {
+    let (cases, texts) = cases(|case| case.cores <= 4);
+    assert_eq!(cases.len(), 24);
+    let judged = run(&cases, &texts, &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
+    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
+    assert_eq!(judged.len(), 24);
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+#[test]
+fn a_schedule_that_is_not_the_reference_s_is_found_out() {
+    let (_, texts) = cases(|case| case.name == "pub012");
+    // Longer than the reference takes it to be: what follows comes too late.
+    let text = texts[0].replacen("x 0 0 0 0 3 0", "x 0 0 0 0 2 0", 1);
+    assert_ne!(text, texts[0]);
+    let cases = parse(&text).expect("well formed");
+    let judged = run(&cases, &[text], &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
+    let difference = judged[0].outcome.clone().expect_err("a difference");
+    let expected = "dag 0 job 0 subtask 0: finish: expected at 2, ran at 2.99";
+    assert!(difference.starts_with(expected), "{difference}");
+}
+
+#[test]
+fn a_guest_without_cases_is_refused() {
+    let outcome = harness::Guest::new("replay").end_in(harness::protocol::Status::Usage);
+    let verdict = outcome.transcript.verdict().expect("checked before");
+    assert!(
+        verdict.reason.contains("-initrd FILE"),
+        "{}",
+        verdict.reason
+    );
+}
