@@ -16,7 +16,7 @@
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table;
 //! - [`guest`]: all that for a test;
-//! - [`run`](mod@run), [`test`](mod@test): the subcommands.
+//! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
 //! as good that did not say so twice. It uses the standard library only, and
@@ -39,6 +39,7 @@ pub mod probe;
 pub mod protocol;
 pub mod qemu;
 pub mod run;
+pub mod soak;
 pub mod system;
 pub mod tail;
 pub mod test;

@@ -35,6 +35,11 @@ const SUBCOMMANDS: &[(&str, &str, Work)] = &[
         "measure parts of the project on this host",
         harness::bench::bench,
     ),
+    (
+        "soak",
+        "run random DAG sets for a long time and check everything",
+        harness::soak::soak,
+    ),
 ];
 
 fn main() -> ExitCode {

@@ -23,7 +23,8 @@ fn round(
     let executed = Executed::default();
     let plans = draw_set(1, round, load, cores);
     let dags = build(&plans, LENGTH, overrun, &executed);
-    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph())
+        .expect("a drawn set has no fault");
     let report = machine.run();
     let case = format!("round {round}, load {load}, {policy:?}, {preemption:?}, {overrun:?}");
     assert_eq!(report.violations(), [], "{case}");
@@ -92,7 +93,8 @@ fn the_largest_set_can_be_committed_and_run() {
         OverrunPolicy::Queue,
         &executed,
     );
-    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph())
+        .expect("a drawn set has no fault");
     let report = machine.run();
     assert_eq!((report.jobs.len(), executed.instances()), (8, 96));
 }

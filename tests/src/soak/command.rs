@@ -1,0 +1,298 @@
+//! The command line of `soak`, and what it prints.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use super::figures::Figures;
+use super::plan::{Length, Part, Plan};
+use super::progress::Progress;
+use super::{Report, run};
+use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::qemu::{MOST_CORES, Mode};
+
+/// The most that a load may be, in percent.
+const MOST_LOAD: u64 = 1000;
+
+/// The table of `soak`.
+static SOAK: Command = Command {
+    invocation: "./scripts/soak",
+    about: "Runs random DAG sets on the bare machine for a long time, and checks everything.",
+    positional: None,
+    options: &[
+        Opt {
+            name: "short",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "Seconds instead of minutes, of the same kinds.",
+        },
+        Opt {
+            name: "cores",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: MOST_CORES,
+            },
+            default: "4",
+            help: "Processors of the guest.",
+        },
+        Opt {
+            name: "load",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: MOST_LOAD,
+            },
+            default: "90",
+            help: "The load, in percent of all cores.",
+        },
+        Opt {
+            name: "overload",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: MOST_LOAD,
+            },
+            default: "130",
+            help: "The load of the overload, in percent of all cores.",
+        },
+        Opt {
+            name: "seconds",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: 86_400,
+            },
+            default: "600",
+            help: "Guest time at the load, half of it under each policy.",
+        },
+        Opt {
+            name: "overload-seconds",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: 86_400,
+            },
+            default: "60",
+            help: "Guest time in overload with each overrun policy, likewise.",
+        },
+        Opt {
+            name: "round-ms",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: 10_000,
+            },
+            default: "5000",
+            help: "Guest time in which a round, that is one set of DAGs, releases jobs.",
+        },
+        Opt {
+            name: "seed",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: u64::MAX,
+            },
+            default: "1",
+            help: "Seed of the sets and the execution times.",
+        },
+        Opt {
+            name: "mode",
+            short: None,
+            takes: Takes::OneOf(Mode::NAMES),
+            default: "deterministic",
+            help: "What time means; see ./scripts/run --help.",
+        },
+        Opt {
+            name: "only",
+            short: None,
+            takes: Takes::Text("PART"),
+            default: "",
+            help: "Only this part, by the table's name, such as edf-130-skip.",
+        },
+        Opt {
+            name: "first",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: 1_000_000,
+            },
+            default: "0",
+            help: "The first round of each part.",
+        },
+        Opt {
+            name: "rounds",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: 1_000_000,
+            },
+            default: "",
+            help: "The rounds of each part, instead of a time.",
+        },
+        Opt {
+            name: "side-by-side",
+            short: None,
+            takes: Takes::Number { least: 1, most: 64 },
+            default: "",
+            help: "Guests that run at once; as many as the host has processors, and one where \
+                   time is real.",
+        },
+    ],
+    notes: "\
+A round draws a random set of 3 to 8 DAGs of 3 to 12 subtasks, whose execution
+times are random too, and runs it for the time of a round. Checked are: rules R1
+to R5, by the guest from its record and by the host from the trace; every job
+completed, skipped or aborted, as the overrun policy allows; no allocation while
+jobs run; heap and stacks as before. The last line is `N passed, M failed`, in
+rounds; a failure is printed with the command that runs its round again.
+
+exit codes: 0 no round failed; 1 some did; 2 a refused command line
+",
+};
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn soak(words: &[String]) -> ExitCode {
+    let options = match SOAK.parse(words) {
+        Ok(Request::Work(options)) => options,
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => return refuse(&error.to_string()),
+    };
+    let plan = match plan(&options) {
+        Ok(plan) => plan,
+        Err(reason) => return refuse(&reason),
+    };
+    println!(
+        "{} rounds of {} ms on {} cores, seed {}, mode {}",
+        plan.rounds(),
+        plan.round.as_millis(),
+        plan.cores,
+        plan.seed,
+        plan.mode
+    );
+    let mut progress = Progress::new(plan.rounds());
+    let report = run(&plan, |over| progress.show(over));
+    progress.end();
+    match report {
+        Ok(report) => conclude(&report),
+        Err(reason) => {
+            eprintln!("soak: {reason}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn refuse(reason: &str) -> ExitCode {
+    eprintln!("soak: {reason}");
+    ExitCode::from(2)
+}
+
+/// Makes the plan that the options ask for.
+fn plan(options: &Parsed) -> Result<Plan, String> {
+    let number = |name| options.number(name).unwrap_or(0);
+    let mut length = match options.is_given("short") {
+        true => Length::SHORT,
+        false => Length::LONG,
+    };
+    for (name, place) in [
+        ("seconds", &mut length.seconds),
+        ("overload-seconds", &mut length.overload_seconds),
+    ] {
+        if options.is_given(name) {
+            *place = number(name);
+        }
+    }
+    if options.is_given("round-ms") {
+        length.round = Duration::from_millis(number("round-ms"));
+    }
+    let mode = options.text("mode").and_then(Mode::from_name);
+    let mode = mode.unwrap_or(Mode::Deterministic);
+    let mut plan = Plan {
+        cores: number("cores"),
+        seed: number("seed"),
+        first: number("first"),
+        mode,
+        side_by_side: side_by_side(options, mode),
+        ..Plan::new(length, number("load"), number("overload"))
+    };
+    if options.is_given("rounds") {
+        plan.parts
+            .iter_mut()
+            .for_each(|part| part.rounds = number("rounds"));
+    }
+    if let Some(only) = options.text("only") {
+        let names: Vec<String> = plan.parts.iter().map(Part::to_string).collect();
+        plan.parts.retain(|part| part.to_string() == only);
+        plan.parts.truncate(1);
+        if plan.parts.is_empty() {
+            return Err(format!("`--only {only}`: there are {}", names.join(", ")));
+        }
+    }
+    Ok(plan)
+}
+
+/// Where time is virtual, guests do not notice each other.
+fn side_by_side(options: &Parsed, mode: Mode) -> usize {
+    let given = options.number("side-by-side");
+    let usual = match mode {
+        Mode::Deterministic => std::thread::available_parallelism().map_or(1, usize::from),
+        Mode::Kvm | Mode::Threads => 1,
+    };
+    given.map_or(usual, |given| usize::try_from(given).unwrap_or(usual))
+}
+
+fn conclude(report: &Report) -> ExitCode {
+    println!("{}", Figures::head());
+    for (name, figures) in &report.parts {
+        println!("{}", figures.row(name));
+    }
+    println!("{}", report.total.row("all"));
+    for line in &report.failures {
+        println!("{line}");
+    }
+    println!("{} passed, {} failed", report.passed, report.failed);
+    ExitCode::from(u8::from(report.failed > 0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::{OVERRUNS, POLICIES};
+    use super::*;
+
+    fn plan_of(line: &str) -> Result<Plan, String> {
+        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
+        match SOAK.parse(&words) {
+            Ok(Request::Work(options)) => plan(&options),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_failures_command_runs_the_same_round() {
+        let plan = plan_of("--seed 7 --overload 150").expect("a plan");
+        let part = plan.parts.last().expect("parts");
+        let command = plan.command(part, 42);
+        let again = plan_of(command.split_once(' ').expect("words").1).expect("a plan");
+        let boots: Vec<_> = again.boots().collect();
+        assert_eq!(boots.len(), 1);
+        assert_eq!((boots[0].first, boots[0].rounds), (42, 1));
+        assert_eq!(boots[0].part.to_string(), part.to_string());
+        assert_eq!((again.seed, again.round), (7, plan.round));
+    }
+
+    #[test]
+    fn an_unknown_part_is_refused_with_those_there_are() {
+        let refused = plan_of("--only edf-90-skip").expect_err("there is none");
+        assert!(refused.starts_with("`--only edf-90-skip`: there are static-90-queue, edf-90"));
+        assert!(
+            POLICIES
+                .iter()
+                .chain(&OVERRUNS)
+                .all(|word| refused.contains(word))
+        );
+    }
+}
