@@ -1,0 +1,131 @@
+//! The publish/subscribe conditions: a synchronizer's callbacks, on all cores.
+//!
+//! The executor's workers are the parallel subtasks of a DAG that has one job: its
+//! source sets the epoch, then there is a worker on each core until all is joined.
+//! So the two worlds have the same kernel, the same cores and the same clock.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+
+use fass::{Dag, SubtaskAttributes, Untyped, create_dag};
+use join_latency::{Experiment, Message, Part};
+use kernel::{Ending, Event, Lock, Machine, json};
+use pub_sub::executor::{Host, work};
+use pub_sub::graph::Graph;
+
+use crate::output::Outcome;
+
+/// Longer than any run.
+const FOREVER: Duration = Duration::from_secs(1_000_000);
+
+/// Runs all jobs.
+pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, Ending> {
+    let shared = Arc::new(Cores {
+        graph: Lock::new(experiment.graph()),
+        event: Event::new(),
+        epoch_ns: AtomicU64::new(u64::MAX),
+        jobs: experiment.jobs as u64,
+        period_ns: experiment.period_ns,
+        shown: AtomicU64::new(0),
+    });
+    fass::finish_create_dags(&[workers(machine.cores(), &shared)])?;
+    let run = machine.run()?;
+    // The workers are at their end, and whatever they still hold of it stays.
+    let graph = shared.graph.with(core::mem::take);
+    Ok(Outcome {
+        samples: experiment.samples(graph),
+        allocations: run.allocations(),
+        violations: run.violations().count() as u64,
+    })
+}
+
+/// Builds the DAG of workers.
+fn workers(cores: u32, shared: &Arc<Cores>) -> Dag {
+    let dag = create_dag();
+    dag.name("executor")
+        .jobs(1)
+        .in_flight(1)
+        .period(FOREVER)
+        .relative_deadline(FOREVER);
+    let own = Arc::clone(shared);
+    let begin = move |_| own.begin();
+    let source = dag.register_untyped_subtask(begin, SubtaskAttributes::named("begin"));
+    let workers: Vec<Untyped> = (0..cores)
+        .map(|_| {
+            let own = Arc::clone(shared);
+            let worker = move |_| work::<Message, Part, _>(&*own);
+            dag.register_untyped_subtask(worker, SubtaskAttributes::default())
+        })
+        .collect();
+    let sink = dag.register_untyped_subtask(|_| (), SubtaskAttributes::named("end"));
+    for worker in &workers {
+        dag.precede(&source, worker).precede(worker, &sink);
+    }
+    dag
+}
+
+/// The cores as the executor's host.
+struct Cores {
+    graph: Lock<Graph<Message, Part>>,
+    event: Event,
+    /// Time 0 of the graph on the kernel's clock.
+    epoch_ns: AtomicU64,
+    jobs: u64,
+    period_ns: u64,
+    /// The progress that was printed last, in jobs.
+    shown: AtomicU64,
+}
+
+impl Cores {
+    /// Sets the epoch, a little ahead so that all workers are there.
+    fn begin(&self) {
+        const LEAD_NS: u64 = 1_000_000;
+        self.epoch_ns
+            .store(fass::now_ns() + LEAD_NS, Ordering::Relaxed);
+    }
+
+    /// Prints, now and then, how many jobs have been released, if there is time.
+    fn show_progress(&self, until_ns: u64) {
+        const TIME_TO_PRINT_NS: u64 = 5_000_000;
+        let now_ns = self.now_ns();
+        let done = (now_ns / self.period_ns).min(self.jobs);
+        let shown = self.shown.load(Ordering::Relaxed);
+        let is_due = done >= shown + (self.jobs / 20).max(1);
+        if is_due && until_ns.saturating_sub(now_ns) > TIME_TO_PRINT_NS {
+            let exchanged =
+                self.shown
+                    .compare_exchange(shown, done, Ordering::Relaxed, Ordering::Relaxed);
+            if exchanged.is_ok() {
+                json::emit("progress", |line| {
+                    line.number("done", done).number("total", self.jobs);
+                });
+            }
+        }
+    }
+}
+
+impl Host<Message, Part> for Cores {
+    fn now_ns(&self) -> u64 {
+        fass::now_ns().saturating_sub(self.epoch_ns.load(Ordering::Relaxed))
+    }
+
+    fn with_graph<R>(&self, section: impl FnOnce(&mut Graph<Message, Part>) -> R) -> R {
+        self.graph.with(section)
+    }
+
+    fn version(&self) -> u64 {
+        self.event.version()
+    }
+
+    fn wait(&self, seen: u64, until_ns: u64) {
+        self.show_progress(until_ns);
+        let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
+        self.event.wait(seen, until_ns.saturating_add(epoch_ns));
+    }
+
+    fn notify(&self) {
+        self.event.notify();
+    }
+}

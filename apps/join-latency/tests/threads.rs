@@ -1,0 +1,117 @@
+//! The experiment on threads, a hundred times as fast: the joins are what the policy
+//! makes of the publications that really happened.
+
+use std::num::NonZeroUsize;
+use std::sync::{Condvar, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use join_latency::{Experiment, Matching, Message, Part, Samples};
+use pub_sub::executor::{Host, work};
+use pub_sub::graph::Graph;
+
+struct Threads {
+    graph: Mutex<Graph<Message, Part>>,
+    version: Mutex<u64>,
+    changed: Condvar,
+    start: Instant,
+}
+
+impl Host<Message, Part> for Threads {
+    fn now_ns(&self) -> u64 {
+        self.start
+            .elapsed()
+            .as_nanos()
+            .try_into()
+            .expect("a short test")
+    }
+
+    fn with_graph<R>(&self, section: impl FnOnce(&mut Graph<Message, Part>) -> R) -> R {
+        section(&mut self.graph.lock().expect("no holder panics"))
+    }
+
+    fn version(&self) -> u64 {
+        *self.version.lock().expect("no holder panics")
+    }
+
+    fn wait(&self, seen: u64, until_ns: u64) {
+        let limit = Duration::from_nanos(until_ns.saturating_sub(self.now_ns()));
+        let limit = limit.min(Duration::from_secs(1));
+        let version = self.version.lock().expect("no holder panics");
+        drop(
+            self.changed
+                .wait_timeout_while(version, limit, |version| *version == seen),
+        );
+    }
+
+    fn notify(&self) {
+        *self.version.lock().expect("no holder panics") += 1;
+        self.changed.notify_all();
+    }
+}
+
+const JOBS: usize = 100;
+const PARALLEL: usize = 3;
+
+fn run(matching: Matching, depth: usize) -> Samples {
+    let thousand = NonZeroUsize::new(1000).expect("not 0");
+    let experiment = Experiment {
+        parallel: PARALLEL,
+        jobs: JOBS,
+        seed: 1,
+        matching,
+        queue: thousand,
+        depth: NonZeroUsize::new(depth).expect("not 0"),
+        period_ns: 250_000,
+        execute: |time| thread::sleep(time / 100),
+    };
+    let host = Threads {
+        graph: Mutex::new(experiment.graph()),
+        version: Mutex::new(0),
+        changed: Condvar::new(),
+        start: Instant::now(),
+    };
+    thread::scope(|scope| {
+        for _ in 0..PARALLEL + 2 {
+            scope.spawn(|| work(&host));
+        }
+    });
+    experiment.samples(host.graph.into_inner().expect("no holder panics"))
+}
+
+#[test]
+fn equal_stamps_join_every_job() {
+    let samples = run(Matching::Exact, 1000);
+    let record = samples.record();
+    assert_eq!((samples.source.len(), samples.lost_inputs), (JOBS, 0));
+    assert_eq!(
+        (record.same_index_sets(), record.missing_joins()),
+        (JOBS, 0)
+    );
+    for (job, joined) in samples.joins.iter().enumerate() {
+        assert_eq!(samples.indices_of(job), [job as u64; PARALLEL]);
+        let last_ns = samples
+            .parallel
+            .iter()
+            .map(|spans| spans[job].finish_ns)
+            .max();
+        assert!(last_ns <= Some(joined.ready_ns));
+        assert!(joined.ready_ns <= joined.span.start_ns);
+    }
+}
+
+#[test]
+fn close_stamps_join_only_what_is_close() {
+    let max_interval_ns = 100_000;
+    let samples = run(Matching::Approximate { max_interval_ns }, 1000);
+    assert!(samples.parallel.iter().all(|spans| spans.len() == JOBS));
+    let record = samples.record();
+    assert!(
+        record.missing_joins() > 0,
+        "the workload is not that regular"
+    );
+    for set in record.sets.windows(2) {
+        let mut pairs = set[0].indices.iter().zip(&set[1].indices);
+        assert!(pairs.all(|(earlier, later)| earlier < later));
+    }
+}
