@@ -15,6 +15,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -82,6 +83,13 @@ impl Guest {
     #[must_use]
     pub fn word(mut self, word: &str) -> Guest {
         self.words.push(word.into());
+        self
+    }
+
+    /// Leaves a file in the guest's memory.
+    #[must_use]
+    pub fn module(mut self, file: &Path) -> Guest {
+        self.qemu.module = Some(file.into());
         self
     }
 

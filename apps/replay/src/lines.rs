@@ -73,9 +73,10 @@ impl<'a> Lines<'a> {
     pub fn expect(&mut self, kind: &str) -> Result<Line<'a>, Malformed> {
         match self.next_line() {
             Some(line) if line.kind == kind => Ok(line),
-            Some(line) => {
-                Err(line.malformed(format!("expected a `{kind}` record, found `{}`", line.kind)))
-            }
+            Some(line) => Err(line.malformed(format!(
+                "expected a `{kind}` record, found {}",
+                quoted(line.kind)
+            ))),
             None => Err(self.ended(&format!("a `{kind}` record"))),
         }
     }
@@ -127,12 +128,12 @@ impl Line<'_> {
         word: &str,
     ) -> Result<T, Malformed> {
         if !word.bytes().all(|byte| byte.is_ascii_digit()) {
-            return Err(self.malformed(format!("`{word}` is not a whole number")));
+            return Err(self.malformed(format!("{} is not a whole number", quoted(word))));
         }
         word.parse().map_err(|error: core::num::ParseIntError| {
             self.malformed(match error.kind() {
-                IntErrorKind::PosOverflow => format!("`{word}` is too large here"),
-                _ => format!("`{word}` is not a whole number"),
+                IntErrorKind::PosOverflow => format!("{} is too large here", quoted(word)),
+                _ => format!("{} is not a whole number", quoted(word)),
             })
         })
     }
@@ -151,6 +152,16 @@ impl Line<'_> {
     }
 }
 
+/// Returns a word of the file for a message: the beginning of it, for a file
+/// that is not text may be one word of megabytes.
+pub fn quoted(word: &str) -> impl fmt::Display {
+    const MOST_SHOWN: usize = 40;
+    fmt::from_fn(move |out| match word.char_indices().nth(MOST_SHOWN) {
+        Some((end, _)) => write!(out, "`{}...`", &word[..end]),
+        None => write!(out, "`{word}`"),
+    })
+}
+
 impl fmt::Display for Malformed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "line {}: {}", self.line, self.reason)
@@ -161,7 +172,14 @@ impl core::error::Error for Malformed {}
 
 #[cfg(test)]
 mod tests {
-    use super::Lines;
+    use super::{Lines, quoted};
+
+    #[test]
+    fn a_word_is_shown_in_part_if_it_is_long() {
+        assert_eq!(quoted("cäse").to_string(), "`cäse`");
+        let shown = quoted(&"ä".repeat(1000)).to_string();
+        assert_eq!(shown, format!("`{}...`", "ä".repeat(40)));
+    }
 
     #[test]
     fn records_know_their_lines() {

@@ -14,7 +14,7 @@ use sched_dag::{
 };
 
 use crate::case::{Case, CaseDag, InstanceTimes, JobTimes};
-use crate::lines::{Line, Lines, Malformed};
+use crate::lines::{Line, Lines, Malformed, quoted};
 
 /// Reads all cases of a file.
 ///
@@ -27,7 +27,10 @@ pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
     let mut cases = Vec::new();
     while let Some(line) = lines.next_line() {
         if line.kind != "case" {
-            return Err(line.malformed(format!("expected a `case` record, found `{}`", line.kind)));
+            return Err(line.malformed(format!(
+                "expected a `case` record, found {}",
+                quoted(line.kind)
+            )));
         }
         cases.push(parse_case(&line, &mut lines)?);
     }
@@ -233,7 +236,10 @@ fn parse_schedule(lines: &mut Lines<'_>, dags: &[CaseDag]) -> Result<Schedule, M
                 return complete(&line, instances, jobs);
             }
             other => {
-                return Err(line.malformed(format!("expected `x`, `j` or `end`, found `{other}`")));
+                return Err(line.malformed(format!(
+                    "expected `x`, `j` or `end`, found {}",
+                    quoted(other)
+                )));
             }
         }
     }
@@ -295,6 +301,6 @@ fn yes(line: &Line<'_>, word: &str) -> Result<bool, Malformed> {
     match word {
         "0" => Ok(false),
         "1" => Ok(true),
-        _ => Err(line.malformed(format!("expected 0 or 1, found `{word}`"))),
+        _ => Err(line.malformed(format!("expected 0 or 1, found {}", quoted(word)))),
     }
 }
