@@ -13,8 +13,8 @@ use super::core_set::CoreSet;
 use super::status::note_running;
 use super::{Assignment, EPOCH_NS, EXECUTION, Event, Execution, NEXT_EVENT_NS, Work};
 use crate::machine::interrupt::Interrupted;
-use crate::machine::this_core;
 use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, this_core};
 use crate::trace::{self, What};
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
@@ -80,12 +80,9 @@ pub(crate) fn fail(now_ns: u64) {
     let Some(instance) = execution.placement.lose(core.index as usize) else {
         return;
     };
-    trace::instance(
-        What::Ended,
-        since_epoch(now_ns),
-        CoreId(core.index),
-        instance,
-    );
+    // Not when the interrupt came: a step may have left events since then.
+    let ended_ns = since_epoch(clock::now_ns());
+    trace::instance(What::Ended, ended_ns, CoreId(core.index), instance);
     note_running(core, None);
     if let Some(record) = execution.record.instance_mut(instance) {
         record.failed_ns = Some(since_epoch(now_ns));

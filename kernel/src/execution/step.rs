@@ -121,6 +121,11 @@ impl Execution {
             return None;
         }
         let suspended = self.placement.detach(here);
+        if let Some(instance) = suspended {
+            // Not when the interrupt came: its step has left events since then.
+            let time_ns = since_epoch(clock::now_ns());
+            trace::instance(What::Suspend, time_ns, CoreId(core.index), instance);
+        }
         let next = match self.placement.take_suspended(here) {
             Some(context) => {
                 self.note_resumed(&context, now_ns);
@@ -133,12 +138,6 @@ impl Execution {
         match suspended {
             Some(instance) => {
                 last.note_suspended(now_ns);
-                trace::instance(
-                    What::Suspend,
-                    since_epoch(now_ns),
-                    CoreId(core.index),
-                    instance,
-                );
                 timer::set(Alarm::Hold, u64::MAX);
                 self.placement.suspend(instance, last)
             }
@@ -164,7 +163,8 @@ impl Execution {
         timer::set_no_later(Alarm::Budget, context.budget_end_ns());
         let here = here();
         if let Some(instance) = self.placement.current(here.index()) {
-            trace::instance(What::Resume, since_epoch(now_ns), here, instance);
+            let time_ns = since_epoch(clock::now_ns());
+            trace::instance(What::Resume, time_ns, here, instance);
         }
     }
 }
