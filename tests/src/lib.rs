@@ -16,6 +16,7 @@
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table;
 //! - [`guest`]: all that for a test;
+//! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
@@ -44,6 +45,7 @@ pub mod system;
 pub mod tail;
 pub mod test;
 pub mod tiny;
+pub mod trace;
 
 pub use guest::Guest;
 pub use outcome::Outcome;

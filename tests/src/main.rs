@@ -31,6 +31,11 @@ const SUBCOMMANDS: &[(&str, &str, Work)] = &[
         harness::oracle::oracle,
     ),
     (
+        "check-trace",
+        "replay the traces of runs against the model's rules",
+        harness::trace::check_trace,
+    ),
+    (
         "bench",
         "measure parts of the project on this host",
         harness::bench::bench,

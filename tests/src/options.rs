@@ -24,7 +24,8 @@ pub struct Command {
     pub invocation: &'static str,
     /// One sentence on what it does.
     pub about: &'static str,
-    /// The one positional word it takes, if any: its name and its help.
+    /// The positional words it takes, if any: their name and their help. One
+    /// word, or any number if the name ends in `...`.
     pub positional: Option<(&'static str, &'static str)>,
     /// The options, in the order of the help text.
     pub options: &'static [Opt],
@@ -77,7 +78,7 @@ pub enum Takes {
 pub struct Parsed {
     values: BTreeMap<&'static str, String>,
     given: Vec<&'static str>,
-    positional: Option<String>,
+    positionals: Vec<String>,
 }
 
 /// What a command line asks for.
@@ -153,19 +154,19 @@ impl Command {
                 .map(|option| (option.name, option.default.to_string()))
                 .collect(),
             given: Vec::new(),
-            positional: None,
+            positionals: Vec::new(),
         }
     }
 
     fn take_positional(&self, parsed: &mut Parsed, word: &str) -> Result<(), UsageError> {
-        match (self.positional, &parsed.positional) {
-            (Some(_), None) => {
-                parsed.positional = Some(word.to_string());
-                Ok(())
-            }
-            (Some((name, _)), Some(first)) => Err(UsageError(format!(
+        match (self.positional, parsed.positionals.first()) {
+            (Some((name, _)), Some(first)) if !name.ends_with("...") => Err(UsageError(format!(
                 "`{word}`: only one {name} is allowed, and `{first}` is one"
             ))),
+            (Some(_), _) => {
+                parsed.positionals.push(word.to_string());
+                Ok(())
+            }
             (None, _) => Err(UsageError(format!(
                 "unknown word `{word}`; options begin with `--`, see {} --help",
                 self.invocation
@@ -279,10 +280,16 @@ impl Parsed {
         self.text(name).and_then(|value| value.parse().ok())
     }
 
-    /// Returns the positional word, if one was given.
+    /// Returns the first positional word, if one was given.
     #[must_use]
     pub fn positional(&self) -> Option<&str> {
-        self.positional.as_deref()
+        self.positionals.first().map(String::as_str)
+    }
+
+    /// Returns all positional words.
+    #[must_use]
+    pub fn positionals(&self) -> &[String] {
+        &self.positionals
     }
 }
 

@@ -1,0 +1,136 @@
+//! The subcommand `check-trace`: from files to an exit code.
+//!
+//! All files are read before the first run is judged, so that a damaged one
+//! does not hide behind the breaches of another.
+
+use std::fs;
+use std::process::ExitCode;
+
+use super::model::Run;
+use super::{check, read, report};
+use crate::options::{Command, Opt, Parsed, Request, Takes};
+
+/// The table of `check-trace`.
+pub static CHECK_TRACE: Command = Command {
+    invocation: "./scripts/check-trace",
+    about: "Replays the traces of runs against the model's rules and reports each breach.",
+    positional: Some((
+        "FILE...",
+        "Serial logs, or other files of JSON lines, with traces: \
+         `./scripts/run --trace FILE` makes one.",
+    )),
+    options: &[
+        Opt {
+            name: "bound-us",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: 1_000_000_000,
+            },
+            default: "1000",
+            help: "Microseconds for which an instance may wait for what it is owed, because a \
+                   decision takes effect after an interrupt.",
+        },
+        Opt {
+            name: "show",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: u64::MAX,
+            },
+            default: "20",
+            help: "Breaches of a run to be shown; all are counted.",
+        },
+        Opt {
+            name: "json",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "Only the machine lines on standard output, the rest on standard error.",
+        },
+    ],
+    notes: "\
+rules:
+  R1 release              nothing of a job before O + kT
+  R2 join                 after all predecessors and the subtask's own job before
+  R3 completion boundary  all that waits for a finish is released in its step
+  R4 completion           complete with the last finish; missed if that is late
+  R5 dispatch             the smallest keys run; no core idles while one waits
+  one life                an instance starts and finishes once, on one core at a time
+  one core                a core runs one instance at a time
+
+For each run there is a machine line of kind `trace_check`;
+docs/serial-protocol.md explains it.
+
+exit codes: 0 no breach; 1 some; 2 a refused command line, or a file without a
+well-formed trace with events
+",
+};
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn check_trace(words: &[String]) -> ExitCode {
+    let options = match CHECK_TRACE.parse(words) {
+        Ok(Request::Work(options)) => options,
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => return refuse(&error.0),
+    };
+    if options.positionals().is_empty() {
+        return refuse("which files? name at least one serial log with a trace");
+    }
+    let mut runs = Vec::new();
+    for file in options.positionals() {
+        match read_file(file) {
+            Ok(found) => runs.extend(found.into_iter().map(|run| (file.as_str(), run))),
+            Err(line) => return refuse(&line),
+        }
+    }
+    let breaches: usize = runs
+        .iter()
+        .map(|(file, run)| judge(file, run, &options))
+        .sum();
+    ExitCode::from(u8::from(breaches > 0))
+}
+
+fn refuse(line: &str) -> ExitCode {
+    eprintln!("check-trace: {line}");
+    ExitCode::from(2)
+}
+
+/// Reads a file's runs, of which at least one must have events.
+fn read_file(file: &str) -> Result<Vec<Run>, String> {
+    let bytes = fs::read(file).map_err(|error| format!("cannot read {file}: {error}"))?;
+    // A person's line may be damaged; a machine line then is found to be.
+    let text = String::from_utf8_lossy(&bytes);
+    let runs = read(&text).map_err(|fault| format!("{file}:{}: {}", fault.line, fault.reason))?;
+    let last = text.lines().count();
+    match runs.first() {
+        None => Err(format!(
+            "{file}:{last}: the file ends without a trace; boot with `trace=dump`"
+        )),
+        Some(first) if runs.iter().all(|run| run.events.is_empty()) => Err(format!(
+            "{file}:{}: no run of the file has an event",
+            first.line
+        )),
+        Some(_) => Ok(runs),
+    }
+}
+
+/// Checks a run, prints what was found, and returns the number of breaches.
+fn judge(file: &str, run: &Run, options: &Parsed) -> usize {
+    let bound_ns = options.number("bound-us").unwrap_or(0).saturating_mul(1000);
+    let shown = options.number("show").unwrap_or(u64::MAX);
+    let shown = usize::try_from(shown).unwrap_or(usize::MAX);
+    let findings = check(run, bound_ns);
+    let table = report::table(file, run, &findings, bound_ns, shown);
+    if options.is_given("json") {
+        eprint!("{table}");
+    } else {
+        print!("{table}");
+    }
+    println!("{}", report::machine_line(file, run, &findings));
+    findings.breaches.len()
+}

@@ -1,0 +1,252 @@
+//! Reading the runs out of a log: kinds `trace_begin` to `trace_end`.
+//!
+//! The log is a serial log or any file of JSON lines; lines of other kinds and
+//! lines for people are passed over, also within a run. A trace that is not as
+//! `docs/serial-protocol.md` says is [`Malformed`] with its line, so that a
+//! damaged log is never taken for a good run or for a breach.
+
+use sched_dag::{CoreId, DagId, Policy, Preemption, SubtaskId};
+
+use super::model::{Dag, Event, Run, Subtask, Word};
+use crate::json::Value;
+use crate::protocol::{MachineLine, read_line};
+use replay::lines::Malformed;
+
+/// Reads all runs of a log; there may be none.
+///
+/// # Errors
+///
+/// The first line that is damaged or out of place.
+pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
+    let mut runs = Vec::new();
+    let mut open: Option<Run> = None;
+    for (index, text) in log.lines().enumerate() {
+        let Some(line) = read_line(index + 1, text) else {
+            continue;
+        };
+        let line = line.map_err(|error| Malformed {
+            line: error.number,
+            reason: error.message,
+        })?;
+        let line = Line(&line);
+        match (line.0.kind.as_str(), &mut open) {
+            ("trace_begin", None) => open = Some(begin(&line)?),
+            ("trace_begin", Some(run)) => {
+                let reason = format!("the trace of line {} has not ended yet", run.line);
+                return Err(line.malformed(reason));
+            }
+            ("trace_dag", Some(run)) => add_dag(&line, run)?,
+            ("trace", Some(run)) => add_events(&line, run)?,
+            ("trace_end", Some(run)) => {
+                end(&line, run)?;
+                runs.extend(open.take());
+            }
+            ("trace_dag" | "trace" | "trace_end", None) => {
+                return Err(line.malformed("no `trace_begin` comes before it"));
+            }
+            _ => {}
+        }
+    }
+    match open {
+        None => Ok(runs),
+        Some(run) => Err(Malformed {
+            line: run.line,
+            reason: "this trace has no `trace_end`; was the guest killed?".into(),
+        }),
+    }
+}
+
+fn begin(line: &Line<'_>) -> Result<Run, Malformed> {
+    let cores = line.number("cores")?;
+    let cores = u32::try_from(cores).ok().filter(|&cores| cores > 0);
+    Ok(Run {
+        number: line.number("run")?,
+        line: line.0.number,
+        policy: match line.text("policy")? {
+            "static" => Policy::StaticPriority,
+            "edf" => Policy::Edf,
+            other => return Err(line.unknown("policy", other, "static or edf")),
+        },
+        preemption: match line.text("preemption")? {
+            "on" => Preemption::Enabled,
+            "off" => Preemption::Disabled,
+            other => return Err(line.unknown("preemption", other, "on or off")),
+        },
+        cores: cores.ok_or_else(|| line.malformed("`cores` must be from 1 to 2^32 - 1"))?,
+        dags: Vec::new(),
+        events: Vec::new(),
+        lost: 0,
+        lost_by_core: None,
+        complete: false,
+    })
+}
+
+fn add_dag(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
+    let (number, expected) = (line.number("dag")?, run.dags.len() as u64);
+    if number != expected {
+        return Err(line.malformed(format!("dag {number} stands where dag {expected} belongs")));
+    }
+    if !run.events.is_empty() {
+        return Err(line.malformed("a DAG is described after the first event"));
+    }
+    match line.text("overrun")? {
+        "queue" | "skip" | "abort" => {}
+        other => return Err(line.unknown("overrun", other, "queue, skip or abort")),
+    }
+    line.number("in_flight")?;
+    let subtasks = line
+        .elements("subtasks")?
+        .iter()
+        .map(|it| subtask(line, it));
+    let subtasks: Vec<Subtask> = subtasks.collect::<Result<_, _>>()?;
+    let mut predecessors = vec![Vec::new(); subtasks.len()];
+    for edge in line.elements("edges")? {
+        let ends: Option<Vec<u64>> = edge.elements().iter().map(Value::as_u64).collect();
+        let count = subtasks.len() as u64;
+        let ends = ends.filter(|ends| ends.iter().all(|&end| end < count));
+        let Some(&[from, to]) = ends.as_deref() else {
+            return Err(line.malformed(format!(
+                "an edge is a pair of numbers less than {count}, the number of subtasks"
+            )));
+        };
+        let (from, to) = (line.small(from)?, line.small(to)?);
+        predecessors[to as usize].push(SubtaskId(from));
+    }
+    for before in &mut predecessors {
+        before.sort_unstable();
+        before.dedup();
+    }
+    run.dags.push(Dag {
+        name: line.text("name")?.to_string(),
+        period_ns: line.number("period_ns")?,
+        relative_deadline_ns: line.number("relative_deadline_ns")?,
+        offset_ns: line.number("offset_ns")?,
+        subtasks,
+        predecessors,
+    });
+    Ok(())
+}
+
+fn subtask(line: &Line<'_>, value: &Value) -> Result<Subtask, Malformed> {
+    let read = || {
+        let [name, priority, non_preemptive, wcet_ns] = value.elements() else {
+            return None;
+        };
+        let is_wcet = *wcet_ns == Value::Null || wcet_ns.as_u64().is_some();
+        let non_preemptive = non_preemptive
+            .as_u64()
+            .filter(|&flag| flag < 2 && is_wcet)?;
+        Some(Subtask {
+            name: name.as_text()?.to_string(),
+            priority: u32::try_from(priority.as_u64()?).ok()?,
+            non_preemptive: non_preemptive == 1,
+        })
+    };
+    read().ok_or_else(|| {
+        line.malformed("a subtask is [name, priority, non-preemptive 0 or 1, WCET or null]")
+    })
+}
+
+fn add_events(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
+    for (index, value) in line.elements("events")?.iter().enumerate() {
+        let event = event(run, value)
+            .map_err(|reason| line.malformed(format!("event {} of the line: {reason}", index + 1)));
+        run.events.push(event?);
+    }
+    Ok(())
+}
+
+fn event(run: &Run, value: &Value) -> Result<Event, String> {
+    let [time_ns, word, core, dag, job, subtask] = value.elements() else {
+        return Err("it is not [time, event, core, dag, job, subtask]".into());
+    };
+    let number = |what: &str, value: &Value, below: u64| {
+        let number = value.as_u64().filter(|&number| number < below);
+        number.ok_or_else(|| format!("its {what} is not a number less than {below}"))
+    };
+    let text = word.as_text().unwrap_or_default();
+    let word = Word::from_text(text).ok_or_else(|| format!("`{text}` is no event"))?;
+    let core = number("core", core, u64::from(run.cores))?;
+    let dag = number("dag", dag, run.dags.len() as u64)?;
+    let dag = DagId(u32::try_from(dag).map_err(|error| error.to_string())?);
+    let subtasks = run.dags[dag.index()].subtasks.len() as u64;
+    let subtask = match word.is_of_job() {
+        true if *subtask == Value::Integer(-1) => None,
+        true => return Err(format!("`{text}` is of a job, and its subtask not -1")),
+        false => Some(number("subtask", subtask, subtasks)?),
+    };
+    let small = |number: u64| u32::try_from(number).map_err(|error| error.to_string());
+    Ok(Event {
+        time_ns: number("time", time_ns, u64::MAX)?,
+        word,
+        core: CoreId(small(core)?),
+        dag,
+        job: number("job", job, u64::MAX)?,
+        subtask: subtask.map(small).transpose()?.map(SubtaskId),
+    })
+}
+
+fn end(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
+    let (stated, found) = (line.number("events")?, run.events.len());
+    if stated != found as u64 {
+        return Err(line.malformed(format!("{stated} events are announced, {found} are there")));
+    }
+    run.lost = line.number("lost")?;
+    run.complete = line.0.value.get("complete").and_then(Value::as_bool) == Some(true);
+    if line.0.value.get("lost_by_core").is_some() {
+        let counts = line.elements("lost_by_core")?.iter().map(Value::as_u64);
+        let counts: Option<Vec<u64>> = counts.collect();
+        let counts = counts.filter(|counts| counts.len() == run.cores as usize);
+        let reason = "`lost_by_core` is not a list of a count for each core";
+        run.lost_by_core = Some(counts.ok_or_else(|| line.malformed(reason))?);
+    }
+    // Each core's events are in the order of time.
+    let pairs = run.events.windows(2);
+    let back = pairs.filter(|pair| pair[1].time_ns < pair[0].time_ns);
+    let back = back.count();
+    if back >= run.cores as usize {
+        return Err(line.malformed(format!(
+            "time goes back {back} times in the events of {} cores; each core's must be in the \
+             order of time",
+            run.cores
+        )));
+    }
+    Ok(())
+}
+
+/// A machine line whose members are asked for.
+struct Line<'a>(&'a MachineLine);
+
+impl Line<'_> {
+    fn malformed(&self, reason: impl Into<String>) -> Malformed {
+        Malformed {
+            line: self.0.number,
+            reason: format!("`{}`: {}", self.0.kind, reason.into()),
+        }
+    }
+
+    fn unknown(&self, name: &str, found: &str, allowed: &str) -> Malformed {
+        self.malformed(format!("`{name}` is `{found}` and must be {allowed}"))
+    }
+
+    fn number(&self, name: &str) -> Result<u64, Malformed> {
+        let reason = || self.malformed(format!("`{name}` is not a number from 0"));
+        self.0.number_at(name).ok_or_else(reason)
+    }
+
+    fn text(&self, name: &str) -> Result<&str, Malformed> {
+        let reason = || self.malformed(format!("`{name}` is not text"));
+        self.0.text_at(name).ok_or_else(reason)
+    }
+
+    fn elements(&self, name: &str) -> Result<&[Value], Malformed> {
+        match self.0.value.get(name) {
+            Some(Value::Array(elements)) => Ok(elements),
+            _ => Err(self.malformed(format!("`{name}` is not a list"))),
+        }
+    }
+
+    fn small(&self, number: u64) -> Result<u32, Malformed> {
+        u32::try_from(number).map_err(|error| self.malformed(error.to_string()))
+    }
+}

@@ -1,0 +1,134 @@
+//! What `check-trace` says about a run: a table for people and a machine line.
+
+use std::fmt::Write;
+
+use sched_dag::{Policy, Preemption};
+
+use super::Findings;
+use super::figures::Distribution;
+use super::model::Run;
+
+/// Returns the text for people: at most `shown` breaches, then the figures.
+#[must_use]
+pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: usize) -> String {
+    let mut text = String::new();
+    let Findings { breaches, figures } = findings;
+    let policy = match run.policy {
+        Policy::StaticPriority => "static",
+        Policy::Edf => "edf",
+    };
+    let preemption = match run.preemption {
+        Preemption::Enabled => "on",
+        Preemption::Disabled => "off",
+    };
+    let (number, line, cores) = (run.number, run.line, run.cores);
+    let mut say = |line: &str| {
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(text, "{line}");
+    };
+    say(&format!(
+        "{file}:{line}: run {number}, policy {policy}, preemption {preemption}, {cores} cores"
+    ));
+    for breach in breaches.iter().take(shown) {
+        say(&format!("  breach {breach}"));
+    }
+    if breaches.len() > shown {
+        say(&format!("  and {} breaches more", breaches.len() - shown));
+    }
+    if run.lost > 0 {
+        say(&format!(
+            "  {} events were lost: only what came from {} ns on is judged",
+            run.lost, figures.from_ns
+        ));
+    }
+    let mut row = |name: &str, value: &str| say(&format!("  {name:32}{value}"));
+    row("events", &figures.events.to_string());
+    row("instances started", &figures.instances.to_string());
+    row("preemptions", &figures.preemptions.to_string());
+    row(
+        "finish to ready, largest",
+        &microseconds(figures.finish_to_ready_max_ns),
+    );
+    row(
+        "ready to start, a core idle",
+        &distribution(&figures.ready_to_start),
+    );
+    row("preemption latency", &distribution(&figures.preemption));
+    row(
+        "longest inversion",
+        &format!(
+            "{} (bound {})",
+            microseconds(figures.longest_inversion_ns),
+            microseconds(bound_ns)
+        ),
+    );
+    let loads = figures.load_permille.iter();
+    let loads: Vec<String> = loads
+        .map(|load| format!("{}.{} %", load / 10, load % 10))
+        .collect();
+    row("load by core", &loads.join("  "));
+    row("breaches", &breaches.len().to_string());
+    text
+}
+
+/// Returns the machine line of kind `trace_check`.
+#[must_use]
+pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
+    let Findings { breaches, figures } = findings;
+    let loads: Vec<String> = figures.load_permille.iter().map(u64::to_string).collect();
+    format!(
+        "{{\"kind\":\"trace_check\",\"file\":\"{}\",\"run\":{},\"events\":{},\"lost\":{},\
+         \"judged_from_ns\":{},\"span_ns\":{},\"instances\":{},\"preemptions\":{},\
+         \"breaches\":{},\"finish_to_ready_max_ns\":{},\"ready_to_start_ns\":{},\
+         \"preemption_latency_ns\":{},\"longest_inversion_ns\":{},\"load_permille\":[{}]}}",
+        escape(file),
+        run.number,
+        figures.events,
+        run.lost,
+        figures.from_ns,
+        figures.span_ns,
+        figures.instances,
+        figures.preemptions,
+        breaches.len(),
+        figures.finish_to_ready_max_ns,
+        object(&figures.ready_to_start),
+        object(&figures.preemption),
+        figures.longest_inversion_ns,
+        loads.join(",")
+    )
+}
+
+fn microseconds(ns: u64) -> String {
+    format!("{}.{:03} us", ns / 1000, ns % 1000)
+}
+
+fn distribution(of: &Distribution) -> String {
+    if of.count == 0 {
+        return "none".into();
+    }
+    format!(
+        "median {}, p99 {}, max {} of {}",
+        microseconds(of.median_ns),
+        microseconds(of.p99_ns),
+        microseconds(of.max_ns),
+        of.count
+    )
+}
+
+fn object(of: &Distribution) -> String {
+    format!(
+        "{{\"count\":{},\"median\":{},\"p99\":{},\"max\":{}}}",
+        of.count, of.median_ns, of.p99_ns, of.max_ns
+    )
+}
+
+/// Text inside the quotes of a JSON string (RFC 8259, section 7).
+fn escape(text: &str) -> String {
+    let escaped = |character: char| match character {
+        '"' => "\\\"".into(),
+        '\\' => "\\\\".into(),
+        control if control < ' ' => format!("\\u{:04x}", u32::from(control)),
+        other => other.to_string(),
+    };
+    text.chars().map(escaped).collect()
+}

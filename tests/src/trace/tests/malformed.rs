@@ -1,0 +1,175 @@
+//! Logs that are not as the protocol says are refused with their line.
+
+use super::super::read;
+
+const GOOD: &str = r#"hello
+{"kind":"trace_begin","policy":"edf","preemption":"off","cores":2,"run":3}
+{"kind":"trace_dag","dag":0,"name":"x","period_ns":10,"relative_deadline_ns":10,"offset_ns":0,"in_flight":1,"overrun":"skip","subtasks":[["a",0,0,null],["b",1,1,7]],"edges":[[0,1]]}
+{"kind":"progress","done":1,"total":2}
+{"kind":"trace","events":[[0,"released",0,0,0,-1],[1,"start",0,0,0,1]]}
+{"kind":"trace","events":[[0,"ready",1,0,0,0]]}
+{"kind":"trace_end","events":3,"lost":0}
+bye
+"#;
+
+#[test]
+fn a_good_log_is_read() {
+    let runs = read(GOOD).unwrap();
+    assert_eq!(runs.len(), 1);
+    let run = &runs[0];
+    assert_eq!((run.number, run.line, run.cores), (3, 2, 2));
+    assert_eq!((run.events.len(), run.dags.len()), (3, 1));
+    assert!(run.dags[0].subtasks[1].non_preemptive);
+    assert_eq!(read("hello\n").unwrap().len(), 0);
+    let twice = format!("{GOOD}{GOOD}");
+    assert_eq!(read(&twice).unwrap().len(), 2);
+}
+
+#[test]
+fn whatever_is_wrong_is_named_with_its_line() {
+    for (from, to, line, reason) in [
+        (
+            "\"edf\"",
+            "\"rr\"",
+            2,
+            "`trace_begin`: `policy` is `rr` and must be static or edf",
+        ),
+        (
+            "\"off\"",
+            "\"no\"",
+            2,
+            "`trace_begin`: `preemption` is `no` and must be on or off",
+        ),
+        (
+            "\"cores\":2",
+            "\"cores\":0",
+            2,
+            "`trace_begin`: `cores` must be from 1 to 2^32 - 1",
+        ),
+        (
+            "\"dag\":0,",
+            "\"dag\":1,",
+            3,
+            "`trace_dag`: dag 1 stands where dag 0 belongs",
+        ),
+        (
+            "\"skip\"",
+            "\"hop\"",
+            3,
+            "`trace_dag`: `overrun` is `hop` and must be queue, skip or abort",
+        ),
+        (
+            "[\"a\",0,0,null]",
+            "[\"a\",0,2,null]",
+            3,
+            "`trace_dag`: a subtask is [name, priority, non-preemptive 0 or 1, WCET or null]",
+        ),
+        (
+            "[[0,1]]",
+            "[[0,2]]",
+            3,
+            "`trace_dag`: an edge is a pair of numbers less than 2, the number of subtasks",
+        ),
+        (
+            "\"period_ns\":10",
+            "\"period_ns\":-1",
+            3,
+            "`trace_dag`: `period_ns` is not a number from 0",
+        ),
+        (
+            "\"start\"",
+            "\"begin\"",
+            5,
+            "`trace`: event 2 of the line: `begin` is no event",
+        ),
+        (
+            "[0,\"released\",0,0,0,-1]",
+            "[0,\"released\",0,0,0,1]",
+            5,
+            "`trace`: event 1 of the line: `released` is of a job, and its subtask not -1",
+        ),
+        (
+            "[0,\"ready\",1,0,0,0]",
+            "[0,\"ready\",2,0,0,0]",
+            6,
+            "`trace`: event 1 of the line: its core is not a number less than 2",
+        ),
+        (
+            "[0,\"ready\",1,0,0,0]",
+            "[0,\"ready\",1,0,0,2]",
+            6,
+            "`trace`: event 1 of the line: its subtask is not a number less than 2",
+        ),
+        (
+            "[0,\"ready\",1,0,0,0]",
+            "[0,\"ready\",1]",
+            6,
+            "`trace`: event 1 of the line: it is not [time, event, core, dag, job, subtask]",
+        ),
+        (
+            "\"events\":3",
+            "\"events\":4",
+            7,
+            "`trace_end`: 4 events are announced, 3 are there",
+        ),
+        (
+            "[1,\"start\",0,0,0,1]",
+            "[1,\"start\",0,0,0,1],[0,\"finish\",0,0,0,1],[1,\"released\",0,0,1,-1]",
+            7,
+            "`trace_end`: 3 events are announced, 5 are there",
+        ),
+        (
+            "\"lost\":0",
+            "\"lose\":0",
+            7,
+            "a line of kind `trace_end` without `lost`",
+        ),
+        (
+            "\"lost\":0",
+            "\"lost\":0,\"lost_by_core\":[0]",
+            7,
+            "`trace_end`: `lost_by_core` is not a list of a count for each core",
+        ),
+        (
+            "bye",
+            "{\"kind\":\"trace\",\"events\":[]}",
+            8,
+            "`trace`: no `trace_begin` comes before it",
+        ),
+        (
+            "{\"kind\":\"trace_end\",\"events\":3,\"lost\":0}",
+            "",
+            2,
+            "this trace has no `trace_end`; was the guest killed?",
+        ),
+        (
+            "{\"kind\":\"progress\",\"done\":1,\"total\":2}",
+            "{\"kind\":\"trace_begin\",\"policy\":\"edf\",\"preemption\":\"off\",\"cores\":2,\"run\":4}",
+            4,
+            "`trace_begin`: the trace of line 2 has not ended yet",
+        ),
+        (
+            "{\"kind\":\"progress\",\"done\":1,\"total\":2}",
+            "{\"kind\":\"progress\",\"do",
+            4,
+            "column 23: the line ends where the closing `\"` must stand",
+        ),
+    ] {
+        assert_eq!(GOOD.matches(from).count(), 1, "{from}");
+        let fault = read(&GOOD.replace(from, to)).expect_err(reason);
+        assert_eq!((fault.line, fault.reason.as_str()), (line, reason));
+    }
+}
+
+#[test]
+fn times_that_go_back_within_a_core_are_refused() {
+    let log = GOOD.replace(
+        "[1,\"start\",0,0,0,1]",
+        "[2,\"start\",0,0,0,1],[1,\"finish\",0,0,0,1]",
+    );
+    let log = log.replace("\"events\":3", "\"events\":4");
+    let fault = read(&log).unwrap_err();
+    let reason = "`trace_end`: time goes back 2 times in the events of 2 cores; each core's must \
+                  be in the order of time";
+    assert_eq!((fault.line, fault.reason.as_str()), (7, reason));
+}
