@@ -70,6 +70,10 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
         let line = "`--json` and `--plain` exclude each other; give one";
         return Err(Refusal::Usage(line.into()));
     }
+    if options.is_given("trace") && options.is_given("serial") {
+        let line = "`--trace` and `--serial` both name the serial log; give one";
+        return Err(Refusal::Usage(line.into()));
+    }
     let app = options.text("app").unwrap_or_default().to_string();
     image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
     let memory_mib = choose_memory(&options)?;
@@ -93,6 +97,9 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
     let outcome = boot(&qemu, &image, &log.path, limit, |line| screen.show(line));
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
+    if let Some(file) = options.text("trace") {
+        screen.say(&format!("trace: `./scripts/check-trace {file}` judges it"));
+    }
     Ok(conclude(&outcome, &log, &screen))
 }
 
@@ -158,6 +165,7 @@ fn describe(options: &Parsed, program: &Path, mode: Mode, memory_mib: u64) -> Qe
     for name in table::GUEST_WORDS {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
+    words.extend(options.is_given("trace").then(|| "trace=dump".into()));
     words.extend(options.text("append").map(String::from));
     Qemu {
         program: program.into(),
@@ -234,12 +242,15 @@ struct Log {
 
 impl Log {
     fn choose(options: &Parsed, app: &str) -> Result<Log, Refusal> {
-        let Some(named) = options.text("serial") else {
+        let named = ["serial", "trace"]
+            .into_iter()
+            .find_map(|option| Some((option, options.text(option)?)));
+        let Some((option, named)) = named else {
             let path = system::new_log(app).map_err(Refusal::Failure)?;
             return Ok(Log { path, stays: false });
         };
         File::create(named).map_err(|error| {
-            Refusal::Usage(format!("`--serial {named}`: cannot be written: {error}"))
+            Refusal::Usage(format!("`--{option} {named}`: cannot be written: {error}"))
         })?;
         let path = named.into();
         Ok(Log { path, stays: true })

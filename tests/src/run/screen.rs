@@ -18,6 +18,7 @@ pub(super) struct Screen {
     people: bool,
     machine: bool,
     quiet: bool,
+    traces: bool,
     on_terminal: bool,
     bar_is_shown: bool,
     tenths_shown: u64,
@@ -29,6 +30,8 @@ impl Screen {
             people: !options.is_given("json"),
             machine: !options.is_given("plain"),
             quiet: options.is_given("quiet"),
+            // Who wants them in a file does not want megabytes of them here.
+            traces: !options.is_given("trace"),
             on_terminal: stderr().is_terminal(),
             bar_is_shown: false,
             tenths_shown: 0,
@@ -55,6 +58,12 @@ impl Screen {
             && machine.kind == "progress"
         {
             self.advance(machine);
+            return;
+        }
+        if let Some(Ok(machine)) = &read
+            && machine.kind.starts_with("trace")
+            && !self.traces
+        {
             return;
         }
         let wanted = if read.is_some() {

@@ -121,6 +121,14 @@ pub static RUN: Command = Command {
             help: "Keep the serial log in this file.",
         },
         Opt {
+            name: "trace",
+            short: None,
+            takes: Takes::Text("FILE"),
+            default: "",
+            help: "Keep the serial log in this file, with the trace of each run, which is not \
+                   shown; ./scripts/check-trace FILE judges it.",
+        },
+        Opt {
             name: "append",
             short: None,
             takes: Takes::Text("WORDS"),
