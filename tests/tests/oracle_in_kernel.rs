@@ -1,11 +1,15 @@
 //! The kernel against reference schedules: the public cases for up to four
 //! cores run on the bare machine as the reference says, and where they do not,
-//! the first difference is named.
+//! the first difference is named. Cases in which no two completions, and no
+//! completion and release, fall on the same instant run so without a window,
+//! too: with each event decided at once, as in apps.
 
 use harness::oracle::in_kernel::{Settings, run, texts_of_cases};
-use harness::oracle::schedules::{Case, parse};
+use harness::oracle::schedules::{Case, check, parse};
 
 const PUBLIC: &str = include_str!("../oracle/schedules.txt");
+
+const DISTINCT: &str = include_str!("../oracle/distinct.txt");
 
 /// Ten milliseconds: idle time is skipped, so a long unit costs nothing.
 const UNIT_US: u64 = 10_000;
@@ -29,6 +33,24 @@ fn the_machine_reproduces_the_public_schedules() {
     let judged = run(&cases, &texts, &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
     let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
     assert_eq!(judged.len(), 24);
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+#[test]
+fn events_apart_need_no_window() {
+    let cases = parse(DISTINCT).expect("the file is well formed");
+    for case in &cases {
+        assert_eq!(check(case), Ok(()), "{} in virtual time", case.name);
+    }
+    let settings = Settings {
+        window_us: 0,
+        guard_us: 20,
+        tolerance_percent: 5,
+        ..Settings::for_unit(1000)
+    };
+    let judged = run(&cases, &texts_of_cases(DISTINCT), &settings).expect("QEMU and an image");
+    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
+    assert_eq!(judged.len(), 10);
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
