@@ -24,8 +24,8 @@ fn random_sets_break_no_rule_and_leave_nothing_behind() {
         part.unwrap_or_else(|| panic!("there is no part {name}")).1
     };
     // The run has to be one in which something could have gone wrong.
-    assert!(report.total.jobs > 4000, "{:?}", report.total);
-    assert!(report.total.preemptions > 3000, "{:?}", report.total);
+    assert!(report.total.jobs > 2000, "{:?}", report.total);
+    assert!(report.total.preemptions > 2000, "{:?}", report.total);
     assert!(report.total.events > 50_000, "{:?}", report.total);
     for policy in ["static", "edf"] {
         assert!(figures(&format!("{policy}-130-queue")).misses > 0);

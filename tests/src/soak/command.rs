@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use super::figures::Figures;
-use super::plan::{Length, Part, Plan};
+use super::plan::{Length, Part, Plan, usual_bound_ns};
 use super::progress::Progress;
 use super::{Report, run};
 use crate::options::{Command, Opt, Parsed, Request, Takes};
@@ -131,6 +131,17 @@ static SOAK: Command = Command {
             help: "The rounds of each part, instead of a time.",
         },
         Opt {
+            name: "bound-us",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: 1_000_000_000,
+            },
+            default: "",
+            help: "Microseconds for which an instance may wait for what it is owed; 50, and where \
+                   time is real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).",
+        },
+        Opt {
             name: "side-by-side",
             short: None,
             takes: Takes::Number { least: 1, most: 64 },
@@ -216,6 +227,8 @@ fn plan(options: &Parsed) -> Result<Plan, String> {
         seed: number("seed"),
         first: number("first"),
         mode,
+        bound_ns: (options.number("bound-us"))
+            .map_or_else(|| usual_bound_ns(mode), |bound_us| bound_us * 1000),
         side_by_side: side_by_side(options, mode),
         ..Plan::new(length, number("load"), number("overload"))
     };

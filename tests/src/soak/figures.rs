@@ -1,6 +1,7 @@
 //! The figures of a soak run, added up over rounds.
 
 use crate::protocol::MachineLine;
+use crate::trace::Findings;
 
 /// Sums over rounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub struct Figures {
     pub violations: u64,
     /// Breaches of the rules that the host found in the traces.
     pub breaches: u64,
+    /// The longest time for which an instance waited that should have run.
+    pub longest_inversion_ns: u64,
 }
 
 impl Figures {
@@ -45,9 +48,18 @@ impl Figures {
             aborts: number("aborts"),
             instances: number("instances"),
             preemptions: number("preemptions"),
-            events: 0,
             violations: number("violations"),
-            breaches: 0,
+            ..Figures::default()
+        });
+    }
+
+    /// Adds what a round's trace shows.
+    pub(super) fn add_trace(&mut self, findings: &Findings) {
+        self.add(&Figures {
+            events: findings.figures.events as u64,
+            breaches: findings.breaches.len() as u64,
+            longest_inversion_ns: findings.figures.longest_inversion_ns,
+            ..Figures::default()
         });
     }
 
@@ -65,13 +77,14 @@ impl Figures {
         self.events += other.events;
         self.violations += other.violations;
         self.breaches += other.breaches;
+        self.longest_inversion_ns = self.longest_inversion_ns.max(other.longest_inversion_ns);
     }
 
     /// Returns the head of the table whose rows [`row`](Self::row) makes.
     #[must_use]
     pub fn head() -> String {
         format!(
-            "{:<18}{:>7}{:>9}{:>9}{:>10}{:>9}{:>8}{:>8}{:>11}{:>12}{:>11}{:>9}",
+            "{:<18}{:>7}{:>9}{:>9}{:>10}{:>9}{:>8}{:>8}{:>11}{:>12}{:>11}{:>9}{:>11}",
             "part",
             "rounds",
             "guest s",
@@ -83,7 +96,8 @@ impl Figures {
             "instances",
             "preemptions",
             "events",
-            "breaches"
+            "breaches",
+            "waits us"
         )
     }
 
@@ -91,7 +105,7 @@ impl Figures {
     #[must_use]
     pub fn row(&self, name: &str) -> String {
         format!(
-            "{name:<18}{:>7}{:>9}{:>9}{:>10}{:>9}{:>8}{:>8}{:>11}{:>12}{:>11}{:>9}",
+            "{name:<18}{:>7}{:>9}{:>9}{:>10}{:>9}{:>8}{:>8}{:>11}{:>12}{:>11}{:>9}{:>11}",
             self.rounds,
             self.guest_ns / 1_000_000_000,
             self.jobs,
@@ -102,7 +116,8 @@ impl Figures {
             self.instances,
             self.preemptions,
             self.events,
-            self.violations + self.breaches
+            self.violations + self.breaches,
+            self.longest_inversion_ns.div_ceil(1000)
         )
     }
 }

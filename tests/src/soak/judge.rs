@@ -28,8 +28,8 @@ impl Judged {
     }
 }
 
-/// Judges a boot.
-pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome) -> Judged {
+/// Judges a boot. Nothing may wait longer than `bound_ns` for what it is owed.
+pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64) -> Judged {
     let mut judged = Judged::default();
     let mut rounds = boot.first..boot.first + boot.rounds;
     for line in outcome.transcript.of_kind("soak") {
@@ -52,7 +52,7 @@ pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome) -> Judged {
     if let Some(reason) = ending.filter(|_| judged.failures.is_empty()) {
         judged.fail(boot.first, reason);
     }
-    trace::judge(boot, outcome, &mut judged);
+    trace::judge(boot, outcome, bound_ns, &mut judged);
     judged
 }
 

@@ -27,6 +27,8 @@ pub struct Plan {
     pub rounds_a_boot: u64,
     /// The first round of each part.
     pub first: u64,
+    /// For how long an instance may wait for what it is owed.
+    pub bound_ns: u64,
     /// How many guests run at the same time.
     pub side_by_side: usize,
 }
@@ -55,6 +57,17 @@ impl fmt::Display for Part {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let text = format!("{}-{}-{}", self.policy, self.load, self.overrun);
         f.pad(&text)
+    }
+}
+
+/// Returns for how long an instance may wait for what it is owed if nobody says
+/// otherwise: some decisions and a switch, and where time is real, what the host
+/// does meanwhile.
+pub(super) fn usual_bound_ns(mode: Mode) -> u64 {
+    match mode {
+        Mode::Deterministic => 50_000,
+        Mode::Kvm => 10_000_000,
+        Mode::Threads => 1_000_000_000,
     }
 }
 
@@ -93,10 +106,10 @@ impl Length {
 
     /// Some seconds, for a test.
     pub const SHORT: Length = Length {
-        seconds: 6,
-        overload_seconds: 2,
-        round: Duration::from_secs(1),
-        rounds_a_boot: 3,
+        seconds: 4,
+        overload_seconds: 1,
+        round: Duration::from_millis(500),
+        rounds_a_boot: 4,
     };
 }
 
@@ -133,6 +146,7 @@ impl Plan {
             round: length.round,
             rounds_a_boot: length.rounds_a_boot,
             first: 0,
+            bound_ns: usual_bound_ns(Mode::Deterministic),
             side_by_side: 1,
         }
     }

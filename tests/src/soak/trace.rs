@@ -1,26 +1,51 @@
 //! The traces of one boot, held against the rules.
 //!
-//! The guest prints a trace for each run: the first is its warm-up, then comes
-//! one a round.
+//! The guest prints a trace for each run: the first is its warm-up, which is
+//! judged as if it belonged to the boot's first round; then comes one a round.
 
 use super::judge::Judged;
 use super::plan::Boot;
 use crate::outcome::Outcome;
-use crate::protocol::MachineLine;
+use crate::trace::model::Run;
+use crate::trace::{check, read};
+
+/// How many breaches of a round are told in words.
+const SHOWN: usize = 5;
 
 /// Judges the traces of all rounds that have left one.
-pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, judged: &mut Judged) {
-    let ends: Vec<&MachineLine> = outcome.transcript.of_kind("trace_end").collect();
+pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64, judged: &mut Judged) {
+    let runs = match read(&outcome.serial) {
+        Ok(runs) => runs,
+        Err(fault) => {
+            let (line, reason) = (fault.line, fault.reason);
+            judged.fail(boot.first, format!("trace, serial line {line}: {reason}"));
+            return;
+        }
+    };
     for round in boot.first..boot.first + boot.rounds {
         let position = usize::try_from(round - boot.first + 1).unwrap_or(usize::MAX);
-        let Some(end) = ends.get(position) else {
-            judged.fail(round, "it has no trace".into());
-            continue;
-        };
-        judged.figures.events += end.number_at("events").unwrap_or(0);
-        match end.number_at("lost") {
-            Some(0) => {}
-            lost => judged.fail(round, format!("its trace has lost {lost:?} events")),
+        match runs.get(position) {
+            Some(run) => judge_run(run, round, bound_ns, judged),
+            None => judged.fail(round, "it has no trace".into()),
         }
+    }
+    if let Some(warm_up) = runs.first() {
+        judge_run(warm_up, boot.first, bound_ns, judged);
+    }
+}
+
+fn judge_run(run: &Run, round: u64, bound_ns: u64, judged: &mut Judged) {
+    if run.lost > 0 {
+        let lost = run.lost;
+        judged.fail(round, format!("its trace has lost {lost} events"));
+    }
+    let findings = check(run, bound_ns);
+    judged.figures.add_trace(&findings);
+    let breaches = &findings.breaches;
+    for breach in breaches.iter().take(SHOWN) {
+        judged.fail(round, breach.to_string());
+    }
+    if let Some(more) = breaches.len().checked_sub(SHOWN + 1) {
+        judged.fail(round, format!("and {} breaches more", more + 1));
     }
 }
