@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use harness::fault_page::documented_faults;
 use harness::protocol::Status;
-use harness::{Guest, Mode};
+use harness::{Guest, Mode, Outcome};
 
 fn guest(test: &str) -> Guest {
     Guest::new("guest-tests").word(&format!("test={test}"))
@@ -128,22 +128,38 @@ fn a_storm_of_interrupts_in_real_time_leaves_every_checksum_alone() {
 }
 
 /// Runs DAGs that preempt one another and check themselves.
-fn preemption(mode: Mode, cores: u64, policy: &str) {
-    let guest = guest("preemption").mode(mode).cores(cores);
-    let guest = guest.word(&format!("policy={policy}")).word("ms=1000");
+fn preemption(mode: Mode, cores: u64, policy: &str) -> Outcome {
+    let guest = guest("preemption").mode(mode).cores(cores).memory_mib(64);
+    let guest = guest.word(&format!("policy={policy}")).word("ms=500");
+    let guest = guest.word("trace=dump").word("trace_events=16384");
     let outcome = guest.limit(Duration::from_secs(120)).succeed();
     let line = outcome.transcript.of_kind("preemption").next();
     let line = line.unwrap_or_else(|| panic!("no preemption line\n{}", outcome.tail()));
     assert!(line.number_at("preemptions") >= Some(20), "{}", line.text);
     assert_eq!(line.number_at("diverged"), Some(0), "{}", line.text);
     assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+    outcome
+}
+
+/// Checks that the trace shows no breach: nobody waited for longer than the
+/// processors' taking turns explains.
+fn keeps_the_rules(outcome: &Outcome) {
+    const BOUND_NS: u64 = 200_000;
+    let runs = harness::trace::read(&outcome.serial)
+        .unwrap_or_else(|fault| panic!("line {}: {}", fault.line, fault.reason));
+    assert_eq!(runs.len(), 1);
+    let findings = harness::trace::check(&runs[0], BOUND_NS);
+    assert_eq!(runs[0].lost, 0);
+    let breaches: Vec<String> = findings.breaches.iter().map(ToString::to_string).collect();
+    assert!(breaches.is_empty(), "{}", breaches.join("\n"));
 }
 
 #[test]
 fn preempted_instances_lose_nothing() {
     for cores in [1, 2, 4] {
-        preemption(Mode::Deterministic, cores, "static");
-        preemption(Mode::Deterministic, cores, "edf");
+        for policy in ["static", "edf"] {
+            keeps_the_rules(&preemption(Mode::Deterministic, cores, policy));
+        }
     }
 }
 
