@@ -55,7 +55,10 @@ fn workers(cores: u32, shared: &Arc<Cores>) -> Dag {
     let workers: Vec<Untyped> = (0..cores)
         .map(|_| {
             let own = Arc::clone(shared);
-            let worker = move |_| work::<Message, Part, _>(&*own);
+            let worker = move |_| {
+                own.wait_for_epoch();
+                work::<Message, Part, _>(&*own);
+            };
             dag.register_untyped_subtask(worker, SubtaskAttributes::default())
         })
         .collect();
@@ -84,6 +87,14 @@ impl Cores {
         const LEAD_NS: u64 = 1_000_000;
         self.epoch_ns
             .store(fass::now_ns() + LEAD_NS, Ordering::Relaxed);
+    }
+
+    /// Waits for time 0, before which the graph's time stands still.
+    fn wait_for_epoch(&self) {
+        let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
+        while fass::now_ns() < epoch_ns {
+            self.event.wait(self.event.version(), epoch_ns);
+        }
     }
 
     /// Prints, now and then, how many jobs have been released, if there is time.

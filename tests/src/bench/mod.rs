@@ -6,18 +6,22 @@
 //! same run. The exit code is 0 if all limits hold, 1 if one does not, and 2 for
 //! a refused command line.
 //!
-//! - [`scheduler`]: the commit, and the cost of a dispatched instance.
+//! - [`scheduler`]: the commit, and the cost of a dispatched instance;
+//! - [`join_latency`]: the paper's evaluation, on the machine in QEMU.
 
+pub mod join_latency;
 pub mod scheduler;
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-const USAGE: &str = "usage: bench WHAT
+const USAGE: &str = "usage: bench WHAT [options]
 
-Measures on this host and prints a table and a JSON object for each figure.
 WHAT is one of:
-  scheduler   the commit of a large DAG, and the cost of a dispatched instance
+  scheduler      the commit of a large DAG, and the cost of a dispatched instance:
+                 prints a table and a JSON object for each figure
+  join-latency   the paper's evaluation: boots each condition, writes samples,
+                 figures, plots and a report; see bench join-latency --help
 
 Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.
 ";
@@ -25,6 +29,9 @@ Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.
 /// Runs the subcommand.
 #[must_use]
 pub fn bench(words: &[String]) -> ExitCode {
+    if let Some(("join-latency", rest)) = words.split_first().map(|(what, rest)| (&**what, rest)) {
+        return join_latency::run(rest);
+    }
     if words.iter().any(|word| word == "--help" || word == "-h") {
         print!("{USAGE}");
         return ExitCode::SUCCESS;

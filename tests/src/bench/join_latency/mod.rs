@@ -1,0 +1,154 @@
+//! The paper's evaluation: join latency by a DAG, by equal and by close stamps.
+//!
+//! A *condition* is what joins, the number N of parallel subtasks, and a seed. Each
+//! is one boot of the app `join-latency`, which prints the times of all executions
+//! and joins. They are kept as one file a condition, from which all else is
+//! computed: samples, summary, pictures, report. So nothing is lost if this is
+//! interrupted, and what is there already is not measured again, as long as it was
+//! measured under the same conditions (image, QEMU, all options).
+//!
+//! - [`table`], [`plan`], [`condition`]: what is to be measured;
+//! - [`times`], [`figures`]: from the guest's lines to figures;
+//! - [`files`], [`plots`], [`report`]: from figures to what people and programs read;
+//! - [`progress`]: what is seen meanwhile.
+
+mod condition;
+mod figures;
+mod files;
+mod page;
+mod plan;
+mod plots;
+mod progress;
+mod report;
+mod table;
+mod times;
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use condition::Condition;
+use figures::Figures;
+use files::{Measured, samples_csv, summary_json, write_whole};
+use join_latency::Samples;
+use plan::{Plan, Provenance};
+use progress::Progress;
+
+use crate::options::Request;
+use crate::outcome::boot;
+use crate::{image, install, system};
+
+/// Runs `bench join-latency` with the words after its name.
+pub(super) fn run(words: &[String]) -> ExitCode {
+    let plan = match table::TABLE.parse(words) {
+        Ok(Request::Work(options)) => {
+            // Settling the mode may need QEMU.
+            if let Err(error) = install::ensure_qemu() {
+                eprintln!("bench join-latency: {error}");
+                return ExitCode::FAILURE;
+            }
+            Plan::new(&options)
+        }
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => Err(error.to_string()),
+    };
+    let plan = match plan {
+        Ok(plan) => plan,
+        Err(line) => {
+            eprintln!("bench join-latency: {line}");
+            return ExitCode::from(2);
+        }
+    };
+    match measure_all(&plan) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(line) => {
+            eprintln!("bench join-latency: {line}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Measures what is not there yet, and writes all results.
+fn measure_all(plan: &Plan) -> Result<(), String> {
+    let image = image::build("join-latency").map_err(|error| error.to_string())?;
+    let provenance = Provenance::of(&image.path);
+    println!(
+        "{} conditions of {} jobs; mode {}, {} cores; {}",
+        plan.conditions.len(),
+        plan.jobs,
+        plan.mode,
+        plan.cores,
+        provenance.qemu
+    );
+    println!("time: {}", plan.mode.meaning());
+    let mut progress = Progress::new(plan.conditions.len());
+    let mut measured = Measured::new();
+    for condition in &plan.conditions {
+        let statement = provenance.statement(plan, condition);
+        let file = plan.file(condition);
+        let kept = fs::read_to_string(&file).ok();
+        let kept = kept.and_then(|text| times::from_csv(&text, &statement, condition.subtasks));
+        let samples = match kept {
+            Some(samples) => {
+                progress.skip(condition.to_string());
+                samples
+            }
+            None => {
+                progress.begin(condition.to_string());
+                let samples = measure(plan, condition, &image.path, &mut progress)?;
+                write_whole(&file, &times::to_csv(&samples, &statement))?;
+                progress.end();
+                samples
+            }
+        };
+        measured.push((*condition, Figures::of(&samples)));
+        // After each: an interruption leaves numbers for what was measured.
+        let summary = summary_json(plan, &provenance, &measured);
+        write_whole(&plan.out.join("summary.json"), &summary)?;
+        write_whole(&plan.out.join("samples.csv"), &samples_csv(&measured))?;
+    }
+    let drawn = plots::draw(&plan.out);
+    if let Err(line) = &drawn {
+        eprintln!("{line}");
+    }
+    let page = report::page(plan, &provenance, &measured, drawn.err().as_deref());
+    write_whole(&plan.out.join("report.html"), &page)?;
+    print!("{}", report::table(&files::pooled(plan, &measured)));
+    println!("written: {}", plan.out.join("report.html").display());
+    Ok(())
+}
+
+/// Boots one condition.
+fn measure(
+    plan: &Plan,
+    condition: &Condition,
+    image: &Path,
+    progress: &mut Progress,
+) -> Result<Samples, String> {
+    let log = system::new_log("join-latency")?;
+    let limit = Duration::from_secs(120 + plan.jobs);
+    let qemu = plan.qemu(condition);
+    let outcome = boot(&qemu, image, &log, limit, |line| progress.follow(line))?;
+    if let Err(fault) = outcome.judge() {
+        return Err(format!(
+            "{condition} failed: {}\n{}",
+            fault.reason,
+            outcome.tail()
+        ));
+    }
+    let samples = times::read_transcript(&outcome.transcript, condition.subtasks)?;
+    if samples.source.len() as u64 != plan.jobs {
+        let jobs = samples.source.len();
+        return Err(format!(
+            "{condition}: the guest printed {jobs} of {} jobs",
+            plan.jobs
+        ));
+    }
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_file(&log);
+    Ok(samples)
+}

@@ -1,0 +1,220 @@
+//! What is to be measured, and on what: settled before anything is built.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::condition::{Condition, Policy};
+use crate::options::Parsed;
+use crate::probe;
+use crate::qemu::{Machine, Mode, PROGRAM, Qemu};
+use crate::system;
+
+/// Everything that all conditions have in common, and the conditions.
+#[derive(Debug)]
+pub(super) struct Plan {
+    pub(super) out: PathBuf,
+    pub(super) conditions: Vec<Condition>,
+    pub(super) policies: Vec<Policy>,
+    pub(super) subtasks: Vec<usize>,
+    pub(super) seeds: Vec<u64>,
+    pub(super) jobs: u64,
+    pub(super) queue: u64,
+    pub(super) cores: u64,
+    pub(super) memory_mib: u64,
+    pub(super) mode: Mode,
+}
+
+impl Plan {
+    /// Settles the plan.
+    ///
+    /// # Errors
+    ///
+    /// What the options ask for cannot be: one line that says why.
+    pub(super) fn new(options: &Parsed) -> Result<Plan, String> {
+        let number = |name| options.number(name).unwrap_or(1);
+        let policies = Policy::list(options.text("policies").unwrap_or_default())?;
+        let mut subtasks: Vec<usize> = Vec::new();
+        for text in options.text("subtasks").unwrap_or_default().split(',') {
+            let parallel = text
+                .parse()
+                .map_err(|_| format!("`--subtasks`: `{text}`"))?;
+            if subtasks.contains(&parallel) {
+                return Err(format!("`--subtasks`: {parallel} stands twice"));
+            }
+            subtasks.push(parallel);
+        }
+        let most_parallel = subtasks.iter().max().map_or(1, |most| *most as u64);
+        let least_cores = most_parallel + 2;
+        let cores = options.number("cores").unwrap_or(least_cores);
+        if cores < least_cores {
+            return Err(format!(
+                "`--cores {cores}`: source, join and {most_parallel} parallel subtasks need \
+                 {least_cores}, so that none waits for a core; give more, or fewer subtasks"
+            ));
+        }
+        let seed = number("seed");
+        let last_seed = seed.checked_add(number("repeat") - 1);
+        let last_seed =
+            last_seed.ok_or("`--repeat`: there are not so many seeds after `--seed`")?;
+        let seeds: Vec<u64> = (seed..=last_seed).collect();
+        let jobs = number("jobs");
+        let mut conditions = Vec::new();
+        for &subtasks in &subtasks {
+            for &policy in &policies {
+                let with_seed = |&seed| Condition {
+                    policy,
+                    subtasks,
+                    seed,
+                };
+                conditions.extend(seeds.iter().map(with_seed));
+            }
+        }
+        Ok(Plan {
+            out: options.text("out").unwrap_or_default().into(),
+            conditions,
+            policies,
+            subtasks,
+            seeds,
+            jobs,
+            queue: number("queue"),
+            cores,
+            // The kernel records each instance, and the app its joins: half a KiB.
+            memory_mib: 64 + (jobs * least_cores).div_ceil(2048),
+            mode: choose_mode(options)?,
+        })
+    }
+
+    /// Describes the guest of a condition.
+    pub(super) fn qemu(&self, condition: &Condition) -> Qemu {
+        let words = condition.guest_words(self.jobs, self.queue);
+        Qemu {
+            mode: self.mode,
+            machine: Machine::Microvm,
+            cores: self.cores,
+            memory_mib: self.memory_mib,
+            guest_words: format!("mode={} {words}", self.mode),
+            ..Qemu::default()
+        }
+    }
+
+    /// Returns where a condition's raw times are kept.
+    pub(super) fn file(&self, condition: &Condition) -> PathBuf {
+        let name = format!("{}.csv", condition.file_stem());
+        self.out.join("conditions").join(name)
+    }
+}
+
+fn choose_mode(options: &Parsed) -> Result<Mode, String> {
+    let named = options.text("mode").and_then(Mode::from_name);
+    match (named, options.is_given("deterministic")) {
+        (None | Some(Mode::Deterministic), true) => Ok(Mode::Deterministic),
+        (Some(mode), true) => Err(format!(
+            "`--mode {mode}` and `--deterministic` exclude each other; give one"
+        )),
+        (Some(Mode::Kvm), false) => match probe::kvm(Path::new(PROGRAM)) {
+            Ok(()) => Ok(Mode::Kvm),
+            Err(why) => Err(format!("`--mode kvm`: KVM is of no use here: {why}")),
+        },
+        (Some(mode), false) => Ok(mode),
+        (None, false) => Ok(match probe::kvm(Path::new(PROGRAM)) {
+            Ok(()) => Mode::Kvm,
+            Err(_) => Mode::Deterministic,
+        }),
+    }
+}
+
+/// What is measured with: versions, for the record.
+#[derive(Debug)]
+pub(super) struct Provenance {
+    /// QEMU's version.
+    pub(super) qemu: String,
+    /// The commit, with a mark if the tree differs from it.
+    pub(super) commit: String,
+    /// A checksum of the image: other code, other times.
+    pub(super) image: String,
+}
+
+impl Provenance {
+    /// Finds out.
+    pub(super) fn of(image: &Path) -> Provenance {
+        let first_line = |text: String| text.lines().next().unwrap_or("unknown").to_string();
+        let qemu = output(PROGRAM, &["--version"]).map_or("unknown".into(), first_line);
+        let commit = output("git", &["rev-parse", "--short=12", "HEAD"]);
+        let changes = output("git", &["status", "--porcelain"]);
+        let commit = match (commit, changes) {
+            (Some(commit), Some(changes)) if changes.is_empty() => commit.trim().to_string(),
+            (Some(commit), _) => format!("{} and uncommitted changes", commit.trim()),
+            (None, _) => "unknown".into(),
+        };
+        let bytes = fs::read(image).unwrap_or_default();
+        Provenance {
+            qemu,
+            commit,
+            image: format!("{:016x}", checksum(&bytes)),
+        }
+    }
+
+    /// States everything that a condition's times depend on.
+    pub(super) fn statement(&self, plan: &Plan, condition: &Condition) -> String {
+        let qemu = plan.qemu(condition);
+        format!(
+            "{}; image {}; machine {}, {} cores, {} MiB; {}",
+            self.qemu, self.image, qemu.machine, qemu.cores, qemu.memory_mib, qemu.guest_words
+        )
+    }
+}
+
+fn output(program: &str, words: &[&str]) -> Option<String> {
+    let mut command = Command::new(program);
+    let output = command
+        .args(words)
+        .current_dir(system::workspace())
+        .output()
+        .ok()?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    output.status.success().then_some(text)
+}
+
+/// FNV-1a with 64 bits (Fowler, Noll, Vo; draft-eastlake-fnv).
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| {
+        (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Plan, checksum};
+    use crate::bench::join_latency::table::TABLE;
+    use crate::options::Request;
+
+    fn plan(line: &str) -> Result<Plan, String> {
+        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
+        match TABLE.parse(&words) {
+            Ok(Request::Work(options)) => Plan::new(&options),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn every_combination_is_a_condition() {
+        let plan = plan("--deterministic --repeat 2 --policies fass,exact --seed 5").unwrap();
+        assert_eq!(plan.conditions.len(), 3 * 2 * 2);
+        assert_eq!((plan.cores, plan.seeds), (8, vec![5, 6]));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let refusal = |line: &str| plan(line).unwrap_err();
+        assert!(refusal("--cores 7 --deterministic").contains("need 8"));
+        assert!(refusal("--subtasks 2,2 --deterministic").contains("twice"));
+        assert!(refusal("--mode threads --deterministic").contains("exclude"));
+    }
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        assert_eq!(checksum(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(checksum(b"a"), 0xaf63_dc4c_8601_ec8c);
+    }
+}
