@@ -294,7 +294,8 @@ mod tests {
         assert_eq!(boots.len(), 1);
         assert_eq!((boots[0].first, boots[0].rounds), (42, 1));
         assert_eq!(boots[0].part.to_string(), part.to_string());
-        assert_eq!((again.seed, again.round), (7, plan.round));
+        let of = |plan: &Plan| (plan.seed, plan.round, plan.cores, plan.mode, plan.bound_ns);
+        assert_eq!(of(&again), of(&plan));
     }
 
     #[test]

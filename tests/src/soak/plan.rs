@@ -178,9 +178,10 @@ impl Plan {
         let (seed, cores, mode) = (self.seed, self.cores, self.mode);
         format!(
             "./scripts/soak --only {part} --load {0} --overload {0} --first {round} --rounds 1 \
-             --round-ms {1} --seed {seed} --cores {cores} --mode {mode}",
+             --round-ms {1} --seed {seed} --cores {cores} --mode {mode} --bound-us {2}",
             part.load,
-            self.round.as_millis()
+            self.round.as_millis(),
+            self.bound_ns / 1000
         )
     }
 }
