@@ -20,6 +20,11 @@ impl Object<'_, '_> {
         self.field(name, |out| Display::fmt(&value, out))
     }
 
+    /// Writes a field with a truth value.
+    pub fn flag(&mut self, name: &str, value: bool) -> &mut Self {
+        self.field(name, |out| Display::fmt(&value, out))
+    }
+
     /// Writes a field with text.
     pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
         self.field(name, |out| quoted(value).fmt(out))

@@ -4,6 +4,7 @@ use core::fmt;
 
 use sched_dag::{Dag, OverrunPolicy, SubtaskId};
 
+use super::ring::Ring;
 use super::{Event, WORDS, all_rings};
 use crate::json;
 use crate::machine::this_core;
@@ -48,18 +49,13 @@ pub(crate) fn dump(run: &Run, number: u64) {
             });
         }
     }
+    let kept = all_rings().iter().map(|ring| ring.iter().count() as u64);
     json::emit("trace_end", |line| {
-        line.number(
-            "events",
-            all_rings()
-                .iter()
-                .map(|ring| ring.iter().count() as u64)
-                .sum::<u64>(),
-        )
-        .number(
-            "lost",
-            all_rings().iter().map(|ring| ring.lost()).sum::<u64>(),
-        );
+        line.number("events", kept.clone().sum::<u64>())
+            .number("lost", all_rings().iter().map(Ring::lost).sum::<u64>())
+            .list("lost_by_core", all_rings().iter().map(Ring::lost))
+            // A run ends when all its jobs have: nothing is still to come.
+            .flag("complete", true);
     });
 }
 

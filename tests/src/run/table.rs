@@ -3,9 +3,11 @@
 use crate::options::{Command, Opt, Takes};
 use crate::qemu::{LEAST_MEMORY_MIB, MOST_CORES, Machine, Mode};
 
-/// The options that become words `name=value` on the guest's command line.
-/// Those without a default are left out unless given: the app has its own.
-pub(super) const GUEST_WORDS: &[&str] = &["policy", "jobs", "seed", "subtasks", "occupy"];
+/// The options that become words `name=value` on the guest's command line, if
+/// they are given: kernel and apps have defaults of their own, and not every app
+/// knows every word.
+pub(super) const GUEST_WORDS: &[&str] =
+    &["policy", "preemption", "jobs", "seed", "subtasks", "occupy"];
 
 /// The most subtasks side by side: a function returns at most 16 values.
 const MOST_SUBTASKS: u64 = 16;
@@ -40,8 +42,8 @@ pub static RUN: Command = Command {
                 least: 1,
                 most: 1_000_000,
             },
-            default: "200",
-            help: "Jobs that each DAG releases.",
+            default: "",
+            help: "fork-join: jobs that the DAG releases; the app's default is 200.",
         },
         Opt {
             name: "seed",
@@ -50,15 +52,22 @@ pub static RUN: Command = Command {
                 least: 0,
                 most: u64::MAX,
             },
-            default: "1",
-            help: "Seed of the app's random execution times.",
+            default: "",
+            help: "Seed of the app's random draws; the app's default is 1.",
         },
         Opt {
             name: "policy",
             short: None,
             takes: Takes::OneOf(&["static", "edf"]),
-            default: "static",
-            help: "Static priorities, or earliest deadline first.",
+            default: "",
+            help: "Static priorities (the kernel's default), or earliest deadline first.",
+        },
+        Opt {
+            name: "preemption",
+            short: None,
+            takes: Takes::OneOf(&["on", "off"]),
+            default: "",
+            help: "Whether a started instance may lose its core (the kernel's default: on).",
         },
         Opt {
             name: "subtasks",
