@@ -55,7 +55,9 @@ pub fn apps() -> Vec<String> {
         .into_iter()
         .flatten()
         .flatten()
-        .map(|entry| entry.path());
+        .map(|entry| entry.path())
+        // A library for apps is not an app.
+        .filter(|folder| folder.join("src/main.rs").is_file());
     let mut names: Vec<String> = folders.filter_map(|folder| package_name(&folder)).collect();
     names.sort();
     names
