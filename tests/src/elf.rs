@@ -1,4 +1,4 @@
-//! As much of ELF as it takes to weigh an image.
+//! As much of ELF as it takes to weigh an image and to find its symbols.
 //!
 //! *Stripped size* is what `strip` would leave: the file's headers, every
 //! byte that is loaded or a note, and a section table of the sections left
@@ -10,6 +10,10 @@
 const SECTION_HEADER_BYTES: u64 = 64;
 const PROGRAM_HEADER_BYTES: u64 = 56;
 const SHF_ALLOC: u64 = 2;
+const SHF_EXECINSTR: u64 = 4;
+
+/// The type of the section that holds all symbols.
+pub(crate) const SHT_SYMTAB: u64 = 2;
 
 /// The mean length that we take for a section's name, and its alignment.
 const NAME_BYTES: u64 = 24;
@@ -20,9 +24,7 @@ const NAME_BYTES: u64 = 24;
 ///
 /// In words: it is none, or a table points outside it.
 pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
-    if !file.starts_with(b"\x7fELF\x02\x01") {
-        return Err("not a 64-bit little-endian ELF file".into());
-    }
+    check(file)?;
     let segments = table(file, 32, 56, PROGRAM_HEADER_BYTES)?;
     let mut end = 64 + PROGRAM_HEADER_BYTES * count(segments.len());
     for segment in segments {
@@ -38,6 +40,56 @@ pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
     Ok(end + kept * (SECTION_HEADER_BYTES + NAME_BYTES))
 }
 
+/// A section of the file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Section {
+    pub(crate) kind: u64,
+    flags: u64,
+    /// Where it is in memory, if it is loaded.
+    pub(crate) address: u64,
+    /// Where it begins in the file.
+    pub(crate) offset: u64,
+    pub(crate) bytes: u64,
+    /// For symbols: the number of the section with their names.
+    pub(crate) link: u64,
+}
+
+impl Section {
+    /// Reports whether it holds instructions.
+    pub(crate) const fn is_code(&self) -> bool {
+        self.flags & SHF_EXECINSTR != 0
+    }
+}
+
+/// Returns the sections of an ELF file, by number.
+///
+/// # Errors
+///
+/// As [`stripped_bytes`].
+pub(crate) fn sections(file: &[u8]) -> Result<Vec<Section>, String> {
+    check(file)?;
+    let headers = table(file, 40, 60, SECTION_HEADER_BYTES)?.into_iter();
+    let section = |at: u64| {
+        Ok(Section {
+            kind: number(file, at + 4, 4)?,
+            flags: number(file, at + 8, 8)?,
+            address: number(file, at + 16, 8)?,
+            offset: number(file, at + 24, 8)?,
+            bytes: number(file, at + 32, 8)?,
+            link: number(file, at + 40, 4)?,
+        })
+    };
+    headers.map(section).collect()
+}
+
+fn check(file: &[u8]) -> Result<(), String> {
+    if file.starts_with(b"\x7fELF\x02\x01") {
+        Ok(())
+    } else {
+        Err("not a 64-bit little-endian ELF file".into())
+    }
+}
+
 /// Returns the offsets of a table's entries; `offset_at` and `count_at` say
 /// where in the ELF header its place and length stand.
 fn table(file: &[u8], offset_at: u64, count_at: u64, entry: u64) -> Result<Vec<u64>, String> {
@@ -48,7 +100,12 @@ fn table(file: &[u8], offset_at: u64, count_at: u64, entry: u64) -> Result<Vec<u
         .collect())
 }
 
-fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
+/// Returns the little-endian number of `length` bytes at `at`.
+///
+/// # Errors
+///
+/// In words: it lies outside the file.
+pub(crate) fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
     let start = usize::try_from(at).unwrap_or(usize::MAX);
     let bytes = file.get(start..start.saturating_add(length));
     let bytes = bytes.ok_or("a header points outside the file")?;
@@ -56,6 +113,19 @@ fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
         .iter()
         .rev()
         .fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
+}
+
+/// Returns the text at `at`, which ends before the next zero byte.
+///
+/// # Errors
+///
+/// In words: it lies outside the file, or has no end.
+pub(crate) fn text(file: &[u8], at: u64) -> Result<String, String> {
+    let start = usize::try_from(at).unwrap_or(usize::MAX);
+    let rest = file.get(start..).ok_or("a name lies outside the file")?;
+    let end = rest.iter().position(|byte| *byte == 0);
+    let bytes = &rest[..end.ok_or("a name has no end")?];
+    Ok(String::from_utf8_lossy(bytes).into_owned())
 }
 
 fn count(length: usize) -> u64 {

@@ -11,7 +11,7 @@
 //! From the bottom up:
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
-//! - [`elf`], [`image`], [`tiny`]: what is booted;
+//! - [`elf`], [`image`], [`places`], [`tiny`]: what is booted;
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table;
@@ -36,6 +36,7 @@ pub mod json;
 pub mod options;
 pub mod oracle;
 pub mod outcome;
+pub mod places;
 pub mod probe;
 pub mod protocol;
 pub mod qemu;

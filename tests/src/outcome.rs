@@ -11,6 +11,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::places::Places;
 use crate::protocol::{Status, Transcript};
 use crate::qemu::{Ending, Qemu};
 use crate::tail::Tail;
@@ -29,6 +30,8 @@ pub struct Outcome {
     pub transcript: Transcript,
     /// Where the log lies.
     pub log: PathBuf,
+    /// Where the image lies that was booted.
+    pub image: PathBuf,
     /// The wall time from start to end.
     pub elapsed: Duration,
     /// What QEMU itself complained of; mostly empty.
@@ -70,6 +73,7 @@ pub fn boot(
         transcript: Transcript::read(&serial),
         serial,
         log: log.to_path_buf(),
+        image: image.to_path_buf(),
         elapsed: running.elapsed(),
         complaints: running.complaints(),
     })
@@ -121,7 +125,8 @@ impl Outcome {
         }
     }
 
-    /// Returns the last serial lines, indented, and where all of them are.
+    /// Returns the last serial lines, indented, and where all of them are. To
+    /// a fault at an address it adds the function.
     #[must_use]
     pub fn tail(&self) -> String {
         let lines: Vec<&str> = self.serial.lines().collect();
@@ -139,8 +144,12 @@ impl Outcome {
             }
             _ => writeln!(text, "the serial log {log}:"),
         };
+        let places = Places::new(&self.image);
         for line in shown {
             let _ = writeln!(text, "  | {line}");
+            if let Some(place) = places.explain(line) {
+                let _ = writeln!(text, "  = {place}");
+            }
         }
         text
     }
@@ -162,6 +171,7 @@ mod tests {
             serial: serial.into(),
             transcript: Transcript::read(serial),
             log: "the.log".into(),
+            image: "the image".into(),
             elapsed: Duration::ZERO,
             complaints: String::new(),
         }

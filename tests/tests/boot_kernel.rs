@@ -84,6 +84,12 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
             "{test}\n{}",
             outcome.tail()
         );
+        // The host names the function that the address lies in.
+        let named = outcome
+            .tail()
+            .lines()
+            .any(|line| line.starts_with("  = 0x"));
+        assert!(named, "{test}\n{}", outcome.tail());
     }
 }
 

@@ -3,11 +3,14 @@
 //! Lines for people and machine lines go to standard output in the order of
 //! the serial log, so that `grep '^{'` works there as on the log itself.
 //! Progress lines become one line on standard error that renews itself if
-//! that is a terminal, and otherwise a line each tenth of the way.
+//! that is a terminal, and otherwise a line each tenth of the way. A fault at
+//! an address gets a line of our own that names the function.
 
 use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::Path;
 
 use crate::options::Parsed;
+use crate::places::Places;
 use crate::protocol::{MachineLine, read_line};
 
 /// The width of the bar.
@@ -22,10 +25,11 @@ pub(super) struct Screen {
     on_terminal: bool,
     bar_is_shown: bool,
     tenths_shown: u64,
+    places: Places,
 }
 
 impl Screen {
-    pub(super) fn new(options: &Parsed) -> Screen {
+    pub(super) fn new(options: &Parsed, image: &Path) -> Screen {
         Screen {
             people: !options.is_given("json"),
             machine: !options.is_given("plain"),
@@ -35,6 +39,7 @@ impl Screen {
             on_terminal: stderr().is_terminal(),
             bar_is_shown: false,
             tenths_shown: 0,
+            places: Places::new(image),
         }
     }
 
@@ -74,6 +79,10 @@ impl Screen {
         if wanted {
             self.end();
             put(&mut stdout(), line);
+        }
+        if let Some(place) = self.places.explain(line) {
+            self.end();
+            self.say(&format!("  {place}"));
         }
     }
 
