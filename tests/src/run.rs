@@ -182,7 +182,7 @@ fn describe(options: &Parsed, program: &Path, mode: Mode, memory_mib: u64) -> Qe
 /// The person's limit, or one that is generous also where a job takes its
 /// real time: two minutes, and a second for each job.
 fn limit(options: &Parsed) -> Duration {
-    let jobs = options.number("jobs").unwrap_or(0);
+    let jobs = options.number("jobs").unwrap_or(200);
     let seconds = options.number("timeout").unwrap_or(120 + jobs);
     if options.is_given("gdb") {
         // A person at a debugger takes all day.
@@ -193,14 +193,8 @@ fn limit(options: &Parsed) -> Duration {
 
 /// Says what is run, and what its times are worth.
 fn introduce(screen: &Screen, options: &Parsed, qemu: &Qemu, why: Option<String>) {
-    let of = |name: &str| options.text(name).unwrap_or("?").to_string();
-    screen.say(&format!(
-        "app {}, seed {}, {} jobs, policy {}",
-        of("app"),
-        of("seed"),
-        of("jobs"),
-        of("policy")
-    ));
+    let app = options.text("app").unwrap_or("?");
+    screen.say(&format!("app {app}, guest words: {}", qemu.guest_words));
     screen.say(&format!(
         "mode {}, machine {}, {} cores, {} MiB of memory",
         qemu.mode, qemu.machine, qemu.cores, qemu.memory_mib
