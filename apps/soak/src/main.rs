@@ -58,9 +58,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         overrun_name: options.text("overrun").unwrap_or(OVERRUNS[0].0),
         policy_name: options.text("policy").unwrap_or("static"),
     };
-    options.finish(&[
-        "first", "rounds", "overrun", "seed", "load", "round_ms", "policy",
-    ])?;
+    options.finish(&["first", "rounds", "overrun", "seed", "load", "round_ms"])?;
     println!(
         "{rounds} rounds of {} ms at {} % load of {} cores, overrun: {}",
         soak.length.as_millis(),
