@@ -168,7 +168,8 @@ def distribution(samples, policies, parallel, colours, jobs):
         panel.set_ylabel(name)
     histogram.set_yscale("log")
     cumulative.set_ylim(0, 1.02)
-    cumulative.legend(loc="center right")
+    # Between what joins at once and what waits for messages nothing is drawn.
+    cumulative.legend(loc="center", bbox_to_anchor=(0.4, 0.55))
 
 
 def gantt(out, summary, policies, parallel, colours):

@@ -81,6 +81,9 @@ impl Callbacks<Message> for Part {
                             message: job,
                         },
                     );
+                } else if context.dropped() > 0 {
+                    // The join waits for messages that will never come.
+                    context.shut_down();
                 }
             }
             (

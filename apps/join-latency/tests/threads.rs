@@ -115,3 +115,9 @@ fn close_stamps_join_only_what_is_close() {
         assert!(pairs.all(|(earlier, later)| earlier < later));
     }
 }
+
+#[test]
+fn a_run_that_has_lost_messages_ends_and_says_so() {
+    let samples = run(Matching::Exact, 1);
+    assert!(samples.lost_inputs > 0);
+}

@@ -67,6 +67,10 @@ impl<M: Clone, C, H: Host<M, C>> Context<M> for OnHost<'_, H, C> {
         self.0.notify();
     }
 
+    fn dropped(&self) -> u64 {
+        self.0.with_graph(|graph| graph.dropped())
+    }
+
     fn shut_down(&self) {
         self.0.with_graph(Graph::shut_down);
         self.0.notify();

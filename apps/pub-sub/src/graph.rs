@@ -76,6 +76,9 @@ pub trait Context<M> {
     /// If the graph has no such topic.
     fn publish(&self, topic: TopicId, message: M);
 
+    /// Returns how many messages the graph's subscriptions have dropped.
+    fn dropped(&self) -> u64;
+
     /// Lets all workers end when they have executed what they are at.
     fn shut_down(&self);
 }

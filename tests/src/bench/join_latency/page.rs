@@ -70,7 +70,7 @@ const STYLE: &str = "
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--back); color: var(--ink);
   font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif; }
-main { max-width: 62rem; margin: 2.5rem auto; padding: 2.5rem 3rem; background: white;
+main { max-width: 68rem; margin: 2.5rem auto; padding: 2.5rem 3rem; background: white;
   border: 1px solid var(--line); border-radius: 10px; }
 h1 { font-size: 2rem; line-height: 1.2; margin: 0 0 .4rem; }
 h2 { font-size: 1.3rem; margin: 2.4rem 0 .6rem; padding-top: 1.2rem;
@@ -83,9 +83,9 @@ h2 { font-size: 1.3rem; margin: 2.4rem 0 .6rem; padding-top: 1.2rem;
 .card b { display: block; font-size: 1.5rem; font-variant-numeric: tabular-nums; }
 .card span { color: var(--soft); font-size: .92rem; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-size: .86rem;
+table { border-collapse: collapse; width: 100%; font-size: .82rem;
   font-variant-numeric: tabular-nums; }
-th, td { padding: .34rem .5rem; text-align: right; white-space: nowrap; }
+th, td { padding: .34rem .45rem; text-align: right; white-space: nowrap; }
 th { white-space: normal; vertical-align: bottom; color: var(--soft); font-weight: 600;
   border-bottom: 2px solid var(--line); }
 th:nth-child(2), td:nth-child(2) { text-align: left; }

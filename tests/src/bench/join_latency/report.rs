@@ -15,20 +15,17 @@ use super::plots::{self, PICTURES};
 /// Figures of one policy and N.
 type Row = (Policy, usize, Figures);
 
-const HEADS: [&str; 13] = [
+const HEADS: [&str; 10] = [
     "N",
     "joined by",
     "joins per job",
     "of one job",
     "across jobs",
     "never happened",
-    "join latency, literal: median",
-    "p99",
-    "cover delay: median",
-    "p99",
-    "join to start: median",
-    "response: median",
-    "p99",
+    "join latency, literal",
+    "cover delay",
+    "join to start",
+    "response",
 ];
 
 /// Returns the figures as a table for a terminal.
@@ -89,7 +86,7 @@ pub(super) fn page(
     body.push_str("<h2>Figures</h2>\n");
     body.push_str(&page::table(&HEADS, &table_rows(&rows)));
     body.push_str(
-        "<p>Medians and percentiles are over the joins that happened (cover delay and \
+        "<p>Times: median / 99th percentile, over the joins that happened (cover delay and \
                    response: over the jobs that a join covers). Mean and maximum are in \
                    <code>summary.json</code>, every sample in <code>samples.csv</code>.</p>\n",
     );
@@ -164,27 +161,22 @@ fn table_rows(rows: &[Row]) -> Vec<(bool, Vec<String>)> {
     rows.iter()
         .map(|(policy, subtasks, figures)| {
             let starts_group = last.replace(*subtasks) != Some(*subtasks);
-            let [latency, cover, start, response] =
-                [0, 1, 2, 3].map(|metric| figures.distribution(metric));
-            let time = |count: usize, value_ns| match count {
-                0 => "none".into(),
-                _ => ns(value_ns),
-            };
-            let cells = vec![
+            let times = (0..METRICS.len()).map(|metric| {
+                let of = figures.distribution(metric);
+                match of.count {
+                    0 => "none".into(),
+                    _ => format!("{} / {}", ns(of.median_ns), ns(of.p99_ns)),
+                }
+            });
+            let mut cells = vec![
                 subtasks.to_string(),
                 policy.title(),
                 format!("{:.3}", figures.joins_per_job()),
                 figures.same_index.to_string(),
                 figures.cross_index.to_string(),
                 figures.missing.to_string(),
-                time(latency.count, latency.median_ns),
-                time(latency.count, latency.p99_ns),
-                time(cover.count, cover.median_ns),
-                time(cover.count, cover.p99_ns),
-                time(start.count, start.median_ns),
-                time(response.count, response.median_ns),
-                time(response.count, response.p99_ns),
             ];
+            cells.extend(times);
             (starts_group, cells)
         })
         .collect()
