@@ -23,6 +23,8 @@ pub(super) struct Plan {
     pub(super) cores: u64,
     pub(super) memory_mib: u64,
     pub(super) mode: Mode,
+    /// Whether a deterministic condition is booted once only.
+    pub(super) once: bool,
 }
 
 impl Plan {
@@ -82,6 +84,7 @@ impl Plan {
             // The kernel records each instance, and the app its joins: half a KiB.
             memory_mib: 64 + (jobs * least_cores).div_ceil(2048),
             mode: choose_mode(options)?,
+            once: options.is_given("once"),
         })
     }
 

@@ -65,6 +65,12 @@ impl Progress {
         self.report("is there already");
     }
 
+    /// Says something about the condition in hand.
+    pub(super) fn note(&self, what: &str) {
+        let wipe = if self.on_terminal { "\r\x1b[K" } else { "" };
+        let _ = writeln!(stderr(), "{wipe}{}: {what}", self.name);
+    }
+
     fn report(&self, what: &str) {
         let wipe = if self.on_terminal { "\r\x1b[K" } else { "" };
         let Progress {

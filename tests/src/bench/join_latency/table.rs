@@ -95,6 +95,13 @@ pub(super) static TABLE: Command = Command {
             default: "",
             help: "The same as --mode deterministic.",
         },
+        Opt {
+            name: "once",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "Boot each deterministic condition once, not until two boots agree.",
+        },
     ],
     notes: "\
 writes into DIR:
