@@ -5,9 +5,9 @@
 //! Here the rounds are split into boots, a few at a time, and each round's trace
 //! is checked on the host against the same rules, from other evidence.
 //!
-//! - [`plan`]: which rounds, in which boots;
-//! - [`judge`], [`figures`]: what became of a boot's rounds;
-//! - [`command`]: the command line; [`progress`]: what is shown meanwhile.
+//! - `plan`: which rounds, in which boots;
+//! - `judge`, `figures`: what became of a boot's rounds;
+//! - `command`: the command line; `progress`: what is shown meanwhile.
 
 mod command;
 mod figures;

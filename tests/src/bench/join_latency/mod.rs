@@ -7,10 +7,10 @@
 //! interrupted, and what is there already is not measured again, as long as it was
 //! measured under the same conditions (image, QEMU, all options).
 //!
-//! - [`table`], [`plan`], [`condition`]: what is to be measured;
-//! - [`times`], [`figures`]: from the guest's lines to figures;
-//! - [`files`], [`plots`], [`report`]: from figures to what people and programs read;
-//! - [`progress`]: what is seen meanwhile.
+//! - `table`, `plan`, `condition`: what is to be measured;
+//! - `times`, `figures`: from the guest's lines to figures;
+//! - `files`, `plots`, `report`: from figures to what people and programs read;
+//! - `progress`: what is seen meanwhile.
 
 mod condition;
 mod figures;
@@ -125,9 +125,9 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
 
 /// Measures one condition: in deterministic mode until two boots agree.
 ///
-/// QEMU's single-threaded emulation is not quite deterministic: its RCU thread may
-/// stop a processor's turn when the host is busy, and then some instruction is
-/// executed a few virtual nanoseconds earlier or later. It was seen once in 30 boots.
+/// Counted time in QEMU 7.2 with several processors is not deterministic to the last
+/// bit when the host is busy: one boot of many had one interrupt 9 ns late. Nothing
+/// of the host reaches the guest, so the cause is outside it; which, is not known.
 fn measure(
     plan: &Plan,
     condition: &Condition,
