@@ -126,8 +126,9 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
 /// Measures one condition: in deterministic mode until two boots agree.
 ///
 /// Counted time in QEMU 7.2 with several processors is not deterministic to the last
-/// bit when the host is busy: one boot of many had one interrupt 9 ns late. Nothing
-/// of the host reaches the guest, so the cause is outside it; which, is not known.
+/// bit when the host is busy: about one boot in thirty had a single interrupt 9 ns
+/// late. Nothing of the host reaches the guest, so the cause is outside it; which, is
+/// not known.
 fn measure(
     plan: &Plan,
     condition: &Condition,

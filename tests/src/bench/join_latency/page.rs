@@ -70,7 +70,7 @@ const STYLE: &str = "
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--back); color: var(--ink);
   font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif; }
-main { max-width: 68rem; margin: 2.5rem auto; padding: 2.5rem 3rem; background: white;
+main { max-width: 76rem; margin: 2.5rem auto; padding: 2.5rem 3rem; background: white;
   border: 1px solid var(--line); border-radius: 10px; }
 h1 { font-size: 2rem; line-height: 1.2; margin: 0 0 .4rem; }
 h2 { font-size: 1.3rem; margin: 2.4rem 0 .6rem; padding-top: 1.2rem;
