@@ -29,7 +29,7 @@ pub mod physical;
 pub mod processors;
 pub mod pvh;
 
-pub use list::List;
+pub use list::{Full, List};
 
 /// The most processors that are told apart: the 8-bit APIC ids, less broadcast.
 pub const MAX_PROCESSORS: usize = 255;
