@@ -13,6 +13,8 @@
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
 
+use alloc::string::ToString;
+
 use sched_dag::Instance;
 
 use crate::machine::fault::Exception;
@@ -42,19 +44,21 @@ pub(crate) fn end_panicked(info: &PanicInfo<'_>) {
         return;
     };
     cpu::enable_interrupts();
-    // From here on the app's own code runs once more, to show the message: what
-    // happens in it is the same instance's fault, without another report.
-    if !context.note_fault() {
-        report(
-            instance,
-            &Fault {
-                cause: "panic",
-                message: &info.message(),
-                place: &place_of(info),
-                address: None,
-            },
-        );
-    }
+    // The message is made into text before any lock is taken, as that is the
+    // app's code once more. A panic in it comes here a second time.
+    let message = match context.note_fault() {
+        false => info.message().to_string(),
+        true => "it panicked again while its message was made".into(),
+    };
+    report(
+        instance,
+        &Fault {
+            cause: "panic",
+            message: &message,
+            place: &place_of(info),
+            address: None,
+        },
+    );
     cpu::disable_interrupts();
     execution::fail(clock::now_ns());
     contexts::lose();
@@ -71,18 +75,16 @@ pub(crate) fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupte
     let Some(instance) = execution::running(core) else {
         return false;
     };
-    if !core.context().note_fault() {
-        let rip = exception.registers.rip;
-        report(
-            instance,
-            &Fault {
-                cause: exception.name,
-                message: exception,
-                place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
-                address: exception.address,
-            },
-        );
-    }
+    let rip = exception.registers.rip;
+    report(
+        instance,
+        &Fault {
+            cause: exception.name,
+            message: exception,
+            place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
+            address: exception.address,
+        },
+    );
     end_interrupted(interrupted, clock::now_ns());
     true
 }
@@ -99,19 +101,17 @@ pub(crate) fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         timer::set(Alarm::Budget, context.budget_end_ns());
         return;
     }
-    if !context.note_fault() {
-        let budget_ns = execution::budget_ns(instance);
-        let rip = interrupted.instruction();
-        report(
-            instance,
-            &Fault {
-                cause: "budget overrun",
-                message: &fmt::from_fn(|f| write!(f, "executed for more than {budget_ns} ns")),
-                place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
-                address: None,
-            },
-        );
-    }
+    let budget_ns = execution::budget_ns(instance);
+    let rip = interrupted.instruction();
+    report(
+        instance,
+        &Fault {
+            cause: "budget overrun",
+            message: &fmt::from_fn(|f| write!(f, "executed for more than {budget_ns} ns")),
+            place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
+            address: None,
+        },
+    );
     end_interrupted(interrupted, now_ns);
 }
 

@@ -26,8 +26,8 @@
 //! 3. **After commit nothing allocates**: from a job's release to its completion
 //!    all memory is there already.
 //! 4. **A core without work halts**, and is woken by the core that has some.
-//! 5. **`unsafe` is in `machine`, `memory` and `entry`** alone, each block with
-//!    the invariant that it relies on.
+//! 5. **`unsafe` is in `machine`, `memory` and the entry** (`entry`, `start`) alone,
+//!    each block with the invariant that it relies on.
 //! 6. **Apps are not trusted**: what they say is verified at commit.
 //!
 //! # From bottom to top

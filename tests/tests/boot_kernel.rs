@@ -41,7 +41,7 @@ fn faults_are_contained(cores: u64) {
     let outcome = Guest::new("faults").cores(cores).succeed();
     let transcript = &outcome.transcript;
     let verdicts: Vec<_> = transcript.of_kind("containment").collect();
-    assert_eq!(verdicts.len(), 12, "{}", outcome.tail());
+    assert_eq!(verdicts.len(), 13, "{}", outcome.tail());
     for line in &verdicts {
         assert_eq!(line.text_at("verdict"), Some("contained"), "{}", line.text);
     }
@@ -134,14 +134,15 @@ fn a_storm_of_interrupts_in_real_time_leaves_every_checksum_alone() {
 }
 
 /// Runs DAGs that preempt one another and check themselves.
-fn preemption(mode: Mode, cores: u64, policy: &str) -> Outcome {
+fn preemption(mode: Mode, cores: u64, policy: &str, least_preemptions: u64) -> Outcome {
     let guest = guest("preemption").mode(mode).cores(cores).memory_mib(64);
     let guest = guest.word(&format!("policy={policy}")).word("ms=500");
     let guest = guest.word("trace=dump").word("trace_events=16384");
     let outcome = guest.limit(Duration::from_secs(120)).succeed();
     let line = outcome.transcript.of_kind("preemption").next();
     let line = line.unwrap_or_else(|| panic!("no preemption line\n{}", outcome.tail()));
-    assert!(line.number_at("preemptions") >= Some(20), "{}", line.text);
+    let preemptions = line.number_at("preemptions");
+    assert!(preemptions >= Some(least_preemptions), "{}", line.text);
     assert_eq!(line.number_at("diverged"), Some(0), "{}", line.text);
     assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
     outcome
@@ -164,13 +165,13 @@ fn keeps_the_rules(outcome: &Outcome) {
 fn preempted_instances_lose_nothing() {
     for cores in [1, 2, 4] {
         for policy in ["static", "edf"] {
-            keeps_the_rules(&preemption(Mode::Deterministic, cores, policy));
+            keeps_the_rules(&preemption(Mode::Deterministic, cores, policy, 100));
         }
     }
 }
 
 #[test]
 fn preempted_instances_lose_nothing_in_real_time() {
-    preemption(Mode::Threads, 2, "static");
-    preemption(Mode::Threads, 4, "edf");
+    preemption(Mode::Threads, 2, "static", 1);
+    preemption(Mode::Threads, 4, "edf", 1);
 }

@@ -14,8 +14,9 @@ pub struct Unpunished;
 pub type Crime = fn() -> Unpunished;
 
 /// Every crime, by name.
-pub const CRIMES: [(&str, Crime); 12] = [
+pub const CRIMES: [(&str, Crime); 13] = [
     ("panic", panic),
+    ("panic_in_message", panic_twice),
     ("null_write", write_to_null),
     ("wild_read", read_wildly),
     ("non_canonical", read_non_canonical),
@@ -31,6 +32,17 @@ pub const CRIMES: [(&str, Crime); 12] = [
 
 fn panic() -> Unpunished {
     panic!("a panic on purpose")
+}
+
+/// Panics with a message whose own making panics.
+fn panic_twice() -> Unpunished {
+    struct Unspeakable;
+    impl core::fmt::Display for Unspeakable {
+        fn fmt(&self, _: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+            panic!("a panic within a panic")
+        }
+    }
+    panic!("{Unspeakable}")
 }
 
 /// Writes to address 8, on the page that must be absent.
