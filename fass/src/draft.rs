@@ -71,20 +71,11 @@ impl Draft {
                 given: outputs.len(),
             });
         }
-        let wcet_ns = attributes
-            .wcet
-            .and_then(|wcet| self.convert(wcet, Some(&subtask), "WCET"));
-        let budget_ns = attributes
-            .budget
-            .and_then(|budget| self.convert(budget, Some(&subtask), "budget"));
+        let spec = self.specify(&subtask, attributes);
         self.spec.subtasks.push(SubtaskSpec {
-            name: attributes.name,
-            wcet_ns,
-            budget_ns,
-            priority: attributes.priority.map(Priority),
-            non_preemptive: attributes.non_preemptive,
             inputs: ports(inputs, &input_types),
             outputs: ports(outputs, &output_types),
+            ..spec
         });
         self.make_bodies.push(defer(f));
         subtask
@@ -96,22 +87,26 @@ impl Draft {
         F: FnMut(u64) + Send + 'static,
     {
         let subtask = self.next_label(&attributes);
-        let wcet_ns = attributes
-            .wcet
-            .and_then(|wcet| self.convert(wcet, Some(&subtask), "WCET"));
-        let budget_ns = attributes
-            .budget
-            .and_then(|budget| self.convert(budget, Some(&subtask), "budget"));
-        self.spec.subtasks.push(SubtaskSpec {
+        let spec = self.specify(&subtask, attributes);
+        self.spec.subtasks.push(spec);
+        self.make_bodies.push(untyped::defer(f));
+        subtask.id.index()
+    }
+
+    /// Returns what the attributes say of a subtask, without its ports.
+    fn specify(&mut self, subtask: &SubtaskLabel, attributes: SubtaskAttributes) -> SubtaskSpec {
+        let wcet = attributes.wcet;
+        let wcet_ns = wcet.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
+        let budget = attributes.budget;
+        let budget_ns = budget.and_then(|budget| self.convert(budget, Some(subtask), "budget"));
+        SubtaskSpec {
             name: attributes.name,
             wcet_ns,
             budget_ns,
             priority: attributes.priority.map(Priority),
             non_preemptive: attributes.non_preemptive,
             ..SubtaskSpec::default()
-        });
-        self.make_bodies.push(untyped::defer(f));
-        subtask.id.index()
+        }
     }
 
     /// Replaces the period, whatever a source said before.
