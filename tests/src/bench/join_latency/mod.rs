@@ -123,19 +123,22 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
     Ok(())
 }
 
-/// Measures one condition: in deterministic mode until two boots agree.
+/// How often a condition is booted at most in deterministic mode.
+const MOST_BOOTS: usize = 6;
+
+/// Measures one condition: in deterministic mode until two boots agree, or
+/// [`MOST_BOOTS`] have been tried; then it says so and keeps the first.
 ///
-/// Counted time in QEMU 7.2 with several processors is not deterministic to the last
-/// bit when the host is busy: about one boot in thirty had a single interrupt 9 ns
-/// late. Nothing of the host reaches the guest, so the cause is outside it; which, is
-/// not known.
+/// Counted time in QEMU 7.2 with several processors is not deterministic to the
+/// last bit: now and then an interrupt comes a few nanoseconds late, and two cores
+/// that meet at a lock then do so in the other order. Nothing of the host reaches
+/// the guest, so the cause is outside it; which, is not known.
 fn measure(
     plan: &Plan,
     condition: &Condition,
     image: &Path,
     progress: &mut Progress,
 ) -> Result<Samples, String> {
-    const MOST_BOOTS: usize = 6;
     let mut seen = Vec::new();
     while seen.len() < MOST_BOOTS {
         let samples = boot_once(plan, condition, image, progress)?;
@@ -148,9 +151,10 @@ fn measure(
         }
         seen.push(samples);
     }
-    Err(format!(
-        "{condition}: no two of {MOST_BOOTS} deterministic boots agree"
-    ))
+    progress.note(&format!(
+        "no two of {MOST_BOOTS} boots agree to the last nanosecond; the first is kept"
+    ));
+    Ok(seen.swap_remove(0))
 }
 
 /// Boots one condition.
