@@ -42,7 +42,7 @@ pub const WCET_OF_ENDS: Duration = Duration::from_millis(1);
 
 /// After this time any subtask is at fault. Generous, because on a busy host a
 /// virtual processor can lose its core to others for long.
-pub const BUDGET: Duration = Duration::from_millis(500);
+pub const BUDGET: Duration = Duration::from_secs(5);
 
 /// The most parallel subtasks: the sink's arguments are a tuple.
 pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
