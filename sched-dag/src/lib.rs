@@ -42,6 +42,10 @@
 //!   idles while an instance is ready. At one instant all completions come
 //!   first, then all releases, then one dispatch.
 //!
+//! A *sporadic* DAG's jobs are released by signals instead of the clock, at least
+//! T apart: the rules S1 to S4 stand in `scheduler/signals.rs`, their tests in
+//! `tests/sporadic.rs`. From its release on its job is a job like others.
+//!
 //! What happens to a release that finds as many jobs in flight as the DAG may
 //! have is the DAG's [`OverrunPolicy`]; its tests are in `tests/overrun.rs`.
 //!
@@ -98,7 +102,7 @@ mod verify;
 pub mod virtual_time;
 
 pub use ids::{CoreId, DagId, Instance, SubtaskId};
-pub use policy::{OverrunPolicy, Policy, Preemption, Priority};
+pub use policy::{Activation, OverrunPolicy, Policy, Preemption, Priority};
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use scheduler::{
     DagStatistics, Decision, JobOutcome, Moment, Observer, Released, Scheduler, SchedulerOptions,

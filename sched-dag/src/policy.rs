@@ -1,5 +1,17 @@
 //! The choices that govern scheduling: policy, preemption, priority, overrun.
 
+/// What releases the jobs of a DAG.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Activation {
+    /// The clock: job k is released at O + kT.
+    #[default]
+    Periodic,
+    /// Signals ([`Moment::signal`](crate::Moment::signal)): one job each, but
+    /// never two releases less than T apart, and none before O. T is then the
+    /// minimum inter-arrival time.
+    Sporadic,
+}
+
 /// How the ready instances are ordered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Policy {

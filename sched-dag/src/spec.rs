@@ -7,18 +7,21 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
 
-use crate::policy::{OverrunPolicy, Priority};
+use crate::policy::{Activation, OverrunPolicy, Priority};
 
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
 pub struct DagSpec {
     /// The name that messages use; may be empty, then messages say `dag 0`.
     pub name: String,
-    /// The time between two nominal releases; `None` if no source states one.
+    /// What releases the jobs.
+    pub activation: Activation,
+    /// The time between two nominal releases, of a sporadic DAG the least time;
+    /// `None` if no source states one.
     pub period_ns: Option<u64>,
     /// The time after a release by which all sinks shall have finished.
     pub relative_deadline_ns: Option<u64>,
-    /// The time of the first nominal release.
+    /// The time of the first nominal release, of a sporadic DAG the earliest one.
     pub offset_ns: u64,
     /// The most jobs that may be in flight; `None`: enough for the deadline,
     /// `ceil(D / T)` jobs and one more.

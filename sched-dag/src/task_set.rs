@@ -7,7 +7,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 
 use crate::ids::{DagId, SubtaskId};
-use crate::policy::{OverrunPolicy, Priority};
+use crate::policy::{Activation, OverrunPolicy, Priority};
 
 /// All DAG tasks of one commit.
 #[derive(Clone, Debug)]
@@ -19,6 +19,7 @@ pub struct TaskSet {
 #[derive(Clone, Debug)]
 pub struct Dag {
     pub(crate) name: String,
+    pub(crate) activation: Activation,
     pub(crate) period_ns: u64,
     pub(crate) relative_deadline_ns: u64,
     pub(crate) offset_ns: u64,
@@ -76,7 +77,20 @@ impl Dag {
         &self.name
     }
 
-    /// Returns the time between two nominal releases, never 0.
+    /// Returns what releases the jobs.
+    #[must_use]
+    pub const fn activation(&self) -> Activation {
+        self.activation
+    }
+
+    /// Reports whether signals release the jobs, rather than the clock.
+    #[must_use]
+    pub const fn is_sporadic(&self) -> bool {
+        matches!(self.activation, Activation::Sporadic)
+    }
+
+    /// Returns the time between two nominal releases, of a sporadic DAG the
+    /// minimum inter-arrival time; never 0.
     #[must_use]
     pub const fn period_ns(&self) -> u64 {
         self.period_ns
@@ -88,7 +102,8 @@ impl Dag {
         self.relative_deadline_ns
     }
 
-    /// Returns the time of the first nominal release.
+    /// Returns the time of the first nominal release, of a sporadic DAG the
+    /// earliest one.
     #[must_use]
     pub const fn offset_ns(&self) -> u64 {
         self.offset_ns

@@ -40,7 +40,7 @@ use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::ids::{CoreId, Instance};
+use crate::ids::{CoreId, DagId, Instance};
 use crate::scheduler::heap::IndexedHeap;
 use crate::scheduler::{Decision, Observer, Scheduler};
 
@@ -59,6 +59,18 @@ pub trait Workload: Observer {
     fn fails(&mut self, instance: Instance) -> bool {
         let _ = instance;
         false
+    }
+
+    /// Returns when the next signal to a sporadic DAG comes. Asked again at every
+    /// instant; what has finished may send one, too.
+    fn next_signal_ns(&self) -> Option<u64> {
+        None
+    }
+
+    /// Returns the DAG of the next signal that has come by now, and forgets that.
+    fn take_signal(&mut self, now_ns: u64) -> Option<DagId> {
+        let _ = now_ns;
+        None
     }
 
     /// An instant begins, in which all that follows happens until the next one.
@@ -131,7 +143,8 @@ pub struct VirtualTime {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum End {
-    /// Every job of every DAG has ended; an ended DAG has no further ones.
+    /// Every job of every DAG has ended; an ended DAG has no further ones. Or
+    /// nothing happens any more, because a sporadic DAG gets no further signal.
     Finished,
     /// The next event lies after the time up to which the run should go.
     TimeReached,
@@ -178,12 +191,12 @@ impl VirtualTime {
                 .finish_times
                 .peek()
                 .map(|((finish_ns, _), _)| finish_ns);
-            let event_ns = match (finish_ns, self.scheduler.next_event_ns()) {
-                (Some(finish_ns), Some(event_ns)) => finish_ns.min(event_ns),
-                (one, other) => match one.or(other) {
-                    Some(event_ns) => event_ns,
-                    None => return End::Finished,
-                },
+            let scheduler_ns = self.scheduler.next_event_ns();
+            let signal_ns =
+                (workload.next_signal_ns()).map(|signal_ns| signal_ns.max(self.scheduler.now_ns()));
+            let events = [finish_ns, scheduler_ns, signal_ns];
+            let Some(event_ns) = events.into_iter().flatten().min() else {
+                return End::Finished;
             };
             if event_ns > until_ns {
                 return End::TimeReached;
@@ -227,6 +240,9 @@ impl VirtualTime {
         for (instance, core) in self.failing.drain(..) {
             workload.failed(instance, core, now_ns);
             moment.fail(instance, workload);
+        }
+        while let Some(dag) = workload.take_signal(now_ns) {
+            moment.signal(dag, workload);
         }
         for &decision in moment.release_due(workload).dispatch() {
             let (core, instance) = (decision.core(), decision.instance());

@@ -353,6 +353,11 @@ impl<'a> Case<'a> {
         }
     }
 
+    /// Reports whether jobs are certain to come; a sporadic DAG's signals may not.
+    fn must_keep_up(&self, dag: usize) -> bool {
+        !self.dag(dag).is_sporadic()
+    }
+
     /// Finds the DAGs that cannot keep up at WCETs: by urgency those that could
     /// not even alone, then the first at which the cores do not suffice.
     fn certain(&self) -> Vec<(usize, Reason)> {
@@ -362,6 +367,9 @@ impl<'a> Case<'a> {
             if length_ns > task.relative_deadline_ns() {
                 return Some((dag, Reason::LengthBeyondDeadline { length_ns }));
             }
+            if !self.must_keep_up(dag) {
+                return None;
+            }
             let ids = (0_u32..).map(SubtaskId).zip(task.wcets_ns());
             let mut long = ids.filter(|&(_, &wcet)| wcet > task.period_ns());
             let (subtask, _) = long.next()?;
@@ -370,7 +378,7 @@ impl<'a> Case<'a> {
         let mut certain: Vec<(usize, Reason)> = self.order.iter().filter_map(hopeless).collect();
         let cores = u128::from(self.settings.cores);
         let mut used = Vec::new();
-        for &dag in &self.order {
+        for &dag in self.order.iter().filter(|&&dag| self.must_keep_up(dag)) {
             used.push((self.tasks[dag].volume_ns(), self.tasks[dag].period_ns()));
             let Some(sum) = Ratio::sum(used.iter().copied()) else {
                 break;

@@ -21,6 +21,12 @@
 //! | `federated` | dedicated cores, as an offer | Li 2014; Baruah 2015 |
 //! | `judge`, `relation`, `answer`, `overheads` | the verdict at commit | |
 //!
+//! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
+//! uses that releases lie on a grid: their papers' model is the sporadic one, and
+//! the equations count the jobs that fit into a window at that distance. What is
+//! *certain* to go wrong is not said of sporadic DAGs, except by a path that is
+//! longer than the deadline, since their signals may stay away.
+//!
 //! Each module cites its paper and states its assumptions and the traps that it
 //! avoids. The functions for single tests take [`Task`]s in priority order and
 //! stand for themselves; [`answer`] knows which of them apply.

@@ -46,7 +46,7 @@ pub fn violations<'a>(
                 let instance = Instance { dag, job, subtask };
                 check.instance(instance, instance_times, times, precursor)
             });
-            check.job(dag, job, times).chain(of_instances)
+            check.job(dag, job, times, precursor).chain(of_instances)
         })
     })
 }
@@ -67,10 +67,11 @@ impl<'a> Check<'a> {
         dag: DagId,
         job: u64,
         times: &'a JobRecord,
+        precursor: Option<u64>,
     ) -> impl Iterator<Item = Violation> + 'a {
         let found = times.release_ns.map(|release_ns| {
             [
-                self.off_grid(dag, job, release_ns),
+                self.off_grid(dag, job, release_ns, precursor),
                 self.released_at_wrong_time(dag, job, release_ns, times),
                 self.ended_at_wrong_time(dag, job, times),
                 self.wrong_outcome(dag, job, release_ns, times),
@@ -109,9 +110,27 @@ impl<'a> Check<'a> {
         found.into_iter().flatten()
     }
 
-    /// R1: releases lie on the grid.
-    fn off_grid(self, dag: DagId, job: u64, release_ns: u64) -> Option<Violation> {
+    /// R1: releases lie on the grid, or, of a sporadic DAG, far enough apart.
+    fn off_grid(
+        self,
+        dag: DagId,
+        job: u64,
+        release_ns: u64,
+        precursor: Option<u64>,
+    ) -> Option<Violation> {
         let model = self.task_set.dag(dag);
+        if model.is_sporadic() {
+            let before = precursor.and_then(|before| self.record.job(dag, before)?.release_ns);
+            let earliest_ns = before.map_or(model.offset_ns(), |before_ns| {
+                before_ns.saturating_add(model.period_ns())
+            });
+            return (release_ns < earliest_ns).then_some(Violation::TooSoon {
+                dag,
+                job,
+                release_ns,
+                earliest_ns,
+            });
+        }
         let grid_ns = (job.saturating_mul(model.period_ns())).saturating_add(model.offset_ns());
         (release_ns != grid_ns).then_some(Violation::OffGrid {
             dag,

@@ -225,13 +225,23 @@ impl Sweep<'_> {
         self.record.instance(instance)?.start_ns
     }
 
+    /// The grid says, or, of a sporadic DAG, the record.
+    fn release_ns(&self, Instance { dag, job, .. }: Instance) -> u64 {
+        let model = self.task_set.dag(dag);
+        if model.is_sporadic() {
+            let of_job = self.record.job(dag, job);
+            return of_job.and_then(|job| job.release_ns).unwrap_or(u64::MAX);
+        }
+        (job.saturating_mul(model.period_ns())).saturating_add(model.offset_ns())
+    }
+
     /// Static priority: (priority, DAG, job, subtask). EDF: the deadline instead.
     fn key(&self, instance: Instance) -> Key {
         let dag = self.task_set.dag(instance.dag);
         let urgency = match self.options.policy {
             Policy::StaticPriority => dag.subtask(instance.subtask).priority().0.into(),
-            Policy::Edf => (instance.job.saturating_mul(dag.period_ns()))
-                .saturating_add(dag.offset_ns())
+            Policy::Edf => self
+                .release_ns(instance)
                 .saturating_add(dag.relative_deadline_ns()),
         };
         (urgency, instance)

@@ -31,6 +31,14 @@ pub enum Violation {
         release_ns: u64,
         grid_ns: u64,
     },
+    /// R1: a sporadic job's release is less than one minimum inter-arrival time
+    /// after the one before it, or before the offset.
+    TooSoon {
+        dag: DagId,
+        job: u64,
+        release_ns: u64,
+        earliest_ns: u64,
+    },
     /// R1 and the overrun policy: the release was carried out too early or,
     /// where times are exact, too late.
     ReleasedAtWrongTime {
@@ -118,6 +126,7 @@ impl Violation {
     pub const fn rule(&self) -> Rule {
         match self {
             Self::OffGrid { .. }
+            | Self::TooSoon { .. }
             | Self::ReleasedAtWrongTime { .. }
             | Self::NotReleased { .. }
             | Self::StartedBeforeRelease { .. } => Rule::Release,
@@ -171,6 +180,17 @@ impl fmt::Display for Violation {
             } => write!(
                 f,
                 "dag {} job {job} has its release at {release_ns} ns, the grid says {grid_ns} ns",
+                dag.0
+            ),
+            Self::TooSoon {
+                dag,
+                job,
+                release_ns,
+                earliest_ns,
+            } => write!(
+                f,
+                "dag {} job {job} has its release at {release_ns} ns, the minimum inter-arrival \
+                 time allows {earliest_ns} ns",
                 dag.0
             ),
             Self::ReleasedAtWrongTime {

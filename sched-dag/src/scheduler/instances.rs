@@ -55,13 +55,14 @@ impl Scheduler {
         observer: &mut impl Observer,
     ) {
         if self.dags[dag.index()].joins.release(sequence, source) {
-            let job = self.dags[dag.index()].jobs.job(sequence).number;
+            let job = self.dags[dag.index()].jobs.job(sequence);
             let instance = Instance {
                 dag,
-                job,
+                job: job.number,
                 subtask: source,
             };
-            let key = key_of(self.options.policy, self.task_set.dag(dag), instance);
+            let model = self.task_set.dag(dag);
+            let key = key_of(self.options.policy, model, instance, job.release_ns);
             let index = self.subtask_index(dag, source);
             self.phases[index] = Phase::Ready;
             self.ready.set(index, key);
@@ -113,9 +114,10 @@ impl Scheduler {
             } = &mut dags[dag.index()];
             let sequence = joins.end(model, subtask, jobs.next, |joins, next| {
                 let sequence = joins.progress(next);
+                let job = jobs.job(sequence);
                 let instance = Instance {
                     dag,
-                    job: jobs.job(sequence).number,
+                    job: job.number,
                     subtask: next,
                 };
                 if jobs.is_cut(sequence) {
@@ -123,7 +125,7 @@ impl Scheduler {
                     ending.push(next);
                 } else {
                     let index = *first_subtask + next.index();
-                    let key: Key = key_of(options.policy, model, instance);
+                    let key: Key = key_of(options.policy, model, instance, job.release_ns);
                     phases[index] = Phase::Ready;
                     ready.set(index, key);
                     observer.ready(instance);

@@ -11,6 +11,12 @@
 //! every edge, which is the job's number modulo J. Without skipped jobs this is
 //! the same as J jobs being in flight.
 //!
+//! A periodic DAG's jobs are due on the grid. A sporadic DAG's next job is due
+//! once a signal has come, at the earliest one minimum inter-arrival time after
+//! the job before it (the module `signals` has the rules). At most one signal is
+//! kept, pending or as a waiting job, so at most one sporadic job waits, and it
+//! is the latest that was due.
+//!
 //! *Judging* a job is to find out whether it meets its deadline; jobs are
 //! judged in the order of their numbers, each once.
 
@@ -18,6 +24,7 @@ use alloc::boxed::Box;
 use alloc::vec;
 
 use super::joins::slot;
+use crate::ids::to_u32;
 use crate::task_set::Dag;
 
 /// The jobs of one DAG.
@@ -38,8 +45,11 @@ pub(super) struct Jobs {
     ended: bool,
     /// The first job that is not due yet.
     next_due: u64,
-    /// Its nominal release time; `None`: there is no further job.
+    /// Its nominal release time; `None`: there is no further job, or, of a
+    /// sporadic DAG, no signal for it yet.
     next_due_ns: Option<u64>,
+    /// The nominal release time of the latest job that was due.
+    last_due_ns: u64,
     /// The first job that waits; all up to `next_due` do.
     first_waiting: u64,
     /// The first waiting job that is not judged.
@@ -51,6 +61,8 @@ pub(super) struct Jobs {
 pub(super) struct Job {
     /// The job's number on the nominal grid.
     pub(super) number: u64,
+    /// Its nominal release time.
+    pub(super) release_ns: u64,
     /// The instances that have not ended.
     pub(super) unfinished: u32,
     /// Whether its deadline has passed before it was complete.
@@ -68,6 +80,7 @@ impl Jobs {
             ended: false,
             next_due: 0,
             next_due_ns: due_ns(dag, 0),
+            last_due_ns: 0,
             first_waiting: 0,
             judged_waiting: 0,
         }
@@ -83,11 +96,32 @@ impl Jobs {
     }
 
     /// Reports whether there is neither a job in flight, nor one waiting, nor
-    /// one ahead: the DAG is ended, or has a limit of jobs and is there.
+    /// one ahead: the DAG is ended, or has a limit of jobs and is there, or is
+    /// sporadic without a limit and has no signal.
     pub(super) fn are_over(&self, dag: &Dag) -> bool {
-        self.oldest == self.next
-            && self.waiting() == 0
-            && (self.ended || dag.jobs().is_some_and(|jobs| self.next_due >= jobs))
+        let none_ahead = match dag.jobs() {
+            Some(jobs) => self.next_due >= jobs,
+            None => dag.is_sporadic() && self.next_due_ns.is_none(),
+        };
+        self.oldest == self.next && self.waiting() == 0 && (self.ended || none_ahead)
+    }
+
+    /// Lets the next job of a sporadic DAG be due at `now_ns`, or as soon after it
+    /// as the minimum inter-arrival time allows, and returns that time. `None` if
+    /// the signal is dropped: an earlier one is still kept, or no job is left.
+    pub(super) fn signal(&mut self, dag: &Dag, now_ns: u64) -> Option<u64> {
+        let limit_reached = dag.jobs().is_some_and(|jobs| self.next_due >= jobs);
+        if self.ended || limit_reached || self.waiting() > 0 || self.next_due_ns.is_some() {
+            return None;
+        }
+        let earliest_ns = match self.next_due {
+            0 => dag.offset_ns(),
+            _ => self.last_due_ns.checked_add(dag.period_ns())?,
+        };
+        let release_ns = now_ns.max(earliest_ns);
+        let deadline_ns = release_ns.checked_add(dag.relative_deadline_ns())?;
+        self.next_due_ns = (deadline_ns < u64::MAX).then_some(release_ns);
+        self.next_due_ns
     }
 
     pub(super) fn waiting(&self) -> u64 {
@@ -113,21 +147,24 @@ impl Jobs {
             .next_due_ns
             .filter(|&release_ns| release_ns <= now_ns)?;
         let number = self.next_due;
+        self.last_due_ns = release_ns;
         self.next_due += 1;
         self.next_due_ns = due_ns(dag, self.next_due);
         Some((number, release_ns))
     }
 
     /// Releases the first waiting job and returns its sequence number.
-    pub(super) fn release_waiting(&mut self, subtasks: u32) -> u64 {
+    pub(super) fn release_waiting(&mut self, dag: &Dag) -> u64 {
         let sequence = self.next;
         let number = self.first_waiting;
+        let release_ns = self.waiting_release_ns(dag, number);
         self.first_waiting += 1;
         self.next += 1;
         let missed = number < self.judged_waiting;
         *self.job_mut(sequence) = Job {
             number,
-            unfinished: subtasks,
+            release_ns,
+            unfinished: to_u32(dag.subtasks().len()),
             missed,
         };
         if missed {
@@ -137,10 +174,22 @@ impl Jobs {
         sequence
     }
 
-    /// Drops the first waiting job and returns it.
-    pub(super) fn skip_waiting(&mut self) -> u64 {
+    /// Drops the first waiting job and returns it with its nominal release time.
+    pub(super) fn skip_waiting(&mut self, dag: &Dag) -> (u64, u64) {
+        let number = self.first_waiting;
+        let release_ns = self.waiting_release_ns(dag, number);
         self.first_waiting += 1;
-        self.first_waiting - 1
+        (number, release_ns)
+    }
+
+    /// Returns the nominal release time of a waiting job.
+    fn waiting_release_ns(&self, dag: &Dag, number: u64) -> u64 {
+        if dag.is_sporadic() {
+            debug_assert_eq!(number + 1, self.next_due, "one sporadic job waits");
+            self.last_due_ns
+        } else {
+            dag.offset_ns() + dag.period_ns() * number
+        }
     }
 
     /// Marks the oldest job in flight that is not aborted, and returns its
@@ -191,12 +240,17 @@ impl Jobs {
     /// Returns the first job that is not judged and is in flight or waits, with
     /// its deadline.
     fn first_unjudged(&self, dag: &Dag) -> Option<(u64, u64)> {
-        let number = if self.judged < self.next {
-            self.job(self.judged).number
+        let (number, release_ns) = if self.judged < self.next {
+            let job = self.job(self.judged);
+            (job.number, job.release_ns)
         } else {
-            self.first_waiting.max(self.judged_waiting)
+            let number = self.first_waiting.max(self.judged_waiting);
+            if number >= self.next_due {
+                return None;
+            }
+            (number, self.waiting_release_ns(dag, number))
         };
-        (number < self.next_due).then(|| (number, deadline_ns(dag, number)))
+        Some((number, release_ns + dag.relative_deadline_ns()))
     }
 
     /// Judges the next job whose deadline has passed before `now_ns`: it is
@@ -233,9 +287,9 @@ impl Jobs {
 }
 
 /// Returns a job's nominal release time; `None` beyond the DAG's limit of jobs,
-/// or if the instant after its deadline is not a time.
+/// or if the instant after its deadline is not a time, or if only a signal says.
 fn due_ns(dag: &Dag, number: u64) -> Option<u64> {
-    if dag.jobs().is_some_and(|jobs| number >= jobs) {
+    if dag.is_sporadic() || dag.jobs().is_some_and(|jobs| number >= jobs) {
         return None;
     }
     let release_ns = dag
@@ -244,14 +298,4 @@ fn due_ns(dag: &Dag, number: u64) -> Option<u64> {
         .checked_add(dag.offset_ns())?;
     let deadline_ns = release_ns.checked_add(dag.relative_deadline_ns())?;
     (deadline_ns < u64::MAX).then_some(release_ns)
-}
-
-/// Returns the nominal release time of a job that is or was due.
-pub(super) fn release_ns(dag: &Dag, number: u64) -> u64 {
-    dag.offset_ns() + dag.period_ns() * number
-}
-
-/// Returns the absolute deadline of a job that is or was due.
-pub(super) fn deadline_ns(dag: &Dag, number: u64) -> u64 {
-    release_ns(dag, number) + dag.relative_deadline_ns()
 }

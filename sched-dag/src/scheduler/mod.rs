@@ -10,7 +10,7 @@
 //! dispatch that sees both. The types force this order:
 //!
 //! 1. [`Scheduler::at`] begins the instant and gives a [`Moment`], which takes
-//!    completions, and faults and stops, which end a DAG;
+//!    completions, signals to sporadic DAGs, and faults and stops, which end a DAG;
 //! 2. [`Moment::release_due`] turns it into a [`Released`], which takes none;
 //! 3. [`Released::dispatch`] ends it with the [`Decision`]s.
 //!
@@ -48,6 +48,7 @@ mod key;
 mod moment;
 mod observer;
 mod overrun;
+mod signals;
 mod statistics;
 
 use alloc::boxed::Box;
@@ -195,7 +196,8 @@ impl Scheduler {
 
     /// Reports whether nothing of a DAG is left to be done: no job is in flight,
     /// and none is to come. A DAG without a limit of jobs is over only once it
-    /// [is ended](Self::is_ended) and what it had started has ended.
+    /// [is ended](Self::is_ended) and what it had started has ended; but a sporadic
+    /// one is over whenever no signal is pending, and may begin again.
     ///
     /// # Panics
     ///
@@ -280,11 +282,12 @@ impl DagState {
     }
 }
 
-/// Returns the key of an instance that is ready.
-fn key_of(policy: Policy, dag: &Dag, instance: Instance) -> Key {
+/// Returns the key of an instance that is ready, of a job with a nominal release
+/// time.
+fn key_of(policy: Policy, dag: &Dag, instance: Instance, release_ns: u64) -> Key {
     let urgency = match policy {
         Policy::StaticPriority => u64::from(dag.subtask(instance.subtask).priority().0),
-        Policy::Edf => jobs::deadline_ns(dag, instance.job),
+        Policy::Edf => release_ns + dag.relative_deadline_ns(),
     };
     Key::new(urgency, instance)
 }

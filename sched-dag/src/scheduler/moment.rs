@@ -62,6 +62,18 @@ impl<'s> Moment<'s> {
         self.scheduler.stop(dag, observer);
     }
 
+    /// Takes note of an event that a sporadic DAG waits for. Its next job is due
+    /// now, or as soon after the job before it as the minimum inter-arrival time
+    /// allows; while that one is to come, or waits for room, further signals are
+    /// dropped and counted (the module `signals` states the rules).
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG, or it is not sporadic.
+    pub fn signal(&mut self, dag: DagId, observer: &mut impl Observer) {
+        self.scheduler.signal(dag, observer);
+    }
+
     /// Releases the jobs that are due, and notices deadlines that have passed.
     pub fn release_due(self, observer: &mut impl Observer) -> Released<'s> {
         let now_ns = self.scheduler.now_ns;

@@ -25,6 +25,12 @@ pub trait Observer {
         let _ = (dag, job, release_ns);
     }
 
+    /// A sporadic DAG got a signal, which lets its next job be released at
+    /// `release_ns`, now or later; `None`: the signal is dropped.
+    fn signalled(&mut self, dag: DagId, release_ns: Option<u64>) {
+        let _ = (dag, release_ns);
+    }
+
     /// All that the instance waits for has happened (R2).
     fn ready(&mut self, instance: Instance) {
         let _ = instance;
@@ -84,6 +90,10 @@ impl<O: Observer + ?Sized> Observer for &mut O {
 
     fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
         (**self).skipped(dag, job, release_ns);
+    }
+
+    fn signalled(&mut self, dag: DagId, release_ns: Option<u64>) {
+        (**self).signalled(dag, release_ns);
     }
 
     fn ready(&mut self, instance: Instance) {

@@ -40,8 +40,7 @@
 //! has started and not finished, then at once.
 
 use super::Scheduler;
-use super::jobs::release_ns;
-use crate::ids::{DagId, to_u32};
+use crate::ids::DagId;
 use crate::policy::OverrunPolicy;
 use crate::scheduler::Observer;
 
@@ -100,9 +99,9 @@ impl Scheduler {
         while let Some(job) = self.dags[dag.index()].jobs.releasable() {
             let model = self.task_set.dag(dag);
             let state = &mut self.dags[dag.index()];
-            let sequence = state.jobs.release_waiting(to_u32(model.subtasks().len()));
+            let sequence = state.jobs.release_waiting(model);
             state.statistics.released += 1;
-            observer.released(dag, job, release_ns(model, job));
+            observer.released(dag, job, state.jobs.job(sequence).release_ns);
             for position in 0..model.sources().len() {
                 let source = self.task_set.dag(dag).sources()[position];
                 self.release_source(dag, sequence, source, observer);
@@ -123,8 +122,8 @@ impl Scheduler {
 
     fn skip_oldest_waiting(&mut self, dag: DagId, observer: &mut impl Observer) {
         let state = &mut self.dags[dag.index()];
-        let job = state.jobs.skip_waiting();
+        let (job, release_ns) = state.jobs.skip_waiting(self.task_set.dag(dag));
         state.statistics.skips += 1;
-        observer.skipped(dag, job, release_ns(self.task_set.dag(dag), job));
+        observer.skipped(dag, job, release_ns);
     }
 }

@@ -20,6 +20,10 @@ pub struct DagStatistics {
     pub aborts: u64,
     /// Releases that had to wait for an older job to end.
     pub queued: u64,
+    /// Signals to a sporadic DAG.
+    pub signals: u64,
+    /// Signals that came while an earlier one was still kept, or no job was left.
+    pub dropped_signals: u64,
     /// Instances that a fault has ended.
     pub faults: u64,
     /// Jobs that were in flight when the DAG was ended, without aborted ones.

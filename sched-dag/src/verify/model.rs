@@ -107,6 +107,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         });
     Dag {
         name: spec.name.clone(),
+        activation: spec.activation,
         period_ns: spec.period_ns.expect("verified to be given"),
         relative_deadline_ns: spec.relative_deadline_ns.expect("verified to be given"),
         offset_ns: spec.offset_ns,

@@ -1,0 +1,49 @@
+//! Sporadic DAGs: released by signals, never faster than stated.
+//!
+//! Words: a *signal* is an event that wants one job of a sporadic DAG. The DAG's
+//! *minimum inter-arrival time* T is its period in the model. The rules, whose
+//! tests in `tests/sporadic.rs` bear their numbers:
+//!
+//! - **S1, release.** A signal at time a lets the next job k be due at its
+//!   nominal release time r(k) = max(a, r(k-1) + T), job 0 at max(a, O). A signal
+//!   that comes early is thereby delayed. Releases are never less than T apart,
+//!   whatever sends the signals.
+//! - **S2, one is kept.** While a signal's job is not yet due, or is due and
+//!   waits for an older job to end, further signals are *dropped*, and counted.
+//!   So a burst of signals costs two jobs, and constant memory.
+//! - **S3, from there on as ever.** The deadline is r(k) + D; overrun policy,
+//!   keys, joins and misses are those of a periodic job. A signal at the instant
+//!   of a completion may release at that instant: signals come after completions
+//!   and before releases.
+//! - **S4, the end.** Signals beyond the limit of jobs, and to an ended DAG, are
+//!   dropped. A sporadic DAG without limit is over whenever it has nothing in
+//!   flight and no signal is kept: it keeps no run going.
+//!
+//! For the analysis a sporadic DAG is one with period T. All tests there hold for
+//! every pattern of releases at least T apart: the sporadic one is the model of
+//! the papers that they come from. A response time counts from r(k), not from the
+//! signal, which may have come up to T before.
+
+use super::Scheduler;
+use crate::ids::DagId;
+use crate::scheduler::Observer;
+
+impl Scheduler {
+    /// Takes a signal to a sporadic DAG.
+    pub(super) fn signal(&mut self, dag: DagId, observer: &mut impl Observer) {
+        let model = self.task_set.dag(dag);
+        assert!(
+            model.is_sporadic(),
+            "a signal to dag {}, which is periodic; signal sporadic dags only",
+            dag.0
+        );
+        let state = &mut self.dags[dag.index()];
+        let release_ns = state.jobs.signal(model, self.now_ns);
+        state.statistics.signals += 1;
+        if release_ns.is_none() {
+            state.statistics.dropped_signals += 1;
+        }
+        observer.signalled(dag, release_ns);
+        self.set_timer(dag);
+    }
+}
