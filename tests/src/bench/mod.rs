@@ -7,8 +7,10 @@
 //! a refused command line.
 //!
 //! - [`scheduler`]: the commit, and the cost of a dispatched instance;
+//! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU.
 
+pub mod hand_off;
 pub mod join_latency;
 pub mod scheduler;
 
@@ -20,6 +22,8 @@ const USAGE: &str = "usage: bench WHAT [options]
 WHAT is one of:
   scheduler      the commit of a large DAG, and the cost of a dispatched instance:
                  prints a table and a JSON object for each figure
+  hand-off       the way from a completion to its successor's first instruction, in
+                 instructions and in time; see bench hand-off --help
   join-latency   the paper's evaluation: boots each condition, writes samples,
                  figures, plots and a report; see bench join-latency --help
 
@@ -29,8 +33,10 @@ Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.
 /// Runs the subcommand.
 #[must_use]
 pub fn bench(words: &[String]) -> ExitCode {
-    if let Some(("join-latency", rest)) = words.split_first().map(|(what, rest)| (&**what, rest)) {
-        return join_latency::run(rest);
+    match words.split_first().map(|(what, rest)| (&**what, rest)) {
+        Some(("hand-off", rest)) => return hand_off::run(rest),
+        Some(("join-latency", rest)) => return join_latency::run(rest),
+        _ => {}
     }
     if words.iter().any(|word| word == "--help" || word == "-h") {
         print!("{USAGE}");

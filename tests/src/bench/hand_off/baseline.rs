@@ -1,0 +1,163 @@
+//! The figures that the repository keeps, and how new ones stand to them.
+//!
+//! A baseline holds counted instructions, which repeat exactly: one that differs
+//! comes from a change of the code, of the compiler or of QEMU. A figure has
+//! *grown* if its median or its p99 is larger by more than [`MARGIN_PERCENT`]
+//! and by more than [`MARGIN`] instructions a step, for of a few instructions one is
+//! many per cent.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use super::figure::Figure;
+use crate::json;
+
+/// By how many per cent a figure may be larger than its baseline.
+pub(super) const MARGIN_PERCENT: u64 = 3;
+
+/// By how many instructions a step it may be larger in any case.
+pub(super) const MARGIN: u64 = 4;
+
+/// How a figure stands to its baseline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Standing {
+    /// There is none to compare with.
+    New,
+    /// As good as it was, or better.
+    Kept,
+    /// Worse by more than the margin.
+    Grown,
+}
+
+/// Reads a baseline.
+///
+/// # Errors
+///
+/// In words: the file cannot be read, or holds something else.
+pub(super) fn read(file: &Path) -> Result<Vec<Figure>, String> {
+    let place = file.display();
+    let again = "`./scripts/bench hand-off --save-baseline` writes it anew";
+    let text = fs::read_to_string(file)
+        .map_err(|error| format!("the baseline `{place}`: {error}; {again}"))?;
+    let value =
+        json::parse(&text).map_err(|error| format!("the baseline `{place}`: {error}; {again}"))?;
+    let figures = value.get("figures").map_or(&[][..], |list| list.elements());
+    let figures: Option<Vec<Figure>> = figures.iter().map(Figure::from_json).collect();
+    figures
+        .filter(|figures| !figures.is_empty())
+        .ok_or_else(|| format!("the baseline `{place}` holds no figures; {again}"))
+}
+
+/// Writes a baseline, a line a figure.
+///
+/// # Errors
+///
+/// In words: the file cannot be written.
+pub(super) fn write(file: &Path, figures: &[Figure]) -> Result<(), String> {
+    let mut text = String::from("{\"counts\":\"instructions\",\"figures\":[\n");
+    for (number, figure) in figures.iter().enumerate() {
+        let end = if number + 1 < figures.len() { "," } else { "" };
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(text, "{{{}}}{end}", figure.json_members());
+    }
+    text.push_str("]}\n");
+    let failed = |error| format!("cannot write the baseline `{}`: {error}", file.display());
+    if let Some(folder) = file.parent() {
+        fs::create_dir_all(folder).map_err(failed)?;
+    }
+    fs::write(file, text).map_err(failed)
+}
+
+/// Compares a figure with that of the baseline.
+pub(super) fn standing(now: &Figure, baseline: &[Figure]) -> (Option<Figure>, Standing) {
+    let Some(before) = baseline.iter().find(|before| before.is_same(now)) else {
+        return (None, Standing::New);
+    };
+    let grows = |now_is: u64, was: u64| {
+        let growth = u128::from(now_is)
+            .saturating_sub(u128::from(was) * u128::from(now.per) / u128::from(before.per));
+        growth > u128::from(MARGIN * now.per)
+            && growth * 100 > u128::from(was) * u128::from(MARGIN_PERCENT)
+    };
+    let has_grown = grows(now.median, before.median) || grows(now.p99, before.p99);
+    let standing = if has_grown {
+        Standing::Grown
+    } else {
+        Standing::Kept
+    };
+    (Some(before.clone()), standing)
+}
+
+/// Returns the figures of a baseline that were not measured now.
+pub(super) fn missing<'a>(
+    now: &'a [Figure],
+    baseline: &'a [Figure],
+) -> impl Iterator<Item = &'a Figure> {
+    let is_missing = |before: &&Figure| !now.iter().any(|now| now.is_same(before));
+    baseline.iter().filter(is_missing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figure(median: u64, p99: u64, per: u64) -> Figure {
+        Figure {
+            cores: 1,
+            workload: "chain-64".into(),
+            figure: "hop".into(),
+            per,
+            median,
+            p99,
+            max: p99,
+        }
+    }
+
+    fn stands(now: &Figure, before: Figure) -> Standing {
+        standing(now, &[before]).1
+    }
+
+    #[test]
+    fn a_figure_has_grown_beyond_both_margins() {
+        let before = || figure(1000, 1000, 1);
+        assert_eq!(stands(&figure(1030, 1030, 1), before()), Standing::Kept);
+        assert_eq!(stands(&figure(1031, 1000, 1), before()), Standing::Grown);
+        assert_eq!(stands(&figure(900, 1031, 1), before()), Standing::Grown);
+        // 40 % of 10 instructions are 4.
+        assert_eq!(
+            stands(&figure(14, 14, 1), figure(10, 10, 1)),
+            Standing::Kept
+        );
+        assert_eq!(
+            stands(&figure(15, 15, 1), figure(10, 10, 1)),
+            Standing::Grown
+        );
+        // From nothing: an allocation in every job of ten.
+        assert_eq!(
+            stands(&figure(50, 50, 10), figure(0, 0, 10)),
+            Standing::Grown
+        );
+        assert_eq!(standing(&figure(1, 1, 1), &[]).1, Standing::New);
+    }
+
+    #[test]
+    fn a_baseline_is_read_back() {
+        let folder = std::env::temp_dir().join(format!("hand-off-{}", std::process::id()));
+        let file = folder.join("baseline.json");
+        let figures = [figure(1, 2, 3), figure(4, 5, 6)];
+        write(&file, &figures).unwrap();
+        assert_eq!(read(&file).unwrap(), figures);
+        fs::write(&file, "{}").unwrap();
+        assert!(read(&file).unwrap_err().contains("holds no figures"));
+        fs::remove_dir_all(folder).unwrap();
+        assert!(read(&file).unwrap_err().contains("--save-baseline"));
+    }
+
+    #[test]
+    fn a_figure_that_is_no_longer_measured_is_found() {
+        let before = [figure(1, 1, 1)];
+        assert_eq!(missing(&[], &before).count(), 1);
+        assert_eq!(missing(&before, &before).count(), 0);
+    }
+}

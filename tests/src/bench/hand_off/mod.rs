@@ -1,0 +1,126 @@
+//! The way from a completion to its successor's first instruction, measured.
+//!
+//! The app `hand-off` runs DAGs of empty bodies that stamp, and prints what lies
+//! between the stamps. In deterministic mode a nanosecond is an instruction, so
+//! the same figures come out of every run, and can be held against those that
+//! the repository keeps: `tests/baselines/hand-off.json`.
+//!
+//! - `table`, `plan`: what is to be measured;
+//! - `figure`, `baseline`: what was, and what it was before;
+//! - `report`: the tables.
+
+mod baseline;
+mod figure;
+mod plan;
+mod report;
+mod table;
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use figure::Figure;
+use plan::{Boot, Plan};
+
+use crate::options::Request;
+use crate::outcome::boot;
+use crate::qemu::Mode;
+use crate::{image, install, system};
+
+/// How long a boot may take in wall time.
+const LIMIT: Duration = Duration::from_secs(300);
+
+/// Runs `bench hand-off` with the words after its name.
+pub(super) fn run(words: &[String]) -> ExitCode {
+    let plan = match table::TABLE.parse(words) {
+        Ok(Request::Work(options)) => {
+            // Settling the mode may need QEMU.
+            if let Err(error) = install::ensure_qemu() {
+                eprintln!("bench hand-off: {error}");
+                return ExitCode::FAILURE;
+            }
+            Plan::new(&options)
+        }
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => Err(error.to_string()),
+    };
+    let plan = match plan {
+        Ok(plan) => plan,
+        Err(line) => {
+            eprintln!("bench hand-off: {line}");
+            return ExitCode::from(2);
+        }
+    };
+    match measure_all(&plan) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(line) => {
+            eprintln!("bench hand-off: {line}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Measures and reports. Returns whether nothing has grown.
+fn measure_all(plan: &Plan) -> Result<bool, String> {
+    let before = if plan.compares {
+        Some(baseline::read(&plan.baseline)?)
+    } else {
+        None
+    };
+    let image = image::build("hand-off").map_err(|error| error.to_string())?;
+    let mut measured = Vec::new();
+    for &mode in &plan.modes {
+        let mut figures = Vec::new();
+        for boot in &plan.boots {
+            figures.extend(measure(boot, mode, &image.path)?);
+        }
+        for figure in &figures {
+            println!("{}", figure.machine_line(mode));
+        }
+        measured.push((mode, figures));
+    }
+    print!("{}", report::table(&measured));
+    let instructions = measured
+        .iter()
+        .find(|(mode, _)| *mode == Mode::Deterministic);
+    let Some((_, instructions)) = instructions else {
+        return Ok(true);
+    };
+    let mut is_good = true;
+    if let Some(before) = before {
+        let comparison = report::comparison(instructions, &before);
+        print!("{}", comparison.text);
+        is_good = comparison.is_good;
+    }
+    if plan.saves {
+        baseline::write(&plan.baseline, instructions)?;
+        println!("written: {}", plan.baseline.display());
+    }
+    Ok(is_good)
+}
+
+/// Boots once and reads the figures.
+fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
+    let log = system::new_log("hand-off")?;
+    let outcome = boot(&what.qemu(mode), image, &log, LIMIT, |_| {})?;
+    if let Err(fault) = outcome.judge() {
+        return Err(format!(
+            "the guest on {} cores, mode {mode}, failed: {}\n{}",
+            what.cores,
+            fault.reason,
+            outcome.tail()
+        ));
+    }
+    let figures = Figure::read_all(&outcome.transcript, what.cores)?;
+    if figures.is_empty() {
+        return Err(format!("the guest printed no figures\n{}", outcome.tail()));
+    }
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_file(&log);
+    Ok(figures)
+}
