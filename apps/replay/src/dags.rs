@@ -63,6 +63,14 @@ impl Scale {
             .saturating_sub(start_ns)
     }
 
+    /// Executes for so many units, inside a subtask. The core is held meanwhile.
+    pub fn execute(self, units: u64, epoch: &Epoch) {
+        for _ in 0..units {
+            let ns = self.unit_from(epoch.elapsed_ns());
+            fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
+        }
+    }
+
     fn duration(self, units: u64) -> Result<Duration, String> {
         let ns = self.unit_ns.checked_mul(units);
         ns.map(Duration::from_nanos).ok_or_else(|| {
@@ -95,10 +103,7 @@ pub fn build(case: &Case, scale: Scale, epoch: &Epoch) -> Result<Vec<Dag>, Strin
                 let (executions, epoch) = (executions.clone(), epoch.clone());
                 let execute = move |job| {
                     let units = usize::try_from(job).map_or(0, |job| executions[job]);
-                    for _ in 0..units {
-                        let ns = scale.unit_from(epoch.elapsed_ns());
-                        fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
-                    }
+                    scale.execute(units, &epoch);
                 };
                 let attributes = SubtaskAttributes::default().priority(subtask.priority().0);
                 dag.register_untyped_subtask(execute, attributes)

@@ -19,7 +19,7 @@ extern crate alloc;
 mod account;
 mod dags;
 mod graph;
-mod random;
+pub mod random;
 mod set;
 mod shares;
 

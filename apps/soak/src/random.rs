@@ -46,7 +46,8 @@ impl Random {
 }
 
 /// Returns number `n` of the sequence of `seed`, counted from 0.
-pub(crate) const fn nth(seed: u64, n: u64) -> u64 {
+#[must_use]
+pub const fn nth(seed: u64, n: u64) -> u64 {
     let mut mixed = seed.wrapping_add(INCREMENT.wrapping_mul(n.wrapping_add(1)));
     mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -55,7 +56,8 @@ pub(crate) const fn nth(seed: u64, n: u64) -> u64 {
 
 /// Maps a number of 64 bits to a range: the high part of the product has not
 /// the bias of a remainder.
-pub(crate) fn scale(number: u64, range: RangeInclusive<u64>) -> u64 {
+#[must_use]
+pub fn scale(number: u64, range: RangeInclusive<u64>) -> u64 {
     let (least, most) = range.into_inner();
     let choices = u128::from(most.saturating_sub(least)) + 1;
     let drawn = (u128::from(number) * choices) >> 64;

@@ -46,6 +46,24 @@ pub const KINDS: &[(&str, &[&str])] = &[
     ("replay_instances", &["rows"]),
     ("replay_jobs", &["rows"]),
     (
+        "dag_run",
+        &[
+            "set",
+            "dag",
+            "subtasks",
+            "released",
+            "completed",
+            "deadline_misses",
+            "skips",
+            "aborts",
+            "response_time_ns.min",
+            "response_time_ns.median",
+            "response_time_ns.p99",
+            "response_time_ns.max",
+        ],
+    ),
+    ("dag_set", &["set", "dags", "violations", "allocations"]),
+    (
         "soak",
         &[
             "round",

@@ -1,0 +1,141 @@
+//! What the commit would refuse, told with the lines of the file.
+//!
+//! The commit names DAGs and subtasks. Who wrote a file looks for a line, so each
+//! fault is given that of the edge, subtask or DAG that it is about.
+
+use alloc::string::ToString;
+use alloc::vec::Vec;
+
+use replay::lines::Malformed;
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, DagSpec, Fault, Policy, SubtaskId, SubtaskLabel, verify,
+};
+
+use crate::build::Length;
+use crate::file::{FileDag, Set};
+
+/// Verifies a set as its commit will, with any shape of graph allowed.
+///
+/// # Errors
+///
+/// Every fault, with its line.
+pub fn check(set: &Set, policy: Policy, cores: u32, length: Length) -> Result<(), Vec<Malformed>> {
+    let specs = set.dags.iter().map(|dag| DagSpec {
+        jobs: Some(length.jobs(&dag.spec)),
+        ..dag.spec.clone()
+    });
+    let specs: Vec<DagSpec> = specs.collect();
+    let options =
+        CommitOptions::new(policy, cores).with_construction(ConstructionPolicy::any_graph());
+    let Err(rejected) = verify(&specs, &options) else {
+        return Ok(());
+    };
+    let malformed = |fault: &Fault| Malformed {
+        line: line_of(set, fault),
+        reason: fault.to_string(),
+    };
+    let faults = rejected.faults();
+    let is_cycle = |fault: &Fault| matches!(fault, Fault::Cycle { .. } | Fault::SelfEdge { .. });
+    let has_cycle = faults.iter().any(is_cycle);
+    // A graph that is one cycle has no ends either; the cycle says all.
+    let follows =
+        |fault: &Fault| has_cycle && matches!(fault, Fault::NoSource { .. } | Fault::NoSink { .. });
+    let news = faults.iter().filter(|fault| !follows(fault));
+    let mut found: Vec<Malformed> = news.map(malformed).collect();
+    found.sort_by_key(|malformed| malformed.line);
+    Err(found)
+}
+
+/// Returns the line that a fault is about; 1 if it is about no line in particular.
+fn line_of(set: &Set, fault: &Fault) -> usize {
+    let line = match fault {
+        Fault::Cycle { dag, hops } => set.dags.get(dag.id.index()).map(|dag| {
+            let ends = (hops.last(), hops.first());
+            edge_line(dag, ends).unwrap_or(dag.line)
+        }),
+        Fault::SelfEdge { dag, subtask, .. } => set.dags.get(dag.id.index()).map(|dag| {
+            let ends = (Some(subtask), Some(subtask));
+            edge_line(dag, ends).unwrap_or(dag.line)
+        }),
+        Fault::WcetExceedsDeadline { dag, subtask, .. } => set
+            .dags
+            .get(dag.id.index())
+            .map(|dag| subtask_line(dag, subtask.id).unwrap_or(dag.line)),
+        Fault::PrioritiesPartlyGiven { dag, without } => set.dags.get(dag.id.index()).map(|dag| {
+            let first = without.first();
+            let line = first.and_then(|subtask| subtask_line(dag, subtask.id));
+            line.unwrap_or(dag.line)
+        }),
+        Fault::TooManyInstances { dag, .. }
+        | Fault::NoSubtasks { dag }
+        | Fault::NoSource { dag }
+        | Fault::NoSink { dag }
+        | Fault::TooManySubtasks { dag, .. }
+        | Fault::ZeroPeriod { dag }
+        | Fault::ZeroDeadline { dag }
+        | Fault::ZeroInFlight { dag }
+        | Fault::TimeOverflow { dag, .. }
+        | Fault::PrioritiesExhausted { dag } => set.dags.get(dag.id.index()).map(|dag| dag.line),
+        _ => None,
+    };
+    line.unwrap_or(1)
+}
+
+fn subtask_line(dag: &FileDag, subtask: SubtaskId) -> Option<usize> {
+    Some(dag.subtasks.get(subtask.index())?.line)
+}
+
+/// Returns the line of the edge between two subtasks.
+fn edge_line(dag: &FileDag, ends: (Option<&SubtaskLabel>, Option<&SubtaskLabel>)) -> Option<usize> {
+    let ends = (ends.0?.id.index(), ends.1?.id.index());
+    let position = dag.spec.edges.iter().position(|edge| *edge == ends)?;
+    dag.edge_lines.get(position).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parse::parse;
+
+    fn faults(text: &str, length: Length) -> Vec<String> {
+        let file = parse(text).unwrap();
+        let faults = check(&file.sets[0], Policy::StaticPriority, 2, length).unwrap_err();
+        faults.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_cycle_is_told_with_the_line_of_its_last_edge() {
+        let text = "dag x period 1s\nsubtask a wcet 1ms\nsubtask b wcet 1ms\n\
+                    edge a -> b\nedge b -> a\nend";
+        let found = faults(text, Length::Jobs(1));
+        let words =
+            "line 5: dag `x` has a cycle: subtask `a` -> subtask `b` -> subtask `a`; remove";
+        assert!(
+            found.len() == 1 && found[0].starts_with(words),
+            "{found:#?}"
+        );
+        let own = "dag x period 1s\nsubtask a wcet 1ms\nedge a -> a\nend";
+        let found = faults(own, Length::Jobs(1));
+        assert!(found[0].starts_with("line 3: "), "{}", found[0]);
+    }
+
+    #[test]
+    fn every_fault_has_its_line() {
+        let text = "dag x period 0s deadline 1ms in-flight 0\n# no\nsubtask a wcet 2ms priority 1\n\
+                    subtask b wcet 1ms\nend";
+        let found = faults(text, Length::Jobs(1));
+        let lines: Vec<&str> = found.iter().map(|fault| &fault[..7]).collect();
+        assert_eq!(
+            lines,
+            ["line 1:", "line 1:", "line 3:", "line 4:"],
+            "{found:#?}"
+        );
+    }
+
+    #[test]
+    fn times_of_all_jobs_must_fit() {
+        let text = "dag x period 584000s\nsubtask a wcet 1ms\nend";
+        let found = faults(text, Length::Jobs(1_000_000));
+        assert!(found[0].starts_with("line 1: "), "{}", found[0]);
+    }
+}

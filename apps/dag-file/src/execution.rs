@@ -1,0 +1,175 @@
+//! How long an instance executes.
+//!
+//! What an instance draws follows from the seed, its set's position of the
+//! subtask and its job alone. So two policies, or two numbers of cores, get the
+//! same load.
+
+use alloc::format;
+use alloc::string::String;
+use alloc::sync::Arc;
+
+use replay::lines::quoted;
+use soak::random::{nth, scale};
+
+/// A millionth, the finest fraction of a WCET.
+const WHOLE: u64 = 1_000_000;
+
+/// How execution times follow from what the file says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Execution {
+    /// Every instance takes its WCET.
+    Wcet,
+    /// Uniformly distributed between two fractions of the WCET, in millionths.
+    Uniform {
+        /// The smallest fraction.
+        least: u64,
+        /// The largest fraction, at most a whole.
+        most: u64,
+    },
+    /// One of the subtask's samples, each with the same probability; the WCET
+    /// where a subtask has none.
+    Samples,
+}
+
+impl Execution {
+    /// What [`parse`](Self::parse) reads, for messages.
+    pub const FORMS: &'static str = "wcet, uniform:0.2..1 (fractions of the WCET) or samples";
+
+    /// Reads `wcet`, `uniform:LO..HI` with fractions of the WCET, or `samples`.
+    ///
+    /// # Errors
+    ///
+    /// In words: it is none of them, or the fractions are no range within 0 to 1.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "wcet" => return Ok(Self::Wcet),
+            "samples" => return Ok(Self::Samples),
+            _ => {}
+        }
+        let range = text.strip_prefix("uniform:").and_then(|range| {
+            let (least, most) = range.split_once("..")?;
+            Some((fraction(least)?, fraction(most)?))
+        });
+        match range {
+            Some((least, most)) if least <= most && most <= WHOLE => {
+                Ok(Self::Uniform { least, most })
+            }
+            Some(_) => Err(format!(
+                "{}: the fractions must rise and be 1 at most, as in uniform:0.2..1",
+                quoted(text)
+            )),
+            None => Err(format!("{}: give {}", quoted(text), Self::FORMS)),
+        }
+    }
+}
+
+/// Reads a decimal fraction of up to six digits, in millionths.
+fn fraction(text: &str) -> Option<u64> {
+    let (whole, part) = text.split_once('.').unwrap_or((text, "0"));
+    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    if !is_number(whole) || !is_number(part) || part.len() > 6 {
+        return None;
+    }
+    let whole: u64 = whole.parse().ok()?;
+    let missing = u32::try_from(6 - part.len()).ok()?;
+    let part: u64 = part.parse().ok()?;
+    whole
+        .checked_mul(WHOLE)?
+        .checked_add(part * 10_u64.pow(missing))
+}
+
+/// The execution times of one subtask.
+#[derive(Clone, Debug)]
+pub(crate) struct Times {
+    pub(crate) execution: Execution,
+    pub(crate) wcet_ns: u64,
+    pub(crate) samples_ns: Arc<[u64]>,
+    pub(crate) seed: u64,
+}
+
+impl Times {
+    /// Returns how long a job's instance executes, in nanoseconds.
+    pub(crate) fn of_job(&self, job: u64) -> u64 {
+        let draw = |range| scale(nth(self.seed, job), range);
+        match self.execution {
+            Execution::Wcet => self.wcet_ns,
+            Execution::Uniform { least, most } => {
+                let part = |of: u64| {
+                    let ns = u128::from(self.wcet_ns) * u128::from(of) / u128::from(WHOLE);
+                    u64::try_from(ns).unwrap_or(self.wcet_ns)
+                };
+                draw(part(least)..=part(most))
+            }
+            Execution::Samples => {
+                let last = (self.samples_ns.len() as u64).saturating_sub(1);
+                let drawn = usize::try_from(draw(0..=last)).ok();
+                let sample = drawn.and_then(|drawn| self.samples_ns.get(drawn));
+                sample.copied().unwrap_or(self.wcet_ns)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_read() {
+        assert_eq!(Execution::parse("wcet"), Ok(Execution::Wcet));
+        assert_eq!(Execution::parse("samples"), Ok(Execution::Samples));
+        let (least, most) = (250_000, WHOLE);
+        let uniform = Ok(Execution::Uniform { least, most });
+        assert_eq!(Execution::parse("uniform:0.25..1"), uniform);
+        assert_eq!(Execution::parse("uniform:0.250..1.0"), uniform);
+        for text in [
+            "uniform",
+            "uniform:1",
+            "uniform:a..1",
+            "uniform:-1..1",
+            "average",
+            "",
+        ] {
+            assert!(
+                Execution::parse(text).unwrap_err().contains("give wcet, "),
+                "{text}"
+            );
+        }
+        for text in ["uniform:1..0.5", "uniform:0..1.000001"] {
+            assert!(
+                Execution::parse(text).unwrap_err().contains("must rise"),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn times_stay_within_what_was_asked_and_depend_on_the_seed_alone() {
+        let times = |execution, seed| Times {
+            execution,
+            wcet_ns: 1_000_000,
+            samples_ns: [10, 20, 30].into(),
+            seed,
+        };
+        let uniform = Execution::parse("uniform:0.5..0.75").unwrap();
+        let draw = |seed| -> Vec<u64> {
+            (0..1000)
+                .map(|job| times(uniform, seed).of_job(job))
+                .collect()
+        };
+        assert!(draw(1).iter().all(|ns| (500_000..=750_000).contains(ns)));
+        assert_eq!(draw(1), draw(1));
+        assert_ne!(draw(1), draw(2));
+        let samples = times(Execution::Samples, 1);
+        let mut drawn: Vec<u64> = (0..100).map(|job| samples.of_job(job)).collect();
+        drawn.sort_unstable();
+        drawn.dedup();
+        assert_eq!(drawn, [10, 20, 30]);
+        let none = Times {
+            samples_ns: Arc::default(),
+            ..samples
+        };
+        assert_eq!(none.of_job(3), 1_000_000);
+        assert_eq!(times(Execution::Wcet, 9).of_job(5), 1_000_000);
+    }
+}

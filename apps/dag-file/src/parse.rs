@@ -1,0 +1,314 @@
+//! Reading DAG files, strictly: whatever is not as `docs/dag-file.md` says is
+//! refused with its line.
+//!
+//! A file is records of blank-separated words, one record a line. A word that
+//! begins with `#` begins a comment. The last record is `end`, so that a file of
+//! which a part is missing is never taken for a shorter one.
+
+mod keys;
+
+use alloc::collections::BTreeMap;
+use alloc::format;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use replay::lines::{Line, Lines, Malformed, quoted};
+use sched_dag::{DagSpec, OverrunPolicy, Priority, SubtaskSpec};
+
+use keys::Keys;
+
+use crate::file::{DagFile, FileDag, FileSubtask, Set};
+use crate::time::{Time, parse_ns};
+
+/// What may stand where a record begins.
+const RECORDS: &str = "`set`, `dag`, `subtask`, `edge` or `end`";
+
+/// Reads a file.
+///
+/// Names are resolved and each record is understood; what only the commit can
+/// tell, such as a cycle, is for [`check()`](crate::check()).
+///
+/// # Errors
+///
+/// [`Malformed`] for the first record that is not as the format says.
+pub fn parse(text: &str) -> Result<DagFile, Malformed> {
+    let mut lines = Lines::new(text);
+    let mut reader = Reader::default();
+    loop {
+        let Some(line) = next_record(&mut lines) else {
+            let (expected, remedy) = if reader.file.sets.is_empty() {
+                (
+                    "a `dag` record",
+                    "it is empty: describe a dag, or name another file",
+                )
+            } else {
+                ("`end`", "a part of it is missing, or that last line is")
+            };
+            let Malformed { line, reason } = lines.ended(expected);
+            let reason = format!("{reason}; {remedy}");
+            return Err(Malformed { line, reason });
+        };
+        if line.kind == "end" {
+            line.exactly(0)?;
+            break reader.finish(&line)?;
+        }
+        reader.take(&line)?;
+    }
+    match next_record(&mut lines) {
+        None => Ok(reader.file),
+        Some(line) => Err(line.malformed(format!(
+            "{} stands after `end`; remove it, or move `end` to the last line",
+            quoted(line.kind)
+        ))),
+    }
+}
+
+/// Reports whether a name can stand in a file: one word that begins neither a
+/// comment nor an arrow.
+#[must_use]
+pub fn is_name(word: &str) -> bool {
+    let is_plain = |character: char| !character.is_whitespace() && !character.is_control();
+    !word.is_empty() && !word.starts_with('#') && word != "->" && word.chars().all(is_plain)
+}
+
+/// Returns the next line that is not only a comment, without its comment.
+fn next_record<'a>(lines: &mut Lines<'a>) -> Option<Line<'a>> {
+    loop {
+        let mut line = lines.next_line()?;
+        if line.kind.starts_with('#') {
+            continue;
+        }
+        let comment = line.words.iter().position(|word| word.starts_with('#'));
+        line.words.truncate(comment.unwrap_or(line.words.len()));
+        return Some(line);
+    }
+}
+
+/// What has been read so far.
+#[derive(Default)]
+struct Reader<'a> {
+    file: DagFile,
+    /// Names and positions of the subtasks of the latest DAG.
+    subtasks: BTreeMap<&'a str, usize>,
+}
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+        match line.kind {
+            "set" => self.take_set(line),
+            "dag" => self.take_dag(line),
+            "subtask" => self.take_subtask(line),
+            "edge" => self.take_edge(line),
+            other => Err(line.malformed(format!(
+                "expected {RECORDS}, found {}; correct it, or make it a comment with #",
+                quoted(other)
+            ))),
+        }
+    }
+
+    fn take_set(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+        let name = line.exactly(1)?[0];
+        self.close(line)?;
+        if self.file.sets.iter().any(|set| set.name == name) {
+            return Err(line.malformed(format!(
+                "set {} stands here twice; rename one",
+                quoted(name)
+            )));
+        }
+        self.file.sets.push(Set {
+            name: name.into(),
+            dags: Vec::new(),
+        });
+        Ok(())
+    }
+
+    fn take_dag(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+        if self.file.sets.is_empty() {
+            self.file.sets.push(Set::default());
+        } else if self.dag().is_some() {
+            self.close(line)?;
+        }
+        let dag = read_dag(line)?;
+        let set = self.file.sets.last_mut();
+        let dags = &mut set.ok_or_else(|| line.malformed("no set"))?.dags;
+        if let Some(first) = dags.iter().find(|first| first.spec.name == dag.spec.name) {
+            return Err(line.malformed(format!(
+                "dag {} stands here twice, first on line {}; rename one",
+                quoted(&dag.spec.name),
+                first.line
+            )));
+        }
+        dags.push(dag);
+        self.subtasks.clear();
+        Ok(())
+    }
+
+    fn take_subtask(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+        let (spec, subtask) = read_subtask(line)?;
+        let dag = self.open_dag(line)?;
+        let position = dag.subtasks.len();
+        dag.spec.subtasks.push(spec);
+        dag.subtasks.push(subtask);
+        match self.subtasks.insert(line.words[0], position) {
+            None => Ok(()),
+            Some(first) => Err(line.malformed(format!(
+                "subtask {} stands here twice, first on line {}; rename one",
+                quoted(line.words[0]),
+                self.open_dag(line)?.subtasks[first].line
+            ))),
+        }
+    }
+
+    fn take_edge(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+        let &[earlier, "->", later] = &line.words[..] else {
+            return Err(line.malformed("expected `edge A -> B` with two names of subtasks"));
+        };
+        self.open_dag(line)?;
+        let position = |name: &str| {
+            self.subtasks.get(name).copied().ok_or_else(|| {
+                line.malformed(format!(
+                    "no subtask {} stands before this line in the dag; add one, or correct the name",
+                    quoted(name)
+                ))
+            })
+        };
+        let edge = (position(earlier)?, position(later)?);
+        let dag = self.open_dag(line)?;
+        dag.spec.edges.push(edge);
+        dag.edge_lines.push(line.number);
+        Ok(())
+    }
+
+    /// Returns the latest DAG of the latest set.
+    fn dag(&mut self) -> Option<&mut FileDag> {
+        self.file.sets.last_mut()?.dags.last_mut()
+    }
+
+    fn open_dag(&mut self, line: &Line<'_>) -> Result<&mut FileDag, Malformed> {
+        self.dag().ok_or_else(|| {
+            line.malformed(format!(
+                "`{}` stands before any `dag`; begin with `dag NAME period 25ms`",
+                line.kind
+            ))
+        })
+    }
+
+    /// Checks that the latest set and DAG are not empty, before what follows them.
+    fn close(&mut self, next: &Line<'_>) -> Result<(), Malformed> {
+        let Some(set) = self.file.sets.last() else {
+            return Ok(());
+        };
+        match set.dags.last() {
+            None => Err(next.malformed(format!(
+                "set {} ends here without a dag; add one, or remove the set",
+                quoted(&set.name)
+            ))),
+            Some(dag) if dag.subtasks.is_empty() => Err(next.malformed(format!(
+                "dag {} of line {} ends here without a subtask; add one",
+                quoted(&dag.spec.name),
+                dag.line
+            ))),
+            Some(_) => Ok(()),
+        }
+    }
+
+    fn finish(&mut self, end: &Line<'_>) -> Result<(), Malformed> {
+        if self.file.sets.is_empty() {
+            return Err(end.malformed("the file has no dag; add one before `end`"));
+        }
+        self.close(end)
+    }
+}
+
+fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
+    let (name, mut keys) = Keys::new(line)?;
+    let mut spec = DagSpec {
+        name,
+        ..DagSpec::default()
+    };
+    while let Some(key) = keys.next_key()? {
+        match key {
+            "period" => spec.period_ns = Some(keys.time_ns(key)?),
+            "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
+            "offset" => spec.offset_ns = keys.time_ns(key)?,
+            "in-flight" => spec.in_flight = Some(keys.number(key)?),
+            "overrun" => {
+                spec.overrun = match keys.value(key)? {
+                    "queue" => OverrunPolicy::Queue,
+                    "skip" => OverrunPolicy::Skip,
+                    "abort" => OverrunPolicy::Abort,
+                    other => {
+                        return Err(line.malformed(format!(
+                            "overrun: {} is none of queue, skip and abort",
+                            quoted(other)
+                        )));
+                    }
+                }
+            }
+            other => {
+                return Err(keys.unknown(
+                    other,
+                    "`period`, `deadline`, `offset`, `overrun`, `in-flight`",
+                ));
+            }
+        }
+    }
+    if spec.period_ns.is_none() {
+        let message = format!(
+            "dag {} has no period; add `period 25ms`",
+            quoted(&spec.name)
+        );
+        return Err(line.malformed(message));
+    }
+    spec.relative_deadline_ns = spec.relative_deadline_ns.or(spec.period_ns);
+    Ok(FileDag {
+        spec,
+        line: line.number,
+        ..FileDag::default()
+    })
+}
+
+fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed> {
+    let (name, mut keys) = Keys::new(line)?;
+    let mut spec = SubtaskSpec {
+        name,
+        ..SubtaskSpec::default()
+    };
+    let mut samples_ns: Arc<[u64]> = Arc::default();
+    while let Some(key) = keys.next_key()? {
+        match key {
+            "wcet" => spec.wcet_ns = Some(keys.time_ns(key)?),
+            "priority" => spec.priority = Some(Priority(keys.number(key)?)),
+            "non-preemptive" => spec.non_preemptive = true,
+            "samples" => {
+                let words = keys.value(key)?.split(',');
+                let times = words.map(|word| {
+                    parse_ns(word).map_err(|message| line.malformed(format!("samples: {message}")))
+                });
+                samples_ns = times.collect::<Result<Vec<_>, _>>()?.into();
+            }
+            other => {
+                return Err(keys.unknown(other, "`wcet`, `priority`, `non-preemptive`, `samples`"));
+            }
+        }
+    }
+    let Some(wcet_ns) = spec.wcet_ns else {
+        let message = format!("subtask {} has no wcet; add `wcet 3ms`", quoted(&spec.name));
+        return Err(line.malformed(message));
+    };
+    if let Some(sample) = samples_ns.iter().find(|&&sample_ns| sample_ns > wcet_ns) {
+        return Err(line.malformed(format!(
+            "the sample {} is longer than the wcet {}; raise the wcet, or drop the sample",
+            Time(*sample),
+            Time(wcet_ns)
+        )));
+    }
+    let subtask = FileSubtask {
+        line: line.number,
+        samples_ns,
+    };
+    Ok((spec, subtask))
+}
+
+#[cfg(test)]
+mod tests;

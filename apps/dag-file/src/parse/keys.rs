@@ -1,0 +1,79 @@
+//! The words of a record: its name, then keys, most with a value.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+
+use replay::lines::{Line, Malformed, quoted};
+
+use super::is_name;
+use crate::time::parse_ns;
+
+/// The words of a record after its name: keys, most with a value.
+pub(super) struct Keys<'l, 'a> {
+    line: &'l Line<'a>,
+    rest: core::slice::Iter<'l, &'a str>,
+    seen: Vec<&'a str>,
+}
+
+impl<'l, 'a> Keys<'l, 'a> {
+    /// Takes the record's name, too.
+    pub(super) fn new(line: &'l Line<'a>) -> Result<(String, Self), Malformed> {
+        let Some((name, rest)) = line.words.split_first() else {
+            return Err(line.malformed(format!("`{}` lacks its name", line.kind)));
+        };
+        if !is_name(name) {
+            return Err(line.malformed(format!("{} is no name; give a word", quoted(name))));
+        }
+        let keys = Self {
+            line,
+            rest: rest.iter(),
+            seen: Vec::new(),
+        };
+        Ok(((*name).to_string(), keys))
+    }
+
+    pub(super) fn next_key(&mut self) -> Result<Option<&'a str>, Malformed> {
+        let Some(&key) = self.rest.next() else {
+            return Ok(None);
+        };
+        if self.seen.contains(&key) {
+            let message = format!("{} stands here twice; give it once", quoted(key));
+            return Err(self.line.malformed(message));
+        }
+        self.seen.push(key);
+        Ok(Some(key))
+    }
+
+    pub(super) fn value(&mut self, key: &str) -> Result<&'a str, Malformed> {
+        let value = self.rest.next().copied();
+        value.ok_or_else(|| self.line.malformed(format!("`{key}` lacks its value")))
+    }
+
+    pub(super) fn time_ns(&mut self, key: &str) -> Result<u64, Malformed> {
+        let word = self.value(key)?;
+        parse_ns(word).map_err(|message| self.line.malformed(format!("{key}: {message}")))
+    }
+
+    pub(super) fn number(&mut self, key: &str) -> Result<u32, Malformed> {
+        let word = self.value(key)?;
+        let is_number = word.bytes().all(|byte| byte.is_ascii_digit());
+        let number = word.parse().ok().filter(|_| is_number);
+        match number {
+            Some(number) => Ok(number),
+            None => Err(self.line.malformed(format!(
+                "{key}: {} is no whole number from 0 to {}",
+                quoted(word),
+                u32::MAX
+            ))),
+        }
+    }
+
+    pub(super) fn unknown(&self, key: &str, known: &str) -> Malformed {
+        self.line.malformed(format!(
+            "unknown key {}; a {} has {known}",
+            quoted(key),
+            self.line.kind
+        ))
+    }
+}

@@ -1,0 +1,149 @@
+//! What is read, and what is refused in which words.
+
+use super::parse;
+
+fn refusal(text: &str) -> String {
+    parse(text).unwrap_err().to_string()
+}
+
+const GOOD: &str = "\
+# Two sets.
+set first
+dag camera period 25ms deadline 100ms offset 1ms overrun skip in-flight 4 # all keys
+subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms
+subtask show wcet 500us priority 6
+edge grab -> show
+
+set second
+dag alone period 1s
+subtask only wcet 1ns
+end
+";
+
+#[test]
+fn a_file_is_read_and_written_back() {
+    let file = parse(GOOD).unwrap();
+    assert_eq!(file.sets.len(), 2);
+    let camera = &file.sets[0].dags[0];
+    assert_eq!(
+        (camera.line, camera.subtasks[1].line, camera.edge_lines[0]),
+        (3, 5, 6)
+    );
+    assert_eq!(&*camera.subtasks[0].samples_ns, [1_000_000, 2_000_000]);
+    assert_eq!(camera.spec.relative_deadline_ns, Some(100_000_000));
+    assert_eq!(camera.spec.in_flight, Some(4));
+    // Without a deadline it is the period.
+    let alone = &file.sets[1].dags[0];
+    assert_eq!(alone.spec.relative_deadline_ns, Some(1_000_000_000));
+
+    let written = file.to_string();
+    assert_eq!(parse(&written).unwrap().to_string(), written);
+    let kept = "dag camera period 25ms deadline 100ms offset 1ms overrun skip in-flight 4\n\
+                subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms\n";
+    assert!(written.contains(kept), "{written}");
+}
+
+#[test]
+fn every_part_of_a_file_that_is_cut_off_is_refused() {
+    for length in 0..GOOD.len() - "end\n".len() {
+        let message = refusal(&GOOD[..length]);
+        assert!(message.starts_with("line "), "{length}: {message}");
+    }
+}
+
+#[test]
+fn an_empty_file_is_refused() {
+    let empty = "line 1: the file ends where a `dag` record should be; it is empty: describe a \
+                 dag, or name another file";
+    assert_eq!(refusal(""), empty);
+    assert_eq!(
+        refusal("end"),
+        "line 1: the file has no dag; add one before `end`"
+    );
+}
+
+#[test]
+fn a_refusal_names_line_offender_and_remedy() {
+    let dag = "dag x period 1ms\n";
+    for (text, words) in [
+        (
+            "dig x",
+            "line 1: expected `set`, `dag`, `subtask`, `edge` or `end`, found `dig`; correct it",
+        ),
+        ("dag x", "line 1: dag `x` has no period; add `period 25ms`"),
+        ("dag", "line 1: `dag` lacks its name"),
+        (
+            "dag x perod 1ms",
+            "line 1: unknown key `perod`; a dag has `period`, `deadline`,",
+        ),
+        ("dag x period", "line 1: `period` lacks its value"),
+        (
+            "dag x period 1ms period 2ms",
+            "line 1: `period` stands here twice; give it once",
+        ),
+        (
+            "dag x period -1ms",
+            "line 1: period: `-1ms` is negative; give a time from 0 on",
+        ),
+        (
+            "dag x period 99999999999s",
+            "line 1: period: `99999999999s` is more than 64 bits",
+        ),
+        (
+            "dag x period 1ms overrun wait",
+            "overrun: `wait` is none of queue, skip and abort",
+        ),
+        (
+            "dag x period 1ms in-flight 4294967296",
+            "in-flight: `4294967296` is no whole number",
+        ),
+        (
+            "\nsubtask a wcet 1ms",
+            "line 2: `subtask` stands before any `dag`; begin with",
+        ),
+        (
+            "{dag}subtask a",
+            "line 2: subtask `a` has no wcet; add `wcet 3ms`",
+        ),
+        (
+            "{dag}subtask a wcet 1ms nice 3",
+            "line 2: unknown key `nice`; a subtask has `wcet`,",
+        ),
+        (
+            "{dag}subtask a wcet 1ms samples 1us,2ms",
+            "line 2: the sample 2ms is longer than the wcet 1ms",
+        ),
+        (
+            "{dag}subtask a wcet 1ms\nsubtask a wcet 1ms",
+            "line 3: subtask `a` stands here twice, first on line 2",
+        ),
+        (
+            "{dag}subtask a wcet 1ms\nedge a -> b",
+            "line 3: no subtask `b` stands before this line",
+        ),
+        (
+            "{dag}subtask a wcet 1ms\nedge a b",
+            "line 3: expected `edge A -> B`",
+        ),
+        (
+            "{dag}dag y period 1ms",
+            "line 2: dag `x` of line 1 ends here without a subtask",
+        ),
+        (
+            "{dag}subtask a wcet 1ms\ndag x period 1ms",
+            "line 3: dag `x` stands here twice, first on line 1",
+        ),
+        ("set a\nset b", "line 2: set `a` ends here without a dag"),
+        (
+            "{dag}subtask a wcet 1ms\nend\n\nx",
+            "line 5: `x` stands after `end`",
+        ),
+        (
+            "{dag}subtask a wcet 1ms\n",
+            "line 3: the file ends where `end` should be; a part of it is missing",
+        ),
+    ] {
+        let message = refusal(&text.replace("{dag}", dag));
+        assert!(message.contains(words), "{message}\n  not: {words}");
+    }
+}

@@ -1,0 +1,159 @@
+//! What a set's run has shown, DAG by DAG, beside what its commit had promised.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+
+use dag_file::Set;
+use fass::{Answer, Verdict};
+use kernel::report::{Distribution, Ns};
+use kernel::{Run, json, println};
+use sched_dag::record::Violation;
+use sched_dag::{DagId, DagStatistics};
+
+/// The figures of one set.
+pub(crate) struct Report {
+    set: String,
+    dags: Vec<DagReport>,
+    violations: usize,
+    allocations: u64,
+}
+
+struct DagReport {
+    name: String,
+    subtasks: usize,
+    answer: Verdict,
+    statistics: DagStatistics,
+    responses: Distribution,
+}
+
+impl Report {
+    /// Takes the figures from a run; prints each violation.
+    pub(crate) fn new(set: &Set, answers: &[Answer], run: &Run) -> Self {
+        let dags = (0..).map(DagId).zip(&set.dags).zip(answers);
+        let dags = dags.map(|((id, dag), answer)| DagReport {
+            name: dag.spec.name.clone(),
+            subtasks: dag.subtasks.len(),
+            answer: answer.verdict.clone(),
+            statistics: *run.statistics(id),
+            responses: responses(id, run),
+        });
+        let shown = |violation: &Violation| println!("violation: {violation}");
+        Self {
+            set: set.name.clone(),
+            dags: dags.collect(),
+            violations: run.violations().inspect(shown).count(),
+            allocations: run.allocations(),
+        }
+    }
+
+    /// Prints a machine line for each DAG, and one for the set.
+    pub(crate) fn emit(&self) {
+        for dag in &self.dags {
+            json::emit("dag_run", |line| {
+                line.text("set", &self.set)
+                    .text("dag", &dag.name)
+                    .number("subtasks", dag.subtasks as u64)
+                    .number("released", dag.statistics.released)
+                    .number("completed", dag.statistics.completed)
+                    .number("deadline_misses", dag.statistics.misses)
+                    .number("skips", dag.statistics.skips)
+                    .number("aborts", dag.statistics.aborts)
+                    .object("response_time_ns", |object| dag.responses.describe(object));
+                match &dag.answer {
+                    Verdict::Proven { test, .. } => {
+                        line.number("bound_ns", dag.bound_ns().unwrap_or(0))
+                            .text("test", test);
+                        if let Some(permille) = dag.tightness_permille() {
+                            line.number("tightness_permille", permille);
+                        }
+                    }
+                    Verdict::NotProven(unproven) => {
+                        line.text("not_proven", unproven);
+                    }
+                }
+            });
+        }
+        json::emit("dag_set", |line| {
+            line.text("set", &self.set)
+                .number("dags", self.dags.len() as u64)
+                .number("violations", self.violations as u64)
+                .number("allocations", self.allocations);
+        });
+    }
+
+    /// Prints the same as a table.
+    pub(crate) fn print_table(&self) {
+        println!();
+        if !self.set.is_empty() {
+            println!("set {}:", self.set);
+        }
+        println!(
+            "{:<14}{:>6}{:>12}{:>12}{:>12}{:>12}{:>12}{:>10}{:>8}",
+            "dag", "jobs", "min", "median", "p99", "max", "bound", "max/bound", "misses"
+        );
+        for dag in &self.dags {
+            let none = || "-".to_string();
+            println!(
+                "{:<14}{:>6}{:>12}{:>12}{:>12}{:>12}{:>12}{:>10}{:>8}",
+                dag.name,
+                dag.statistics.completed,
+                Ns(dag.responses.min()),
+                Ns(dag.responses.median()),
+                Ns(dag.responses.p99()),
+                Ns(dag.responses.max()),
+                dag.bound_ns().map_or_else(none, |ns| Ns(ns).to_string()),
+                dag.tightness_permille().map_or_else(none, percent),
+                dag.statistics.misses
+            );
+        }
+        for dag in &self.dags {
+            if let Verdict::NotProven(unproven) = &dag.answer {
+                println!("no bound for `{}`: {unproven}", dag.name);
+            }
+        }
+        println!("{} violations", self.violations);
+    }
+
+    /// Says what makes the run a failure, if anything does.
+    pub(crate) fn complaint(&self, is_strict: bool) -> Option<String> {
+        if self.violations > 0 {
+            return Some(format!(
+                "set `{}`: {} violations",
+                self.set, self.violations
+            ));
+        }
+        let late = self.dags.iter().find(|dag| dag.statistics.misses > 0);
+        let late = late.filter(|_| is_strict)?;
+        let (name, misses) = (&late.name, late.statistics.misses);
+        Some(format!(
+            "dag `{name}` missed {misses} deadlines, and none may be missed"
+        ))
+    }
+}
+
+impl DagReport {
+    fn bound_ns(&self) -> Option<u64> {
+        u64::try_from(self.answer.bound()?.as_nanos()).ok()
+    }
+
+    /// Returns the longest response time in thousandths of the bound.
+    fn tightness_permille(&self) -> Option<u64> {
+        let longest = u128::from(self.responses.max()) * 1000;
+        let permille = longest.checked_div(u128::from(self.bound_ns()?))?;
+        u64::try_from(permille).ok()
+    }
+}
+
+fn percent(permille: u64) -> String {
+    format!("{}.{} %", permille / 10, permille % 10)
+}
+
+/// Returns the response times of all jobs that were completed.
+fn responses(dag: DagId, run: &Run) -> Distribution {
+    let jobs = (0..).zip(run.record().jobs(dag));
+    Distribution::new(jobs.filter_map(|(job, times)| {
+        let completion_ns = run.record().completion_ns(dag, job)?;
+        Some(completion_ns.saturating_sub(times.release_ns?))
+    }))
+}

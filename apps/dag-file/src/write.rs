@@ -1,0 +1,73 @@
+//! Writing DAG files: what [`parse()`](crate::parse()) reads back as it was.
+//!
+//! Only what differs from the default is written, so a file made from another
+//! format reads like one that a person wrote.
+
+use core::fmt::{Display, Formatter, Result};
+
+use sched_dag::{OverrunPolicy, SubtaskSpec};
+
+use crate::file::{DagFile, FileDag, FileSubtask};
+use crate::time::Time;
+
+impl Display for DagFile {
+    fn fmt(&self, out: &mut Formatter<'_>) -> Result {
+        for set in &self.sets {
+            if !set.name.is_empty() {
+                writeln!(out, "set {}\n", set.name)?;
+            }
+            for dag in &set.dags {
+                write_dag(dag, out)?;
+            }
+        }
+        writeln!(out, "end")
+    }
+}
+
+fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
+    let spec = &dag.spec;
+    for remark in &dag.remarks {
+        writeln!(out, "# {remark}")?;
+    }
+    write!(out, "dag {}", spec.name)?;
+    write!(out, " period {}", Time(spec.period_ns.unwrap_or(0)))?;
+    if let Some(deadline_ns) = spec.relative_deadline_ns {
+        write!(out, " deadline {}", Time(deadline_ns))?;
+    }
+    if spec.offset_ns > 0 {
+        write!(out, " offset {}", Time(spec.offset_ns))?;
+    }
+    match spec.overrun {
+        OverrunPolicy::Queue => {}
+        OverrunPolicy::Skip => out.write_str(" overrun skip")?,
+        OverrunPolicy::Abort => out.write_str(" overrun abort")?,
+    }
+    if let Some(jobs) = spec.in_flight {
+        write!(out, " in-flight {jobs}")?;
+    }
+    writeln!(out)?;
+    for (subtask, more) in spec.subtasks.iter().zip(&dag.subtasks) {
+        write_subtask(subtask, more, out)?;
+    }
+    let name = |index: usize| &spec.subtasks[index].name;
+    for &(earlier, later) in &spec.edges {
+        writeln!(out, "edge {} -> {}", name(earlier), name(later))?;
+    }
+    writeln!(out)
+}
+
+fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>) -> Result {
+    let wcet = Time(spec.wcet_ns.unwrap_or(0));
+    write!(out, "subtask {} wcet {wcet}", spec.name)?;
+    if let Some(priority) = spec.priority {
+        write!(out, " priority {}", priority.0)?;
+    }
+    if spec.non_preemptive {
+        out.write_str(" non-preemptive")?;
+    }
+    for (number, sample_ns) in more.samples_ns.iter().enumerate() {
+        let separator = if number == 0 { " samples " } else { "," };
+        write!(out, "{separator}{}", Time(*sample_ns))?;
+    }
+    writeln!(out)
+}
