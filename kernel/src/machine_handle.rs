@@ -141,6 +141,7 @@ impl Machine {
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
         let allocations_before = heap::usage().allocations;
+        let locks_before = execution::lock_acquisitions();
         console::defer();
         execution::arm_next_event();
         let mut progress = Progress { total, printed: 0 };
@@ -149,11 +150,13 @@ impl Machine {
         worker::wait_in_background(|| progress.print_when_due());
         let longest = interrupts_off::take_longest();
         let allocations = heap::usage().allocations - allocations_before;
+        let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
         let dropped = console::resume();
         if dropped > 0 {
             crate::println!("({dropped} bytes of output did not fit in the buffer)");
         }
-        let run = Run::new(execution::end().ok_or_else(nothing)?, allocations, epoch_ns);
+        let ended = execution::end().ok_or_else(nothing)?;
+        let run = Run::new(ended, allocations, locks, epoch_ns);
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }

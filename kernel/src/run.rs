@@ -9,6 +9,7 @@ use crate::execution::Execution;
 pub struct Run {
     execution: Execution,
     allocations: u64,
+    lock_acquisitions: u32,
     epoch_ns: u64,
 }
 
@@ -21,10 +22,16 @@ impl core::fmt::Debug for Run {
 }
 
 impl Run {
-    pub(crate) const fn new(execution: Execution, allocations: u64, epoch_ns: u64) -> Self {
+    pub(crate) const fn new(
+        execution: Execution,
+        allocations: u64,
+        lock_acquisitions: u32,
+        epoch_ns: u64,
+    ) -> Self {
         Self {
             execution,
             allocations,
+            lock_acquisitions,
             epoch_ns,
         }
     }
@@ -69,5 +76,12 @@ impl Run {
     #[must_use]
     pub const fn allocations(&self) -> u64 {
         self.allocations
+    }
+
+    /// Returns how often the scheduler's lock was taken between the start of the
+    /// run and its last completion, modulo 2^32.
+    #[must_use]
+    pub const fn lock_acquisitions(&self) -> u32 {
+        self.lock_acquisitions
     }
 }

@@ -29,7 +29,7 @@ use crate::{contexts, trace};
 pub(crate) use events::{arm_next_event, complete, fail, find_work, interrupt, note_start};
 use placement::Placement;
 pub(crate) use status::{
-    budget_ns, is_finished, jobs_ended, names, next_event_ns, running, try_names,
+    budget_ns, is_finished, jobs_ended, lock_acquisitions, names, next_event_ns, running, try_names,
 };
 
 /// An instance that a core runs, with what it takes.

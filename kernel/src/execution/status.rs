@@ -19,6 +19,11 @@ pub(crate) fn jobs_ended() -> u64 {
     JOBS_ENDED.load(Ordering::Relaxed)
 }
 
+/// Returns how often the scheduler's lock has been taken since boot, modulo 2^32.
+pub(crate) fn lock_acquisitions() -> u32 {
+    EXECUTION.acquisitions()
+}
+
 /// Returns when core 0's timer shall next step the scheduler.
 pub(crate) fn next_event_ns() -> u64 {
     NEXT_EVENT_NS.load(Ordering::Acquire)

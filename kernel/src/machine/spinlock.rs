@@ -82,6 +82,12 @@ impl<T> SpinLock<T> {
         None
     }
 
+    /// Returns how often the data has been taken, modulo 2^32: the tickets that
+    /// were given out.
+    pub(crate) fn acquisitions(&self) -> u32 {
+        self.next.load(Ordering::Relaxed)
+    }
+
     const fn guard(&self, interrupts_were_enabled: bool) -> SpinLockGuard<'_, T> {
         SpinLockGuard {
             lock: self,
