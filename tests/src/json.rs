@@ -7,12 +7,16 @@
 //! it stands, so that a damaged serial line is found and never guessed at.
 //!
 //! Integers stay integers (`i128` holds every `u64` of nanoseconds); only a
-//! number with a fraction or an exponent becomes a float. Nothing here
-//! prints JSON: the printer is the guest's.
+//! number with a fraction or an exponent becomes a float. What the host itself
+//! writes, it writes by [`Object`] and [`quoted`]; machine lines are printed by
+//! the guest.
 
 mod parser;
+mod writer;
 
 use std::fmt;
+
+pub use writer::{Object, quoted};
 
 /// The deepest nesting of arrays and objects that is read.
 pub const DEEPEST: usize = 32;

@@ -36,6 +36,11 @@ const SUBCOMMANDS: &[(&str, &str, Work)] = &[
         harness::trace::check_trace,
     ),
     (
+        "trace",
+        "convert the traces of runs for Perfetto's viewer",
+        harness::trace::trace,
+    ),
+    (
         "bench",
         "measure parts of the project on this host",
         harness::bench::bench,

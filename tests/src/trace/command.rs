@@ -101,7 +101,7 @@ fn refuse(line: &str) -> ExitCode {
 }
 
 /// Reads a file's runs, of which at least one must have events.
-fn read_file(file: &str) -> Result<Vec<Run>, String> {
+pub(super) fn read_file(file: &str) -> Result<Vec<Run>, String> {
     let bytes = fs::read(file).map_err(|error| format!("cannot read {file}: {error}"))?;
     // A person's line may be damaged; a machine line then is found to be.
     let text = String::from_utf8_lossy(&bytes);

@@ -24,11 +24,11 @@ use super::view::{Moment, View};
 #[derive(Clone, Debug, Default)]
 pub(super) struct JobHistory {
     pub(super) released: Option<Moment>,
-    queued: Option<Moment>,
-    skipped: Option<Moment>,
-    aborted: Option<Moment>,
-    missed: Option<Moment>,
-    completed: Option<Moment>,
+    pub(super) queued: Option<Moment>,
+    pub(super) skipped: Option<Moment>,
+    pub(super) aborted: Option<Moment>,
+    pub(super) missed: Option<Moment>,
+    pub(super) completed: Option<Moment>,
 }
 
 impl JobHistory {

@@ -13,7 +13,7 @@
 //!
 //! It also computes the [`figures`]. [`read()`] takes a log apart, [`model`] is
 //! what it finds, `view` puts that in order, [`command`] is the subcommand
-//! and [`report`] what it prints.
+//! and [`report`] what it prints. [`viewer`] draws a run instead of judging it.
 //!
 //! It guarantees that a trace of the scheduler in virtual time has no breach at
 //! a bound of 0. It does not find what leaves no event: that values went astray,
@@ -35,6 +35,7 @@ pub mod report;
 #[cfg(test)]
 mod tests;
 mod view;
+pub mod viewer;
 
 use breach::Breach;
 use figures::Figures;
@@ -43,6 +44,7 @@ use view::View;
 
 pub use command::check_trace;
 pub use read::read;
+pub use viewer::trace;
 
 /// What a run's trace shows.
 #[derive(Clone, Debug, PartialEq, Eq)]

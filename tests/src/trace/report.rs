@@ -7,6 +7,7 @@ use sched_dag::{Policy, Preemption};
 use super::Findings;
 use super::figures::Distribution;
 use super::model::Run;
+use crate::json::quoted;
 
 /// Returns the text for people: at most `shown` breaches, then the figures.
 #[must_use]
@@ -77,11 +78,11 @@ pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
     let Findings { breaches, figures } = findings;
     let loads: Vec<String> = figures.load_permille.iter().map(u64::to_string).collect();
     format!(
-        "{{\"kind\":\"trace_check\",\"file\":\"{}\",\"run\":{},\"events\":{},\"lost\":{},\
+        "{{\"kind\":\"trace_check\",\"file\":{},\"run\":{},\"events\":{},\"lost\":{},\
          \"judged_from_ns\":{},\"span_ns\":{},\"instances\":{},\"preemptions\":{},\
          \"breaches\":{},\"finish_to_ready_max_ns\":{},\"ready_to_start_ns\":{},\
          \"preemption_latency_ns\":{},\"longest_inversion_ns\":{},\"load_permille\":[{}]}}",
-        escape(file),
+        quoted(file),
         run.number,
         figures.events,
         run.lost,
@@ -120,15 +121,4 @@ fn object(of: &Distribution) -> String {
         "{{\"count\":{},\"median\":{},\"p99\":{},\"max\":{}}}",
         of.count, of.median_ns, of.p99_ns, of.max_ns
     )
-}
-
-/// Text inside the quotes of a JSON string (RFC 8259, section 7).
-fn escape(text: &str) -> String {
-    let escaped = |character: char| match character {
-        '"' => "\\\"".into(),
-        '\\' => "\\\\".into(),
-        control if control < ' ' => format!("\\u{:04x}", u32::from(control)),
-        other => other.to_string(),
-    };
-    text.chars().map(escaped).collect()
 }

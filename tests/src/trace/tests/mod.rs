@@ -17,7 +17,7 @@ use sched_dag::{CoreId, DagId, SubtaskId};
 const BOUND_NS: u64 = 5;
 
 /// Makes a run of events in the order of time, under the given header lines.
-fn run_of(header: &str, events: &str) -> Run {
+pub(super) fn run_of(header: &str, events: &str) -> Run {
     let log = format!("{header}\n{{\"kind\":\"trace_end\",\"events\":0,\"lost\":0}}\n");
     let mut run = read(&log).unwrap().remove(0);
     let lines = events.lines().map(str::trim);

@@ -1,0 +1,103 @@
+//! The subcommand `trace`: from a log to a file for a viewer.
+
+use std::fs;
+use std::process::ExitCode;
+
+use super::convert;
+use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::trace::command::read_file;
+
+/// The table of `trace`.
+static TRACE: Command = Command {
+    invocation: "./scripts/trace",
+    about: "Converts the traces of runs for Perfetto's viewer.",
+    positional: Some((
+        "FILE",
+        "A serial log, or another file of JSON lines, with traces: \
+         `./scripts/run --trace FILE` makes one.",
+    )),
+    options: &[
+        Opt {
+            name: "out",
+            short: Some('o'),
+            takes: Takes::Text("FILE"),
+            default: "",
+            help: "Write to this file; else to standard output.",
+        },
+        Opt {
+            name: "run",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: u64::MAX,
+            },
+            default: "",
+            help: "Only the run of this number; else all of them, side by side from time 0.",
+        },
+        Opt {
+            name: "bound-us",
+            short: None,
+            takes: Takes::Number {
+                least: 0,
+                most: 1_000_000_000,
+            },
+            default: "1000",
+            help: "As for ./scripts/check-trace, whose breaches are shown as markers.",
+        },
+    ],
+    notes: "\
+Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
+chrome://tracing, or at https://www.speedscope.app. docs/seeing.md explains the picture.
+
+exit codes: 0 all is well; 1 the output cannot be written; 2 a refused command
+line, or a file without a well-formed trace with events
+",
+};
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn trace(words: &[String]) -> ExitCode {
+    match attempt(words) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err((code, line)) => {
+            eprintln!("trace: {line}");
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn attempt(words: &[String]) -> Result<(), (u8, String)> {
+    let refused = |line: String| (2, line);
+    let options = match TRACE.parse(words).map_err(|error| refused(error.0))? {
+        Request::Work(options) => options,
+        Request::Help(text) => {
+            print!("{text}");
+            return Ok(());
+        }
+    };
+    let question = "which file? name a serial log with a trace";
+    let file = options
+        .positional()
+        .ok_or_else(|| refused(question.into()))?;
+    let mut runs = read_file(file).map_err(refused)?;
+    if let Some(number) = options.number("run") {
+        let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
+        runs.retain(|run| run.number == number);
+        if runs.is_empty() {
+            let there = there.join(", ");
+            return Err(refused(format!(
+                "`--run {number}`: {file} has no such run; there are {there}"
+            )));
+        }
+    }
+    let bound_ns = options.number("bound-us").unwrap_or(0).saturating_mul(1000);
+    write(&convert(&runs, bound_ns), &options)
+}
+
+fn write(text: &str, options: &Parsed) -> Result<(), (u8, String)> {
+    let Some(out) = options.text("out") else {
+        print!("{text}");
+        return Ok(());
+    };
+    fs::write(out, text).map_err(|error| (1, format!("cannot write {out}: {error}")))
+}

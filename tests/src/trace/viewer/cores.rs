@@ -1,0 +1,108 @@
+//! The tracks of the cores: what each one executed when.
+
+use sched_dag::{CoreId, Instance};
+
+use super::super::history::Slice;
+use super::super::model::Word;
+use super::super::view::View;
+use super::flows::Flows;
+use super::output::{Output, Track};
+use super::{Pieces, instance_args, instance_name};
+
+/// A piece of an instance's execution: which one, counted from 0, and of how many.
+struct Piece {
+    instance: Instance,
+    slice: Slice,
+    number: u64,
+    of: usize,
+}
+
+/// Draws the cores of a run.
+pub(super) fn draw(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output) {
+    let pieces = pieces(view);
+    let group = output.group(&format!("{prefix}cores"), "");
+    for core in (0..view.run.cores).map(CoreId) {
+        let mut track = output.track(group, &format!("core {}", core.0));
+        for piece in pieces.iter().filter(|piece| piece.slice.core == core) {
+            draw_piece(view, piece, flows, &mut track);
+        }
+        draw_preemptions(view, core, &mut track);
+        output.add(track);
+    }
+}
+
+/// Returns all pieces in the order of time.
+fn pieces(view: &View<'_>) -> Vec<Piece> {
+    let mut numbers = Pieces::default();
+    let mut pieces = Vec::new();
+    for (&instance, history) in &view.histories {
+        for &slice in &history.slices {
+            pieces.push(Piece {
+                instance,
+                slice,
+                number: numbers.next(instance),
+                of: history.slices.len(),
+            });
+        }
+    }
+    pieces.sort_by_key(|piece| (piece.slice.from_ns, piece.slice.to_ns.unwrap_or(u64::MAX)));
+    pieces
+}
+
+fn draw_piece(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
+    let Piece {
+        instance,
+        slice,
+        number,
+        of,
+    } = *piece;
+    let history = &view.histories[&instance];
+    let is_last = number + 1 == of as u64;
+    let begins = if number > 0 {
+        "resume"
+    } else if history.start.is_some() {
+        "start"
+    } else {
+        "before the trace"
+    };
+    let ends = match slice.to_ns {
+        None => "after the trace",
+        Some(_) if !is_last => "suspend",
+        Some(_) if history.finish.is_some() => "finish",
+        Some(_) if history.dropped.is_some() => "fault",
+        Some(_) => "suspend",
+    };
+    let args = instance_args(instance)
+        .number("piece", number + 1)
+        .text("begins", begins)
+        .text("ends", ends);
+    let name = instance_name(view.run, instance);
+    track.begin(slice.from_ns, &name, &args.end());
+    if begins == "start" {
+        flows.into(instance).for_each(|flow| track.flow_in(flow));
+    }
+    let to_ns = slice.to_ns.unwrap_or(view.end_ns);
+    track.advance(to_ns);
+    if ends == "finish" {
+        flows.out(instance).for_each(|flow| track.flow_out(flow));
+    }
+    track.end(to_ns);
+}
+
+/// Draws what was asked of a core and what it did.
+fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
+    for (event, _) in &view.events {
+        let what = match event.word {
+            Word::Request => "preempt for",
+            Word::Suspend => "preempted",
+            Word::Ended => "fault in",
+            _ => continue,
+        };
+        if let Some(instance) = event.instance()
+            && event.core == core
+        {
+            let name = format!("{what} {}", instance_name(view.run, instance));
+            track.instant(event.time_ns, &name, &instance_args(instance).end());
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! A run's trace for the eye: JSON that Perfetto's viewer opens.
+//!
+//! The format is the Trace Event Format of Chrome's tracing, which
+//! <https://ui.perfetto.dev>, `chrome://tracing` and speedscope read. In its
+//! words: a *process* is a group of *tracks* (it calls them threads); a *slice*
+//! is a stretch of time on a track, an *instant* a moment, a *flow* an arrow from
+//! one slice to another. For each run there are
+//!
+//! - a group `cores` with a track for each core: a slice is one uninterrupted
+//!   piece of an instance's execution, an instant a preemption, or the request
+//!   for one ([`cores`]);
+//! - a group for each DAG: its releases, deadlines and misses as instants, a
+//!   slice for each job from its nominal release to its completion, and for each
+//!   subtask the slices of its instances from readiness to their end, with what
+//!   they executed inside ([`dags`]);
+//! - if the trace breaks a rule, a group `breaches` that says where.
+//!
+//! Flows lead along each edge of the graph from an instance's finish to the
+//! start of its successor in the same job, once between cores and once between
+//! subtasks ([`flows`]).
+//!
+//! It guarantees that slices of one track nest, and that each flow has both its
+//! ends. Each time is the trace's, in microseconds with three decimals. All runs
+//! begin at 0, side by side. Where events were lost, only what came after the
+//! last gap is shown.
+
+mod command;
+mod cores;
+mod dags;
+mod flows;
+mod output;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use sched_dag::Instance;
+
+use super::breach::Breach;
+use super::check;
+use super::model::Run;
+use super::view::View;
+use crate::json::Object;
+use flows::Flows;
+use output::Output;
+
+pub use command::trace;
+
+/// Returns runs as one text of JSON. Breaches are looked for with `bound_ns`, as
+/// [`check`] does.
+#[must_use]
+pub fn convert(runs: &[Run], bound_ns: u64) -> String {
+    let mut output = Output::default();
+    for run in runs {
+        let view = View::new(run, &mut Vec::new());
+        let breaches = check(run, bound_ns).breaches;
+        let prefix = match runs {
+            [_] => String::new(),
+            _ => format!("run {} ", run.number),
+        };
+        let mut flows = Flows::new(&view, output.next_flow());
+        cores::draw(&view, &prefix, &flows, &mut output);
+        dags::draw(&view, &prefix, &mut flows, &mut output);
+        draw_breaches(&breaches, &prefix, &mut output);
+        output.set_next_flow(flows.next());
+    }
+    output.end()
+}
+
+fn draw_breaches(breaches: &[Breach], prefix: &str, output: &mut Output) {
+    if breaches.is_empty() {
+        return;
+    }
+    let group = output.group(&format!("{prefix}breaches"), "");
+    let mut track = output.track(group, "rules");
+    for breach in breaches {
+        let args = Object::new().text("what", &breach.text).end();
+        track.instant(breach.time_ns, &breach.rule.to_string(), &args);
+    }
+    output.add(track);
+}
+
+/// The name of an instance on a track that shows all DAGs.
+fn instance_name(run: &Run, instance: Instance) -> String {
+    let Instance { dag, job, subtask } = instance;
+    let model = &run.dags[dag.index()];
+    let subtask = name_or(&model.subtasks[subtask.index()].name, subtask.0);
+    format!("{}/{subtask} #{job}", name_or(&model.name, dag.0))
+}
+
+fn name_or(name: &str, number: u32) -> String {
+    match name {
+        "" => number.to_string(),
+        name => name.to_string(),
+    }
+}
+
+/// What a group's or a track's slices say of an instance.
+fn instance_args(instance: Instance) -> Object {
+    let Instance { dag, job, subtask } = instance;
+    Object::new()
+        .number("dag", dag.0)
+        .number("job", job)
+        .number("subtask", subtask.0)
+}
+
+/// Counts how often each instance was named, from 0.
+#[derive(Default)]
+struct Pieces(BTreeMap<Instance, u64>);
+
+impl Pieces {
+    fn next(&mut self, instance: Instance) -> u64 {
+        let count = self.0.entry(instance).or_default();
+        *count += 1;
+        *count - 1
+    }
+}
