@@ -107,8 +107,8 @@ pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use scheduler::{
     DagStatistics, Decision, JobOutcome, Moment, Observer, Released, Scheduler, SchedulerOptions,
 };
-pub use spec::{DagSpec, SubtaskSpec, TopicPort};
-pub use task_set::{Dag, Subtask, TaskSet};
+pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort};
+pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use verify::{
     CommitOptions, ConstructionPolicy, Count, DagLabel, Direction, Fault, MAX_ARITY, Rejected,
     SubtaskLabel, Time, Verified, Warning, verify,

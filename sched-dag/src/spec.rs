@@ -35,6 +35,42 @@ pub struct DagSpec {
     /// Precedence edges `(predecessor, successor)` by position in `subtasks`,
     /// beside those that follow from topics.
     pub edges: Vec<(usize, usize)>,
+    /// What subtasks share from job to job.
+    pub states: Vec<StateSpec>,
+    /// Topics whose latest value subtasks of any DAG read.
+    pub latest: Vec<LatestSpec>,
+}
+
+/// A state that subtasks of one DAG share, as its app describes it.
+///
+/// Its users do not run at the same time unless all of them only read. The
+/// verification gives them an order and adds the precedence edges that keep it,
+/// and lets one job be in flight, so that jobs keep it, too.
+#[derive(Clone, Debug, Default)]
+pub struct StateSpec {
+    /// The name that messages use.
+    pub name: String,
+    /// Who uses it, each subtask once, in any order.
+    pub users: Vec<StateUser>,
+}
+
+/// A subtask's use of a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StateUser {
+    /// The subtask by position in `subtasks`.
+    pub subtask: usize,
+    /// Whether it changes the state rather than only reads it.
+    pub updates: bool,
+}
+
+/// A topic of which the latest complete value is read by subtasks that wait for
+/// nothing. No edge follows from it.
+#[derive(Clone, Debug)]
+pub struct LatestSpec {
+    /// The topic, with the type that the readers expect.
+    pub port: TopicPort,
+    /// The number of subtasks, of any DAG, that read it so.
+    pub samplers: usize,
 }
 
 /// A subtask as its app describes it.

@@ -32,6 +32,18 @@ pub struct Dag {
     pub(crate) predecessors: Adjacency,
     pub(crate) successors: Adjacency,
     pub(crate) topological_order: Box<[SubtaskId]>,
+    pub(crate) state_precedences: Box<[StatePrecedence]>,
+}
+
+/// An edge that two subtasks have because they share a state.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StatePrecedence {
+    /// The state's name.
+    pub state: String,
+    /// The subtask that uses it first in each job.
+    pub earlier: SubtaskId,
+    /// The subtask that waits for that one.
+    pub later: SubtaskId,
 }
 
 /// A verified subtask.
@@ -171,6 +183,13 @@ impl Dag {
     #[must_use]
     pub fn topological_order(&self) -> &[SubtaskId] {
         &self.topological_order
+    }
+
+    /// Returns the edges that follow from shared states. They are among the
+    /// predecessors and successors; there may be another reason for one, too.
+    #[must_use]
+    pub fn state_precedences(&self) -> &[StatePrecedence] {
+        &self.state_precedences
     }
 }
 

@@ -10,6 +10,7 @@ use super::fault::{Direction, Fault, Time};
 use super::findings::Findings;
 use super::label::{DagLabel, SubtaskLabel};
 use super::options::CommitOptions;
+use super::states::is_shared;
 use super::warning::Warning;
 use crate::policy::{Policy, Priority};
 use crate::spec::DagSpec;
@@ -43,10 +44,13 @@ pub(super) fn check(specs: &[DagSpec], options: &CommitOptions, findings: &mut F
 ///
 /// A job that meets its deadline is in flight for at most D, so at most
 /// ceil(D / T) of them are at any time; one more lets a late job end while the
-/// next one is released.
+/// next one is released. Where subtasks share a state, jobs take turns.
 pub(super) fn in_flight(spec: &DagSpec) -> u64 {
     if let Some(given) = spec.in_flight {
         return u64::from(given);
+    }
+    if spec.states.iter().any(is_shared) {
+        return 1;
     }
     let (Some(period_ns), Some(deadline_ns)) = (spec.period_ns, spec.relative_deadline_ns) else {
         return 1;

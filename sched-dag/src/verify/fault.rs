@@ -159,6 +159,48 @@ pub enum Fault {
     /// Priorities were to be derived below those given elsewhere, and the
     /// numbers up to `u32::MAX` do not suffice.
     PrioritiesExhausted { dag: DagLabel },
+    /// Two states of a DAG with one name.
+    DuplicateState { dag: DagLabel, state: String },
+    /// A state that no subtask uses.
+    UnusedState { dag: DagLabel, state: String },
+    /// A state that is read and never updated.
+    StateNeverUpdated {
+        dag: DagLabel,
+        state: String,
+        reader: SubtaskLabel,
+    },
+    /// A subtask that uses a state twice.
+    StateUsedTwice {
+        dag: DagLabel,
+        state: String,
+        subtask: SubtaskLabel,
+    },
+    /// Subtasks share a state, and several jobs may be in flight.
+    StateOverJobs {
+        dag: DagLabel,
+        state: String,
+        in_flight: u32,
+        users: Vec<SubtaskLabel>,
+    },
+    /// The latest value of a topic that no subtask writes.
+    LatestUnwritten { dag: DagLabel, topic: String },
+    /// The latest value of a topic is read as another type than is written.
+    LatestTypeMismatch {
+        dag: DagLabel,
+        topic: String,
+        writer: SubtaskLabel,
+        written: &'static str,
+        read: &'static str,
+    },
+    /// The latest value of a topic, which no subtask reads.
+    LatestUnread { dag: DagLabel, topic: String },
+    /// The latest value of a message that can only be moved, with further readers.
+    LatestOfMoved {
+        dag: DagLabel,
+        topic: String,
+        type_name: &'static str,
+        readers: usize,
+    },
 }
 
 /// Which side of a subtask a topic stands on.
@@ -219,6 +261,15 @@ impl Fault {
             Self::TimeOverflow { .. } => "time_overflow",
             Self::PrioritiesPartlyGiven { .. } => "priorities_partly_given",
             Self::PrioritiesExhausted { .. } => "priorities_exhausted",
+            Self::DuplicateState { .. } => "duplicate_state",
+            Self::UnusedState { .. } => "unused_state",
+            Self::StateNeverUpdated { .. } => "state_never_updated",
+            Self::StateUsedTwice { .. } => "state_used_twice",
+            Self::StateOverJobs { .. } => "state_over_jobs",
+            Self::LatestUnwritten { .. } => "latest_unwritten",
+            Self::LatestTypeMismatch { .. } => "latest_type_mismatch",
+            Self::LatestUnread { .. } => "latest_unread",
+            Self::LatestOfMoved { .. } => "latest_of_moved",
         }
     }
 }

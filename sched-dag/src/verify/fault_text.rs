@@ -264,7 +264,7 @@ impl Fault {
                 "{subtask} of {dag} has {arity} {}, more than {MAX_ARITY}; bundle some into one message",
                 direction.noun()
             ),
-            _ => f.write_str(self.code()),
+            _ => self.fmt_shared(f),
         }
     }
 }

@@ -16,10 +16,13 @@ mod findings;
 mod graph;
 mod interner;
 mod label;
+mod latest;
 mod model;
 mod names;
 mod options;
 mod shape;
+mod shared_text;
+mod states;
 mod topics;
 mod warning;
 
@@ -64,7 +67,9 @@ pub fn verify(specs: &[DagSpec], options: &CommitOptions) -> Result<Verified, Re
     let mut findings = Findings::default();
     attributes::check(specs, options, &mut findings);
     names::check(specs, &mut findings);
-    let topologies = topics::check(specs, options, &mut findings);
+    states::check(specs, &mut findings);
+    let mut topologies = topics::check(specs, options, &mut findings);
+    latest::check(specs, &mut topologies, &mut findings);
     let mut shapes = Vec::with_capacity(specs.len());
     for (dag, topology) in topologies.into_iter().enumerate() {
         shapes.push(shape::check(

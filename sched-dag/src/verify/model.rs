@@ -80,6 +80,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
     let Shape {
         graph,
         topological_order,
+        state_precedences,
     } = shape;
     let ranks = if has_priorities(spec) {
         Vec::new()
@@ -120,6 +121,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         predecessors: graph.predecessors,
         successors: graph.successors,
         topological_order: topological_order.into_boxed_slice(),
+        state_precedences: state_precedences.into_boxed_slice(),
     }
 }
 

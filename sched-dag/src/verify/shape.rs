@@ -9,15 +9,18 @@ use super::findings::Findings;
 use super::graph::Graph;
 use super::label::{DagLabel, SubtaskLabel};
 use super::options::ConstructionPolicy;
+use super::states;
 use super::topics::Topology;
 use super::warning::Warning;
 use crate::ids::{SubtaskId, to_u32};
 use crate::spec::DagSpec;
+use crate::task_set::StatePrecedence;
 
 /// The graph of a DAG, with an order that is complete if there is no cycle.
 pub(super) struct Shape {
     pub(super) graph: Graph,
     pub(super) topological_order: Vec<SubtaskId>,
+    pub(super) state_precedences: Vec<StatePrecedence>,
 }
 
 /// Checks the graph of DAG number `dag`.
@@ -53,10 +56,16 @@ pub(super) fn check(
             );
         }
     }
-    Shape {
+    let mut shape = Shape {
         graph,
         topological_order,
+        state_precedences: Vec::new(),
+    };
+    // Last, so that all other checks judge the graph that the author stated.
+    if shape.topological_order.len() == shape.graph.len() {
+        states::order_users(spec, &mut topology.edges, &mut shape);
     }
+    shape
 }
 
 /// Adds the edges that are given without a topic.

@@ -2,6 +2,7 @@
 
 mod attributes;
 mod shape;
+mod shared;
 mod topics;
 
 use std::any::{TypeId, type_name};

@@ -1,0 +1,177 @@
+//! States that subtasks of one DAG share: their checks, and their precedence.
+//!
+//! Words: a subtask that *updates* a state may change it, one that *reads* it may
+//! not. Two uses *conflict* unless both read. Conflicting uses must not overlap,
+//! and which one is first must not depend on execution times.
+//!
+//! # The order of a state's users
+//!
+//! Within a job the users take turns in the order in which one core would run the
+//! DAG as stated, if it always took the ready subtask that was registered first.
+//! So a path decides, and where there is none, the order of registration. For
+//! each pair of neighbours that conflict an edge is added; readers between two
+//! updates stay parallel. All edges follow one order that all paths follow, so
+//! they close no cycle.
+//!
+//! Jobs take turns as well: the commit lets one be in flight. Job k + 1 finds the
+//! states as job k left them.
+//!
+//! The analysis sees nothing but a DAG with some more edges. There is no lock, so
+//! nothing is ever blocked by a state and no priority is inverted.
+
+use alloc::collections::BinaryHeap;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cmp::Reverse;
+
+use super::fault::Fault;
+use super::findings::Findings;
+use super::graph::Graph;
+use super::label::{DagLabel, SubtaskLabel};
+use super::shape::Shape;
+use crate::ids::{SubtaskId, to_u32};
+use crate::spec::{DagSpec, StateSpec};
+use crate::task_set::StatePrecedence;
+
+/// Reports whether several subtasks use a state; one alone is in order by itself.
+pub(super) fn is_shared(state: &StateSpec) -> bool {
+    let first = state.users.first();
+    first.is_some_and(|first| state.users.iter().any(|user| user.subtask != first.subtask))
+}
+
+/// Checks the states of all DAGs.
+pub(super) fn check(specs: &[DagSpec], findings: &mut Findings) {
+    for (dag, spec) in specs.iter().enumerate() {
+        for (position, state) in spec.states.iter().enumerate() {
+            let is_repeated = |other: &StateSpec| other.name == state.name;
+            if spec.states[..position].iter().any(is_repeated) {
+                let (label, state) = (DagLabel::new(specs, dag), state.name.clone());
+                findings.fault(dag, Fault::DuplicateState { dag: label, state });
+            }
+            check_users(specs, dag, state, findings);
+        }
+    }
+}
+
+fn check_users(specs: &[DagSpec], dag: usize, state: &StateSpec, findings: &mut Findings) {
+    let spec = &specs[dag];
+    let label = || DagLabel::new(specs, dag);
+    let user = |user: usize| SubtaskLabel::new(spec, user);
+    let name = || state.name.clone();
+    let mut users: Vec<usize> = state.users.iter().map(|user| user.subtask).collect();
+    users.sort_unstable();
+    match state.users.first() {
+        None => findings.fault(
+            dag,
+            Fault::UnusedState {
+                dag: label(),
+                state: name(),
+            },
+        ),
+        Some(first) if state.users.iter().all(|user| !user.updates) => findings.fault(
+            dag,
+            Fault::StateNeverUpdated {
+                dag: label(),
+                state: name(),
+                reader: user(first.subtask),
+            },
+        ),
+        Some(_) => {}
+    }
+    for same in users.chunk_by(|one, other| one == other) {
+        if let [subtask, _, ..] = *same {
+            findings.fault(
+                dag,
+                Fault::StateUsedTwice {
+                    dag: label(),
+                    state: name(),
+                    subtask: user(subtask),
+                },
+            );
+        }
+    }
+    users.dedup();
+    if let Some(in_flight) = spec.in_flight.filter(|&jobs| jobs > 1)
+        && is_shared(state)
+    {
+        findings.fault(
+            dag,
+            Fault::StateOverJobs {
+                dag: label(),
+                state: name(),
+                in_flight,
+                users: users.into_iter().map(user).collect(),
+            },
+        );
+    }
+}
+
+/// Adds the precedence of shared states to a graph without cycle, of which
+/// `edges` are the edges.
+pub(super) fn order_users(spec: &DagSpec, edges: &mut Vec<(u32, u32)>, shape: &mut Shape) {
+    if !spec.states.iter().any(is_shared) {
+        return;
+    }
+    let place = places(&shape.graph);
+    for state in spec.states.iter().filter(|state| is_shared(state)) {
+        let mut users = state.users.clone();
+        users.sort_by_key(|user| place.get(user.subtask).copied());
+        let mut add = |earlier: usize, later: usize| {
+            let (earlier, later) = (to_u32(earlier), to_u32(later));
+            edges.push((earlier, later));
+            shape.state_precedences.push(StatePrecedence {
+                state: state.name.clone(),
+                earlier: SubtaskId(earlier),
+                later: SubtaskId(later),
+            });
+        };
+        let mut updater: Option<usize> = None;
+        let mut readers: Vec<usize> = Vec::new();
+        for user in users {
+            if !user.updates {
+                if let Some(updater) = updater {
+                    add(updater, user.subtask);
+                }
+                readers.push(user.subtask);
+            } else {
+                // Through the readers it also follows the update before them.
+                let before = if readers.is_empty() {
+                    updater.as_slice()
+                } else {
+                    &readers
+                };
+                for &before in before {
+                    add(before, user.subtask);
+                }
+                readers.clear();
+                updater = Some(user.subtask);
+            }
+        }
+    }
+    shape.graph = Graph::new(spec.subtasks.len(), edges);
+    shape.topological_order = shape.graph.topological_order();
+}
+
+/// Returns each subtask's place in the order in which one core runs the DAG if it
+/// always takes the first registered of the ready ones.
+fn places(graph: &Graph) -> Vec<usize> {
+    let predecessors = |subtask| graph.predecessors.of(subtask).len();
+    let mut missing: Vec<usize> = graph.subtasks().map(predecessors).collect();
+    let sources = graph
+        .subtasks()
+        .filter(|&subtask| predecessors(subtask) == 0);
+    let mut ready: BinaryHeap<Reverse<SubtaskId>> = sources.map(Reverse).collect();
+    let mut place = vec![0; missing.len()];
+    let mut next = 0;
+    while let Some(Reverse(subtask)) = ready.pop() {
+        place[subtask.index()] = next;
+        next += 1;
+        for &successor in graph.successors.of(subtask) {
+            missing[successor.index()] -= 1;
+            if missing[successor.index()] == 0 {
+                ready.push(Reverse(successor));
+            }
+        }
+    }
+    place
+}
