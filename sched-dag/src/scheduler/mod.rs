@@ -48,6 +48,7 @@ mod key;
 mod moment;
 mod observer;
 mod overrun;
+mod pausing;
 mod signals;
 mod statistics;
 
@@ -110,6 +111,7 @@ struct DagState {
     jobs: Jobs,
     joins: Joins,
     statistics: DagStatistics,
+    is_paused: bool,
 }
 
 impl Scheduler {
@@ -278,6 +280,7 @@ impl DagState {
             jobs: Jobs::new(dag),
             joins: Joins::new(dag),
             statistics: DagStatistics::default(),
+            is_paused: false,
         }
     }
 }

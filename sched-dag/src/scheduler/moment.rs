@@ -62,6 +62,27 @@ impl<'s> Moment<'s> {
         self.scheduler.stop(dag, observer);
     }
 
+    /// Pauses a DAG: from now on its due jobs are skipped, and what is in flight
+    /// goes on (the module `pausing` states the rules). Does nothing if the DAG
+    /// is ended.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    pub fn pause(&mut self, dag: DagId, observer: &mut impl Observer) {
+        self.scheduler.pause(dag, observer);
+    }
+
+    /// Ends the pause of a DAG: jobs that are due from now on are released. Does
+    /// nothing if it is not paused.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    pub fn resume(&mut self, dag: DagId) {
+        self.scheduler.resume(dag);
+    }
+
     /// Takes note of an event that a sporadic DAG waits for. Its next job is due
     /// now, or as soon after the job before it as the minimum inter-arrival time
     /// allows; while that one is to come, or waits for room, further signals are

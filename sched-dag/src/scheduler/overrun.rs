@@ -67,6 +67,10 @@ impl Scheduler {
         release_ns: u64,
         observer: &mut impl Observer,
     ) {
+        if self.is_paused(dag) {
+            self.skip_oldest_waiting(dag, observer);
+            return;
+        }
         self.release_waiting(dag, observer);
         if !self.is_waiting(dag, job) {
             return;
@@ -120,7 +124,7 @@ impl Scheduler {
         self.cancel_ready(dag, sequence, observer);
     }
 
-    fn skip_oldest_waiting(&mut self, dag: DagId, observer: &mut impl Observer) {
+    pub(super) fn skip_oldest_waiting(&mut self, dag: DagId, observer: &mut impl Observer) {
         let state = &mut self.dags[dag.index()];
         let (job, release_ns) = state.jobs.skip_waiting(self.task_set.dag(dag));
         state.statistics.skips += 1;
