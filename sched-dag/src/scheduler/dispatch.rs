@@ -9,53 +9,59 @@
 //! may not be preempted, and of all others those with the smallest keys. No
 //! core is named in more than one exchange, since each one brings in a larger
 //! key than the exchange before and a smaller one than it takes out.
+//!
+//! What this leaves is *settled*: no ready key is smaller than one that runs and
+//! may be preempted. Ends leave it so, since they only make cores idle; nothing
+//! but a newly ready instance can unsettle it. So without one the second step is
+//! not even looked at.
 
-use super::instances::Phase;
 use super::key::Key;
+use super::vertices::Phase;
 use super::{Decision, Scheduler};
-use crate::ids::{CoreId, Instance};
+use crate::ids::CoreId;
 
 impl Scheduler {
     /// Fills `decisions`.
     pub(super) fn decide(&mut self) {
         self.decisions.clear();
-        while self.ready.peek().is_some()
+        while self.cores.any_idle()
+            && let Some((key, vertex)) = self.ready.pop()
             && let Some(core) = self.cores.take_idle()
         {
-            self.take_next(core);
+            self.run(core, key, vertex);
         }
-        while let Some((ready, _)) = self.ready.peek()
+        if !core::mem::take(&mut self.is_unsettled) {
+            return;
+        }
+        while let Some(ready) = self.ready.peek()
             && let Some((core, running)) = self.cores.largest_preemptible()
             && ready < running
+            && let Some((key, vertex)) = self.ready.pop()
         {
             self.preempt(core, running);
+            self.run(core, key, vertex);
         }
     }
 
-    /// Gives a core the first instance in line.
-    fn take_next(&mut self, core: CoreId) {
-        let Some((key, index)) = self.ready.pop() else {
-            return;
-        };
+    /// Gives a core an instance that is ready.
+    fn run(&mut self, core: CoreId, key: Key, vertex: u32) {
         let instance = key.instance();
-        let Instance { dag, subtask, .. } = instance;
-        self.cores
-            .run(core, key, self.may_be_preempted(dag, subtask));
-        let decision = match self.phases[index] {
+        let vertex = self.vertices.get_mut(vertex);
+        let decision = match vertex.phase {
             Phase::Preempted => Decision::Resume { core, instance },
             _ => Decision::Start { core, instance },
         };
-        self.phases[index] = Phase::Running(core);
+        vertex.phase = Phase::Running(core);
+        self.cores.run(core, key, vertex.is_preemptible);
         self.decisions.push(decision);
     }
 
-    /// Lets the first instance in line take the place of one that runs.
+    /// Puts the instance that runs on a core back in line.
     fn preempt(&mut self, core: CoreId, running: Key) {
         let instance = running.instance();
-        let index = self.subtask_index(instance.dag, instance.subtask);
+        let vertex = self.vertex(instance);
         self.decisions.push(Decision::Preempt { core, instance });
-        self.take_next(core);
-        self.phases[index] = Phase::Preempted;
-        self.ready.set(index, running);
+        self.vertices.get_mut(vertex).phase = Phase::Preempted;
+        self.ready.insert(vertex, running);
     }
 }

@@ -36,20 +36,18 @@
 //! its stack and values. That is the driver's.
 
 use super::Scheduler;
-use super::instances::Phase;
 use crate::ids::{DagId, Instance};
 use crate::scheduler::Observer;
 
 impl Scheduler {
     /// Ends an instance that has started, and its DAG (E1).
     pub(super) fn fail(&mut self, instance: Instance, observer: &mut impl Observer) {
-        self.take_off(instance, "fails");
+        let vertex = self.take_off(instance, "fails");
         let dag = instance.dag;
         self.dags[dag.index()].statistics.faults += 1;
         self.stop(dag, observer);
         // Only now its job may end, so that the job counts as cut short.
-        self.ending.push(instance.subtask);
-        self.spread_ends(dag, observer);
+        self.end(vertex, observer);
     }
 
     /// Ends a DAG.
@@ -64,25 +62,6 @@ impl Scheduler {
         state.statistics.dropped += dropped;
         self.set_timer(dag);
         observer.ended(dag);
-        self.cancel_all_ready(dag, observer);
-    }
-
-    /// Cancels all instances of an ended DAG that are ready and have not
-    /// started, and all that thereby would become ready (E3).
-    fn cancel_all_ready(&mut self, dag: DagId, observer: &mut impl Observer) {
-        let model = self.task_set.dag(dag);
-        let state = &self.dags[dag.index()];
-        for &subtask in model.topological_order() {
-            let index = state.first_subtask + subtask.index();
-            if self.phases[index] == Phase::Ready {
-                let sequence = state.joins.progress(subtask);
-                let job = state.jobs.job(sequence).number;
-                self.phases[index] = Phase::Absent;
-                self.ready.remove(index);
-                observer.cancelled(Instance { dag, job, subtask });
-                self.ending.push(subtask);
-            }
-        }
-        self.spread_ends(dag, observer);
+        self.cancel_ready(dag, u64::MAX, observer);
     }
 }

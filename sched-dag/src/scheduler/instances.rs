@@ -5,137 +5,133 @@
 //! are released at that instant (R3), so such a job ends by the same rules as
 //! any other, only without running.
 
-use super::{DagState, Key, Scheduler, key_of};
-use crate::ids::{CoreId, DagId, Instance, SubtaskId};
-use crate::scheduler::{JobOutcome, Observer};
-
-/// What the next instance of a subtask does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Phase {
-    /// It is not ready.
-    Absent,
-    /// It is ready and has not started.
-    Ready,
-    /// It executes.
-    Running(CoreId),
-    /// It has started and lost its core.
-    Preempted,
-}
+use super::jobs::{Job, Jobs};
+use super::key::Key;
+use super::ready_queue::ReadyQueue;
+use super::vertices::{Phase, Vertex};
+use super::{JobOutcome, Observer, Scheduler};
+use crate::ids::{DagId, Instance};
+use crate::policy::Policy;
 
 impl Scheduler {
     /// Ends an instance that has started.
     pub(super) fn finish(&mut self, instance: Instance, observer: &mut impl Observer) {
-        self.take_off(instance, "is completed");
-        self.ending.push(instance.subtask);
-        self.spread_ends(instance.dag, observer);
+        let vertex = self.take_off(instance, "is completed");
+        self.end(vertex, observer);
     }
 
-    /// Takes a started instance from its core, or out of line if it has none.
-    /// `event` says what the driver claims, if the instance has not started.
-    pub(super) fn take_off(&mut self, instance: Instance, event: &str) {
-        let Instance { dag, job, subtask } = instance;
-        let state = &self.dags[dag.index()];
-        let sequence = state.joins.progress(subtask);
-        let index = self.subtask_index(dag, subtask);
-        let in_flight = sequence < state.jobs.next && state.jobs.job(sequence).number == job;
-        match self.phases[index] {
+    /// Takes a started instance from its core, or out of line if it has none,
+    /// and returns its vertex. `event` says what the driver claims, if the
+    /// instance has not started.
+    pub(super) fn take_off(&mut self, instance: Instance, event: &str) -> u32 {
+        let number = self.vertex(instance);
+        let vertex = self.vertices.get(number);
+        let jobs = &self.dags[instance.dag.index()].jobs;
+        let in_flight = vertex.dag == instance.dag
+            && vertex.progress < jobs.next
+            && jobs.job(vertex.progress).number == instance.job;
+        match vertex.phase {
             Phase::Running(core) if in_flight => self.cores.free(core),
-            Phase::Preempted if in_flight => self.ready.remove(index),
+            Phase::Preempted if in_flight => self.ready.remove(number, vertex.urgency),
             _ => panic!("{instance} {event} and has not started; complete each once, or fail it"),
         }
-        self.phases[index] = Phase::Absent;
+        number
     }
 
-    /// Releases a source in the job with a sequence number.
-    pub(super) fn release_source(
+    /// Releases the sources of a DAG in the job with a sequence number.
+    pub(super) fn release_sources(
         &mut self,
         dag: DagId,
         sequence: u64,
-        source: SubtaskId,
         observer: &mut impl Observer,
     ) {
-        if self.dags[dag.index()].joins.release(sequence, source) {
-            let job = self.dags[dag.index()].jobs.job(sequence);
-            let instance = Instance {
-                dag,
-                job: job.number,
-                subtask: source,
-            };
-            let model = self.task_set.dag(dag);
-            let key = key_of(self.options.policy, model, instance, job.release_ns);
-            let index = self.subtask_index(dag, source);
-            self.phases[index] = Phase::Ready;
-            self.ready.set(index, key);
-            observer.ready(instance);
+        let Self {
+            task_set,
+            options,
+            dags,
+            vertices,
+            ready,
+            is_unsettled,
+            ..
+        } = self;
+        let state = &dags[dag.index()];
+        let job = state.jobs.job(sequence);
+        for source in task_set.dag(dag).sources() {
+            let number = state.first_vertex + source.0;
+            if vertices.release(number, sequence) {
+                let vertex = vertices.get_mut(number);
+                line_up(options.policy, number, vertex, job, ready, observer);
+                *is_unsettled = true;
+            }
         }
     }
 
-    /// Cancels all instances of an aborted job that are ready and have not
-    /// started, and all that thereby would become ready.
+    /// Cancels all instances of a DAG that are ready, have not started, and do
+    /// the job with a sequence number (all jobs if that is `u64::MAX`), and all
+    /// that thereby would become ready.
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64, observer: &mut impl Observer) {
-        let model = self.task_set.dag(dag);
         let state = &self.dags[dag.index()];
-        let job = state.jobs.job(sequence).number;
-        for &subtask in model.topological_order() {
-            let index = state.first_subtask + subtask.index();
-            if self.phases[index] == Phase::Ready && state.joins.progress(subtask) == sequence {
-                self.phases[index] = Phase::Absent;
-                self.ready.remove(index);
+        for &subtask in self.task_set.dag(dag).topological_order() {
+            let number = state.first_vertex + subtask.0;
+            let vertex = self.vertices.get_mut(number);
+            let is_meant = sequence == u64::MAX || vertex.progress == sequence;
+            if vertex.phase == Phase::Ready && is_meant {
+                let job = state.jobs.job(vertex.progress).number;
+                self.ready.remove(number, vertex.urgency);
                 observer.cancelled(Instance { dag, job, subtask });
-                self.ending.push(subtask);
+                vertex.phase = Phase::Absent;
+                self.ending.push(number);
             }
         }
-        self.spread_ends(dag, observer);
+        self.end_all(observer);
     }
 
-    /// Tells the successors of all instances in `ending` that these have ended,
-    /// and ends jobs of which no instance is left.
+    /// Ends the instance that a vertex is doing, and all that are cancelled by
+    /// that.
+    pub(super) fn end(&mut self, vertex: u32, observer: &mut impl Observer) {
+        self.end_one(vertex, observer);
+        self.end_all(observer);
+    }
+
+    /// Ends all instances in `ending`.
     ///
-    /// A subtask is in `ending` at most once at a time: its next instance can
-    /// only be ready when this one has been taken out. So each round of the
-    /// loop ends another instance in flight.
-    pub(super) fn spread_ends(&mut self, dag: DagId, observer: &mut impl Observer) {
-        while let Some(subtask) = self.ending.pop() {
-            let Self {
-                task_set,
-                options,
-                dags,
-                phases,
-                ready,
-                ending,
-                ..
-            } = self;
-            let model = task_set.dag(dag);
-            let DagState {
-                first_subtask,
-                jobs,
-                joins,
-                ..
-            } = &mut dags[dag.index()];
-            let sequence = joins.end(model, subtask, jobs.next, |joins, next| {
-                let sequence = joins.progress(next);
-                let job = jobs.job(sequence);
-                let instance = Instance {
-                    dag,
-                    job: job.number,
-                    subtask: next,
-                };
-                if jobs.is_cut(sequence) {
-                    observer.cancelled(instance);
-                    ending.push(next);
-                } else {
-                    let index = *first_subtask + next.index();
-                    let key: Key = key_of(options.policy, model, instance, job.release_ns);
-                    phases[index] = Phase::Ready;
-                    ready.set(index, key);
-                    observer.ready(instance);
-                }
-            });
-            let job = jobs.job_mut(sequence);
-            job.unfinished -= 1;
-            if job.unfinished == 0 {
-                self.end_job(dag, sequence, observer);
+    /// A vertex is in it at most once at a time: its next instance can only be
+    /// ready when this one has been taken out. So each round of the loop ends
+    /// another instance in flight.
+    fn end_all(&mut self, observer: &mut impl Observer) {
+        while let Some(vertex) = self.ending.pop() {
+            self.end_one(vertex, observer);
+        }
+    }
+
+    /// Tells the successors that the instance has ended, and ends its job if no
+    /// instance of that is left.
+    fn end_one(&mut self, vertex: u32, observer: &mut impl Observer) {
+        let Self {
+            options,
+            dags,
+            vertices,
+            ready,
+            ending,
+            is_unsettled,
+            ..
+        } = self;
+        let dag = vertices.get(vertex).dag;
+        let jobs: &mut Jobs = &mut dags[dag.index()].jobs;
+        let sequence = vertices.end(vertex, jobs.next, |next, vertex| {
+            let job = jobs.job(vertex.progress);
+            if jobs.is_cut(vertex.progress) {
+                observer.cancelled(vertex.instance(job));
+                ending.push(next);
+            } else {
+                line_up(options.policy, next, vertex, job, ready, observer);
+                *is_unsettled = true;
             }
+        });
+        let job = jobs.job_mut(sequence);
+        job.unfinished -= 1;
+        if job.unfinished == 0 {
+            self.end_job(dag, sequence, observer);
         }
     }
 
@@ -183,4 +179,23 @@ impl Scheduler {
             None => self.timers.remove(dag.index()),
         }
     }
+}
+
+/// Puts the next instance of a vertex, which is ready, in line.
+fn line_up(
+    policy: Policy,
+    number: u32,
+    vertex: &mut Vertex,
+    job: &Job,
+    ready: &mut ReadyQueue,
+    observer: &mut impl Observer,
+) {
+    let instance = vertex.instance(job);
+    let urgency = match policy {
+        Policy::StaticPriority => vertex.urgency,
+        Policy::Edf => job.deadline_ns,
+    };
+    vertex.phase = Phase::Ready;
+    ready.insert(number, Key::new(urgency, instance));
+    observer.ready(instance);
 }

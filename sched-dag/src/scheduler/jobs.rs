@@ -3,7 +3,7 @@
 //! Words: a job is *due* at its nominal release time O + kT. A due job is
 //! released at once, skipped, or *waits*. From its release to the end of its
 //! last instance it is *in flight*. Jobs in flight are known by sequence number
-//! (see [`joins`](super::joins)); they end in that order, because each instance
+//! (see [`vertices`](super::vertices)); they end in that order, because each instance
 //! waits for that of the job before.
 //!
 //! A job's release is *blocked* while the job with its number minus the jobs in
@@ -23,7 +23,7 @@
 use alloc::boxed::Box;
 use alloc::vec;
 
-use super::joins::slot;
+use super::vertices::slots;
 use crate::ids::to_u32;
 use crate::task_set::Dag;
 
@@ -32,6 +32,8 @@ use crate::task_set::Dag;
 pub(super) struct Jobs {
     /// The jobs in flight, by slot of their sequence number.
     in_flight: Box<[Job]>,
+    /// The most jobs in flight, J.
+    limit: u64,
     /// The sequence number of the oldest job in flight.
     pub(super) oldest: u64,
     /// The sequence number of the next job to be released.
@@ -63,6 +65,8 @@ pub(super) struct Job {
     pub(super) number: u64,
     /// Its nominal release time.
     pub(super) release_ns: u64,
+    /// Its absolute deadline.
+    pub(super) deadline_ns: u64,
     /// The instances that have not ended.
     pub(super) unfinished: u32,
     /// Whether its deadline has passed before it was complete.
@@ -72,7 +76,8 @@ pub(super) struct Job {
 impl Jobs {
     pub(super) fn new(dag: &Dag) -> Self {
         Self {
-            in_flight: vec![Job::default(); dag.in_flight() as usize].into_boxed_slice(),
+            in_flight: vec![Job::default(); slots(dag)].into_boxed_slice(),
+            limit: u64::from(dag.in_flight()),
             oldest: 0,
             next: 0,
             judged: 0,
@@ -88,11 +93,21 @@ impl Jobs {
 
     /// Returns the job in flight with a sequence number.
     pub(super) fn job(&self, sequence: u64) -> &Job {
-        &self.in_flight[slot(sequence, self.in_flight.len() as u64)]
+        &self.in_flight[self.slot(sequence)]
     }
 
     pub(super) fn job_mut(&mut self, sequence: u64) -> &mut Job {
-        &mut self.in_flight[slot(sequence, self.in_flight.len() as u64)]
+        &mut self.in_flight[self.slot(sequence)]
+    }
+
+    fn slot(&self, sequence: u64) -> usize {
+        // A mask, as the number of slots is a power of two.
+        let slot = sequence & (self.in_flight.len() as u64 - 1);
+        // It is less than the number of slots, a `usize`.
+        #[allow(clippy::cast_possible_truncation)]
+        {
+            slot as usize
+        }
     }
 
     /// Reports whether there is neither a job in flight, nor one waiting, nor
@@ -135,8 +150,8 @@ impl Jobs {
     /// Returns the first waiting job, if there is one and it is not blocked.
     pub(super) fn releasable(&self) -> Option<u64> {
         let number = self.first_waiting;
-        let blocked = self.oldest < self.next
-            && number - self.job(self.oldest).number >= self.in_flight.len() as u64;
+        let blocked =
+            self.oldest < self.next && number - self.job(self.oldest).number >= self.limit;
         (self.waiting() > 0 && !blocked).then_some(number)
     }
 
@@ -164,6 +179,7 @@ impl Jobs {
         *self.job_mut(sequence) = Job {
             number,
             release_ns,
+            deadline_ns: release_ns + dag.relative_deadline_ns(),
             unfinished: to_u32(dag.subtasks().len()),
             missed,
         };
@@ -240,17 +256,15 @@ impl Jobs {
     /// Returns the first job that is not judged and is in flight or waits, with
     /// its deadline.
     fn first_unjudged(&self, dag: &Dag) -> Option<(u64, u64)> {
-        let (number, release_ns) = if self.judged < self.next {
+        if self.judged < self.next {
             let job = self.job(self.judged);
-            (job.number, job.release_ns)
-        } else {
-            let number = self.first_waiting.max(self.judged_waiting);
-            if number >= self.next_due {
-                return None;
-            }
-            (number, self.waiting_release_ns(dag, number))
-        };
-        Some((number, release_ns + dag.relative_deadline_ns()))
+            return Some((job.number, job.deadline_ns));
+        }
+        let number = self.first_waiting.max(self.judged_waiting);
+        (number < self.next_due).then(|| {
+            let release_ns = self.waiting_release_ns(dag, number);
+            (number, release_ns + dag.relative_deadline_ns())
+        })
     }
 
     /// Judges the next job whose deadline has passed before `now_ns`: it is

@@ -9,7 +9,8 @@ use crate::ids::{DagId, Instance, SubtaskId};
 /// An instance's place in the order of dispatch; the smaller key goes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
-    /// The priority's number, or the absolute deadline in nanoseconds.
+    /// The priority's number, or the rank that stands for it; or the absolute
+    /// deadline in nanoseconds.
     urgency: u64,
     dag: DagId,
     job: u64,
@@ -27,10 +28,28 @@ impl Key {
         }
     }
 
+    pub(super) const fn urgency(self) -> u64 {
+        self.urgency
+    }
+
     pub(super) const fn instance(self) -> Instance {
         let Self {
             dag, job, subtask, ..
         } = self;
         Instance { dag, job, subtask }
+    }
+}
+
+impl Default for Key {
+    fn default() -> Self {
+        let (dag, subtask) = (DagId(0), SubtaskId(0));
+        Self::new(
+            0,
+            Instance {
+                dag,
+                job: 0,
+                subtask,
+            },
+        )
     }
 }

@@ -36,6 +36,7 @@
 //! core (or, preempted, its place in line). It does not measure, it believes
 //! the driver's times; a time earlier than one before counts as that one.
 
+mod bits;
 mod cores;
 mod decision;
 mod dispatch;
@@ -43,14 +44,15 @@ mod ending;
 pub(crate) mod heap;
 mod instances;
 mod jobs;
-mod joins;
 mod key;
 mod moment;
 mod observer;
 mod overrun;
 mod pausing;
+mod ready_queue;
 mod signals;
 mod statistics;
+mod vertices;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -63,14 +65,14 @@ pub use statistics::DagStatistics;
 
 use cores::Cores;
 use heap::IndexedHeap;
-use instances::Phase;
 use jobs::Jobs;
-use joins::Joins;
 use key::Key;
+use ready_queue::ReadyQueue;
+use vertices::Vertices;
 
-use crate::ids::{CoreId, DagId, Instance, SubtaskId};
+use crate::ids::{CoreId, DagId, Instance, to_u32};
 use crate::policy::{Policy, Preemption};
-use crate::task_set::{Dag, TaskSet};
+use crate::task_set::TaskSet;
 
 /// How a scheduler orders instances, and for how many cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -91,25 +93,26 @@ pub struct Scheduler {
     options: SchedulerOptions,
     now_ns: u64,
     dags: Box<[DagState]>,
-    /// What each subtask's next instance does, by index over all DAGs.
-    phases: Box<[Phase]>,
-    /// The ready instances that do not run, by the same index.
-    ready: IndexedHeap<Key>,
+    vertices: Vertices,
+    /// The ready instances that do not run.
+    ready: ReadyQueue,
+    /// Whether an instance has become ready since the last dispatch.
+    is_unsettled: bool,
     cores: Cores,
     /// When something happens to each DAG without a completion.
     timers: IndexedHeap<u64>,
-    /// Subtasks whose instances have ended and whose successors do not know yet.
-    ending: Vec<SubtaskId>,
+    /// Vertices whose instances were cancelled and whose successors do not know
+    /// yet.
+    ending: Vec<u32>,
     decisions: Vec<Decision>,
 }
 
 /// The state of one DAG.
 #[derive(Debug)]
 struct DagState {
-    /// The index over all DAGs of its first subtask.
-    first_subtask: usize,
+    /// Its first subtask among the vertices.
+    first_vertex: u32,
     jobs: Jobs,
-    joins: Joins,
     statistics: DagStatistics,
     is_paused: bool,
 }
@@ -137,9 +140,14 @@ impl Scheduler {
         let states: Box<[DagState]> = dags
             .iter()
             .map(|dag| {
-                let first_subtask = subtasks;
+                let first_vertex = to_u32(subtasks);
                 subtasks += dag.subtasks().len();
-                DagState::new(dag, first_subtask)
+                DagState {
+                    first_vertex,
+                    jobs: Jobs::new(dag),
+                    statistics: DagStatistics::default(),
+                    is_paused: false,
+                }
             })
             .collect();
         let mut timers = IndexedHeap::new(dags.len());
@@ -148,12 +156,14 @@ impl Scheduler {
                 timers.set(index, event_ns);
             }
         }
+        let mut vertices = Vertices::new(&task_set, options.preemption);
         Self {
             options,
             now_ns: 0,
             dags: states,
-            phases: alloc::vec![Phase::Absent; subtasks].into_boxed_slice(),
-            ready: IndexedHeap::new(subtasks),
+            ready: ReadyQueue::new(&task_set, options.policy, &mut vertices),
+            is_unsettled: false,
+            vertices,
             cores: Cores::new(options.cores),
             timers,
             ending: Vec::with_capacity(longest),
@@ -260,37 +270,9 @@ impl Scheduler {
         self.now_ns
     }
 
-    /// Returns a subtask's index over all DAGs. At most one instance of a
-    /// subtask is ready or runs at a time, so tables of them use this index.
-    fn subtask_index(&self, dag: DagId, subtask: SubtaskId) -> usize {
-        self.dags[dag.index()].first_subtask + subtask.index()
+    /// Returns the vertex of an instance's subtask. At most one instance of it is
+    /// ready or runs at a time.
+    fn vertex(&self, instance: Instance) -> u32 {
+        self.dags[instance.dag.index()].first_vertex + instance.subtask.0
     }
-
-    /// Returns whether a started instance of a subtask may lose its core.
-    fn may_be_preempted(&self, dag: DagId, subtask: SubtaskId) -> bool {
-        self.options.preemption == Preemption::Enabled
-            && !self.task_set.dag(dag).subtask(subtask).is_non_preemptive()
-    }
-}
-
-impl DagState {
-    fn new(dag: &Dag, first_subtask: usize) -> Self {
-        Self {
-            first_subtask,
-            jobs: Jobs::new(dag),
-            joins: Joins::new(dag),
-            statistics: DagStatistics::default(),
-            is_paused: false,
-        }
-    }
-}
-
-/// Returns the key of an instance that is ready, of a job with a nominal release
-/// time.
-fn key_of(policy: Policy, dag: &Dag, instance: Instance, release_ns: u64) -> Key {
-    let urgency = match policy {
-        Policy::StaticPriority => u64::from(dag.subtask(instance.subtask).priority().0),
-        Policy::Edf => release_ns + dag.relative_deadline_ns(),
-    };
-    Key::new(urgency, instance)
 }

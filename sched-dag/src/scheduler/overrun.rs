@@ -106,10 +106,7 @@ impl Scheduler {
             let sequence = state.jobs.release_waiting(model);
             state.statistics.released += 1;
             observer.released(dag, job, state.jobs.job(sequence).release_ns);
-            for position in 0..model.sources().len() {
-                let source = self.task_set.dag(dag).sources()[position];
-                self.release_source(dag, sequence, source, observer);
-            }
+            self.release_sources(dag, sequence, observer);
         }
     }
 

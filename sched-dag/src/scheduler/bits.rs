@@ -1,0 +1,99 @@
+//! A set of small numbers whose least one is found at once.
+//!
+//! One bit a number, and above each level of words another one with a bit for
+//! each word that is not empty: for up to 4,096 numbers that makes two levels,
+//! for 262,144 three. (An array of such levels is van Emde Boas's idea with
+//! 64-way branching; Mehlhorn and Sanders, Algorithms and Data Structures,
+//! 2008, exercise 5.9.)
+
+use alloc::boxed::Box;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// A set of numbers below a limit.
+#[derive(Debug)]
+pub(super) struct BitSet {
+    /// The words with the numbers themselves, then those above, up to one word.
+    levels: Box<[Box<[u64]>]>,
+}
+
+impl BitSet {
+    /// Makes an empty set for the numbers `0..limit`.
+    pub(super) fn new(limit: usize) -> Self {
+        let mut levels = Vec::new();
+        let mut words = limit;
+        loop {
+            words = words.div_ceil(64).max(1);
+            levels.push(vec![0; words].into_boxed_slice());
+            if words == 1 {
+                break;
+            }
+        }
+        Self {
+            levels: levels.into_boxed_slice(),
+        }
+    }
+
+    pub(super) fn insert(&mut self, number: usize) {
+        let mut place = number;
+        for level in &mut self.levels {
+            let word = &mut level[place / 64];
+            let was_empty = *word == 0;
+            *word |= 1 << (place % 64);
+            if !was_empty {
+                return;
+            }
+            place /= 64;
+        }
+    }
+
+    pub(super) fn remove(&mut self, number: usize) {
+        let mut place = number;
+        for level in &mut self.levels {
+            let word = &mut level[place / 64];
+            *word &= !(1 << (place % 64));
+            if *word != 0 {
+                return;
+            }
+            place /= 64;
+        }
+    }
+
+    /// Returns the least number.
+    pub(super) fn first(&self) -> Option<usize> {
+        let mut place = 0;
+        for level in self.levels.iter().rev() {
+            let word = level[place];
+            if word == 0 {
+                return None;
+            }
+            place = place * 64 + word.trailing_zeros() as usize;
+        }
+        Some(place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gives_the_least_number_at_every_size() {
+        for limit in [0, 1, 63, 64, 65, 4_096, 4_097, 300_000] {
+            let mut set = BitSet::new(limit);
+            assert_eq!(set.first(), None, "limit {limit}");
+            let numbers: Vec<_> = (0..limit.min(1_000)).map(|n| limit - 1 - n).collect();
+            for &number in &numbers {
+                set.insert(number);
+                set.insert(number);
+                assert_eq!(set.first(), Some(number), "limit {limit}");
+            }
+            for &number in numbers.iter().rev() {
+                assert_eq!(set.first(), Some(number), "limit {limit}");
+                set.remove(number);
+                set.remove(number);
+            }
+            assert_eq!(set.first(), None, "limit {limit}");
+        }
+    }
+}

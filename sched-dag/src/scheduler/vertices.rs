@@ -1,0 +1,198 @@
+//! The subtasks of all DAGs as the scheduler walks them: joins and phases (R2).
+//!
+//! Subtasks are numbered over all DAGs, in the order of the commit; the number
+//! is a *vertex*. What the way from a completion to its successors needs of a
+//! vertex lies together, in one cache line.
+//!
+//! Jobs in flight are known by *sequence number*: the how-manieth released job
+//! of its DAG it is. Skipped jobs have none, so the sequence has no gaps, and
+//! the job before the one with number s is the one with number s - 1. A job's
+//! *slot* is its sequence number modulo the DAG's [`slots`].
+//!
+//! Each vertex has a counter for each slot: the predecessors that have not
+//! finished yet, and for a source the release. Each has its *progress*: the
+//! sequence number of the job that it has to do next. An instance (s, v) is
+//! ready when its counter is 0 and v's progress is s. Whichever of both comes
+//! last makes it ready, exactly once.
+//!
+//! A counter returns to its initial value when its instance ends, long before
+//! the slot's next job is released; so a release touches sources only, and an
+//! end touches successors only.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use super::jobs::Job;
+use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
+use crate::policy::Preemption;
+use crate::task_set::{Dag, TaskSet};
+
+/// What the next instance of a subtask does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// It is not ready.
+    Absent,
+    /// It is ready and has not started.
+    Ready,
+    /// It executes.
+    Running(CoreId),
+    /// It has started and lost its core.
+    Preempted,
+}
+
+/// One subtask.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Vertex {
+    pub(super) phase: Phase,
+    /// The sequence number of the job that it has to do next, or is doing.
+    pub(super) progress: u64,
+    /// What orders it under static priority.
+    pub(super) urgency: u64,
+    pub(super) dag: DagId,
+    pub(super) subtask: SubtaskId,
+    /// Whether a started instance may lose its core.
+    pub(super) is_preemptible: bool,
+    /// What a counter begins with.
+    initial: u32,
+    /// Where its counters begin, and the mask of the slots.
+    counters: u32,
+    slot_mask: u32,
+    /// Where its successors begin and end.
+    successors: [u32; 2],
+}
+
+/// All subtasks.
+#[derive(Debug)]
+pub(super) struct Vertices {
+    vertices: Box<[Vertex]>,
+    /// The successors of all vertices, those of one together.
+    successors: Box<[u32]>,
+    /// The counters of all vertices, those of one together.
+    counters: Box<[u32]>,
+}
+
+impl Vertices {
+    pub(super) fn new(task_set: &TaskSet, preemption: Preemption) -> Self {
+        let count = task_set.dags().iter().map(|dag| dag.subtasks().len()).sum();
+        let mut all = Self {
+            vertices: Box::default(),
+            successors: Box::default(),
+            counters: Box::default(),
+        };
+        let mut vertices = Vec::with_capacity(count);
+        let (mut successors, mut counters) = (Vec::new(), Vec::new());
+        for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
+            let first = to_u32(vertices.len());
+            for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
+                let initial = to_u32(dag.predecessors(subtask).len().max(1));
+                let from = to_u32(successors.len());
+                successors.extend(dag.successors(subtask).iter().map(|next| first + next.0));
+                vertices.push(Vertex {
+                    phase: Phase::Absent,
+                    progress: 0,
+                    urgency: u64::from(attributes.priority().0),
+                    dag: id,
+                    subtask,
+                    is_preemptible: preemption == Preemption::Enabled
+                        && !attributes.is_non_preemptive(),
+                    initial,
+                    counters: to_u32(counters.len()),
+                    slot_mask: to_u32(slots(dag) - 1),
+                    successors: [from, to_u32(successors.len())],
+                });
+                counters.extend((0..slots(dag)).map(|_| initial));
+            }
+        }
+        all.vertices = vertices.into_boxed_slice();
+        all.successors = successors.into_boxed_slice();
+        all.counters = counters.into_boxed_slice();
+        all
+    }
+
+    /// Returns the number of vertices.
+    pub(super) const fn len(&self) -> usize {
+        self.vertices.len()
+    }
+
+    pub(super) fn get(&self, vertex: u32) -> &Vertex {
+        &self.vertices[vertex as usize]
+    }
+
+    pub(super) fn get_mut(&mut self, vertex: u32) -> &mut Vertex {
+        &mut self.vertices[vertex as usize]
+    }
+
+    /// Counts the release of a source in a job, and reports whether the instance
+    /// is ready.
+    pub(super) fn release(&mut self, source: u32, sequence: u64) -> bool {
+        arrive(&mut self.counters, self.vertices[source as usize], sequence)
+    }
+
+    /// Ends the instance that a vertex is doing, calls `ready` for each vertex
+    /// whose next instance thereby is ready, and returns the sequence number.
+    ///
+    /// `released` is the sequence number of the next job to be released.
+    pub(super) fn end(
+        &mut self,
+        vertex: u32,
+        released: u64,
+        mut ready: impl FnMut(u32, &mut Vertex),
+    ) -> u64 {
+        let Self {
+            vertices,
+            successors,
+            counters,
+        } = self;
+        let own = &mut vertices[vertex as usize];
+        let sequence = own.progress;
+        own.phase = Phase::Absent;
+        own.progress = sequence + 1;
+        let own = *own;
+        counters[own.counter(sequence)] = own.initial;
+        let [from, to] = own.successors;
+        for &successor in &successors[from as usize..to as usize] {
+            let next = &mut vertices[successor as usize];
+            if arrive(counters, *next, sequence) {
+                ready(successor, next);
+            }
+        }
+        if sequence + 1 < released && counters[own.counter(sequence + 1)] == 0 {
+            ready(vertex, &mut vertices[vertex as usize]);
+        }
+        sequence
+    }
+}
+
+impl Vertex {
+    /// Returns the vertex's part of a job.
+    pub(super) const fn instance(&self, job: &Job) -> Instance {
+        Instance {
+            dag: self.dag,
+            job: job.number,
+            subtask: self.subtask,
+        }
+    }
+
+    fn counter(self, sequence: u64) -> usize {
+        let slot = sequence & u64::from(self.slot_mask);
+        // The slot is less than a count that came from a u32.
+        #[allow(clippy::cast_possible_truncation)]
+        {
+            self.counters as usize + slot as usize
+        }
+    }
+}
+
+/// Counts one predecessor, or the release, of a vertex's instance in a job, and
+/// reports whether the instance is ready.
+fn arrive(counters: &mut [u32], vertex: Vertex, sequence: u64) -> bool {
+    let counter = &mut counters[vertex.counter(sequence)];
+    *counter -= 1;
+    *counter == 0 && vertex.progress == sequence
+}
+
+/// Returns the number of slots for the jobs in flight of a DAG: a power of two,
+/// so that finding a slot needs no division.
+pub(super) fn slots(dag: &Dag) -> usize {
+    (dag.in_flight() as usize).next_power_of_two()
+}
