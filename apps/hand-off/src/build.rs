@@ -9,7 +9,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{Dag, SubtaskAttributes, VecToSubs, create_dag};
+use fass::{Dag, Occupation, SubtaskAttributes, VecToSubs, create_dag};
 
 use crate::shape::Shape;
 use crate::stamps::{Pen, Stamps};
@@ -34,6 +34,8 @@ pub struct Workload {
     pub period: Duration,
     /// Which bodies stamp.
     pub stamping: Stamping,
+    /// How long each subtask between source and sink computes; mostly zero.
+    pub work: Duration,
     /// The WCET of each subtask, if they shall have one, and with it a budget.
     pub wcet: Option<Duration>,
 }
@@ -159,6 +161,16 @@ impl Builder<'_> {
         let (dag, attributes) = (self.dag, self.attributes(number));
         let (inputs, outputs) = (vec![input], vec![output]);
         match self.pen(number) {
+            Some(mut pen) if !self.workload.work.is_zero() => {
+                let work = self.workload.work;
+                let body = move |(value,): (u64,)| {
+                    pen.stamp();
+                    fass::execute_for(work, Occupation::Spin);
+                    pen.stamp();
+                    (value,)
+                };
+                dag.register_subtask(body, inputs, outputs, attributes);
+            }
             Some(mut pen) => {
                 let body = move |(value,): (u64,)| {
                     twice(&mut pen);
@@ -232,6 +244,7 @@ mod tests {
                     // Time 0 would count as no time.
                     period: Duration::from_millis(10),
                     stamping,
+                    work: Duration::ZERO,
                     wcet: None,
                 });
                 dag.offset(Duration::from_millis(1));

@@ -1,7 +1,8 @@
 //! Boots, measures the way from a completion to its successor, and reports.
 //!
-//! Words of the command line: `jobs` of each workload; `chain`, `branches` and
-//! `layered` are the sizes of the workloads, `seed` is that of the layered ones.
+//! Words of the command line: `part` is what to measure, `jobs` how many of each
+//! workload; `chain`, `branches` and `layered` are the sizes of the workloads, `seed`
+//! is that of the layered ones.
 
 #![no_std]
 #![no_main]
@@ -13,7 +14,6 @@ mod row;
 
 use alloc::vec::Vec;
 
-use hand_off::Shape;
 use kernel::options::UsageError;
 use kernel::{Ending, Machine};
 
@@ -21,23 +21,59 @@ kernel::entry!(main);
 
 fn main(machine: &Machine) -> Result<(), Ending> {
     let plan = Plan::read(machine)?;
-    measure::clock();
-    for &subtasks in &plan.chain {
-        measure::chain(machine, subtasks, &plan)?;
-    }
-    for &parallel in &plan.branches {
-        measure::fork_join(machine, parallel, &plan)?;
-    }
-    for &subtasks in &plan.layered {
-        let seed = plan.seed;
-        measure::layered(machine, Shape::Layered { subtasks, seed }, &plan)?;
+    match plan.part {
+        Part::Workloads => workloads(machine, &plan)?,
+        Part::HandOff => {
+            measure::clock();
+            workloads(machine, &plan)?;
+            measure::preemption(machine, plan.jobs)?;
+            for &subtasks in &plan.chain {
+                measure::budgets(machine, subtasks, plan.jobs)?;
+            }
+        }
+        Part::Elsewhere => {
+            measure::woken_cores(machine, plan.jobs)?;
+            measure::joins(machine, plan.jobs)?;
+            measure::preemption(machine, plan.jobs)?;
+        }
     }
     machine.report_memory();
     Ok(())
 }
 
+fn workloads(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+    for &subtasks in &plan.chain {
+        measure::chain(machine, subtasks, plan.jobs)?;
+    }
+    for &parallel in &plan.branches {
+        measure::fork_join(machine, parallel, plan.jobs)?;
+    }
+    for &subtasks in &plan.layered {
+        measure::layered(machine, subtasks, plan.seed, plan.jobs)?;
+    }
+    Ok(())
+}
+
+/// Which measurements are made.
+#[derive(Clone, Copy)]
+enum Part {
+    /// All that one core is enough for.
+    HandOff,
+    /// Chains, fork-joins and layered graphs alone.
+    Workloads,
+    /// What needs a second core.
+    Elsewhere,
+}
+
+const PARTS: [(&str, Part); 3] = [
+    ("hand-off", Part::HandOff),
+    ("workloads", Part::Workloads),
+    ("elsewhere", Part::Elsewhere),
+];
+
 /// What is to be measured.
 struct Plan {
+    part: Part,
     jobs: u64,
     chain: Vec<usize>,
     branches: Vec<usize>,
@@ -55,13 +91,14 @@ impl Plan {
         };
         let most_parallel = sched_dag::MAX_ARITY as u64;
         let plan = Self {
+            part: options.choice("part", &PARTS)?,
             jobs: options.number("jobs", 2..=100_000, 200)?,
             chain: sizes("chain", 2, 10_000, &[64])?,
             branches: sizes("branches", 1, most_parallel, &[2, 4, 6, 16])?,
             layered: sizes("layered", 3, 100_000, &[1000])?,
             seed: options.number("seed", 0..=u64::MAX, 1)?,
         };
-        options.finish(&["jobs", "chain", "branches", "layered", "seed"])?;
+        options.finish(&["part", "jobs", "chain", "branches", "layered", "seed"])?;
         Ok(plan)
     }
 }

@@ -30,11 +30,8 @@ impl Row {
     }
 
     /// States that a sample is of so many equal steps.
-    pub(crate) fn per(self, per: usize) -> Self {
-        Self {
-            per: per as u64,
-            ..self
-        }
+    pub(crate) fn per(self, per: u64) -> Self {
+        Self { per, ..self }
     }
 
     /// Prints it as a machine line.

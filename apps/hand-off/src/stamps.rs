@@ -32,9 +32,14 @@ impl Pen {
     /// Reads the clock and keeps the time, as long as there is room.
     #[inline]
     pub fn stamp(&mut self) {
-        let now_ns = fass::now_ns();
+        self.put(fass::now_ns());
+    }
+
+    /// Keeps a time, as long as there is room.
+    #[inline]
+    pub fn put(&mut self, time_ns: u64) {
         if let Some(place) = self.times.get(self.next) {
-            place.store(now_ns, Ordering::Relaxed);
+            place.store(time_ns, Ordering::Relaxed);
         }
         self.next += 1;
     }
@@ -47,7 +52,8 @@ impl Pen {
 
 impl Stamps {
     /// Makes a pen for the next subtask's body, which writes twice a job.
-    pub(crate) fn pen(&mut self, jobs: u64) -> Pen {
+    #[must_use]
+    pub fn pen(&mut self, jobs: u64) -> Pen {
         let pen = Pen::new(
             usize::try_from(jobs)
                 .unwrap_or(usize::MAX)

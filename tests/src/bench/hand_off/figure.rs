@@ -27,10 +27,20 @@ const NAMES: &[(&str, &str)] = &[
     ("hop", "start -> start, per hop"),
     ("source_to_sink", "source start -> sink start"),
     ("instance", "source start -> sink start, per instance"),
-    ("release_to_start", "release -> source's first instruction"),
+    ("release_to_start", "release -> first instruction"),
     ("release_jitter", "release jitter above its minimum"),
     ("commit", "commit, per subtask"),
     ("allocations", "heap allocations, per job"),
+    ("locks", "takings of the scheduler's lock, per instance"),
+    ("sink_wakeups", "times the sink was made ready, per job"),
+    (
+        "preempted_to_start",
+        "preempted -> preemptor's first instruction",
+    ),
+    (
+        "return_to_resumed",
+        "preemptor's return -> the preempted goes on",
+    ),
 ];
 
 impl Figure {
@@ -100,6 +110,11 @@ impl Figure {
         (self.cores, &self.workload, &self.figure) == (other.cores, &other.workload, &other.figure)
     }
 
+    /// Returns whether it counts something else than time or instructions.
+    pub(super) fn is_count(&self) -> bool {
+        matches!(&*self.figure, "allocations" | "locks" | "sink_wakeups")
+    }
+
     /// Says in words what it is a figure of.
     pub(super) fn name(&self) -> &str {
         let known = NAMES.iter().find(|(figure, _)| *figure == self.figure);
@@ -111,6 +126,7 @@ impl Figure {
         if self.per == 1 {
             return number.to_string();
         }
-        format!("{:.1}", number as f64 / self.per as f64)
+        let decimals = if self.is_count() { 2 } else { 1 };
+        format!("{:.decimals$}", number as f64 / self.per as f64)
     }
 }

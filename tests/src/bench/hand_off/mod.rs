@@ -7,13 +7,16 @@
 //!
 //! - `table`, `plan`: what is to be measured;
 //! - `figure`, `baseline`: what was, and what it was before;
-//! - `report`: the tables.
+//! - `wakeups`: what only the trace can tell;
+//! - `report`, `scale`: the tables.
 
 mod baseline;
 mod figure;
 mod plan;
 mod report;
+mod scale;
 mod table;
+mod wakeups;
 
 use std::fs;
 use std::path::Path;
@@ -65,20 +68,40 @@ pub(super) fn run(words: &[String]) -> ExitCode {
     }
 }
 
+/// Measures as `--compare` does, and prints the table.
+///
+/// # Errors
+///
+/// In words: a guest failed, there is no baseline, or which figures have grown.
+pub fn check() -> Result<(), String> {
+    let plan = match table::TABLE.parse(&["--compare".into(), "--mode=deterministic".into()]) {
+        Ok(Request::Work(options)) => Plan::new(&options)?,
+        Ok(Request::Help(_)) => return Err("the options of the check ask for help".into()),
+        Err(error) => return Err(error.to_string()),
+    };
+    let before = baseline::read(&plan.baseline)?;
+    let now = measure_mode(&plan, Mode::Deterministic)?;
+    let comparison = report::comparison(&now, &before);
+    print!("{}", comparison.text);
+    if comparison.complaints.is_empty() {
+        return Ok(());
+    }
+    Err(comparison.complaints.join("; "))
+}
+
 /// Measures and reports. Returns whether nothing has grown.
 fn measure_all(plan: &Plan) -> Result<bool, String> {
+    if let Some(scale) = &plan.scale {
+        return measure_scale(scale).map(|()| true);
+    }
     let before = if plan.compares {
         Some(baseline::read(&plan.baseline)?)
     } else {
         None
     };
-    let image = image::build("hand-off").map_err(|error| error.to_string())?;
     let mut measured = Vec::new();
     for &mode in &plan.modes {
-        let mut figures = Vec::new();
-        for boot in &plan.boots {
-            figures.extend(measure(boot, mode, &image.path)?);
-        }
+        let figures = measure_mode(plan, mode)?;
         for figure in &figures {
             println!("{}", figure.machine_line(mode));
         }
@@ -95,13 +118,55 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
     if let Some(before) = before {
         let comparison = report::comparison(instructions, &before);
         print!("{}", comparison.text);
-        is_good = comparison.is_good;
+        is_good = comparison.complaints.is_empty();
     }
     if plan.saves {
         baseline::write(&plan.baseline, instructions)?;
         println!("written: {}", plan.baseline.display());
     }
     Ok(is_good)
+}
+
+/// Counts what more cores and more subtasks cost.
+fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
+    let image = image::build("hand-off").map_err(|error| error.to_string())?;
+    let count = |cores, sizes: &str| {
+        let boot = Boot::of_scale(cores, scale.jobs, sizes);
+        let figures = measure(&boot, Mode::Deterministic, &image.path)?;
+        for figure in &figures {
+            println!("{}", figure.machine_line(Mode::Deterministic));
+        }
+        Ok::<_, String>(figures)
+    };
+    let mut by_cores = Vec::new();
+    for &cores in &scale.cores {
+        by_cores.push((cores, count(cores, scale::SIZES)?));
+    }
+    let mut by_subtasks = Vec::new();
+    for &subtasks in &scale.subtasks {
+        by_subtasks.push((subtasks, count(1, &scale::sizes(subtasks))?));
+    }
+    println!("medians of the instructions that all cores together executed:");
+    print!("{}", scale::by_cores(&by_cores));
+    println!("layered random graphs on one core:");
+    print!("{}", scale::by_subtasks(&by_subtasks));
+    Ok(())
+}
+
+/// Makes all boots in one mode.
+fn measure_mode(plan: &Plan, mode: Mode) -> Result<Vec<Figure>, String> {
+    let image = image::build("hand-off").map_err(|error| error.to_string())?;
+    let mut figures: Vec<Figure> = Vec::new();
+    for boot in &plan.boots {
+        for figure in measure(boot, mode, &image.path)? {
+            // What is counted afterwards stands with its workload.
+            let end = figures.iter().rposition(|other| {
+                (other.cores, &other.workload) == (figure.cores, &figure.workload)
+            });
+            figures.insert(end.map_or(figures.len(), |end| end + 1), figure);
+        }
+    }
+    Ok(figures)
 }
 
 /// Boots once and reads the figures.
@@ -116,7 +181,11 @@ fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String>
             outcome.tail()
         ));
     }
-    let figures = Figure::read_all(&outcome.transcript, what.cores)?;
+    let figures = if what.counts_wakeups {
+        wakeups::count(&outcome.transcript, what.cores)?
+    } else {
+        Figure::read_all(&outcome.transcript, what.cores)?
+    };
     if figures.is_empty() {
         return Err(format!("the guest printed no figures\n{}", outcome.tail()));
     }

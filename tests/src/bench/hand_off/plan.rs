@@ -16,6 +16,8 @@ pub(super) struct Boot {
     pub(super) cores: u64,
     memory_mib: u64,
     words: String,
+    /// Whether its trace tells what is to be counted, rather than its figures.
+    pub(super) counts_wakeups: bool,
 }
 
 /// Everything that is to be measured.
@@ -23,9 +25,35 @@ pub(super) struct Boot {
 pub(super) struct Plan {
     pub(super) modes: Vec<Mode>,
     pub(super) boots: Vec<Boot>,
+    /// Numbers of cores and of subtasks to count the cost of, instead.
+    pub(super) scale: Option<Scale>,
     pub(super) compares: bool,
     pub(super) saves: bool,
     pub(super) baseline: PathBuf,
+}
+
+/// Which sizes the cost is to be counted at.
+#[derive(Debug)]
+pub(super) struct Scale {
+    pub(super) cores: Vec<u64>,
+    pub(super) subtasks: Vec<u64>,
+    pub(super) jobs: u64,
+}
+
+impl Scale {
+    fn new(options: &Parsed) -> Scale {
+        let numbers = |name| {
+            let text = options.text(name).unwrap_or_default();
+            text.split(',')
+                .filter_map(|number| number.parse().ok())
+                .collect()
+        };
+        Scale {
+            cores: numbers("cores"),
+            subtasks: numbers("subtasks"),
+            jobs: options.number("jobs").unwrap_or(2),
+        }
+    }
 }
 
 impl Plan {
@@ -60,8 +88,20 @@ impl Plan {
             || system::workspace().join("tests/baselines/hand-off.json"),
             PathBuf::from,
         );
+        let scale = options.is_given("scale").then(|| Scale::new(options));
+        let other = ["compare", "save-baseline", "mode"];
+        match other.iter().find(|name| options.is_given(name)) {
+            Some(other) if scale.is_some() => {
+                return Err(format!(
+                    "`--scale` with `--{other}`: it counts instructions, for no baseline; leave \
+                     one of them out"
+                ));
+            }
+            _ => {}
+        }
         Ok(Plan {
             modes,
+            scale,
             boots: boots(options),
             compares: compares.is_some(),
             saves: saves.is_some(),
@@ -70,19 +110,39 @@ impl Plan {
     }
 }
 
+/// Returns the boots that measure everything at these sizes.
 fn boots(options: &Parsed) -> Vec<Boot> {
     let text = |name| options.text(name).unwrap_or_default();
-    let sizes = ["jobs", "chain", "branches", "layered", "seed"];
-    let words = sizes.map(|name| format!("{name}={}", text(name)));
-    let words = format!("{} {}", words.join(" "), text("append"));
-    vec![Boot {
-        cores: 1,
+    let [jobs, chain, branches, layered, seed] =
+        ["jobs", "chain", "branches", "layered", "seed"].map(text);
+    let sizes = format!("chain={chain} branches={branches} layered={layered} seed={seed}");
+    let boot = |cores, part: &str, words: String| Boot {
+        cores,
         memory_mib: 256,
-        words,
-    }]
+        words: format!("part={part} {words} {}", text("append")),
+        counts_wakeups: part == "workloads",
+    };
+    // A trace shows what it shows in a few jobs.
+    let wakeups = format!("jobs=20 chain=2 layered=3 branches={branches} trace=dump");
+    vec![
+        boot(1, "hand-off", format!("jobs={jobs} {sizes}")),
+        boot(1, "workloads", wakeups),
+        boot(2, "elsewhere", format!("jobs={jobs}")),
+    ]
 }
 
 impl Boot {
+    /// Returns a boot that runs the workloads alone, for what their size and the
+    /// number of cores cost.
+    pub(super) fn of_scale(cores: u64, jobs: u64, sizes: &str) -> Boot {
+        Boot {
+            cores,
+            memory_mib: 1024,
+            words: format!("part=workloads jobs={jobs} {sizes}"),
+            counts_wakeups: false,
+        }
+    }
+
     /// Returns the machine for this boot.
     pub(super) fn qemu(&self, mode: Mode) -> Qemu {
         Qemu {

@@ -1,6 +1,7 @@
 //! What `bench hand-off` accepts: the one table behind its parser and its help.
 
 use crate::options::{Command, Opt, Takes};
+use crate::qemu::MOST_CORES;
 
 /// The table of `bench hand-off`.
 pub(super) static TABLE: Command = Command {
@@ -82,6 +83,33 @@ pub(super) static TABLE: Command = Command {
             },
             default: "1",
             help: "Seed of the layered random graphs.",
+        },
+        Opt {
+            name: "scale",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "Instead, count what the workloads cost on more cores and with more subtasks.",
+        },
+        Opt {
+            name: "cores",
+            short: None,
+            takes: Takes::Numbers {
+                least: 1,
+                most: MOST_CORES,
+            },
+            default: "1,2,4,8,16,32,64",
+            help: "With --scale: the numbers of cores.",
+        },
+        Opt {
+            name: "subtasks",
+            short: None,
+            takes: Takes::Numbers {
+                least: 3,
+                most: 10_000,
+            },
+            default: "10,100,1000,10000",
+            help: "With --scale: the numbers of subtasks of a layered random graph.",
         },
         Opt {
             name: "append",

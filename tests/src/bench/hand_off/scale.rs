@@ -1,0 +1,70 @@
+//! What cores and subtasks cost: the same workloads on more and more of them.
+//!
+//! With counted time all cores share one clock, which each instruction of any of them
+//! moves on. So a figure is the number of instructions that *all* cores have executed
+//! in between, waiting for a lock included; halted cores execute none. It is work, not
+//! time: what it says is how much more there is to do for each instance.
+
+use std::fmt::Write;
+
+use super::figure::Figure;
+
+/// The sizes of the workloads when the cores vary.
+pub(super) const SIZES: &str = "chain=64 branches=16 layered=1000";
+
+/// The columns: workload, figure, heading.
+type Column = (&'static str, &'static str, &'static str);
+
+const BY_CORES: &[Column] = &[
+    ("chain-64", "hop", "chain-64 hop"),
+    ("fork-join-16", "return_to_start", "fj-16 return->sink"),
+    ("fork-join-16", "source_to_sink", "fj-16 source->sink"),
+    ("layered-1000", "instance", "layered instance"),
+    ("layered-1000", "locks", "locks/instance"),
+    ("chain-64", "release_to_start", "release->start"),
+];
+
+const BY_SUBTASKS: &[Column] = &[
+    ("layered", "instance", "instance"),
+    ("layered", "release_to_start", "release->start"),
+    ("layered", "locks", "locks/instance"),
+    ("layered", "commit", "commit/subtask"),
+];
+
+/// Returns the sizes of the workloads for so many subtasks of a layered graph.
+pub(super) fn sizes(subtasks: u64) -> String {
+    format!("chain=2 branches=2 layered={subtasks}")
+}
+
+/// Returns a table with a row for each number of cores.
+pub(super) fn by_cores(rows: &[(u64, Vec<Figure>)]) -> String {
+    table("cores", BY_CORES, rows)
+}
+
+/// Returns a table with a row for each number of subtasks, on one core.
+pub(super) fn by_subtasks(rows: &[(u64, Vec<Figure>)]) -> String {
+    table("subtasks", BY_SUBTASKS, rows)
+}
+
+fn table(what: &str, columns: &[Column], rows: &[(u64, Vec<Figure>)]) -> String {
+    let mut text = format!("{what:>8}");
+    for (_, _, heading) in columns {
+        // Writing into a `String` cannot fail.
+        let _ = write!(text, "  {heading:>18}");
+    }
+    text.push('\n');
+    for (size, figures) in rows {
+        let _ = write!(text, "{size:>8}");
+        let sized = format!("layered-{size}");
+        for &(workload, name, _) in columns {
+            let is_it = |figure: &&Figure| {
+                (figure.workload == workload || (workload == "layered" && figure.workload == sized))
+                    && figure.figure == name
+            };
+            let shown = figures.iter().find(is_it).map(|one| one.one(one.median));
+            let _ = write!(text, "  {:>18}", shown.unwrap_or_default());
+        }
+        text.push('\n');
+    }
+    text
+}
