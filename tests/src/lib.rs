@@ -15,6 +15,7 @@
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table;
+//! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`guest`]: all that for a test;
 //! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak): the subcommands.
@@ -27,6 +28,7 @@
 
 pub mod bench;
 pub mod child;
+pub mod dag_file;
 pub mod elf;
 pub mod fault_page;
 pub mod guest;

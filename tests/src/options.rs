@@ -74,7 +74,7 @@ pub enum Takes {
 }
 
 /// A command line that was understood.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Parsed {
     values: BTreeMap<&'static str, String>,
     given: Vec<&'static str>,
@@ -278,6 +278,16 @@ impl Parsed {
     #[must_use]
     pub fn number(&self, name: &str) -> Option<u64> {
         self.text(name).and_then(|value| value.parse().ok())
+    }
+
+    /// Returns the same command line with another value of an option, as if the
+    /// person had given it.
+    #[must_use]
+    pub fn with(&self, name: &'static str, value: &str) -> Parsed {
+        let mut other = self.clone();
+        other.values.insert(name, value.into());
+        other.given.push(name);
+        other
     }
 
     /// Returns the first positional word, if one was given.

@@ -8,6 +8,7 @@
 //! Exit codes: 0 all is well, 1 a failure, 2 a refused command line (ours or
 //! the guest's).
 
+mod folder;
 mod screen;
 mod table;
 
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use crate::dag_file::{self, Prepared};
 use crate::image;
 use crate::install;
 use crate::options::{Parsed, Request, UsageError};
@@ -47,8 +49,10 @@ impl From<UsageError> for Refusal {
 pub fn run(words: &[String]) -> ExitCode {
     match attempt(words) {
         Ok(code) => code,
-        Err(Refusal::Usage(line)) => {
-            eprintln!("run: {line}");
+        Err(Refusal::Usage(lines)) => {
+            for line in lines.lines() {
+                eprintln!("run: {line}");
+            }
             ExitCode::from(2)
         }
         Err(Refusal::Failure(line)) => {
@@ -74,13 +78,42 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
         let line = "`--trace` and `--serial` both name the serial log; give one";
         return Err(Refusal::Usage(line.into()));
     }
-    let app = options.text("app").unwrap_or_default().to_string();
-    image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
-    let memory_mib = choose_memory(&options)?;
-    let program = choose_program(&options)?;
-    let log = Log::choose(&options, &app)?;
+    if let Some(folder) = dag_file::batch::folder(&options) {
+        return folder::run(&options, &folder);
+    }
+    let dags = prepare(&options)?;
+    if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
+        print!("{}", dags.file);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let booted = boot_app(&options, dags.as_ref(), true)?;
+    Ok(conclude(&booted.outcome, &booted.log, &booted.screen))
+}
 
-    let (mode, why) = choose_mode(&options, &program)?;
+/// Reads the file that `--dag` names, if there is one.
+fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
+    dag_file::prepare(options).map_err(|lines| Refusal::Usage(lines.join("\n")))
+}
+
+/// A guest that has been booted and has ended, somehow.
+struct Booted {
+    outcome: Outcome,
+    log: Log,
+    screen: Screen,
+}
+
+/// Boots what the options name, and shows its lines if it shall.
+fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Booted, Refusal> {
+    let app = match dags {
+        Some(_) => "dag-file".into(),
+        None => options.text("app").unwrap_or_default().to_string(),
+    };
+    image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
+    let memory_mib = choose_memory(options, dags)?;
+    let program = choose_program(options)?;
+    let log = Log::choose(options, &app)?;
+
+    let (mode, why) = choose_mode(options, &program)?;
     let image = match options.text("image") {
         Some(path) => PathBuf::from(path),
         None => {
@@ -90,24 +123,36 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
                 .path
         }
     };
-    let qemu = describe(&options, &program, mode, memory_mib);
-    let limit = limit(&options);
-    let mut screen = Screen::new(&options, &image);
-    introduce(&screen, &options, &qemu, why);
-    let outcome = boot(&qemu, &image, &log.path, limit, |line| screen.show(line));
+    let qemu = describe(options, &program, mode, memory_mib, dags);
+    let limit = limit(options, dags);
+    let mut screen = Screen::new(options, &image);
+    introduce(&screen, &app, &qemu, why);
+    let show = |line: &str| {
+        if shows {
+            screen.show(line);
+        }
+    };
+    let outcome = boot(&qemu, &image, &log.path, limit, show);
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
     if let Some(file) = options.text("trace") {
         screen.say(&format!("trace: `./scripts/check-trace {file}` judges it"));
     }
-    Ok(conclude(&outcome, &log, &screen))
+    Ok(Booted {
+        outcome,
+        log,
+        screen,
+    })
 }
 
 /// Settles the memory: the person's choice, or what is usual, and in both
 /// cases enough for the stacks and tables of that many processors.
-fn choose_memory(options: &Parsed) -> Result<u64, Refusal> {
+fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
     let cores = options.number("cores").unwrap_or(1);
-    let least = LEAST_MEMORY_MIB.max((cores * 5).div_ceil(8));
+    let mut least = LEAST_MEMORY_MIB.max((cores * 5).div_ceil(8));
+    if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
+        least = least.max(dags.memory_mib);
+    }
     let memory_mib = options.number("memory").unwrap_or(least);
     if memory_mib >= least {
         return Ok(memory_mib);
@@ -159,12 +204,19 @@ fn choose_mode(options: &Parsed, program: &Path) -> Result<(Mode, Option<String>
     }
 }
 
-fn describe(options: &Parsed, program: &Path, mode: Mode, memory_mib: u64) -> Qemu {
+fn describe(
+    options: &Parsed,
+    program: &Path,
+    mode: Mode,
+    memory_mib: u64,
+    dags: Option<&Prepared>,
+) -> Qemu {
     let machine = options.text("machine").and_then(Machine::from_name);
     let mut words = vec![format!("mode={mode}")];
     for name in table::GUEST_WORDS {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
+    words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
     words.extend(options.is_given("trace").then(|| "trace=dump".into()));
     words.extend(options.text("append").map(String::from));
     Qemu {
@@ -174,16 +226,17 @@ fn describe(options: &Parsed, program: &Path, mode: Mode, memory_mib: u64) -> Qe
         cores: options.number("cores").unwrap_or(1),
         memory_mib,
         guest_words: words.join(" "),
-        module: None,
+        module: dags.map(|dags| dags.module.clone()),
         wait_for_debugger: options.is_given("gdb"),
     }
 }
 
 /// The person's limit, or one that is generous also where a job takes its
-/// real time: two minutes, and a second for each job.
-fn limit(options: &Parsed) -> Duration {
+/// real time: two minutes, and a second for each job. A DAG file has its own.
+fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
     let jobs = options.number("jobs").unwrap_or(200);
-    let seconds = options.number("timeout").unwrap_or(120 + jobs);
+    let usual = dags.map_or(120 + jobs, |dags| dags.limit_s);
+    let seconds = options.number("timeout").unwrap_or(usual);
     if options.is_given("gdb") {
         // A person at a debugger takes all day.
         return Duration::from_secs(86_400);
@@ -192,8 +245,7 @@ fn limit(options: &Parsed) -> Duration {
 }
 
 /// Says what is run, and what its times are worth.
-fn introduce(screen: &Screen, options: &Parsed, qemu: &Qemu, why: Option<String>) {
-    let app = options.text("app").unwrap_or("?");
+fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say(&format!("app {app}, guest words: {}", qemu.guest_words));
     screen.say(&format!(
         "mode {}, machine {}, {} cores, {} MiB of memory",

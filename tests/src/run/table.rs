@@ -6,8 +6,16 @@ use crate::qemu::{LEAST_MEMORY_MIB, MOST_CORES, Machine, Mode};
 /// The options that become words `name=value` on the guest's command line, if
 /// they are given: kernel and apps have defaults of their own, and not every app
 /// knows every word.
-pub(super) const GUEST_WORDS: &[&str] =
-    &["policy", "preemption", "jobs", "seed", "subtasks", "occupy"];
+pub(super) const GUEST_WORDS: &[&str] = &[
+    "policy",
+    "preemption",
+    "jobs",
+    "seconds",
+    "seed",
+    "execution",
+    "subtasks",
+    "occupy",
+];
 
 /// The most subtasks side by side: a function returns at most 16 values.
 const MOST_SUBTASKS: u64 = 16;
@@ -43,7 +51,7 @@ pub static RUN: Command = Command {
                 most: 1_000_000,
             },
             default: "",
-            help: "fork-join: jobs that the DAG releases; the app's default is 200.",
+            help: "Jobs that each DAG releases; the default is 200 for fork-join, 50 for --dag.",
         },
         Opt {
             name: "seed",
@@ -84,8 +92,62 @@ pub static RUN: Command = Command {
             short: None,
             takes: Takes::OneOf(&["hold", "spin"]),
             default: "",
-            help: "fork-join: how a subtask executes: it holds its core while the processor \
-                   halts (the app's default), or it spins.",
+            help: "fork-join, --dag: how a subtask executes: it holds its core while the \
+                   processor halts (the app's default), or it spins.",
+        },
+        Opt {
+            name: "dag",
+            short: None,
+            takes: Takes::Text("FILE"),
+            default: "",
+            help: "Run the DAGs of a file, see docs/dag-file.md: our text format, RD-Gen's .yaml, \
+                   or task graphs in .json; of a folder, each of its files, in one table.",
+        },
+        Opt {
+            name: "print-dag",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "--dag: print the file in our text format; run nothing.",
+        },
+        Opt {
+            name: "graph",
+            short: None,
+            takes: Takes::Text("NAME"),
+            default: "",
+            help: "--dag: the one graph to take of a set of task graphs; else each is run.",
+        },
+        Opt {
+            name: "unit",
+            short: None,
+            takes: Takes::Text("TIME"),
+            default: "",
+            help: "--dag: what 1 stands for where a format has no units; 1ms.",
+        },
+        Opt {
+            name: "execution",
+            short: None,
+            takes: Takes::Text("MODEL"),
+            default: "",
+            help: "--dag: execution times: wcet (the default), uniform:0.2..1 (drawn, fractions of \
+                   the WCET), or samples (drawn from the file's).",
+        },
+        Opt {
+            name: "seconds",
+            short: None,
+            takes: Takes::Number {
+                least: 1,
+                most: 1_000_000,
+            },
+            default: "",
+            help: "--dag: each DAG releases the jobs of so many seconds, instead of --jobs.",
+        },
+        Opt {
+            name: "strict-deadlines",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "--dag: a deadline miss makes the run a failure.",
         },
         Opt {
             name: "memory",

@@ -1,0 +1,22 @@
+//! DAG files on the host: reading all formats, and what a run of one needs.
+//!
+//! The kernel reads one format, `docs/dag-file.md`. Here others become that one:
+//!
+//! - [`rd_gen`]: RD-Gen's YAML, by [`yaml`], with several rates split by [`rates`];
+//! - [`stg`]: task graphs with published makespans, from JSON;
+//! - [`load`]: whichever of them a file is, checked as the commit will check it;
+//! - [`prepare`]: what `./scripts/run --dag FILE` boots;
+//! - [`batch`]: a folder of files, one boot each, in one table.
+//!
+//! Every message about a file begins `FILE:LINE:`.
+
+pub mod batch;
+mod load;
+mod prepare;
+pub mod rates;
+pub mod rd_gen;
+pub mod stg;
+pub mod yaml;
+
+pub use load::{Import, load};
+pub use prepare::{Prepared, prepare};

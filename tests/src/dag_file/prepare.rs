@@ -1,0 +1,166 @@
+//! What `./scripts/run --dag FILE` boots: the file as a boot module, words for the
+//! guest, and enough memory and time.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use dag_file::time::parse_ns;
+use dag_file::{DagFile, Execution, Length, Set};
+
+use super::load::{Import, load};
+use crate::options::Parsed;
+use crate::system;
+
+/// The options that only mean something together with `--dag`.
+const COMPANIONS: [&str; 6] = [
+    "graph",
+    "unit",
+    "print-dag",
+    "execution",
+    "seconds",
+    "strict-deadlines",
+];
+
+/// The jobs of each DAG if nobody says how many.
+const JOBS: u64 = 50;
+
+/// What the kernel costs at most, measured in deterministic mode: a context switch,
+/// a dispatch, an interrupt. The commit adds it to WCETs before it bounds anything.
+const OVERHEADS: &str = "overheads_ns=300,900,2000";
+
+/// A file that is ready to be booted.
+#[derive(Debug)]
+pub struct Prepared {
+    /// What it says.
+    pub file: DagFile,
+    /// Where the boot module lies. It is removed with this value.
+    pub module: PathBuf,
+    /// The least memory for it, in MiB.
+    pub memory_mib: u64,
+    /// Words for the guest beside those that options become.
+    pub words: Vec<String>,
+    /// A limit that is generous also where a job takes its real time, in seconds.
+    pub limit_s: u64,
+}
+
+impl Drop for Prepared {
+    fn drop(&mut self) {
+        // It is ours, and in the way of no one if it cannot be removed.
+        let _ = fs::remove_file(&self.module);
+    }
+}
+
+/// Reads the file that `--dag` names, if it is given.
+///
+/// # Errors
+///
+/// Lines for people: what is wrong with the options or with the file.
+pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
+    let Some(path) = options.text("dag") else {
+        let lonely = COMPANIONS.iter().find(|name| options.is_given(name));
+        return lonely.map_or(Ok(None), |name| {
+            Err(vec![format!(
+                "`--{name}` needs `--dag FILE`; give that, too"
+            )])
+        });
+    };
+    let refuse = |line: String| vec![line];
+    if options.is_given("app") {
+        let line = "`--app` and `--dag` exclude each other; give one".to_string();
+        return Err(refuse(line));
+    }
+    if options.is_given("jobs") && options.is_given("seconds") {
+        let line = "`--jobs` and `--seconds` exclude each other; give one".to_string();
+        return Err(refuse(line));
+    }
+    if let Some(text) = options.text("execution") {
+        Execution::parse(text).map_err(|why| refuse(format!("`--execution`: {why}")))?;
+    }
+    let unit_ns = match parse_ns(options.text("unit").unwrap_or("1ms")) {
+        Ok(0) => Err("a unit of 0; give at least 1ns".into()),
+        other => other,
+    };
+    let unit_ns = unit_ns.map_err(|why| refuse(format!("`--unit`: {why}")))?;
+    let length = length(options);
+    let import = Import {
+        unit_ns,
+        graph: options.text("graph").map(String::from),
+        cores: u32::try_from(options.number("cores").unwrap_or(1)).unwrap_or(u32::MAX),
+        length,
+    };
+    let file = load(Path::new(path), &import)?;
+    let module = system::new_log("dag-file")
+        .map_err(refuse)?
+        .with_extension("dag");
+    fs::write(&module, file.to_string())
+        .map_err(|error| refuse(format!("cannot write `{}`: {error}", module.display())))?;
+    let mut words = Vec::new();
+    if options.is_given("strict-deadlines") {
+        words.push("deadlines=strict".into());
+    }
+    if !options
+        .text("append")
+        .is_some_and(|words| words.contains("overheads_ns="))
+    {
+        words.push(OVERHEADS.into());
+    }
+    Ok(Some(Prepared {
+        memory_mib: memory_mib(&file, length),
+        limit_s: limit_s(&file, length),
+        file,
+        module,
+        words,
+    }))
+}
+
+fn length(options: &Parsed) -> Length {
+    match options.number("seconds") {
+        Some(seconds) => Length::Span(seconds.saturating_mul(1_000_000_000)),
+        None => Length::Jobs(options.number("jobs").unwrap_or(JOBS)),
+    }
+}
+
+/// Returns the instances of a set that a run has in all.
+fn instances(set: &Set, length: Length) -> u64 {
+    let of = |dag: &dag_file::FileDag| {
+        let jobs = length.jobs(&dag.spec);
+        jobs.saturating_mul(dag.subtasks.len() as u64)
+    };
+    set.dags.iter().map(of).fold(0, u64::saturating_add)
+}
+
+/// A quarter of memory is for stacks and what a core needs, and of the rest records
+/// may take half: so that much is needed for a set's subtasks, each with a stack and
+/// its bodies and edges, and for the records of its instances.
+fn memory_mib(file: &DagFile, length: Length) -> u64 {
+    const OF_A_SUBTASK: u64 = 96 << 10;
+    const OF_AN_INSTANCE: u64 = 192;
+    const MIB: u64 = 1 << 20;
+    let subtasks = file.most_subtasks() as u64;
+    let instances = file.sets.iter().map(|set| instances(set, length));
+    let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
+        .saturating_add(instances.max().unwrap_or(0).saturating_mul(OF_AN_INSTANCE));
+    24 + bytes.div_ceil(MIB)
+}
+
+/// Two minutes, the time that all jobs span and the time that they would take on
+/// one core, and a second for every 500 instances.
+fn limit_s(file: &DagFile, length: Length) -> u64 {
+    const NS_PER_S: u128 = 1_000_000_000;
+    let mut seconds = 120_u128;
+    for set in &file.sets {
+        seconds += u128::from(instances(set, length) / 500);
+        for dag in &set.dags {
+            let jobs = u128::from(length.jobs(&dag.spec));
+            let wcets = dag
+                .spec
+                .subtasks
+                .iter()
+                .filter_map(|subtask| subtask.wcet_ns);
+            let busy_ns: u128 = wcets.map(u128::from).sum();
+            let period_ns = u128::from(dag.spec.period_ns.unwrap_or(0));
+            seconds = seconds.saturating_add(jobs.saturating_mul(busy_ns + period_ns) / NS_PER_S);
+        }
+    }
+    u64::try_from(seconds).unwrap_or(u64::MAX).min(86_400)
+}

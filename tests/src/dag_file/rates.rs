@@ -1,0 +1,300 @@
+//! From a graph with timers to DAGs of one rate each.
+//!
+//! In a multi-rate graph a *timer* (a subtask with a period of its own) starts by
+//! the clock, whatever stands before it; every other subtask starts when what
+//! stands before it has finished. A DAG of ours has one period. So the graph is
+//! split:
+//!
+//! - A subtask without timer belongs to the *slowest* rate among those before it:
+//!   a join of two rates has all its inputs renewed no more often than that.
+//! - An edge into a timer, or from another rate, orders nothing: its reader takes
+//!   the latest value that is there. It is left out, and told in a remark.
+//! - What remains connected is a DAG.
+//!
+//! So no subtask starts more or less often than its graph says, and the edges that
+//! remain are the precedences of the graph. A graph of one rate becomes one DAG
+//! with all its edges. (`docs/decisions/` has the alternatives.)
+//!
+//! Where times are missing: a source without timer gets the longest period of the
+//! graph, else its shortest end-to-end deadline, else the sum of all execution
+//! times. A DAG without deadline gets the smallest multiple of its period that is
+//! not shorter than its longest path, for no schedule can do better.
+
+use std::collections::BTreeMap;
+
+use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check};
+use sched_dag::{DagSpec, Policy, SubtaskSpec};
+
+/// A graph in which each subtask may have a timer.
+#[derive(Clone, Debug, Default)]
+pub struct Graph {
+    /// The subtasks.
+    pub subtasks: Vec<Subtask>,
+    /// The edges, with their lines.
+    pub edges: Vec<(usize, usize, usize)>,
+    positions: BTreeMap<String, usize>,
+}
+
+/// A subtask of such a graph.
+#[derive(Clone, Debug, Default)]
+pub struct Subtask {
+    /// Its name.
+    pub name: String,
+    /// Its line in the file.
+    pub line: usize,
+    /// Its worst-case execution time.
+    pub wcet_ns: u64,
+    /// Its timer's period, if it has one.
+    pub period_ns: Option<u64>,
+    /// Its timer's first release.
+    pub offset_ns: u64,
+    /// By when it shall be complete, from the release of its DAG.
+    pub deadline_ns: Option<u64>,
+}
+
+/// A period and an offset: the slower rate is the larger one.
+type Rate = (u64, u64);
+
+impl Graph {
+    /// Adds a subtask whose name is new.
+    pub fn add(&mut self, subtask: Subtask) {
+        let position = self.subtasks.len();
+        self.positions.insert(subtask.name.clone(), position);
+        self.subtasks.push(subtask);
+    }
+
+    /// Returns the position of the subtask of that name.
+    #[must_use]
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.positions.get(name).copied()
+    }
+
+    fn before(&self) -> Vec<Vec<usize>> {
+        let mut before = vec![Vec::new(); self.subtasks.len()];
+        for &(earlier, later, _) in &self.edges {
+            before[later].push(earlier);
+        }
+        before
+    }
+}
+
+/// Splits a graph into DAGs, called `name` or, if there are several, `name` and
+/// their first subtask.
+///
+/// # Errors
+///
+/// The graph has a cycle.
+pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> {
+    refuse_cycles(graph, name)?;
+    let rates = rates(graph);
+    let is_kept = |&(earlier, later, _): &(usize, usize, usize)| {
+        graph.subtasks[later].period_ns.is_none() && rates[earlier] == rates[later]
+    };
+    let parts = parts(graph, is_kept);
+    let is_one = parts.len() == 1;
+    let named = |part: &[usize]| match part.first() {
+        Some(&first) if !is_one => format!("{name}-{}", graph.subtasks[first].name),
+        _ => name.into(),
+    };
+    let mut dags: Vec<FileDag> = Vec::new();
+    for part in &parts {
+        let edges = graph.edges.iter().filter(|edge| is_kept(edge));
+        dags.push(dag(graph, part, edges, rates[part[0]], named(part)));
+    }
+    for &(earlier, later, line) in graph.edges.iter().filter(|edge| !is_kept(edge)) {
+        let reader = parts
+            .iter()
+            .position(|part| part.contains(&later))
+            .unwrap_or(0);
+        let (from, to) = (&graph.subtasks[earlier].name, &graph.subtasks[later].name);
+        let remark = format!("{to} reads the latest value of {from} (line {line}): no precedence");
+        dags[reader].remarks.push(remark);
+    }
+    Ok(dags)
+}
+
+/// Returns each subtask's rate. The graph has no cycle.
+fn rates(graph: &Graph) -> Vec<Rate> {
+    let periods = graph
+        .subtasks
+        .iter()
+        .filter_map(|subtask| subtask.period_ns);
+    let deadlines = graph
+        .subtasks
+        .iter()
+        .filter_map(|subtask| subtask.deadline_ns);
+    let volume = || {
+        let wcets = graph.subtasks.iter().map(|subtask| subtask.wcet_ns);
+        wcets.fold(0, u64::saturating_add).max(1)
+    };
+    let missing = periods
+        .max()
+        .or_else(|| deadlines.min())
+        .unwrap_or_else(volume);
+    let before = graph.before();
+    let mut rates: Vec<Option<Rate>> = (graph.subtasks.iter().zip(&before))
+        .map(|(subtask, before)| match subtask.period_ns {
+            Some(period_ns) => Some((period_ns, subtask.offset_ns)),
+            None if before.is_empty() => Some((missing, subtask.offset_ns)),
+            None => None,
+        })
+        .collect();
+    for subtask in topological(graph) {
+        if rates[subtask].is_none() {
+            rates[subtask] = before[subtask].iter().filter_map(|&one| rates[one]).max();
+        }
+    }
+    rates
+        .into_iter()
+        .map(|rate| rate.unwrap_or((missing, 0)))
+        .collect()
+}
+
+/// Returns the subtasks so that each comes after those before it.
+fn topological(graph: &Graph) -> Vec<usize> {
+    let mut after = vec![Vec::new(); graph.subtasks.len()];
+    let mut waits_for = vec![0; graph.subtasks.len()];
+    for &(earlier, later, _) in &graph.edges {
+        after[earlier].push(later);
+        waits_for[later] += 1;
+    }
+    let is_free = |subtask: &usize| waits_for[*subtask] == 0;
+    let mut order: Vec<usize> = (0..graph.subtasks.len()).filter(is_free).collect();
+    let mut next = 0;
+    while let Some(&subtask) = order.get(next) {
+        next += 1;
+        for &later in &after[subtask] {
+            waits_for[later] -= 1;
+            if waits_for[later] == 0 {
+                order.push(later);
+            }
+        }
+    }
+    order
+}
+
+/// Returns the parts that the kept edges leave connected, each in the order of the
+/// file, the parts by their first subtask.
+fn parts(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<Vec<usize>> {
+    let mut beside = vec![Vec::new(); graph.subtasks.len()];
+    for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
+        beside[earlier].push(later);
+        beside[later].push(earlier);
+    }
+    let mut is_taken = vec![false; graph.subtasks.len()];
+    let mut parts = Vec::new();
+    for first in 0..graph.subtasks.len() {
+        let mut part = Vec::new();
+        let mut waiting = vec![first];
+        while let Some(subtask) = waiting.pop() {
+            if !std::mem::replace(&mut is_taken[subtask], true) {
+                part.push(subtask);
+                waiting.extend(&beside[subtask]);
+            }
+        }
+        if !part.is_empty() {
+            part.sort_unstable();
+            parts.push(part);
+        }
+    }
+    parts
+}
+
+/// Makes a DAG of one part.
+fn dag<'g>(
+    graph: &Graph,
+    part: &[usize],
+    edges: impl Iterator<Item = &'g (usize, usize, usize)>,
+    (period_ns, offset_ns): Rate,
+    name: String,
+) -> FileDag {
+    let position = |subtask: usize| part.binary_search(&subtask).ok();
+    let subtasks = part.iter().map(|&subtask| &graph.subtasks[subtask]);
+    let mut spec = DagSpec {
+        name,
+        period_ns: Some(period_ns),
+        relative_deadline_ns: subtasks.clone().filter_map(|one| one.deadline_ns).min(),
+        offset_ns,
+        ..DagSpec::default()
+    };
+    let mut dag = FileDag {
+        line: graph.subtasks[part[0]].line,
+        ..FileDag::default()
+    };
+    for subtask in subtasks {
+        spec.subtasks.push(SubtaskSpec {
+            name: subtask.name.clone(),
+            wcet_ns: Some(subtask.wcet_ns),
+            ..SubtaskSpec::default()
+        });
+        dag.subtasks.push(FileSubtask {
+            line: subtask.line,
+            ..FileSubtask::default()
+        });
+    }
+    for &(earlier, later, line) in edges {
+        if let (Some(earlier), Some(later)) = (position(earlier), position(later)) {
+            spec.edges.push((earlier, later));
+            dag.edge_lines.push(line);
+        }
+    }
+    if spec.relative_deadline_ns.is_none() {
+        let path_ns = longest_path_ns(graph, part, &spec.edges);
+        let periods = path_ns.div_ceil(period_ns.max(1)).max(1);
+        spec.relative_deadline_ns = Some(period_ns.saturating_mul(periods));
+        let remark = "no deadline is given: a multiple of the period that fits the longest path";
+        dag.remarks.push(remark.into());
+    }
+    dag.spec = spec;
+    dag
+}
+
+/// Returns the longest path through a part; `edges` are between its positions.
+fn longest_path_ns(graph: &Graph, part: &[usize], edges: &[(usize, usize)]) -> u64 {
+    let mut after = vec![Vec::new(); part.len()];
+    for &(earlier, later) in edges {
+        after[earlier].push(later);
+    }
+    let mut ends_ns = vec![0_u64; part.len()];
+    let mut longest_ns = 0;
+    for subtask in topological(graph) {
+        let Ok(position) = part.binary_search(&subtask) else {
+            continue;
+        };
+        let end_ns = ends_ns[position].saturating_add(graph.subtasks[subtask].wcet_ns);
+        longest_ns = longest_ns.max(end_ns);
+        for &later in &after[position] {
+            ends_ns[later] = ends_ns[later].max(end_ns);
+        }
+    }
+    longest_ns
+}
+
+/// Checks the whole graph, timers and all, for cycles alone.
+fn refuse_cycles(graph: &Graph, name: &str) -> Result<(), Vec<Malformed>> {
+    let untimed = |subtask: &Subtask| SubtaskSpec {
+        name: subtask.name.clone(),
+        ..SubtaskSpec::default()
+    };
+    let whole = FileDag {
+        spec: DagSpec {
+            name: name.into(),
+            period_ns: Some(1),
+            relative_deadline_ns: Some(1),
+            subtasks: graph.subtasks.iter().map(untimed).collect(),
+            edges: graph.edges.iter().map(|edge| (edge.0, edge.1)).collect(),
+            ..DagSpec::default()
+        },
+        edge_lines: graph.edges.iter().map(|edge| edge.2).collect(),
+        ..FileDag::default()
+    };
+    let dags = vec![whole];
+    let set = Set {
+        name: String::new(),
+        dags,
+    };
+    check(&set, Policy::Edf, 1, Length::Jobs(1))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,211 @@
+//! Reading what RD-Gen writes: a graph in networkx's node-link form, as YAML.
+//!
+//! A node has an `id`, an `execution_time` and, if a timer drives it, a `period`
+//! and perhaps an `offset`; an `end_to_end_deadline` counts from the release of
+//! its chain. A link has `source` and `target`. Times are numbers without unit.
+//! How timers become DAGs is told in [`rates`](super::rates).
+//!
+//! There is no message that takes time here, so a link's `communication_time` is
+//! added to the execution time of its target, which reads the message.
+
+use dag_file::{DagFile, Malformed, Set, is_name, quoted, time};
+
+use super::rates::{Graph, Subtask, split};
+use super::yaml::{Node, Value, parse};
+
+/// Reads a file into one set; `name` is what its DAGs are called after.
+///
+/// # Errors
+///
+/// Everything that is not as described, with its line.
+pub fn read(text: &str, name: &str, unit_ns: u64) -> Result<DagFile, Vec<Malformed>> {
+    let graph = read_graph(text, unit_ns).map_err(|malformed| vec![malformed])?;
+    let dags = split(&graph, name)?;
+    let name = String::new();
+    Ok(DagFile {
+        sets: vec![Set { name, dags }],
+    })
+}
+
+fn malformed(line: usize, reason: impl Into<String>) -> Malformed {
+    let reason = reason.into();
+    Malformed { line, reason }
+}
+
+fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
+    let document = parse(text)?;
+    let mut nodes: &[Node] = &[];
+    let mut links: &[Node] = &[];
+    for (key, node) in members(&document, "the document")? {
+        match key.as_str() {
+            "nodes" => nodes = items(node, key)?,
+            "links" | "edges" => links = items(node, key)?,
+            "directed" => expect(node, key, "true", "an edge needs a direction")?,
+            "multigraph" => expect(
+                node,
+                key,
+                "false",
+                "two edges between two nodes say no more",
+            )?,
+            "graph" => {}
+            other => {
+                let known = "directed, graph, links, multigraph, nodes";
+                return Err(unknown(node, other, "a node-link document", known));
+            }
+        }
+    }
+    if nodes.is_empty() {
+        let reason = "the file has no nodes; a node-link document lists them under `nodes`";
+        return Err(malformed(document.line, reason));
+    }
+    let mut graph = Graph::default();
+    for node in nodes {
+        let subtask = read_node(node, unit_ns)?;
+        if let Some(first) = graph.position(&subtask.name) {
+            let (id, line) = (quoted(&subtask.name), graph.subtasks[first].line);
+            let reason = format!("node {id} stands here twice, first on line {line}; drop one");
+            return Err(malformed(node.line, reason));
+        }
+        graph.add(subtask);
+    }
+    for link in links {
+        read_link(link, &mut graph, unit_ns)?;
+    }
+    Ok(graph)
+}
+
+fn read_node(node: &Node, unit_ns: u64) -> Result<Subtask, Malformed> {
+    let mut subtask = Subtask {
+        line: node.line,
+        ..Subtask::default()
+    };
+    let mut wcet_ns = None;
+    for (key, value) in members(node, "a node")? {
+        match key.as_str() {
+            "id" => {
+                let id = text(value, key)?;
+                if !is_name(id) {
+                    let reason = format!("id {} is no single word; rename the node", quoted(id));
+                    return Err(malformed(value.line, reason));
+                }
+                subtask.name = id.into();
+            }
+            "execution_time" => wcet_ns = Some(time_ns(value, key, unit_ns)?),
+            "period" => subtask.period_ns = Some(time_ns(value, key, unit_ns)?),
+            "offset" => subtask.offset_ns = time_ns(value, key, unit_ns)?,
+            "end_to_end_deadline" => subtask.deadline_ns = Some(time_ns(value, key, unit_ns)?),
+            other => {
+                let known = "id, execution_time, period, offset, end_to_end_deadline";
+                return Err(unknown(value, other, "a node", known));
+            }
+        }
+    }
+    if subtask.name.is_empty() {
+        return Err(malformed(node.line, "this node has no `id`; give it one"));
+    }
+    subtask.wcet_ns = wcet_ns.ok_or_else(|| {
+        let id = quoted(&subtask.name);
+        malformed(
+            node.line,
+            format!("node {id} has no `execution_time`; give it one"),
+        )
+    })?;
+    Ok(subtask)
+}
+
+fn read_link(link: &Node, graph: &mut Graph, unit_ns: u64) -> Result<(), Malformed> {
+    let (mut source, mut target, mut communication_ns) = (None, None, 0);
+    for (key, value) in members(link, "a link")? {
+        match key.as_str() {
+            "source" => source = Some(end(value, key, graph)?),
+            "target" => target = Some(end(value, key, graph)?),
+            "communication_time" => communication_ns = time_ns(value, key, unit_ns)?,
+            "firing_prob" => {
+                let reason = "`firing_prob`: here every subtask runs in every job; generate \
+                              without probabilistic branches";
+                return Err(malformed(value.line, reason));
+            }
+            other => {
+                let known = "source, target, communication_time";
+                return Err(unknown(value, other, "a link", known));
+            }
+        }
+    }
+    let (Some(source), Some(target)) = (source, target) else {
+        let reason = "this link lacks its `source` or its `target`; give both";
+        return Err(malformed(link.line, reason));
+    };
+    let wcet_ns = graph.subtasks[target].wcet_ns.checked_add(communication_ns);
+    graph.subtasks[target].wcet_ns = wcet_ns.ok_or_else(|| {
+        let reason = "execution and communication together are more than 64 bits of nanoseconds";
+        malformed(link.line, reason)
+    })?;
+    graph.edges.push((source, target, link.line));
+    Ok(())
+}
+
+fn end(value: &Node, key: &str, graph: &Graph) -> Result<usize, Malformed> {
+    let id = text(value, key)?;
+    graph.position(id).ok_or_else(|| {
+        let reason = format!(
+            "{key}: there is no node {}; add it, or drop the link",
+            quoted(id)
+        );
+        malformed(value.line, reason)
+    })
+}
+
+fn members<'n>(node: &'n Node, what: &str) -> Result<&'n [(String, Node)], Malformed> {
+    match &node.value {
+        Value::Mapping(members) => Ok(members),
+        _ => Err(malformed(
+            node.line,
+            format!(
+                "{what} must be a mapping of keys, here is a {}",
+                node.kind()
+            ),
+        )),
+    }
+}
+
+fn items<'n>(node: &'n Node, key: &str) -> Result<&'n [Node], Malformed> {
+    match &node.value {
+        Value::Sequence(items) => Ok(items),
+        _ => Err(malformed(
+            node.line,
+            format!("`{key}` must be a sequence, here is a {}", node.kind()),
+        )),
+    }
+}
+
+fn text<'n>(node: &'n Node, key: &str) -> Result<&'n str, Malformed> {
+    match &node.value {
+        Value::Scalar(text) if !text.is_empty() => Ok(text),
+        _ => Err(malformed(
+            node.line,
+            format!("`{key}` must be a value on its line; give one"),
+        )),
+    }
+}
+
+fn time_ns(node: &Node, key: &str, unit_ns: u64) -> Result<u64, Malformed> {
+    time::scale_ns(text(node, key)?, unit_ns)
+        .map_err(|message| malformed(node.line, format!("{key}: {message}")))
+}
+
+fn expect(node: &Node, key: &str, wanted: &str, why: &str) -> Result<(), Malformed> {
+    let found = text(node, key)?;
+    if found.eq_ignore_ascii_case(wanted) {
+        return Ok(());
+    }
+    let reason = format!("`{key}` must be {wanted}, found {}: {why}", quoted(found));
+    Err(malformed(node.line, reason))
+}
+
+fn unknown(node: &Node, key: &str, what: &str, known: &str) -> Malformed {
+    let reason = format!("unknown key {}; {what} has {known}", quoted(key));
+    malformed(node.line, reason)
+}
+
+#[cfg(test)]
+mod tests;

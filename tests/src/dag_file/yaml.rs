@@ -1,0 +1,312 @@
+//! The part of YAML that generators of DAGs write.
+//!
+//! Read are block mappings and block sequences, nested by indentation; scalars,
+//! plain or in quotes; the empty `{}` and `[]`; comments; and the marks `---` and
+//! `...` around the one document. Whatever else YAML has (anchors, aliases, tags,
+//! block scalars, filled flow collections, tabs) is refused with its line, as are
+//! keys that stand twice. Nothing is guessed: a scalar stays text, and who wants a
+//! number reads one.
+
+use dag_file::{Malformed, quoted};
+
+/// The deepest nesting that is read.
+const DEEPEST: usize = 32;
+
+/// A value and where it begins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// The line, counted from 1.
+    pub line: usize,
+    /// The value.
+    pub value: Value,
+}
+
+/// A value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Value {
+    /// Text without its quotes; empty if nothing stands there.
+    Scalar(String),
+    /// A sequence.
+    Sequence(Vec<Node>),
+    /// A mapping, in the order of the file.
+    Mapping(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// Names the kind of value, for messages.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self.value {
+            Value::Scalar(_) => "scalar",
+            Value::Sequence(_) => "sequence",
+            Value::Mapping(_) => "mapping",
+        }
+    }
+}
+
+/// Reads the one document that `text` consists of.
+///
+/// # Errors
+///
+/// The first place that is not as described above.
+pub fn parse(text: &str) -> Result<Node, Malformed> {
+    let mut reader = Reader {
+        lines: lines(text)?,
+        next: 0,
+    };
+    let Some(first) = reader.lines.first() else {
+        return Err(malformed(1, "the file is empty; it has no YAML document"));
+    };
+    let indent = first.indent;
+    let node = reader.block(indent, 0)?;
+    match reader.peek() {
+        None => Ok(node),
+        Some(line) => Err(malformed(
+            line.number,
+            "this line's indentation fits nothing above; align it with its siblings",
+        )),
+    }
+}
+
+/// A line with something on it.
+#[derive(Clone, Debug)]
+struct Line {
+    number: usize,
+    indent: usize,
+    text: String,
+}
+
+fn malformed(line: usize, reason: impl Into<String>) -> Malformed {
+    let reason = reason.into();
+    Malformed { line, reason }
+}
+
+/// Takes comments, blank lines and the document's marks away.
+fn lines(text: &str) -> Result<Vec<Line>, Malformed> {
+    let mut lines: Vec<Line> = Vec::new();
+    let mut has_ended = false;
+    for (index, text) in text.lines().enumerate() {
+        let number = index + 1;
+        let content = without_comment(text).trim_end();
+        let indent = content.len() - content.trim_start_matches(' ').len();
+        let content = &content[indent..];
+        if content.is_empty() || (content == "---" && lines.is_empty()) {
+            continue;
+        }
+        if content.starts_with('\t') {
+            return Err(malformed(number, "a tab indents this line; use blanks"));
+        }
+        if content == "---" || has_ended {
+            return Err(malformed(
+                number,
+                "a second document begins here; give one a file",
+            ));
+        }
+        if content == "..." {
+            has_ended = true;
+            continue;
+        }
+        lines.push(Line {
+            number,
+            indent,
+            text: content.into(),
+        });
+    }
+    Ok(lines)
+}
+
+/// Cuts off a comment: a `#` at the beginning or after a blank, outside quotes.
+fn without_comment(text: &str) -> &str {
+    let mut quote = None;
+    let mut before = ' ';
+    for (at, character) in text.char_indices() {
+        match quote {
+            Some(open) if character == open && before != '\\' => quote = None,
+            Some(_) => {}
+            // In the middle of a word an apostrophe is no quote.
+            None if matches!(character, '"' | '\'') && " :-".contains(before) => {
+                quote = Some(character);
+            }
+            None if character == '#' && before.is_whitespace() => return &text[..at],
+            None => {}
+        }
+        before = character;
+    }
+    text
+}
+
+struct Reader {
+    lines: Vec<Line>,
+    next: usize,
+}
+
+impl Reader {
+    fn peek(&self) -> Option<&Line> {
+        self.lines.get(self.next)
+    }
+
+    /// Returns the next line if it is indented so far.
+    fn sibling(&self, indent: usize) -> Option<Line> {
+        self.peek().filter(|line| line.indent == indent).cloned()
+    }
+
+    /// Reads the collection or scalar whose first line is the next one.
+    fn block(&mut self, indent: usize, depth: usize) -> Result<Node, Malformed> {
+        let Some(line) = self.sibling(indent) else {
+            return Err(malformed(1, "there is nothing to read"));
+        };
+        if depth > DEEPEST {
+            let reason = format!("this is nested more than {DEEPEST} levels deep");
+            return Err(malformed(line.number, reason));
+        }
+        if is_item(&line.text) {
+            return self.sequence(indent, depth);
+        }
+        if split_key(&line)?.is_some() {
+            return self.mapping(indent, depth);
+        }
+        self.next += 1;
+        scalar(&line, &line.text)
+    }
+
+    fn sequence(&mut self, indent: usize, depth: usize) -> Result<Node, Malformed> {
+        let mut items = Vec::new();
+        let first = self.peek().map_or(1, |line| line.number);
+        while let Some(line) = self.sibling(indent).filter(|line| is_item(&line.text)) {
+            let rest = line.text[1..].trim_start_matches(' ');
+            if rest.is_empty() {
+                self.next += 1;
+                items.push(self.below(&line, indent + 1, depth)?);
+                continue;
+            }
+            // What follows the dash is a block of its own, further in.
+            let inner = indent + line.text.len() - rest.len();
+            let rest = rest.to_string();
+            self.lines[self.next].indent = inner;
+            self.lines[self.next].text = rest;
+            items.push(self.block(inner, depth + 1)?);
+        }
+        Ok(Node {
+            line: first,
+            value: Value::Sequence(items),
+        })
+    }
+
+    fn mapping(&mut self, indent: usize, depth: usize) -> Result<Node, Malformed> {
+        let mut members: Vec<(String, Node)> = Vec::new();
+        let first = self.peek().map_or(1, |line| line.number);
+        while let Some(line) = self.sibling(indent).filter(|line| !is_item(&line.text)) {
+            let Some((key, rest)) = split_key(&line)? else {
+                let reason = format!("{} is no `key: value`", quoted(&line.text));
+                return Err(malformed(line.number, reason));
+            };
+            if members.iter().any(|(known, _)| *known == key) {
+                let reason = format!("key {} stands here twice; give it once", quoted(&key));
+                return Err(malformed(line.number, reason));
+            }
+            self.next += 1;
+            let node = if rest.is_empty() {
+                // The items of a sequence may stand right below their key.
+                let is_at_key = self.sibling(indent).is_some_and(|next| is_item(&next.text));
+                self.below(&line, indent + usize::from(!is_at_key), depth)?
+            } else {
+                scalar(&line, rest)?
+            };
+            members.push((key, node));
+        }
+        Ok(Node {
+            line: first,
+            value: Value::Mapping(members),
+        })
+    }
+
+    /// Reads what stands below `line`, at least so far in; nothing is empty.
+    fn below(&mut self, line: &Line, least: usize, depth: usize) -> Result<Node, Malformed> {
+        match self.peek().map(|next| next.indent) {
+            Some(indent) if indent >= least => self.block(indent, depth + 1),
+            _ => scalar(line, ""),
+        }
+    }
+}
+
+fn is_item(text: &str) -> bool {
+    text == "-" || text.starts_with("- ")
+}
+
+/// Splits `key: value`; the value may be empty.
+fn split_key(line: &Line) -> Result<Option<(String, &str)>, Malformed> {
+    let text = &line.text;
+    let end = if text.starts_with(['"', '\'']) {
+        closing_quote(text).map(|end| end + 1)
+    } else {
+        text.find(": ")
+            .or(text.ends_with(':').then(|| text.len() - 1))
+    };
+    let Some((key, rest)) = end.map(|end| text.split_at(end)) else {
+        return Ok(None);
+    };
+    let Some(rest) = rest.strip_prefix(':') else {
+        return Ok(None);
+    };
+    match scalar(line, key)?.value {
+        Value::Scalar(key) => Ok(Some((key, rest.trim_start()))),
+        _ => Err(malformed(line.number, "a collection cannot be a key")),
+    }
+}
+
+/// Returns where the quote closes that `text` begins with.
+fn closing_quote(text: &str) -> Option<usize> {
+    let quote = text.chars().next()?;
+    let mut is_escaped = false;
+    text.char_indices().skip(1).find_map(|(at, character)| {
+        let closes = character == quote && !is_escaped;
+        is_escaped = quote == '"' && character == '\\' && !is_escaped;
+        closes.then_some(at)
+    })
+}
+
+/// Reads what stands on one line.
+fn scalar(line: &Line, text: &str) -> Result<Node, Malformed> {
+    let value = match text {
+        "{}" => Value::Mapping(Vec::new()),
+        "[]" => Value::Sequence(Vec::new()),
+        _ => Value::Scalar(plain(line.number, text)?),
+    };
+    Ok(Node {
+        line: line.number,
+        value,
+    })
+}
+
+fn plain(line: usize, text: &str) -> Result<String, Malformed> {
+    if !text.starts_with(['"', '\'']) {
+        let not_read = |character| "&*!|>{}[]%@`".contains(character);
+        return if text.starts_with(not_read) {
+            let shown = quoted(text);
+            let reason = format!("{shown}: only plain scalars, {{}} and [] are read; write it out");
+            Err(malformed(line, reason))
+        } else {
+            Ok(text.into())
+        };
+    }
+    let end = closing_quote(text).filter(|end| end + 1 == text.len());
+    let Some(end) = end else {
+        let reason = format!(
+            "{}: its quote does not close at the line's end",
+            quoted(text)
+        );
+        return Err(malformed(line, reason));
+    };
+    let inner = &text[1..end];
+    if inner.contains('\\') && text.starts_with('"') {
+        let reason = format!(
+            "{}: escapes are not read; write the character",
+            quoted(text)
+        );
+        return Err(malformed(line, reason));
+    }
+    Ok(inner.into())
+}
+
+#[cfg(test)]
+mod tests;

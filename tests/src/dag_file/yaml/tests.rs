@@ -1,0 +1,89 @@
+//! What is read of YAML, and what is refused.
+
+use super::{Node, Value, parse};
+
+/// Writes a value on one line, for comparing.
+fn flat(node: &Node) -> String {
+    match &node.value {
+        Value::Scalar(text) => format!("`{text}`"),
+        Value::Sequence(items) => {
+            let items: Vec<String> = items.iter().map(flat).collect();
+            format!("[{}]", items.join(","))
+        }
+        Value::Mapping(members) => {
+            let members = members
+                .iter()
+                .map(|(key, node)| format!("{key}={}", flat(node)));
+            format!("{{{}}}", members.collect::<Vec<_>>().join(","))
+        }
+    }
+}
+
+fn read(text: &str) -> String {
+    parse(text).map(|node| flat(&node)).unwrap()
+}
+
+#[test]
+fn what_a_generator_writes_is_read() {
+    let text = "\
+# a graph
+directed: true
+graph: {}
+links:
+- source: 0
+  target: 1   # an edge
+-   source: 1
+    target: 2
+nodes:
+  - id: \"0\"
+    'quoted key': 'it''s'
+  - id: 1
+empty:
+";
+    let text = text.replace("'it''s'", "'a: b # c'");
+    assert_eq!(
+        read(&text),
+        "{directed=`true`,graph={},links=[{source=`0`,target=`1`},{source=`1`,target=`2`}],\
+         nodes=[{id=`0`,quoted key=`a: b # c`},{id=`1`}],empty=``}"
+    );
+    assert_eq!(read("---\na: 1\n...\n"), "{a=`1`}");
+    assert_eq!(
+        read("- 1\n- - 2\n  - 3\n-\n  a: b\n"),
+        "[`1`,[`2`,`3`],{a=`b`}]"
+    );
+    assert_eq!(read("a: it's # no\nb: c#d"), "{a=`it's`,b=`c#d`}");
+}
+
+#[test]
+fn values_know_their_lines() {
+    let Value::Mapping(members) = parse("a: 1\n\n# c\nb:\n- 2\n").unwrap().value else {
+        panic!("it is a mapping");
+    };
+    assert_eq!((members[0].1.line, members[1].1.line), (1, 5));
+}
+
+#[test]
+fn what_is_not_read_is_refused_with_its_line() {
+    for (text, words) in [
+        ("", "line 1: the file is empty"),
+        ("# nothing\n", "line 1: the file is empty"),
+        ("a: 1\na: 2\n", "line 2: key `a` stands here twice"),
+        (
+            "a: 1\n  b: 2\n",
+            "line 2: this line's indentation fits nothing above",
+        ),
+        ("a: 1\n\tb: 2\n", "line 2: a tab indents this line"),
+        ("a: &x 1\n", "line 1: `&x 1`: only plain scalars"),
+        ("a: {b: 1}\n", "line 1: `{b: 1}`: only plain scalars"),
+        ("a: |\n  text\n", "line 1: `|`: only plain scalars"),
+        ("a: 'open\n", "line 1: `'open`: its quote does not close"),
+        ("a: \"x\\n\"\n", "escapes are not read"),
+        ("a: 1\nnothing\n", "line 2: `nothing` is no `key: value`"),
+        ("a: 1\n---\nb: 2\n", "line 2: a second document begins here"),
+    ] {
+        let message = parse(text).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}\n  not: {words}");
+    }
+    let deep = format!("{}x", "- ".repeat(100));
+    assert!(parse(&deep).unwrap_err().reason.contains("levels deep"));
+}

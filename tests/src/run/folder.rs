@@ -1,0 +1,63 @@
+//! `run --dag FOLDER`: each DAG file of a folder, one boot each, in one table.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use super::{Refusal, boot_app, conclude, prepare};
+use crate::dag_file::batch;
+use crate::options::Parsed;
+
+/// Runs all files. A refused or failed one does not keep the others from running;
+/// the exit code is that of the worst.
+pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> {
+    for name in ["print-dag", "graph", "trace", "serial", "gdb"] {
+        if options.is_given(name) {
+            let line = format!("`--{name}` is for one file; name one with `--dag`");
+            return Err(Refusal::Usage(line));
+        }
+    }
+    let files = batch::files(folder).map_err(Refusal::Usage)?;
+    let shows_lines = options.is_given("json");
+    if !shows_lines {
+        println!("{}", batch::heading());
+    }
+    let (mut refused, mut failed) = (0, 0);
+    for file in &files {
+        let place = file.display();
+        let one = options.with("dag", &place.to_string()).with("quiet", "yes");
+        let booted = prepare(&one).and_then(|dags| boot_app(&one, dags.as_ref(), false));
+        let booted = match booted {
+            Ok(booted) => booted,
+            Err(Refusal::Usage(lines)) => {
+                lines.lines().for_each(|line| eprintln!("run: {line}"));
+                refused += 1;
+                continue;
+            }
+            Err(Refusal::Failure(line)) => {
+                eprintln!("run: {place}: {line}");
+                failed += 1;
+                continue;
+            }
+        };
+        if booted.outcome.judge().is_err() {
+            eprintln!("run: {place}:");
+            failed += 1;
+        }
+        conclude(&booted.outcome, &booted.log, &booted.screen);
+        if shows_lines {
+            batch::lines(file, &booted.outcome).for_each(|line| println!("{line}"));
+        } else {
+            let cores = options.number("cores").unwrap_or(1);
+            print!("{}", batch::rows(file, cores, &booted.outcome));
+        }
+    }
+    if !shows_lines {
+        let count = files.len();
+        println!("{count} files: {refused} refused, {failed} failed");
+    }
+    Ok(match (refused, failed) {
+        (0, 0) => ExitCode::SUCCESS,
+        (0, _) => ExitCode::FAILURE,
+        _ => ExitCode::from(2),
+    })
+}
