@@ -13,6 +13,10 @@ pub struct DagId(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SubtaskId(pub u32);
 
+/// A subtask, by its position among the subtasks of all DAGs of one commit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Vertex(pub u32);
+
 /// A processor, by its position among the processors that the scheduler serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CoreId(pub u32);
@@ -38,6 +42,14 @@ impl DagId {
 
 impl SubtaskId {
     /// Returns the position as an index into a DAG's table of subtasks.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl Vertex {
+    /// Returns the position as an index into a table of all subtasks.
     #[must_use]
     pub const fn index(self) -> usize {
         self.0 as usize

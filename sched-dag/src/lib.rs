@@ -101,11 +101,12 @@ mod task_set;
 mod verify;
 pub mod virtual_time;
 
-pub use ids::{CoreId, DagId, Instance, SubtaskId};
+pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use policy::{Activation, OverrunPolicy, Policy, Preemption, Priority};
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use scheduler::{
-    DagStatistics, Decision, JobOutcome, Moment, Observer, Released, Scheduler, SchedulerOptions,
+    DagStatistics, Decision, HandOff, JobOutcome, Moment, Observer, Released, Scheduler,
+    SchedulerOptions,
 };
 pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};

@@ -42,7 +42,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::scheduler::heap::IndexedHeap;
-use crate::scheduler::{Decision, Observer, Scheduler};
+use crate::scheduler::{Decision, HandOff, Observer, Scheduler};
 
 /// What instances do and how long it takes them.
 ///
@@ -125,13 +125,19 @@ impl<F: FnMut(Instance) -> u64> Workload for ExecutionTimes<F> {
 #[derive(Debug)]
 pub struct VirtualTime {
     scheduler: Scheduler,
+    cores: Cores,
+    /// What fails at the present instant.
+    failing: Vec<(Instance, CoreId)>,
+}
+
+/// What the cores execute, and what is left of it.
+#[derive(Debug)]
+struct Cores {
     /// When the instance on each busy core finishes if nothing intervenes; at
     /// one instant the core with the smaller number comes first.
     finish_times: IndexedHeap<(u64, CoreId)>,
     /// What each core executes.
     executing: Box<[Option<Instance>]>,
-    /// What fails at the present instant.
-    failing: Vec<(Instance, CoreId)>,
     /// What is left of each preempted instance, by its subtask's index over all
     /// DAGs.
     remaining_ns: Box<[u64]>,
@@ -167,11 +173,13 @@ impl VirtualTime {
         let first_subtasks = first_subtasks.collect();
         Self {
             scheduler,
-            finish_times: IndexedHeap::new(cores),
-            executing: vec![None; cores].into_boxed_slice(),
+            cores: Cores {
+                finish_times: IndexedHeap::new(cores),
+                executing: vec![None; cores].into_boxed_slice(),
+                remaining_ns: vec![0; subtasks].into_boxed_slice(),
+                first_subtasks,
+            },
             failing: Vec::with_capacity(cores),
-            remaining_ns: vec![0; subtasks].into_boxed_slice(),
-            first_subtasks,
         }
     }
 
@@ -187,10 +195,7 @@ impl VirtualTime {
     /// again with a later time.
     pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload) -> End {
         loop {
-            let finish_ns = self
-                .finish_times
-                .peek()
-                .map(|((finish_ns, _), _)| finish_ns);
+            let finish_ns = self.cores.next_finish_ns();
             let scheduler_ns = self.scheduler.next_event_ns();
             let signal_ns =
                 (workload.next_signal_ns()).map(|signal_ns| signal_ns.max(self.scheduler.now_ns()));
@@ -222,21 +227,10 @@ impl VirtualTime {
     /// Lets one instant happen. An instance that cannot finish is the error.
     fn step(&mut self, now_ns: u64, workload: &mut impl Workload) -> Result<(), Instance> {
         workload.instant(now_ns);
-        let mut moment = self.scheduler.at(now_ns);
-        while let Some(((finish_ns, core), index)) = self.finish_times.peek()
-            && finish_ns <= now_ns
-        {
-            self.finish_times.remove(index);
-            let Some(instance) = self.executing[index].take() else {
-                continue;
-            };
-            if workload.fails(instance) {
-                self.failing.push((instance, core));
-            } else {
-                workload.finished(instance, core, now_ns);
-                moment.complete(instance, workload);
-            }
+        if let Some(done) = self.finish(now_ns, workload) {
+            return done;
         }
+        let mut moment = self.scheduler.at(now_ns);
         for (instance, core) in self.failing.drain(..) {
             workload.failed(instance, core, now_ns);
             moment.fail(instance, workload);
@@ -245,31 +239,88 @@ impl VirtualTime {
             moment.signal(dag, workload);
         }
         for &decision in moment.release_due(workload).dispatch() {
-            let (core, instance) = (decision.core(), decision.instance());
-            let index = self.first_subtasks[instance.dag.index()] + instance.subtask.index();
-            let remaining_ns = match decision {
-                Decision::Preempt { .. } => {
-                    let finish_ns = self
-                        .finish_times
-                        .key(core.index())
-                        .map_or(now_ns, |(at_ns, _)| at_ns);
-                    self.remaining_ns[index] = finish_ns - now_ns;
-                    workload.preempted(instance, core, now_ns);
-                    continue;
-                }
-                Decision::Resume { .. } => {
-                    workload.resumed(instance, core, now_ns);
-                    self.remaining_ns[index]
-                }
-                Decision::Start { .. } => {
-                    workload.started(instance, core, now_ns);
-                    workload.execute(instance, now_ns)
-                }
-            };
-            let finish_ns = now_ns.checked_add(remaining_ns).ok_or(instance)?;
-            self.finish_times.set(core.index(), (finish_ns, core));
-            self.executing[core.index()] = Some(instance);
+            self.cores.carry_out(decision, now_ns, workload)?;
         }
+        Ok(())
+    }
+
+    /// Completes what finishes at `now_ns`, and takes note of what fails instead.
+    /// If it is one instance and nothing else happens, that may be the whole
+    /// instant: then the result is the instant's.
+    fn finish(
+        &mut self,
+        now_ns: u64,
+        workload: &mut impl Workload,
+    ) -> Option<Result<(), Instance>> {
+        let is_quiet =
+            |workload: &mut _| Workload::next_signal_ns(workload).is_none_or(|ns| ns > now_ns);
+        let mut finished = 0;
+        while let Some((instance, core)) = self.cores.take_finished(now_ns) {
+            finished += 1;
+            let is_last = self.cores.next_finish_ns().is_none_or(|ns| ns > now_ns);
+            if workload.fails(instance) {
+                self.failing.push((instance, core));
+                continue;
+            }
+            workload.finished(instance, core, now_ns);
+            if finished > 1 || !is_last || !is_quiet(workload) {
+                self.scheduler.at(now_ns).complete(instance, workload);
+                continue;
+            }
+            let vertex = self.scheduler.vertex(instance);
+            return match self.scheduler.hand_off(now_ns, core, vertex, workload) {
+                HandOff::To(_, decision) => Some(self.cores.carry_out(decision, now_ns, workload)),
+                HandOff::Idle => Some(Ok(())),
+                HandOff::Open => None,
+            };
+        }
+        None
+    }
+}
+
+impl Cores {
+    fn next_finish_ns(&self) -> Option<u64> {
+        self.finish_times.peek().map(|((at_ns, _), _)| at_ns)
+    }
+
+    /// Takes an instance that finishes at `now_ns` from its core.
+    fn take_finished(&mut self, now_ns: u64) -> Option<(Instance, CoreId)> {
+        let ((_, core), index) = self
+            .finish_times
+            .peek()
+            .filter(|((at_ns, _), _)| *at_ns <= now_ns)?;
+        self.finish_times.remove(index);
+        Some((self.executing[index].take()?, core))
+    }
+
+    /// Carries out a decision. An instance that cannot finish is the error.
+    fn carry_out(
+        &mut self,
+        decision: Decision,
+        now_ns: u64,
+        workload: &mut impl Workload,
+    ) -> Result<(), Instance> {
+        let (core, instance) = (decision.core(), decision.instance());
+        let index = self.first_subtasks[instance.dag.index()] + instance.subtask.index();
+        let remaining_ns = match decision {
+            Decision::Preempt { .. } => {
+                let finish_ns = self.finish_times.key(core.index());
+                self.remaining_ns[index] = finish_ns.map_or(now_ns, |(at_ns, _)| at_ns) - now_ns;
+                workload.preempted(instance, core, now_ns);
+                return Ok(());
+            }
+            Decision::Resume { .. } => {
+                workload.resumed(instance, core, now_ns);
+                self.remaining_ns[index]
+            }
+            Decision::Start { .. } => {
+                workload.started(instance, core, now_ns);
+                workload.execute(instance, now_ns)
+            }
+        };
+        let finish_ns = now_ns.checked_add(remaining_ns).ok_or(instance)?;
+        self.finish_times.set(core.index(), (finish_ns, core));
+        self.executing[core.index()] = Some(instance);
         Ok(())
     }
 }

@@ -4,11 +4,10 @@
 //! The kernel asks for a dispatch on the core that has just completed, so the
 //! next instance in line starts there without an interrupt to another core.
 //!
-//! The core to be preempted first, with the largest key, is remembered as long
-//! as changes leave it known: a larger key that comes in takes its place. When
-//! the core itself changes, the next question looks at all cores. Between two
-//! releases there is rarely one: what starts from the line has a key beyond
-//! those that run.
+//! The core to be preempted first is looked for among all cores when there is
+//! need. That is rare: when no core is idle and something has become ready that
+//! is not the first in line. Keeping the cores in order instead would cost every
+//! start and every completion.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -22,7 +21,6 @@ use crate::ids::{CoreId, to_u32};
 pub(super) struct Cores {
     occupations: Box<[Occupation]>,
     idle: Vec<CoreId>,
-    largest: Largest,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -34,23 +32,18 @@ enum Occupation {
     Preemptible(Key),
 }
 
-/// The core with the largest key among those that may be preempted.
-#[derive(Clone, Copy, Debug)]
-enum Largest {
-    Known(CoreId, Key),
-    None,
-    /// To be looked for.
-    Unknown,
-}
-
 impl Cores {
     pub(super) fn new(cores: u32) -> Self {
         Self {
             occupations: vec![Occupation::Idle; cores as usize].into_boxed_slice(),
             // Core 0 is on top.
             idle: (0..cores).rev().map(CoreId).collect(),
-            largest: Largest::None,
         }
+    }
+
+    /// Returns the number of cores.
+    pub(super) const fn count(&self) -> usize {
+        self.occupations.len()
     }
 
     pub(super) fn running(&self, core: CoreId) -> Option<Key> {
@@ -70,54 +63,27 @@ impl Cores {
         self.idle.pop()
     }
 
-    /// Gives a core, idle or just preempted, an instance.
+    /// Gives a core, which is not among the idle ones, an instance.
     pub(super) fn run(&mut self, core: CoreId, key: Key, may_be_preempted: bool) {
-        self.forget(core);
-        if !may_be_preempted {
-            self.occupations[core.index()] = Occupation::Fixed(key);
-            return;
-        }
-        self.occupations[core.index()] = Occupation::Preemptible(key);
-        match self.largest {
-            Largest::Known(_, largest) if key < largest => {}
-            Largest::Unknown => {}
-            Largest::Known(..) | Largest::None => self.largest = Largest::Known(core, key),
-        }
+        self.occupations[core.index()] = match may_be_preempted {
+            true => Occupation::Preemptible(key),
+            false => Occupation::Fixed(key),
+        };
     }
 
     /// Makes a core idle.
     pub(super) fn free(&mut self, core: CoreId) {
-        self.forget(core);
         self.occupations[core.index()] = Occupation::Idle;
         self.idle.push(core);
     }
 
     /// Returns the largest key among the instances that may be preempted.
-    pub(super) fn largest_preemptible(&mut self) -> Option<(CoreId, Key)> {
-        if let Largest::Unknown = self.largest {
-            self.largest = self.find_largest();
-        }
-        match self.largest {
-            Largest::Known(core, key) => Some((core, key)),
-            _ => None,
-        }
-    }
-
-    /// The occupation of a core is about to change.
-    fn forget(&mut self, core: CoreId) {
-        if matches!(self.largest, Largest::Known(largest, _) if largest == core) {
-            self.largest = Largest::Unknown;
-        }
-    }
-
-    fn find_largest(&self) -> Largest {
-        let preemptible = self.occupations.iter().enumerate();
-        let keys = preemptible.filter_map(|(core, occupation)| match occupation {
-            Occupation::Preemptible(key) => Some((*key, to_u32(core))),
+    pub(super) fn largest_preemptible(&self) -> Option<(CoreId, Key)> {
+        let occupations = self.occupations.iter().enumerate();
+        let keys = occupations.filter_map(|(core, occupation)| match occupation {
+            Occupation::Preemptible(key) => Some((*key, core)),
             _ => None,
         });
-        keys.max().map_or(Largest::None, |(key, core)| {
-            Largest::Known(CoreId(core), key)
-        })
+        keys.max().map(|(key, core)| (CoreId(to_u32(core)), key))
     }
 }

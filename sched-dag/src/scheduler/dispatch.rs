@@ -28,9 +28,10 @@ impl Scheduler {
             && let Some((key, vertex)) = self.ready.pop()
             && let Some(core) = self.cores.take_idle()
         {
-            self.run(core, key, vertex);
+            let decision = self.give(core, key, vertex);
+            self.decisions.push(decision);
         }
-        if !core::mem::take(&mut self.is_unsettled) {
+        if core::mem::take(&mut self.fresh) == 0 {
             return;
         }
         while let Some(ready) = self.ready.peek()
@@ -39,12 +40,13 @@ impl Scheduler {
             && let Some((key, vertex)) = self.ready.pop()
         {
             self.preempt(core, running);
-            self.run(core, key, vertex);
+            let decision = self.give(core, key, vertex);
+            self.decisions.push(decision);
         }
     }
 
     /// Gives a core an instance that is ready.
-    fn run(&mut self, core: CoreId, key: Key, vertex: u32) {
+    pub(super) fn give(&mut self, core: CoreId, key: Key, vertex: u32) -> Decision {
         let instance = key.instance();
         let vertex = self.vertices.get_mut(vertex);
         let decision = match vertex.phase {
@@ -53,13 +55,13 @@ impl Scheduler {
         };
         vertex.phase = Phase::Running(core);
         self.cores.run(core, key, vertex.is_preemptible);
-        self.decisions.push(decision);
+        decision
     }
 
     /// Puts the instance that runs on a core back in line.
     fn preempt(&mut self, core: CoreId, running: Key) {
         let instance = running.instance();
-        let vertex = self.vertex(instance);
+        let vertex = self.vertex(instance).0;
         self.decisions.push(Decision::Preempt { core, instance });
         self.vertices.get_mut(vertex).phase = Phase::Preempted;
         self.ready.insert(vertex, running);

@@ -24,7 +24,7 @@ impl Scheduler {
     /// and returns its vertex. `event` says what the driver claims, if the
     /// instance has not started.
     pub(super) fn take_off(&mut self, instance: Instance, event: &str) -> u32 {
-        let number = self.vertex(instance);
+        let number = self.vertex(instance).0;
         let vertex = self.vertices.get(number);
         let jobs = &self.dags[instance.dag.index()].jobs;
         let in_flight = vertex.dag == instance.dag
@@ -51,7 +51,7 @@ impl Scheduler {
             dags,
             vertices,
             ready,
-            is_unsettled,
+            fresh,
             ..
         } = self;
         let state = &dags[dag.index()];
@@ -61,7 +61,7 @@ impl Scheduler {
             if vertices.release(number, sequence) {
                 let vertex = vertices.get_mut(number);
                 line_up(options.policy, number, vertex, job, ready, observer);
-                *is_unsettled = true;
+                *fresh += 1;
             }
         }
     }
@@ -113,7 +113,7 @@ impl Scheduler {
             vertices,
             ready,
             ending,
-            is_unsettled,
+            fresh,
             ..
         } = self;
         let dag = vertices.get(vertex).dag;
@@ -125,7 +125,7 @@ impl Scheduler {
                 ending.push(next);
             } else {
                 line_up(options.policy, next, vertex, job, ready, observer);
-                *is_unsettled = true;
+                *fresh += 1;
             }
         });
         let job = jobs.job_mut(sequence);

@@ -41,6 +41,7 @@ mod cores;
 mod decision;
 mod dispatch;
 mod ending;
+mod hand_off;
 pub(crate) mod heap;
 mod instances;
 mod jobs;
@@ -59,6 +60,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 pub use decision::Decision;
+pub use hand_off::HandOff;
 pub use moment::{Moment, Released};
 pub use observer::{JobOutcome, Observer};
 pub use statistics::DagStatistics;
@@ -70,7 +72,7 @@ use key::Key;
 use ready_queue::ReadyQueue;
 use vertices::Vertices;
 
-use crate::ids::{CoreId, DagId, Instance, to_u32};
+use crate::ids::{CoreId, DagId, Instance, Vertex, to_u32};
 use crate::policy::{Policy, Preemption};
 use crate::task_set::TaskSet;
 
@@ -96,8 +98,8 @@ pub struct Scheduler {
     vertices: Vertices,
     /// The ready instances that do not run.
     ready: ReadyQueue,
-    /// Whether an instance has become ready since the last dispatch.
-    is_unsettled: bool,
+    /// How many instances have become ready since the last dispatch.
+    fresh: u32,
     cores: Cores,
     /// When something happens to each DAG without a completion.
     timers: IndexedHeap<u64>,
@@ -162,7 +164,7 @@ impl Scheduler {
             now_ns: 0,
             dags: states,
             ready: ReadyQueue::new(&task_set, options.policy, &mut vertices),
-            is_unsettled: false,
+            fresh: 0,
             vertices,
             cores: Cores::new(options.cores),
             timers,
@@ -272,7 +274,24 @@ impl Scheduler {
 
     /// Returns the vertex of an instance's subtask. At most one instance of it is
     /// ready or runs at a time.
-    fn vertex(&self, instance: Instance) -> u32 {
-        self.dags[instance.dag.index()].first_vertex + instance.subtask.0
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn vertex(&self, instance: Instance) -> Vertex {
+        Vertex(self.dags[instance.dag.index()].first_vertex + instance.subtask.0)
+    }
+
+    /// Returns the instance that a vertex does, or has to do next. If its job is
+    /// not released yet, the number of the job means nothing.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such vertex.
+    #[must_use]
+    pub fn instance_of(&self, vertex: Vertex) -> Instance {
+        let vertex = self.vertices.get(vertex.0);
+        vertex.instance(self.dags[vertex.dag.index()].jobs.job(vertex.progress))
     }
 }

@@ -33,6 +33,8 @@ use crate::task_set::{Dag, TaskSet};
 #[derive(Debug)]
 pub(super) struct ReadyQueue {
     front: Option<(Key, u32)>,
+    /// How many are in the rest.
+    others: usize,
     rest: Rest,
 }
 
@@ -62,33 +64,38 @@ impl ReadyQueue {
         } else {
             Rest::Keyed(IndexedHeap::new(vertices.len()))
         };
-        Self { front: None, rest }
+        Self {
+            front: None,
+            others: 0,
+            rest,
+        }
     }
 
     /// Returns the smallest key.
     pub(super) fn peek(&self) -> Option<Key> {
         match self.front {
             Some((key, _)) => Some(key),
+            None if self.others == 0 => None,
             None => self.rest.peek(),
         }
     }
 
     /// Puts an instance of a vertex in line.
     pub(super) fn insert(&mut self, vertex: u32, key: Key) {
-        let first = match self.front {
-            Some((front, _)) => Some(front),
-            None => self.rest.peek(),
-        };
-        if first.is_some_and(|first| first < key) {
-            self.rest.insert(vertex, key);
+        if self.peek().is_some_and(|first| first < key) {
+            self.insert_behind(vertex, key);
         } else if let Some((key, vertex)) = self.front.replace((key, vertex)) {
-            self.rest.insert(vertex, key);
+            self.insert_behind(vertex, key);
         }
     }
 
     /// Takes the instance with the smallest key out.
     pub(super) fn pop(&mut self) -> Option<(Key, u32)> {
-        self.front.take().or_else(|| self.rest.pop())
+        if self.front.is_some() || self.others == 0 {
+            return self.front.take();
+        }
+        self.others -= 1;
+        self.rest.pop()
     }
 
     /// Takes the instance of a vertex out, which waits.
@@ -97,10 +104,16 @@ impl ReadyQueue {
             self.front = None;
             return;
         }
+        self.others -= 1;
         match &mut self.rest {
             Rest::Ranked { ranks, .. } => ranks.remove(place(urgency)),
             Rest::Keyed(heap) => heap.remove(vertex as usize),
         }
+    }
+
+    fn insert_behind(&mut self, vertex: u32, key: Key) {
+        self.others += 1;
+        self.rest.insert(vertex, key);
     }
 }
 
@@ -180,7 +193,11 @@ mod tests {
             ranks: BitSet::new(100),
             waiting: vec![(Key::default(), 0); 100].into_boxed_slice(),
         };
-        [ranked, Rest::Keyed(IndexedHeap::new(100))].map(|rest| ReadyQueue { front: None, rest })
+        [ranked, Rest::Keyed(IndexedHeap::new(100))].map(|rest| ReadyQueue {
+            front: None,
+            others: 0,
+            rest,
+        })
     }
 
     #[test]
