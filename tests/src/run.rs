@@ -13,6 +13,7 @@ mod screen;
 mod table;
 
 use std::fs::{self, File};
+use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -83,7 +84,8 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
     }
     let dags = prepare(&options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
-        print!("{}", dags.file);
+        // That no one reads on (`| head`) is no failure.
+        let _ = write!(stdout(), "{}", dags.file);
         return Ok(ExitCode::SUCCESS);
     }
     let booted = boot_app(&options, dags.as_ref(), true)?;

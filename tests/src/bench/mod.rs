@@ -8,10 +8,12 @@
 //!
 //! - [`scheduler`]: the commit, and the cost of a dispatched instance;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
-//! - [`join_latency`]: the paper's evaluation, on the machine in QEMU.
+//! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
+//! - [`makespan`]: task graphs on the machine, beside their published optima.
 
 pub mod hand_off;
 pub mod join_latency;
+pub mod makespan;
 pub mod scheduler;
 
 use std::process::ExitCode;
@@ -26,6 +28,8 @@ WHAT is one of:
                  instructions and in time; see bench hand-off --help
   join-latency   the paper's evaluation: boots each condition, writes samples,
                  figures, plots and a report; see bench join-latency --help
+  makespan       task graphs with published optimal makespans, on the machine; see
+                 bench makespan --help
 
 Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.
 ";
@@ -36,6 +40,7 @@ pub fn bench(words: &[String]) -> ExitCode {
     match words.split_first().map(|(what, rest)| (&**what, rest)) {
         Some(("hand-off", rest)) => return hand_off::run(rest),
         Some(("join-latency", rest)) => return join_latency::run(rest),
+        Some(("makespan", rest)) => return makespan::run(rest),
         _ => {}
     }
     if words.iter().any(|word| word == "--help" || word == "-h") {

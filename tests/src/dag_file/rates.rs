@@ -18,7 +18,7 @@
 //! Where times are missing: a source without timer gets the longest period of the
 //! graph, else its shortest end-to-end deadline, else the sum of all execution
 //! times. A DAG without deadline gets the smallest multiple of its period that is
-//! not shorter than its longest path, for no schedule can do better.
+//! longer than its longest path, for no schedule can be faster than that.
 
 use std::collections::BTreeMap;
 
@@ -79,7 +79,7 @@ impl Graph {
 }
 
 /// Splits a graph into DAGs, called `name` or, if there are several, `name` and
-/// their first subtask.
+/// their first source.
 ///
 /// # Errors
 ///
@@ -92,8 +92,12 @@ pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> 
     };
     let parts = parts(graph, is_kept);
     let is_one = parts.len() == 1;
-    let named = |part: &[usize]| match part.first() {
-        Some(&first) if !is_one => format!("{name}-{}", graph.subtasks[first].name),
+    let mut has_input = vec![false; graph.subtasks.len()];
+    for &(_, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
+        has_input[later] = true;
+    }
+    let named = |part: &[usize]| match part.iter().find(|&&subtask| !has_input[subtask]) {
+        Some(&source) if !is_one => format!("{name}-{}", graph.subtasks[source].name),
         _ => name.into(),
     };
     let mut dags: Vec<FileDag> = Vec::new();
@@ -240,7 +244,7 @@ fn dag<'g>(
     }
     if spec.relative_deadline_ns.is_none() {
         let path_ns = longest_path_ns(graph, part, &spec.edges);
-        let periods = path_ns.div_ceil(period_ns.max(1)).max(1);
+        let periods = path_ns / period_ns.max(1) + 1;
         spec.relative_deadline_ns = Some(period_ns.saturating_mul(periods));
         let remark = "no deadline is given: a multiple of the period that fits the longest path";
         dag.remarks.push(remark.into());

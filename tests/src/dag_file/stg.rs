@@ -166,8 +166,12 @@ fn read_graph(graph: &Value, text: &str) -> Result<TaskGraph, Malformed> {
 }
 
 impl TaskGraph {
-    /// Makes a DAG of it.
-    fn dag(&self, unit_ns: u64) -> Result<FileDag, Malformed> {
+    /// Makes a DAG of it, with units of so many nanoseconds.
+    ///
+    /// # Errors
+    ///
+    /// Its times do not fit 64 bits.
+    pub fn dag(&self, unit_ns: u64) -> Result<FileDag, Malformed> {
         let total: u128 = self.costs.iter().map(|cost| u128::from(*cost)).sum();
         let volume_ns = u64::try_from(total * u128::from(unit_ns)).map_err(|_| Malformed {
             line: self.line,

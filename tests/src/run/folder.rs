@@ -1,5 +1,6 @@
 //! `run --dag FOLDER`: each DAG file of a folder, one boot each, in one table.
 
+use std::io::{Write, stdout};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -19,7 +20,7 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
     let files = batch::files(folder).map_err(Refusal::Usage)?;
     let shows_lines = options.is_given("json");
     if !shows_lines {
-        println!("{}", batch::heading());
+        put(&batch::heading());
     }
     let (mut refused, mut failed) = (0, 0);
     for file in &files {
@@ -45,19 +46,26 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
         }
         conclude(&booted.outcome, &booted.log, &booted.screen);
         if shows_lines {
-            batch::lines(file, &booted.outcome).for_each(|line| println!("{line}"));
+            batch::lines(file, &booted.outcome).for_each(|line| put(&line));
         } else {
             let cores = options.number("cores").unwrap_or(1);
-            print!("{}", batch::rows(file, cores, &booted.outcome));
+            put(batch::rows(file, cores, &booted.outcome).trim_end());
         }
     }
     if !shows_lines {
         let count = files.len();
-        println!("{count} files: {refused} refused, {failed} failed");
+        put(&format!(
+            "{count} files: {refused} refused, {failed} failed"
+        ));
     }
     Ok(match (refused, failed) {
         (0, 0) => ExitCode::SUCCESS,
         (0, _) => ExitCode::FAILURE,
         _ => ExitCode::from(2),
     })
+}
+
+/// Writes lines. That no one reads them (`| head`) must not end the runs.
+fn put(lines: &str) {
+    let _ = writeln!(stdout(), "{lines}");
 }

@@ -73,7 +73,7 @@ fn missing_times_have_their_defaults() {
     let untimed = graph(&[("a", None), ("b", None), ("c", None)], &[(0, 1), (1, 2)]);
     let dag = &split(&untimed, "g").unwrap()[0];
     assert_eq!(dag.spec.period_ns, Some(3_000_000));
-    assert_eq!(dag.spec.relative_deadline_ns, Some(3_000_000));
+    assert_eq!(dag.spec.relative_deadline_ns, Some(6_000_000));
     // A longest path of 3 ms, a period of 2 ms.
     let fast = graph(
         &[("a", Some(2)), ("b", None), ("c", None)],

@@ -1,0 +1,172 @@
+//! Makespans of task graphs beside the shortest that are possible.
+//!
+//! A *makespan* is the time from a job's release to its completion. For the graphs
+//! of Kasahara's Standard Task Graph Set the shortest makespans without preemption
+//! are published. Here each graph runs as a DAG of one job, without preemption, on
+//! the machine: the subtask with the longest remaining path first, which is the
+//! priority that a commit derives from WCETs. What is compared is thus the kernel's
+//! own list schedule with the optimum, in the graphs' units of time.
+//!
+//! No schedule can be shorter than the optimum, and no list schedule on m cores
+//! longer than 2 - 1/m times that (R. L. Graham, SIAM J. Appl. Math. 17, 1969,
+//! doi 10.1137/0117039). Either is a limit: breaking it is a failure.
+//!
+//! - [`measure`]: boots, one a number of cores, with all graphs;
+//! - `report`: tables and files of them.
+
+mod measure;
+mod report;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+pub use measure::{Makespan, measure};
+
+use crate::dag_file::stg::{TaskGraph, read_graphs};
+use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::qemu::MOST_CORES;
+use crate::system;
+
+static TABLE: Command = Command {
+    invocation: "./scripts/bench makespan",
+    about: "Runs task graphs on the bare machine in QEMU and compares their makespans with the \
+            published optima.",
+    positional: None,
+    options: &[
+        Opt {
+            name: "file",
+            short: None,
+            takes: Takes::Text("FILE"),
+            default: "",
+            help: "The set of task graphs; tests/data/stg50.json.",
+        },
+        Opt {
+            name: "cores",
+            short: None,
+            takes: Takes::Numbers {
+                least: 1,
+                most: MOST_CORES,
+            },
+            default: "2,4,8,16",
+            help: "The numbers of cores; the file must have optima for them.",
+        },
+        Opt {
+            name: "graphs",
+            short: None,
+            takes: Takes::Text("NAMES"),
+            default: "",
+            help: "The graphs, with commas between; all of the file.",
+        },
+        Opt {
+            name: "out",
+            short: None,
+            takes: Takes::Text("FILE"),
+            default: "",
+            help: "Write the figures, too: as CSV, or as JSON Lines if the name ends in .json.",
+        },
+    ],
+    notes: "\
+Deterministic mode; execution ends on whole units of time, as in the model of the
+published optima. Printed are makespan and optimum of every graph, and for each
+number of cores how many graphs reach the optimum, and the mean and largest ratio.
+
+Exit code: 0 all is well; 1 a run failed, or a makespan is below the optimum or above
+Graham's bound; 2 the command line or the file is refused.
+",
+};
+
+/// Runs `bench makespan` with the words after its name.
+pub(super) fn run(words: &[String]) -> ExitCode {
+    let refuse = |line: &str| {
+        eprintln!("bench makespan: {line}");
+        ExitCode::from(2)
+    };
+    let options = match TABLE.parse(words) {
+        Ok(Request::Work(options)) => options,
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => return refuse(&error.to_string()),
+    };
+    let cores: Vec<u64> = (options.text("cores").unwrap_or_default().split(','))
+        .filter_map(|number| number.parse().ok())
+        .collect();
+    let graphs = match graphs(&options, &cores) {
+        Ok(graphs) => graphs,
+        Err(line) => return refuse(&line),
+    };
+    // A place that cannot be written is found before the work, not after.
+    let out = options.text("out").map(PathBuf::from);
+    if let Some(out) = &out
+        && let Err(error) = fs::write(out, "")
+    {
+        return refuse(&format!("`--out {}`: {error}", out.display()));
+    }
+    let mut all = Vec::new();
+    for cores in cores {
+        match measure(&graphs, cores) {
+            Ok(makespans) => all.extend(makespans),
+            Err(line) => {
+                eprintln!("bench makespan: {line}");
+                return ExitCode::FAILURE;
+            }
+        }
+    }
+    print!("{}", report::table(&all));
+    if let Some(out) = &out {
+        let as_json = out.extension().is_some_and(|extension| extension == "json");
+        let text = if as_json {
+            report::json_lines(&all)
+        } else {
+            report::csv(&all)
+        };
+        if let Err(error) = fs::write(out, text) {
+            eprintln!("bench makespan: `--out {}`: {error}", out.display());
+            return ExitCode::FAILURE;
+        }
+    }
+    let broken: Vec<String> = all.iter().filter_map(Makespan::complaint).collect();
+    broken
+        .iter()
+        .for_each(|line| eprintln!("bench makespan: {line}"));
+    ExitCode::from(u8::from(!broken.is_empty()))
+}
+
+/// Reads the graphs that are wanted, with an optimum for each number of cores.
+fn graphs(options: &Parsed, cores: &[u64]) -> Result<Vec<TaskGraph>, String> {
+    let usual = || system::workspace().join("tests/data/stg50.json");
+    let path = options.text("file").map_or_else(usual, PathBuf::from);
+    let place = path.display();
+    let text = fs::read_to_string(&path).map_err(|error| format!("{place}: {error}"))?;
+    let graphs = read_graphs(&text)
+        .map_err(|malformed| format!("{place}:{}: {}", malformed.line, malformed.reason))?;
+    let wanted: Option<Vec<&str>> = options
+        .text("graphs")
+        .map(|names| names.split(',').collect());
+    for name in wanted.iter().flatten() {
+        if !graphs.iter().any(|graph| graph.name == *name) {
+            return Err(format!(
+                "`--graphs`: {place} has no graph `{name}`; name one of its own"
+            ));
+        }
+    }
+    let mut graphs = graphs;
+    graphs.retain(|graph| {
+        let names = wanted.as_ref();
+        names.is_none_or(|names| names.contains(&graph.name.as_str()))
+    });
+    for graph in &graphs {
+        if let Some(cores) = cores
+            .iter()
+            .find(|cores| !graph.optimal.contains_key(cores))
+        {
+            let (line, name) = (graph.line, &graph.name);
+            return Err(format!(
+                "{place}:{line}: graph `{name}` has no optimum for {cores} cores; choose others"
+            ));
+        }
+    }
+    Ok(graphs)
+}
