@@ -9,13 +9,13 @@
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | how many events each core keeps; 0: none | 4096 |
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
-//! | `mode=...` | the host's name for what time means; ignored | |
+//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle, see `machine::counted_time` | |
 
 use alloc::format;
 
 use fass::{Overheads, Policy, Preemption};
 
-use crate::machine::interrupts_off;
+use crate::machine::{counted_time, interrupts_off};
 use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
 
@@ -57,9 +57,10 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Tracing, UsageError> {
     if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
         interrupts_off::enable();
     }
-    // What time means is the host's choice and changes nothing here; the word
-    // stands there so that the log shows it.
-    let _ = options.text("mode");
+    // What time means is the host's choice; of its names one alone matters here.
+    if options.text("mode") == Some("deterministic") {
+        counted_time::enable();
+    }
     let events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
     Ok(Tracing {
         events: usize::try_from(events).unwrap_or(0),

@@ -7,7 +7,7 @@ use core::arch::asm;
 use core::arch::x86_64::__cpuid;
 use core::panic::Location;
 
-use super::interrupts_off;
+use super::{counted_time, interrupts_off};
 
 /// Disables interrupts on this processor and reports whether they were enabled.
 #[track_caller]
@@ -47,6 +47,7 @@ pub(crate) fn enable_interrupts() {
 /// between and leave the processor halted with work to do.
 pub(crate) fn enable_interrupts_and_halt() {
     interrupts_off::end();
+    counted_time::count_before_halt();
     // SAFETY: as for `enable_interrupts`; halting changes no state.
     unsafe { asm!("sti", "hlt") };
 }

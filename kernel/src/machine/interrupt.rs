@@ -9,7 +9,7 @@ use core::panic::Location;
 
 use super::context::{Parked, Registers};
 use super::once::Once;
-use super::{cpu, descriptors, fault, interrupts_off, local_apic, this_core};
+use super::{cpu, descriptors, fault, interrupts_off, local_apic, this_core, timer};
 
 global_asm!(
     include_str!("interrupt.s"),
@@ -91,6 +91,7 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
     let vector = unsafe { (*registers).vector };
     match (u8::try_from(vector), HANDLERS.get()) {
         (Ok(vector::TIMER), Some(handlers)) => {
+            timer::settle();
             local_apic::acknowledge();
             (handlers.timer)(&mut Interrupted(()));
         }

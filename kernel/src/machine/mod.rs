@@ -7,6 +7,7 @@
 
 pub(crate) mod clock;
 pub(crate) mod context;
+pub(crate) mod counted_time;
 pub(crate) mod cpu;
 pub(crate) mod descriptors;
 pub(crate) mod exit;

@@ -7,7 +7,7 @@
 use core::sync::atomic::Ordering;
 
 use super::this_core::{self, Core};
-use super::{clock, cpu, local_apic};
+use super::{clock, counted_time, cpu, local_apic};
 
 /// What an alarm is for; each core has one of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,16 +65,24 @@ pub(crate) fn arm_earliest() {
     arm(this_core::get());
 }
 
+/// Begins a timer's interrupt: removes from its time what depends on the host, see
+/// [`counted_time`].
+pub(super) fn settle() {
+    counted_time::settle(earliest_ns(this_core::get()));
+}
+
 fn arm(core: &Core) {
-    let times = core
-        .alarms
-        .iter()
-        .map(|alarm| alarm.load(Ordering::Relaxed));
-    match times.min() {
-        None | Some(u64::MAX) => local_apic::start_timer(0),
-        Some(at_ns) => {
+    match earliest_ns(core) {
+        u64::MAX => local_apic::start_timer(0),
+        at_ns => {
             let remaining_ns = at_ns.saturating_sub(clock::now_ns());
             local_apic::start_timer(clock::apic_ticks(remaining_ns));
         }
     }
+}
+
+/// Returns the time of the core's earliest alarm, `u64::MAX` if it has none.
+fn earliest_ns(core: &Core) -> u64 {
+    let times = core.alarms.iter().map(|at| at.load(Ordering::Relaxed));
+    times.min().unwrap_or(u64::MAX)
 }

@@ -1,0 +1,83 @@
+//! Time that QEMU counts, made to repeat to the nanosecond.
+//!
+//! With `-icount shift=0,sleep=off` an instruction takes a nanosecond, and when
+//! all cores halt QEMU advances the clock to the next timer's end. That jump is
+//! made by another thread of QEMU's than the one that executes instructions: its
+//! main loop (`main_loop_wait` calls `icount_start_warp_timer`), which is also
+//! awake for no reason after each timer that has fired. It takes the halt of the
+//! last core for real as soon as `hlt` has set its flag, but the instructions up to
+//! and including `hlt` are counted only when the core's turn has ended
+//! (`icount_process_data`). If the main loop looks in between, it jumps to the
+//! timer's end, and those few instructions are added on top of it: the interrupt
+//! comes some 9 ns late. Which of the two is first depends on the host, some
+//! 1 halt in 100,000 goes the other way, and everything that follows is shifted.
+//!
+//! What is late by less than [`GRACE_NS`] can be made equally late: a timer's
+//! interrupt, before it does or looks at anything, waits until exactly that long
+//! after its time ([`settle`]). As a loop has a length, it could not wait for a
+//! nanosecond; it executes as many `nop`s as nanoseconds are left. And a core reads
+//! the counter right before it halts ([`count_before_halt`]), which makes QEMU count
+//! what it has executed so far, so that no more than a few instructions are at stake.
+//!
+//! All this is off unless [`enable`] is called, and of no use where an instruction
+//! does not take a nanosecond. It guarantees nothing where a timer's interrupt
+//! waits for its turn because other cores compute; but then not all cores have
+//! halted, and the clock has not jumped.
+
+use core::arch::asm;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use super::{clock, cpu};
+
+/// How long after its time a timer's interrupt goes on. From there to [`settle`] it
+/// is some 70 instructions, from [`count_before_halt`] to the halt less than 10.
+const GRACE_NS: u64 = 128;
+
+static IS_ENABLED: AtomicBool = AtomicBool::new(false);
+
+/// Makes timers' interrupts settle from now on.
+pub(crate) fn enable() {
+    IS_ENABLED.store(true, Ordering::Relaxed);
+}
+
+/// Returns [`GRACE_NS`] after `at_ns`, the time for which this core's timer was
+/// armed; at once if that is past, or if the timer is early.
+#[inline]
+pub(super) fn settle(at_ns: u64) {
+    if IS_ENABLED.load(Ordering::Relaxed)
+        && let Some(late_ns) = clock::now_ns().checked_sub(at_ns)
+    {
+        execute_nops(GRACE_NS.saturating_sub(late_ns));
+    }
+}
+
+/// Begins the last few instructions before a halt.
+#[inline]
+pub(super) fn count_before_halt() {
+    if IS_ENABLED.load(Ordering::Relaxed) {
+        let _ = cpu::time_stamp();
+    }
+}
+
+/// Executes that many instructions, at most [`GRACE_NS`], and always the same few
+/// besides.
+fn execute_nops(count: u64) {
+    let count = count.min(GRACE_NS);
+    // SAFETY: the jump goes to one of the `nop`s, of one byte each, or to the end,
+    // since `count` is not larger than their number; no memory is touched.
+    unsafe {
+        asm!(
+            "lea {target}, [rip + 2f]",
+            "sub {target}, {count}",
+            "jmp {target}",
+            ".rept {most}",
+            "nop",
+            ".endr",
+            "2:",
+            target = out(reg) _,
+            count = in(reg) count,
+            most = const GRACE_NS,
+            options(nomem, nostack),
+        );
+    }
+}
