@@ -1,4 +1,5 @@
-//! The two cells in which the crate's `unsafe` lives: a job slot and a set-once.
+//! The three cells in which the crate's `unsafe` lives: a job slot, a shared value
+//! and a set-once.
 //!
 //! # The slot ring
 //!
@@ -33,6 +34,19 @@
 //! a platform that runs instances in a wrong order gets its value refused
 //! ([`Writer::put`]) or finds none ([`Reader::take`]), but never a data race.
 //!
+//! # The shared value
+//!
+//! A [`Shared`] value is changed by one or looked at by several, never both. Who
+//! wants it *claims* it for that time. Nobody ever waits: the schedule is such that
+//! every claim succeeds, and one that does not is refused.
+//!
+//! > **Claim invariant.** The word `claims` counts those who look at the value, or
+//! > is `CHANGING` while one may change it. Nobody touches the value without a
+//! > claim. A claim is made by an `Acquire` exchange that moves `claims` from 0 to
+//! > `CHANGING`, or from any smaller count to the next; it is given back by a
+//! > `Release` change. So all that one holder did happens before all that the next
+//! > conflicting one does.
+//!
 //! # The set-once
 //!
 //! [`SetOnce`] holds the installed platform: empty, then set for ever.
@@ -46,7 +60,8 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
-use core::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use core::ops::{Deref, DerefMut};
+use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 /// The turn of a slot that holds no value.
 const EMPTY_SLOT: u64 = 0;
@@ -166,6 +181,92 @@ impl<T> Drop for Slot<T> {
             // initialised; `&mut self` shows that both ends are gone.
             unsafe { self.value.get_mut().assume_init_drop() };
         }
+    }
+}
+
+/// The claims of a value that is being changed; also more than can ever look.
+const CHANGING: u32 = u32::MAX;
+
+/// A value that one may change or several look at.
+pub struct Shared<T> {
+    claims: AtomicU32,
+    value: UnsafeCell<T>,
+}
+
+// SAFETY: by the claim invariant threads have either one `&mut T` or several `&T`
+// between them. `T: Send` because the value is changed, and moved out of and into
+// its place, by one thread after another; `T: Sync` because several look at it.
+unsafe impl<T: Send + Sync> Sync for Shared<T> {}
+
+/// The claim of one who may change the value.
+pub struct Changing<'a, T>(&'a Shared<T>);
+
+/// The claim of one who looks at the value.
+pub struct Looking<'a, T>(&'a Shared<T>);
+
+impl<T> Shared<T> {
+    pub(crate) const fn new(value: T) -> Self {
+        Self {
+            claims: AtomicU32::new(0),
+            value: UnsafeCell::new(value),
+        }
+    }
+
+    /// Claims the value for a change, unless somebody else has a claim.
+    pub(crate) fn change(&self) -> Option<Changing<'_, T>> {
+        let claim = self
+            .claims
+            .compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed);
+        claim.ok().map(|_| Changing(self))
+    }
+
+    /// Claims the value for a look, unless somebody may change it.
+    pub(crate) fn look(&self) -> Option<Looking<'_, T>> {
+        let one_more = |claims| (claims < CHANGING - 1).then(|| claims + 1);
+        let claim = self
+            .claims
+            .fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more);
+        claim.ok().map(|_| Looking(self))
+    }
+}
+
+impl<T> Deref for Changing<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: by the claim invariant this claim is the only one, and `&self`
+        // keeps it from giving out `&mut T` meanwhile.
+        unsafe { &*self.0.value.get() }
+    }
+}
+
+impl<T> DerefMut for Changing<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        // SAFETY: by the claim invariant this claim is the only one, and `&mut self`
+        // keeps it from giving out another reference meanwhile.
+        unsafe { &mut *self.0.value.get() }
+    }
+}
+
+impl<T> Deref for Looking<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: by the claim invariant nobody may change the value while this
+        // claim exists.
+        unsafe { &*self.0.value.get() }
+    }
+}
+
+impl<T> Drop for Changing<'_, T> {
+    fn drop(&mut self) {
+        self.0.claims.store(0, Ordering::Release);
+    }
+}
+
+impl<T> Drop for Looking<'_, T> {
+    fn drop(&mut self) {
+        self.0.claims.fetch_sub(1, Ordering::Release);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Tests of the cells, on real threads. They also serve under Miri, where the
 //! counts shrink so that a run ends.
 
-use super::{SetOnce, ring};
+use super::{SetOnce, Shared, ring};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{thread, vec::Vec};
@@ -218,4 +218,50 @@ fn set_once_has_one_winner_and_all_see_it() {
         assert_eq!(winners.load(Ordering::Relaxed), 1);
         assert!(cell.get().is_some());
     }
+}
+
+#[test]
+fn a_claim_for_a_change_excludes_all_others() {
+    let shared = Shared::new(1);
+    {
+        let mut change = shared.change().expect("free");
+        *change += 1;
+        assert!(shared.change().is_none() && shared.look().is_none());
+    }
+    let (one, other) = (shared.look().expect("free"), shared.look().expect("shared"));
+    assert_eq!((*one, *other), (2, 2));
+    assert!(shared.change().is_none());
+    drop(one);
+    assert!(shared.change().is_none());
+    drop(other);
+    assert!(shared.change().is_some());
+}
+
+#[test]
+fn threads_never_change_a_shared_value_at_the_same_time() {
+    let shared = Arc::new(Shared::new([0_u64; 4]));
+    let threads: Vec<_> = (0..3)
+        .map(|_| {
+            let shared = Arc::clone(&shared);
+            thread::spawn(move || {
+                let mut changes = 0;
+                for round in 0..JOBS {
+                    if round % 3 == 0
+                        && let Some(values) = shared.look()
+                    {
+                        assert_eq!(*values, [values[0]; 4]);
+                    } else if let Some(mut values) = shared.change() {
+                        values.iter_mut().for_each(|value| *value += 1);
+                        changes += 1;
+                    }
+                }
+                changes
+            })
+        })
+        .collect();
+    let changes: u64 = threads
+        .into_iter()
+        .map(|t| t.join().expect("no panic"))
+        .sum();
+    assert_eq!(shared.look().expect("free")[0], changes);
 }

@@ -13,16 +13,16 @@
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
-
-use sched_dag::{CommitOptions, ConstructionPolicy, DagId, DagLabel, DagSpec};
-use sched_dag::{Policy, TaskSet, Verified, Warning};
+use sched_dag::{CommitOptions, ConstructionPolicy, DagId, DagLabel};
+use sched_dag::{Policy, Verified, Warning};
 
 use crate::answer::{Answer, Answers};
 use crate::dag::Dag;
 use crate::fault::{CommitError, Fault};
-use crate::plan::{Body, Plan};
 use crate::platform;
-use crate::topic::Wiring;
+use crate::signal::Signal;
+use crate::staleness::{self, Staleness};
+use crate::tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
 ///
@@ -128,9 +128,14 @@ pub fn finish_create_dags_with(
     if !faults.is_empty() {
         return Err(CommitError { faults, warnings });
     }
+    let staleness = staleness::of_all(dags, &task_set, &answers.of_dags);
     let plan = tie(dags, task_set);
     match platform.launch(plan) {
-        Ok(()) => Ok(Commit { warnings, answers }),
+        Ok(()) => Ok(Commit {
+            warnings,
+            answers,
+            staleness,
+        }),
         Err(error) => Err(CommitError {
             faults: Vec::from([Fault::NotLaunched(error)]),
             warnings,
@@ -163,6 +168,7 @@ pub fn finish_create_dags_with(
 pub struct Commit {
     warnings: Vec<Warning>,
     answers: Answers,
+    staleness: Vec<Staleness>,
 }
 
 impl Commit {
@@ -213,6 +219,15 @@ impl Commit {
         &self.answers.of_dags
     }
 
+    /// Returns for each subtask that samples a latest value, in the order of the
+    /// commit, how old that value can be; see [`Staleness`].
+    ///
+    /// See [`Latest`](crate::Latest) for an example.
+    #[must_use]
+    pub fn staleness(&self) -> &[Staleness] {
+        &self.staleness
+    }
+
     /// Returns the first DAG that is not proven to meet its deadlines: one that
     /// cannot be analysed, else one that is certain to miss them at its WCETs,
     /// else the most urgent one for which no test gives a bound. `None` if every
@@ -234,6 +249,32 @@ impl Commit {
     pub fn first_unproven(&self) -> Option<&Answer> {
         self.answers.of_dags.get(self.answers.first_unproven?)
     }
+}
+
+/// Returns a fault for each use of something of a DAG that is not in the commit.
+fn missing_others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
+    let draft = dag.draft.borrow();
+    let samples = draft.samples.iter();
+    let not_there = samples.filter(|(_, latest)| staleness::writer_of(dags, &**latest).is_none());
+    let latest = not_there.map(|(subtask, latest)| Fault::LatestNotCommitted {
+        dag: label.clone(),
+        subtask: staleness::label_of(dag, *subtask),
+        topic: latest.topic().into(),
+    });
+    let is_target = |signal: &Signal, other: &Dag| {
+        let other = other.draft.borrow();
+        other
+            .signal
+            .as_ref()
+            .is_some_and(|target| signal.is(target))
+    };
+    let raises = draft.raises.iter();
+    let unknown = raises.filter(|(_, signal)| !dags.iter().any(|other| is_target(signal, other)));
+    let signals = unknown.map(|(subtask, _)| Fault::SignalNotCommitted {
+        dag: label.clone(),
+        subtask: staleness::label_of(dag, *subtask),
+    });
+    latest.chain(signals).collect()
 }
 
 /// Returns a fault for each DAG that demands a proof and has none.
@@ -278,6 +319,7 @@ fn verify(dags: &[Dag], options: CommitOptions) -> Result<Verified, CommitError>
             name: spec.name.clone(),
         };
         faults.extend((draft.faults.iter()).map(|fault| fault.clone().in_dag(&label)));
+        faults.extend(missing_others(dags, dag, &label));
         specs.push(spec);
     }
     // A commit of nothing but repeated DAGs has been told what is wrong.
@@ -317,30 +359,4 @@ fn is_consequence(fault: &sched_dag::Fault, ours: &[Fault]) -> bool {
     ours.iter().any(|fault| {
         matches!(fault, Fault::DurationTooLong { dag, what, .. } if dag == label && *what == missing)
     })
-}
-
-/// Turns verified DAGs into a plan, and closes their handles.
-fn tie(dags: &[Dag], task_set: TaskSet) -> Plan {
-    let bodies = (dags.iter().zip(task_set.dags()))
-        .map(|(dag, verified)| {
-            let (spec, make_bodies) = {
-                let mut draft = dag.draft.borrow_mut();
-                draft.is_committed = true;
-                let name = draft.spec.name.clone();
-                let named = DagSpec {
-                    name,
-                    ..DagSpec::default()
-                };
-                let spec = core::mem::replace(&mut draft.spec, named);
-                (spec, core::mem::take(&mut draft.make_bodies))
-            };
-            let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
-            let mut wiring = Wiring::new(&spec, slots);
-            let make = |(subtask, make_body): (usize, crate::subtask::MakeBody)| -> Body {
-                make_body(&mut wiring, subtask)
-            };
-            make_bodies.into_iter().enumerate().map(make).collect()
-        })
-        .collect();
-    Plan { task_set, bodies }
 }

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 use core::time::Duration;
 
-use sched_dag::OverrunPolicy;
+use sched_dag::{Activation, OverrunPolicy};
 
 use crate::attributes::SubtaskAttributes;
 use crate::draft::Draft;
@@ -187,7 +187,7 @@ impl Dag {
         let mut draft = self.open();
         let source = move |()| f();
         let subtask = draft.register(source, &[], &output_topics, attributes);
-        draft.set_period(period, subtask);
+        draft.set_period(Activation::Periodic, period, subtask);
     }
 
     /// Registers a subtask between the source and the sink: a function from a
@@ -361,7 +361,7 @@ impl Dag {
 
     /// Borrows the draft for a change.
     #[track_caller]
-    fn open(&self) -> RefMut<'_, Draft> {
+    pub(crate) fn open(&self) -> RefMut<'_, Draft> {
         let draft = self.draft.borrow_mut();
         assert!(
             !draft.is_committed,

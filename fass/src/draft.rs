@@ -7,17 +7,23 @@
 //! keeps its topics in the spec, but with the type [`Unknown`], which the commit
 //! takes to be whatever the topic's other end says.
 
+use alloc::boxed::Box;
+use alloc::rc::Rc;
 use alloc::string::String;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
-use sched_dag::{DagId, DagLabel, DagSpec, Priority, SubtaskId, SubtaskLabel};
-use sched_dag::{SubtaskSpec, TopicPort};
+use sched_dag::{Activation, DagId, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId};
+use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
 use crate::attributes::SubtaskAttributes;
+use crate::effect::Effect;
 use crate::fault::Fault;
+use crate::latest::AnyLatest;
 use crate::message::MessageType;
+use crate::signal::{Signal, Target};
 use crate::subtask::{MakeBody, defer};
 use crate::tuple::{VecToPubs, VecToSubs};
 use crate::untyped;
@@ -33,6 +39,16 @@ pub(crate) struct Draft {
     pub(crate) is_committed: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
     pub(crate) demands_proof: bool,
+    /// The topics whose latest values are offered.
+    pub(crate) latest: Vec<Rc<dyn AnyLatest>>,
+    /// The latest values that subtasks sample, of whatever DAG.
+    pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>)>,
+    /// The signals that subtasks may raise, of whatever DAG.
+    pub(crate) raises: Vec<(usize, Signal)>,
+    /// What completions of subtasks do beyond the DAG, latest values apart.
+    pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
+    /// What releases this DAG, if it is sporadic.
+    pub(crate) signal: Option<Arc<Target>>,
 }
 
 /// The type of a topic's end that no function states.
@@ -125,7 +141,21 @@ impl Draft {
         self.spec.offset_ns = self.convert(offset, None, "offset").unwrap_or(0);
     }
 
-    pub(crate) fn set_period(&mut self, period: Duration, subtask: SubtaskLabel) {
+    pub(crate) fn set_period(
+        &mut self,
+        activation: Activation,
+        period: Duration,
+        subtask: SubtaskLabel,
+    ) {
+        let is_first = self.spec.period_ns.is_none();
+        if !is_first && self.spec.activation != activation {
+            self.faults.push(Fault::ActivationsDiffer {
+                dag: blank(),
+                subtask,
+            });
+            return;
+        }
+        self.spec.activation = activation;
         let Some(period_ns) = self.convert(period, Some(&subtask), "period") else {
             return;
         };
@@ -159,6 +189,12 @@ impl Draft {
     /// type, where that is known.
     pub(crate) fn spec_with_known_types(&self) -> DagSpec {
         let mut spec = self.spec.clone();
+        spec.latest = (self.latest.iter())
+            .map(|latest| LatestSpec {
+                port: latest.port(),
+                samplers: latest.samplers(),
+            })
+            .collect();
         let unknown = MessageType::of::<Unknown>().id();
         let is_arity_fault =
             |fault: &Fault| matches!(fault, Fault::InputArity { .. } | Fault::OutputArity { .. });
@@ -169,6 +205,7 @@ impl Draft {
             .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs))
             .filter(|port| port.type_id != unknown)
             .cloned()
+            .chain(self.latest.iter().map(|latest| latest.port()))
             .collect();
         for subtask in &mut spec.subtasks {
             for port in subtask.inputs.iter_mut().chain(&mut subtask.outputs) {
@@ -217,12 +254,7 @@ fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
         .map(|(index, topic)| {
             let known = types.get(index).filter(|_| fits).copied();
             let message = known.unwrap_or_else(MessageType::of::<Unknown>);
-            TopicPort {
-                topic: (*topic).into(),
-                type_id: message.id(),
-                type_name: message.name(),
-                can_fan_out: message.can_fan_out(),
-            }
+            message.port(topic)
         })
         .collect()
 }

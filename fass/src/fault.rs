@@ -4,6 +4,7 @@
 //! faults of the graph itself are [`sched_dag::Fault`]s; the ones here can only
 //! be seen from this side: the shape of functions, durations, the platform.
 
+use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -96,6 +97,29 @@ pub enum Fault {
         /// The other period, in nanoseconds.
         second_ns: u64,
     },
+    /// Of two sources of one DAG one is periodic and one sporadic.
+    ActivationsDiffer {
+        /// The DAG.
+        dag: DagLabel,
+        /// The source registered second.
+        subtask: SubtaskLabel,
+    },
+    /// A subtask samples a latest value of a DAG that is not in the commit.
+    LatestNotCommitted {
+        /// The DAG of the subtask.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The topic.
+        topic: String,
+    },
+    /// A subtask may raise the signal of a DAG that is not in the commit.
+    SignalNotCommitted {
+        /// The DAG of the subtask.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+    },
     /// Two sinks of one DAG state different relative deadlines.
     DeadlinesDiffer {
         /// The DAG.
@@ -137,6 +161,9 @@ impl Fault {
             Self::OutputArity { .. } => "output_arity",
             Self::DurationTooLong { .. } => "duration_too_long",
             Self::PeriodsDiffer { .. } => "periods_differ",
+            Self::ActivationsDiffer { .. } => "activations_differ",
+            Self::LatestNotCommitted { .. } => "latest_not_committed",
+            Self::SignalNotCommitted { .. } => "signal_not_committed",
             Self::DeadlinesDiffer { .. } => "deadlines_differ",
             Self::NotProven { .. } => "not_proven",
             Self::Model(fault) => fault.code(),
@@ -153,6 +180,9 @@ impl Fault {
             | Self::OutputArity { dag, .. }
             | Self::DurationTooLong { dag, .. }
             | Self::PeriodsDiffer { dag, .. }
+            | Self::ActivationsDiffer { dag, .. }
+            | Self::LatestNotCommitted { dag, .. }
+            | Self::SignalNotCommitted { dag, .. }
             | Self::DeadlinesDiffer { dag, .. } => dag.clone_from(label),
             Self::NoPlatform | Self::NotProven { .. } | Self::Model(_) | Self::NotLaunched(_) => {}
         }
@@ -214,6 +244,25 @@ impl fmt::Display for Fault {
                 f,
                 "{subtask} gives {dag} a period of {second_ns} ns where {first_ns} ns were given \
                  before; a DAG has one period, make two DAGs or give the same period"
+            ),
+            Self::ActivationsDiffer { dag, subtask } => write!(
+                f,
+                "{subtask} makes a second source of {dag}, which is released by the clock for one \
+                 and by a signal for the other; make two DAGs, or both sources alike"
+            ),
+            Self::LatestNotCommitted {
+                dag,
+                subtask,
+                topic,
+            } => write!(
+                f,
+                "{subtask} of {dag} samples the latest value of topic `{topic}`, whose dag is not \
+                 in the commit; commit both dags in one call"
+            ),
+            Self::SignalNotCommitted { dag, subtask } => write!(
+                f,
+                "{subtask} of {dag} may raise the signal of a dag that is not in the commit; \
+                 commit both dags in one call"
             ),
             Self::DeadlinesDiffer {
                 dag,

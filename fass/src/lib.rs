@@ -65,9 +65,12 @@
 //!   those: every value carries its job's number and is found by it.
 //! - Nothing a function returns is seen before it has returned, and then all of
 //!   it at once. Sending never waits.
-//! - After the commit the crate allocates nothing, takes no lock and does no
-//!   locked read-modify-write. (What functions and their messages' `clone` do
-//!   is theirs.)
+//! - What functions share otherwise is stated and typed: a [`State`] within a DAG, a
+//!   [`Latest`] value between DAGs, a [`Signal`] that releases one. The commit turns
+//!   it into precedence, bounded staleness, or a minimum distance of releases.
+//! - After the commit the crate allocates nothing and takes no lock. Edges do no
+//!   locked read-modify-write; states and latest values do one or two a use. (What
+//!   functions and their messages' `clone` do is theirs.)
 //! - [`finish_create_dags`] reports everything that is wrong at once. Where
 //!   WCETs are given, it also says by when each DAG's jobs are complete, or that
 //!   it cannot prove it ([`Commit::answers`]).
@@ -100,21 +103,29 @@ mod cell;
 mod commit;
 mod dag;
 mod draft;
+mod effect;
 mod fault;
 mod gate;
+mod latest;
 mod message;
 mod plan;
 mod platform;
+mod signal;
+mod staleness;
+mod state;
 mod subtask;
+mod tie;
 mod topic;
 mod tuple;
 mod untyped;
+mod uses;
 
 pub use answer::{Answer, Unproven, Verdict};
 pub use attributes::SubtaskAttributes;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use dag::{Dag, create_dag};
 pub use fault::{CommitError, Fault};
+pub use latest::{Latest, Sample, Sampling};
 pub use message::{Message, MessageType, Unique};
 pub use plan::{Body, Plan};
 pub use platform::{
@@ -122,6 +133,10 @@ pub use platform::{
 };
 pub use sched_dag::analysis::{Overheads, Reason, Test};
 pub use sched_dag::{ConstructionPolicy, Count, OverrunPolicy, Policy, Preemption, Warning};
+pub use signal::{Raiser, Raising, Signal};
+pub use staleness::Staleness;
+pub use state::{Read, State, Update};
 pub use topic::{Ports, Publisher, Subscriber};
 pub use tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use untyped::Untyped;
+pub use uses::{Uses, Using};

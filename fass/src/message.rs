@@ -13,6 +13,8 @@
 use core::any::{TypeId, type_name};
 use core::ops::{Deref, DerefMut};
 
+use sched_dag::TopicPort;
+
 /// A value that a topic can carry from one subtask to others.
 ///
 /// Every type that is `Clone + Send + 'static` is a message already, and so is
@@ -182,6 +184,16 @@ impl MessageType {
             id: TypeId::of::<M>(),
             name: type_name::<M>(),
             can_fan_out: M::CAN_FAN_OUT,
+        }
+    }
+
+    /// Returns one end of a topic of this type.
+    pub(crate) fn port(&self, topic: &str) -> TopicPort {
+        TopicPort {
+            topic: topic.into(),
+            type_id: self.id,
+            type_name: self.name,
+            can_fan_out: self.can_fan_out,
         }
     }
 

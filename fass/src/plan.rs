@@ -3,11 +3,13 @@
 //! The platform's scheduler decides *which* instance runs *where* and *when*;
 //! it then calls [`Body::run`] there. A body never decides anything.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::task::{Context, Poll, Waker};
 
-use sched_dag::TaskSet;
+use sched_dag::{DagId, TaskSet};
 
+use crate::effect::Effect;
 use crate::gate::{Gate, Grant};
 use crate::subtask::SubtaskFuture;
 
@@ -30,6 +32,10 @@ use crate::subtask::SubtaskFuture;
 pub struct Plan {
     /// The verified model, for the scheduler.
     pub task_set: TaskSet,
+    /// The plan's number, never 0, different from that of every other plan of the
+    /// program. Signals know their plan by it
+    /// ([`Platform::raise`](crate::Platform::raise)).
+    pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<Body>>,
 }
@@ -56,11 +62,22 @@ pub struct Plan {
 pub struct Body {
     future: SubtaskFuture,
     gate: Gate,
+    /// What its completions do beyond the DAG.
+    effects: Vec<Box<dyn Effect>>,
 }
 
 impl Body {
     pub(crate) fn new(future: SubtaskFuture, gate: Gate) -> Self {
-        Self { future, gate }
+        Self {
+            future,
+            gate,
+            effects: Vec::new(),
+        }
+    }
+
+    /// Adds what each completion does beyond the DAG.
+    pub(crate) fn add_effects(&mut self, effects: impl IntoIterator<Item = Box<dyn Effect>>) {
+        self.effects.extend(effects);
     }
 
     /// Runs the subtask's part of job `job` to its end.
@@ -69,8 +86,8 @@ impl Body {
     /// slots. Polls the subtask's future exactly once. Does not allocate (the
     /// function itself may).
     ///
-    /// The caller reports the completion to the scheduler afterwards, and starts
-    /// the successors only then.
+    /// The caller calls [`complete`](Self::complete) afterwards, reports the
+    /// completion to the scheduler, and starts the successors only then.
     ///
     /// # Panics
     ///
@@ -87,6 +104,25 @@ impl Body {
     /// ```
     pub fn run(&mut self, job: u64) {
         self.grant(Grant::Run(job));
+    }
+
+    /// Lets happen what the last [`run`](Self::run) has prepared outside the DAG:
+    /// its latest values show, and `raise` is called with the DAG of each signal.
+    ///
+    /// The caller does so once the instance is complete for it, at `completed_ns` on
+    /// the clock of [`crate::now_ns`], and not for an instance that failed. It passes
+    /// the signals to the scheduler with the completion. Does not wait, allocate or
+    /// run code of the app; a body that has no such effects returns at once.
+    ///
+    /// ```
+    /// fn completed(body: &mut fass::Body, now_ns: u64) {
+    ///     body.complete(now_ns, &mut |dag| println!("dag {} gets a signal", dag.0));
+    /// }
+    /// ```
+    pub fn complete(&mut self, completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
+        for effect in &mut self.effects {
+            effect.happen(completed_ns, raise);
+        }
     }
 
     /// Drops the inputs of job `job` that have arrived, instead of running it.

@@ -10,7 +10,7 @@ use core::fmt;
 use core::time::Duration;
 
 use sched_dag::analysis::Overheads;
-use sched_dag::{Policy, Preemption};
+use sched_dag::{DagId, Policy, Preemption};
 
 use crate::cell::SetOnce;
 use crate::plan::Plan;
@@ -92,6 +92,20 @@ pub trait Platform: Sync {
 
     /// Occupies the calling instance's core for `duration` of execution time.
     fn execute_for(&self, duration: Duration, how: Occupation);
+
+    /// Takes a signal to a sporadic DAG of the plan with a number, from outside all
+    /// subtasks ([`Signal::raise`](crate::Signal::raise)); does nothing if that plan
+    /// is not, or no longer, there.
+    ///
+    /// # Panics
+    ///
+    /// If called by a subtask's function. A platform that does not define this
+    /// panics in any case: then only subtasks raise signals.
+    #[track_caller]
+    fn raise(&self, plan: u64, dag: DagId) {
+        let _ = (plan, dag);
+        panic!("this platform takes no signals from outside; raise them in subtasks");
+    }
 
     /// Takes a plan over. Its first release is the platform's to time.
     ///
@@ -267,7 +281,7 @@ pub fn execute_for(duration: Duration, how: Occupation) {
 }
 
 #[track_caller]
-fn expect_installed() -> &'static dyn Platform {
+pub(crate) fn expect_installed() -> &'static dyn Platform {
     match installed() {
         Some(platform) => platform,
         None => panic!(

@@ -1,7 +1,8 @@
 //! The two ends of a topic inside its subtasks, and how the commit ties them.
 //!
 //! A [`Publisher`] is the writing end of a topic and owns the writer of every
-//! edge that leaves it, one a reading port; a [`Subscriber`] is one reading
+//! edge that leaves it, one a reading port, and one of every subtask that samples
+//! the topic's latest value; a [`Subscriber`] is one reading
 //! port. At commit [`Wiring`] hands out the ends: whichever end of an edge is
 //! asked for first makes the ring and leaves the other end for whoever asks
 //! second. All rings exist before the first release, so no job can be missed
@@ -12,6 +13,7 @@
 
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
+use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::Any;
@@ -20,6 +22,7 @@ use sched_dag::DagSpec;
 
 use crate::cell::{Reader, Writer, ring};
 use crate::gate::Gate;
+use crate::latest::{AnyLatest, Stage};
 use crate::message::Message;
 use crate::untyped::Signal;
 
@@ -64,11 +67,17 @@ impl<T> Subscriber<T> {
 /// fn same<T>(_: fn(T), _: fn(T)) {}
 /// same::<<(i32,) as VecToPubs>::Pubs>(|_| (), |_: Publishers<(Publisher<i32>,)>| ());
 /// ```
-pub struct Publisher<T>(Box<[Writer<T>]>);
+pub struct Publisher<T> {
+    /// One a reading port.
+    writers: Box<[Writer<T>]>,
+    /// One a subtask that samples the topic's latest value.
+    stages: Box<[Box<dyn Stage<T>>]>,
+}
 
 impl<T: Message> Publisher<T> {
     /// Hands the value of `job` to every reader: clones for all but the last,
-    /// the value itself for the last.
+    /// the value itself for the last. What samples the latest value is a reader
+    /// whose value is prepared, and shows at the completion.
     ///
     /// # Panics
     ///
@@ -76,11 +85,25 @@ impl<T: Message> Publisher<T> {
     /// instance and did not discard its inputs, or let more jobs be in flight
     /// than the plan says.
     pub(crate) fn send(&mut self, job: u64, value: T) {
-        let Some((last, others)) = self.0.split_last_mut() else {
+        let Self { writers, stages } = self;
+        // The commit refuses several readers of a type that gives `None`.
+        let Some((last, others)) = writers.split_last_mut() else {
+            if let Some((last, others)) = stages.split_last_mut() {
+                for stage in others {
+                    if let Some(clone) = value.for_another_reader() {
+                        stage.stage(job, clone);
+                    }
+                }
+                last.stage(job, value);
+            }
             return;
         };
+        for stage in stages {
+            if let Some(clone) = value.for_another_reader() {
+                stage.stage(job, clone);
+            }
+        }
         for writer in others {
-            // The commit refuses several readers of a type that gives `None`.
             if let Some(clone) = value.for_another_reader() {
                 put(writer, job, clone);
             }
@@ -111,12 +134,15 @@ pub(crate) struct Wiring {
     outputs: Vec<Vec<String>>,
     /// The edges that carry signals: numbers, predecessors and successors.
     signals: Vec<(usize, usize, usize)>,
+    /// For each latest value its topic, and where the writer puts it: a
+    /// `Vec<Box<dyn Stage<T>>>`.
+    stages: Vec<(String, Box<dyn Any>)>,
 }
 
 impl Wiring {
     /// Numbers the edges of a verified DAG: one a reading port, then those
     /// between untyped subtasks.
-    pub(crate) fn new(spec: &DagSpec, in_flight: usize) -> Self {
+    pub(crate) fn new(spec: &DagSpec, latest: &[Rc<dyn AnyLatest>], in_flight: usize) -> Self {
         let mut edges_of_topic = BTreeMap::<String, Vec<usize>>::new();
         let mut edges = 0;
         let mut edges_of_inputs = Vec::with_capacity(spec.subtasks.len());
@@ -147,6 +173,9 @@ impl Wiring {
             edges_of_inputs,
             outputs,
             signals,
+            stages: (latest.iter())
+                .map(|latest| (latest.topic().into(), latest.stages()))
+                .collect(),
         }
     }
 
@@ -164,7 +193,11 @@ impl Wiring {
             }
             self.signals.push((edge, earlier, later));
         }
-        (to, Publisher(from.into()))
+        let publisher = Publisher {
+            writers: from.into(),
+            stages: Box::default(),
+        };
+        (to, publisher)
     }
 
     /// Returns the ends of subtask number `subtask`, to be taken port by port.
@@ -175,6 +208,18 @@ impl Wiring {
             subtask,
             next: 0,
         }
+    }
+
+    fn stages<T: Message>(&mut self, topic: &str) -> Box<[Box<dyn Stage<T>>]> {
+        let mut found = Vec::new();
+        for (of, stages) in &mut self.stages {
+            if of == topic
+                && let Some(stages) = stages.downcast_mut::<Vec<Box<dyn Stage<T>>>>()
+            {
+                found.append(stages);
+            }
+        }
+        found.into()
     }
 
     fn reader<T: Message>(&mut self, edge: usize) -> Reader<T> {
@@ -228,10 +273,14 @@ impl Ports<'_> {
 
     /// Takes the end of the next output port.
     pub(crate) fn publisher<T: Message>(&mut self) -> Publisher<T> {
-        let topic = &self.wiring.outputs[self.subtask][self.next];
+        let topic = &self.wiring.outputs[self.subtask][self.next].clone();
         self.next += 1;
         let edges = self.wiring.edges_of_topic.get(topic).cloned();
         let edges = edges.unwrap_or_default();
-        Publisher(edges.iter().map(|&e| self.wiring.writer(e)).collect())
+        let stages = self.wiring.stages(topic);
+        Publisher {
+            writers: edges.iter().map(|&e| self.wiring.writer(e)).collect(),
+            stages,
+        }
     }
 }

@@ -11,7 +11,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
-use fass::{SubtaskAttributes, Unique, create_dag};
+use fass::{Raiser, Sample, SubtaskAttributes, Unique, create_dag};
 use support::{commit, run_job};
 
 struct Counting;
@@ -109,4 +109,47 @@ fn a_job_allocates_nothing() {
     assert_eq!(ALLOCATIONS.get() - before, 0);
     drop(vec![1]);
     assert!(ALLOCATIONS.get() > before, "the allocator counts");
+}
+
+#[test]
+fn states_latest_values_and_signals_allocate_nothing() {
+    let period = Duration::from_millis(10);
+    let named = SubtaskAttributes::named;
+    let answers = create_dag();
+    answers.relative_deadline(period);
+    let signal = answers.register_sporadic_subtask(|| (), vec![], period, named("answer"));
+    let dag = create_dag();
+    dag.relative_deadline(period);
+    let state = dag.state("count", 0_u64);
+    dag.using((state.update(), signal.raising()))
+        .register_periodic_subtask(
+            |(count, mut signal): (&mut u64, Raiser<'_>)| {
+                *count += 1;
+                signal.raise();
+                (*count,)
+            },
+            vec!["count"],
+            period,
+            named("count"),
+        );
+    let latest = dag.latest::<u64>("count");
+    let reader = create_dag();
+    reader.relative_deadline(period);
+    reader.using(latest.sample()).register_periodic_subtask(
+        |count: Option<Sample<'_, u64>>| assert!(count.is_some_and(|c| *c.value == c.job + 1)),
+        vec![],
+        period,
+        named("read"),
+    );
+    let mut plan = commit(&[dag, reader, answers]);
+
+    let before = ALLOCATIONS.get();
+    let mut signals = 0;
+    for job in 0..1_000 {
+        plan.bodies[0][0].run(job);
+        plan.bodies[0][0].complete(job, &mut |dag| signals += dag.0);
+        plan.bodies[1][0].run(job);
+    }
+    assert_eq!(ALLOCATIONS.get() - before, 0);
+    assert_eq!(signals, 2 * 1_000);
 }

@@ -61,7 +61,9 @@ pub(crate) fn take() -> Plan {
 /// Runs job `job` of DAG 0, predecessors first.
 #[allow(dead_code, reason = "not every test program uses every helper")]
 pub(crate) fn run_job(plan: &mut Plan, job: u64) {
-    let Plan { task_set, bodies } = plan;
+    let Plan {
+        task_set, bodies, ..
+    } = plan;
     for subtask in task_set.dags()[0].topological_order() {
         bodies[0][subtask.index()].run(job);
     }

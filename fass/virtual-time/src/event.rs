@@ -25,6 +25,9 @@ pub enum EventKind {
     Queued { dag: DagId, job: u64 },
     /// A release did not happen.
     Skipped { dag: DagId, job: u64 },
+    /// A sporadic DAG got a signal, which lets a job be released at `release_ns`;
+    /// `None`: the signal was dropped.
+    Signalled { dag: DagId, release_ns: Option<u64> },
     /// All that an instance waits for has happened.
     Ready { instance: Instance },
     /// A core began an instance.
@@ -61,6 +64,7 @@ impl EventKind {
             Self::Released { .. } => "release",
             Self::Queued { .. } => "queue",
             Self::Skipped { .. } => "skip",
+            Self::Signalled { .. } => "signal",
             Self::Ready { .. } => "ready",
             Self::Started { .. } => "start",
             Self::Preempted { .. } => "preempt",

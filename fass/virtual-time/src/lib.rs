@@ -43,7 +43,7 @@ mod session;
 use std::rc::Rc;
 use std::time::Duration;
 
-use fass::{Overheads, Policy, Preemption};
+use fass::{Overheads, Policy, Preemption, Signal};
 pub use sched_dag::record::{Rule, Violation};
 pub use sched_dag::{
     CoreId, DagId, DagLabel, DagStatistics, Instance, JobOutcome, SubtaskId, SubtaskLabel,
@@ -180,6 +180,39 @@ impl VirtualTime {
     pub fn contain_panics(self) -> Self {
         self.machine.contains_panics.set(true);
         self
+    }
+
+    /// Raises a signal from outside at a time of the run, counted from the start of
+    /// scheduling; at once if that is past. To be called after the commit.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new();
+    /// let dag = create_dag();
+    /// dag.relative_deadline(Duration::from_millis(5));
+    /// let answer = SubtaskAttributes::named("answer");
+    /// let button = dag.register_sporadic_subtask(|| (), vec![], Duration::from_millis(50), answer);
+    /// finish_create_dags(&[dag]).unwrap();
+    /// machine.raise_at(&button, Duration::from_millis(7));
+    /// machine.raise_at(&button, Duration::from_millis(9)); // early, so at 57 ms
+    ///
+    /// let report = machine.run();
+    /// assert_eq!(report.violations(), []);
+    /// assert_eq!(report.jobs[1].release_ns, 57_000_000);
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If the signal's DAG is not committed.
+    pub fn raise_at(&self, signal: &Signal, time: Duration) {
+        let Some(target) = signal.target() else {
+            panic!("a signal is raised before its dag is committed; commit the dag first");
+        };
+        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        self.machine.raise_at(ns, target);
     }
 
     /// Runs until every job of every DAG has ended, and reports all that

@@ -6,11 +6,14 @@
 //! that a function's calls into the platform meet nothing borrowed.
 
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
 use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::Duration;
 
 use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+
+use sched_dag::DagId;
 
 use crate::error::RunError;
 use crate::report::Report;
@@ -30,7 +33,11 @@ pub(crate) struct Machine {
     pub(crate) now_ns: Cell<u64>,
     /// What the running function has executed; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
+    /// The signals to come, by time and in the order of their raising.
+    signals: RefCell<BTreeMap<(u64, usize), DagId>>,
     session: RefCell<Option<Session>>,
+    /// The number of the launched plan.
+    plan: Cell<Option<u64>>,
     has_launched: Cell<bool>,
 }
 
@@ -53,7 +60,9 @@ pub(crate) fn make_current() -> Rc<Machine> {
         contains_panics: Cell::new(false),
         now_ns: Cell::new(0),
         executed_ns: Cell::new(None),
+        signals: RefCell::default(),
         session: RefCell::new(None),
+        plan: Cell::new(None),
         has_launched: Cell::new(false),
     });
     CURRENT.set(Rc::downgrade(&machine));
@@ -61,6 +70,35 @@ pub(crate) fn make_current() -> Rc<Machine> {
 }
 
 impl Machine {
+    /// Notes a signal of a plan; one of another plan does nothing.
+    pub(crate) fn raise_at(&self, time_ns: u64, (plan, dag): (u64, DagId)) {
+        if self.plan.get() == Some(plan) {
+            self.signal_at(time_ns, dag);
+        }
+    }
+
+    /// Notes a signal to a DAG of the launched plan.
+    pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
+        let mut signals = self.signals.borrow_mut();
+        let mut of_this_time = signals.range((time_ns, 0)..=(time_ns, usize::MAX));
+        let place = of_this_time
+            .next_back()
+            .map_or(0, |(&(_, last), _)| last + 1);
+        signals.insert((time_ns, place), dag);
+    }
+
+    /// Returns the time of the next signal.
+    pub(crate) fn next_signal_ns(&self) -> Option<u64> {
+        let signals = self.signals.borrow();
+        signals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
+    }
+
+    /// Takes the next signal that is due by `now_ns`.
+    pub(crate) fn take_signal(&self, now_ns: u64) -> Option<DagId> {
+        self.next_signal_ns().filter(|&at_ns| at_ns <= now_ns)?;
+        self.signals.borrow_mut().pop_first().map(|(_, dag)| dag)
+    }
+
     /// Steps the session to its end or for a duration. Meanwhile this machine
     /// is the thread's, whichever was made last.
     pub(crate) fn run(self: &Rc<Self>, duration: Option<Duration>) -> Result<Report, RunError> {
@@ -114,6 +152,16 @@ impl Platform for HostPlatform {
         machine.now_ns.set(machine.now_ns.get().saturating_add(ns));
     }
 
+    fn raise(&self, plan: u64, dag: DagId) {
+        let machine = expect_current();
+        assert!(
+            machine.executed_ns.get().is_none(),
+            "a subtask raises a signal that it was not registered with; register it by \
+             `dag.using(signal.raising())`"
+        );
+        machine.raise_at(machine.now_ns.get(), (plan, dag));
+    }
+
     fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
         let Some(machine) = current() else {
             return Err(LaunchError::new(
@@ -126,6 +174,7 @@ impl Platform for HostPlatform {
                  or make a new `VirtualTime`",
             ));
         }
+        machine.plan.set(Some(plan.number));
         let session = Session::new(plan, &machine);
         machine.session.replace(Some(session));
         Ok(())

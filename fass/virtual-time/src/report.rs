@@ -86,7 +86,7 @@ impl Report {
 
     /// Returns the events as lines such as `5000000 start sink[0] core 1`:
     /// time, verb, name with the job in brackets, and what else there is. The end
-    /// of a DAG has no job.
+    /// of a DAG and a signal have no job.
     ///
     /// For tests that compare whole sequences in words.
     #[must_use]
@@ -98,6 +98,13 @@ impl Report {
         let mut line = format!("{} {} ", event.time_ns, event.kind.verb());
         let (name, job, more) = match event.kind {
             EventKind::DagEnded { dag } => return line + &self.dag_name(dag),
+            EventKind::Signalled { dag, release_ns } => {
+                let what = match release_ns {
+                    Some(release_ns) => format!(" release {release_ns}"),
+                    None => " dropped".to_owned(),
+                };
+                return line + &self.dag_name(dag) + &what;
+            }
             EventKind::Released { dag, job }
             | EventKind::Queued { dag, job }
             | EventKind::Skipped { dag, job }

@@ -68,6 +68,7 @@ impl Session {
             bodies: &mut self.bodies,
             recorder: &mut self.recorder,
             panic: None,
+            now_ns: 0,
         };
         let end = self.driver.run_until(until_ns, &mut runner);
         let panic = runner.panic;
@@ -97,7 +98,7 @@ impl Session {
 
     fn require_end(&self) -> Result<(), RunError> {
         let mut dags = (0..).map(DagId).zip(self.task_set.dags());
-        match dags.find(|(_, dag)| dag.jobs().is_none()) {
+        match dags.find(|(_, dag)| dag.jobs().is_none() && !dag.is_sporadic()) {
             None => Ok(()),
             Some((dag, _)) => Err(RunError::Endless {
                 dag: self.dag_label(dag),
@@ -145,6 +146,8 @@ struct Runner<'s> {
     /// The panic that fails the run. The driver cannot be stopped, so from here
     /// on nothing runs and nothing is recorded.
     panic: Option<PanicRecord>,
+    /// The present instant.
+    now_ns: u64,
 }
 
 impl Runner<'_> {
@@ -227,7 +230,24 @@ impl Workload for Runner<'_> {
         recorder.at(now_ns, EventKind::Resumed { instance, core });
     }
 
+    fn instant(&mut self, now_ns: u64) {
+        self.now_ns = now_ns;
+    }
+
+    fn next_signal_ns(&self) -> Option<u64> {
+        self.machine.next_signal_ns()
+    }
+
+    fn take_signal(&mut self, now_ns: u64) -> Option<DagId> {
+        self.machine.take_signal(now_ns)
+    }
+
     fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        if self.panic.is_none() {
+            let machine = self.machine;
+            let raise = &mut |dag| machine.signal_at(now_ns, dag);
+            self.body(instance).complete(now_ns, raise);
+        }
         let Some(recorder) = self.recorder() else {
             return;
         };
@@ -263,6 +283,13 @@ impl Observer for Runner<'_> {
             return;
         };
         recorder.at(release_ns, EventKind::Skipped { dag, job });
+    }
+
+    fn signalled(&mut self, dag: DagId, release_ns: Option<u64>) {
+        let now_ns = self.now_ns;
+        if let Some(recorder) = self.recorder() {
+            recorder.at(now_ns, EventKind::Signalled { dag, release_ns });
+        }
     }
 
     fn ready(&mut self, instance: Instance) {

@@ -5,6 +5,8 @@
 //! said; `docs/commit-faults.md` shows the same texts to people. A fault that
 //! `fass` rules out by its types (such as 17 inputs) has no case.
 
+mod shared;
+
 use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -72,6 +74,18 @@ pub const CASES: &[Case] = &[
         dag.offset(Duration::from_nanos(u64::MAX));
         vec![dag]
     }),
+    ("activations_differ", shared::activations_differ),
+    ("duplicate_state", shared::duplicate_state),
+    ("unused_state", shared::unused_state),
+    ("state_never_updated", shared::state_never_updated),
+    ("state_used_twice", shared::state_used_twice),
+    ("state_over_jobs", shared::state_over_jobs),
+    ("latest_unwritten", || shared::latest("pose", true)),
+    ("latest_unread", || shared::latest("points", false)),
+    ("latest_type_mismatch", shared::latest_type_mismatch),
+    ("latest_of_moved", shared::latest_of_moved),
+    ("latest_not_committed", shared::latest_not_committed),
+    ("signal_not_committed", shared::signal_not_committed),
     ("not_proven", not_proven),
     ("already_committed", already_committed),
 ];

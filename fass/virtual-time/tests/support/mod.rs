@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "not every test program uses every helper")]
 
+pub(crate) mod sharing;
+
 use std::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};

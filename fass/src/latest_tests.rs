@@ -1,0 +1,69 @@
+//! Tests of the three slots, on real threads.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use super::{Sampler, Sampling, Stage, Triple};
+use crate::effect::Effect;
+use crate::uses::Uses;
+
+const JOBS: u64 = if cfg!(miri) { 100 } else { 300_000 };
+
+fn sample(sampler: &mut Sampler<[u64; 8]>) -> Option<(u64, u64)> {
+    let mut guard = <Sampling<[u64; 8]> as Uses>::enter(sampler);
+    let sample = <Sampling<[u64; 8]> as Uses>::borrow(&mut guard)?;
+    assert_eq!(*sample.value, [sample.job; 8], "whole");
+    Some((sample.job, sample.completed_ns))
+}
+
+#[test]
+fn what_is_staged_shows_only_when_it_happens() {
+    let mut triple = Arc::new(Triple::new());
+    let mut sampler = Sampler {
+        triple: Arc::clone(&triple),
+        front: 2,
+    };
+    assert_eq!(sample(&mut sampler), None);
+    triple.stage(0, [0; 8]);
+    assert_eq!(sample(&mut sampler), None);
+    triple.happen(10, &mut |_| ());
+    triple.stage(1, [1; 8]);
+    assert_eq!(sample(&mut sampler), Some((0, 10)));
+    triple.happen(20, &mut |_| ());
+    triple.happen(30, &mut |_| ()); // an instance that has staged nothing
+    assert_eq!(sample(&mut sampler), Some((1, 20)));
+    assert_eq!(sample(&mut sampler), Some((1, 20)), "again");
+}
+
+#[test]
+fn samples_are_whole_and_never_go_back() {
+    let triple = Arc::new(Triple::new());
+    let mut sampler = Sampler {
+        triple: Arc::clone(&triple),
+        front: 2,
+    };
+    let is_over = Arc::new(AtomicBool::new(false));
+    let writer = thread::spawn({
+        let (mut triple, is_over) = (triple, Arc::clone(&is_over));
+        move || {
+            for job in 0..JOBS {
+                triple.stage(job, [job; 8]);
+                triple.happen(job + 1, &mut |_| ());
+            }
+            is_over.store(true, Ordering::Release);
+        }
+    });
+    let mut last = None;
+    loop {
+        let was_over = is_over.load(Ordering::Acquire);
+        let found = sample(&mut sampler);
+        assert!(found >= last, "{found:?} after {last:?}");
+        last = found;
+        if was_over {
+            break;
+        }
+    }
+    writer.join().expect("no panic");
+    assert_eq!(last, Some((JOBS - 1, JOBS)), "the last one shows");
+}

@@ -1,0 +1,283 @@
+//! Signals: events that release sporadic DAGs.
+//!
+//! A *sporadic* DAG has no period. Each job is released by a *signal*, and never
+//! earlier than one *minimum inter-arrival time* after the job before; that is
+//! enforced, whatever happens outside, so the DAG can be analysed as one with that
+//! period. An early signal waits, one of them; more are dropped and counted
+//! (`sched-dag/src/scheduler/signals.rs` has the rules).
+//!
+//! Signals come from three places:
+//!
+//! - a subtask, of any DAG, that says so at registration ([`Signal::raising`]). Its
+//!   signal takes effect when its instance is complete (R3), not in mid-function;
+//! - the platform: a byte from a serial port, say, or a test in virtual time;
+//! - the app's code outside subtasks ([`Signal::raise`]).
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt;
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use core::time::Duration;
+
+use sched_dag::{Activation, DagId};
+
+use crate::attributes::SubtaskAttributes;
+use crate::dag::Dag;
+use crate::effect::Effect;
+use crate::platform;
+use crate::tuple::VecToPubs;
+use crate::uses::{Uses, sealed};
+
+/// What releases a sporadic DAG. Clones are handles of the same signal.
+///
+/// # Examples
+///
+/// A brake DAG that runs when an obstacle was seen, at most every 50 ms:
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Raiser, SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let named = SubtaskAttributes::named;
+/// let period = Duration::from_millis(10);
+///
+/// let brakes = create_dag();
+/// brakes.name("brakes").relative_deadline(Duration::from_millis(5));
+/// let at_most_every = Duration::from_millis(50);
+/// let obstacle = brakes.register_sporadic_subtask(|| (), vec![], at_most_every, named("brake"));
+///
+/// let vision = create_dag();
+/// vision.name("vision").jobs(20);
+/// vision.register_periodic_subtask(|| (1,), vec!["frame"], period, named("camera"));
+/// vision.using(obstacle.raising()).register_sink_subtask(
+///     |mut obstacle: Raiser<'_>, (frame,): (i32,)| {
+///         if frame > 0 {
+///             obstacle.raise(); // takes effect when this instance is complete
+///         }
+///     },
+///     vec!["frame"],
+///     period,
+///     named("detect"),
+/// );
+/// finish_create_dags(&[brakes, vision]).unwrap();
+/// let report = machine.run();
+/// assert_eq!(report.statistics[0].released, 5); // at 0, 50, 100, 150 and 200 ms
+/// assert_eq!(report.statistics[0].signals, 20);
+/// ```
+#[derive(Clone)]
+pub struct Signal {
+    target: Arc<Target>,
+}
+
+/// The use of a [`Signal`] by a subtask that may raise it: the function gets a
+/// [`Raiser`]. Made by [`Signal::raising`].
+#[derive(Debug)]
+pub struct Raising(Signal);
+
+/// What a function raises a signal with. See [`Signal`].
+#[derive(Debug)]
+pub struct Raiser<'a> {
+    raised: &'a AtomicBool,
+}
+
+/// Which DAG a signal releases, known from the commit on.
+pub(crate) struct Target {
+    /// The plan's number, 0 before the commit.
+    plan: AtomicU64,
+    dag: AtomicU32,
+}
+
+impl Raiser<'_> {
+    /// Raises the signal: it takes effect once, when this instance is complete.
+    pub fn raise(&mut self) {
+        self.raised.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Signal {
+    /// Returns the use of a subtask that may raise the signal.
+    ///
+    /// The commit must have the signal's DAG, too.
+    ///
+    /// See [`Signal`].
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    pub fn raising(&self) -> Raising {
+        Raising(self.clone())
+    }
+
+    /// Raises the signal now, from outside all subtasks. Once the DAG's run is over
+    /// this does nothing.
+    ///
+    /// # Panics
+    ///
+    /// If the signal's DAG is not committed, or in a subtask's function: what a
+    /// subtask does to other DAGs is declared at its registration
+    /// ([`raising`](Self::raising)).
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// let dag = create_dag();
+    /// dag.jobs(1).relative_deadline(Duration::from_millis(5));
+    /// let attributes = SubtaskAttributes::named("answer");
+    /// let button = dag.register_sporadic_subtask(|| (), vec![], Duration::from_millis(50), attributes);
+    /// finish_create_dags(&[dag]).unwrap();
+    /// button.raise();
+    /// assert_eq!(machine.run().jobs.len(), 1);
+    /// ```
+    #[track_caller]
+    pub fn raise(&self) {
+        let Some((plan, dag)) = self.target() else {
+            panic!("a signal is raised before its dag is committed; commit the dag first");
+        };
+        platform::expect_installed().raise(plan, dag);
+    }
+
+    /// Returns what [`Platform::raise`](crate::Platform::raise) is told: the number
+    /// of the plan and the DAG. `None` before the commit.
+    ///
+    /// For platforms that raise signals by themselves.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag};
+    ///
+    /// let minimum = Duration::from_millis(50);
+    /// let button = create_dag().sporadic(minimum);
+    /// assert_eq!(button.target(), None);
+    /// ```
+    #[must_use]
+    pub fn target(&self) -> Option<(u64, DagId)> {
+        let plan = self.target.plan.load(Ordering::Acquire);
+        (plan > 0).then(|| (plan, DagId(self.target.dag.load(Ordering::Relaxed))))
+    }
+
+    pub(crate) fn is(&self, target: &Arc<Target>) -> bool {
+        Arc::ptr_eq(&self.target, target)
+    }
+}
+
+impl Target {
+    /// Tells the signal its DAG.
+    pub(crate) fn set(&self, plan: u64, dag: DagId) {
+        self.dag.store(dag.0, Ordering::Relaxed);
+        self.plan.store(plan, Ordering::Release);
+    }
+}
+
+impl Dag {
+    /// Registers the source of a sporadic DAG: a function without arguments that a
+    /// signal starts, but never earlier than `min_inter_arrival` after the job before.
+    ///
+    /// `output_topics` names one topic for each element of `Ret`. The returned signal
+    /// can be raised by subtasks of all DAGs, or from outside; see [`Signal`].
+    /// Without a limit of [`jobs`](Self::jobs) the DAG keeps no run going: the run
+    /// ends when all others have ended.
+    #[track_caller]
+    #[must_use = "without its signal the DAG is never released"]
+    pub fn register_sporadic_subtask<F, Ret>(
+        &self,
+        mut f: F,
+        output_topics: Vec<&str>,
+        min_inter_arrival: Duration,
+        attributes: SubtaskAttributes,
+    ) -> Signal
+    where
+        F: FnMut() -> Ret + Send + 'static,
+        Ret: VecToPubs,
+    {
+        let mut draft = self.open();
+        let source = move |()| f();
+        let subtask = draft.register(source, &[], &output_topics, attributes);
+        draft.set_period(Activation::Sporadic, min_inter_arrival, subtask);
+        drop(draft);
+        self.signal()
+    }
+
+    /// Makes a DAG of untyped subtasks sporadic, with the least time between two
+    /// releases, and returns its signal. (A typed source states it itself.)
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// let button = fass::create_dag().sporadic(Duration::from_millis(50));
+    /// ```
+    #[track_caller]
+    #[must_use = "without its signal the DAG is never released"]
+    pub fn sporadic(&self, min_inter_arrival: Duration) -> Signal {
+        self.open().replace_period(min_inter_arrival);
+        self.open().spec.activation = Activation::Sporadic;
+        self.signal()
+    }
+
+    #[track_caller]
+    fn signal(&self) -> Signal {
+        let mut draft = self.open();
+        let target = draft.signal.get_or_insert_with(|| {
+            Arc::new(Target {
+                plan: AtomicU64::new(0),
+                dag: AtomicU32::new(0),
+            })
+        });
+        Signal {
+            target: Arc::clone(target),
+        }
+    }
+}
+
+/// A signal that an instance may have raised.
+struct Raised {
+    raised: Arc<AtomicBool>,
+    target: Arc<Target>,
+}
+
+impl Effect for Raised {
+    fn happen(&mut self, _completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
+        if self.raised.load(Ordering::Relaxed) {
+            self.raised.store(false, Ordering::Relaxed);
+            raise(DagId(self.target.dag.load(Ordering::Relaxed)));
+        }
+    }
+}
+
+impl sealed::Sealed for Raising {}
+
+impl Uses for Raising {
+    type Borrowed<'a> = Raiser<'a>;
+    type Held = Arc<AtomicBool>;
+    type Guard<'a> = &'a AtomicBool;
+
+    fn is_of(&self, _dag: &Dag) -> bool {
+        true
+    }
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        let raised = Arc::new(AtomicBool::new(false));
+        let mut draft = dag.draft.borrow_mut();
+        let effect = Raised {
+            raised: Arc::clone(&raised),
+            target: Arc::clone(&self.0.target),
+        };
+        draft.effects.push((subtask, Box::new(effect)));
+        draft.raises.push((subtask, self.0));
+        raised
+    }
+
+    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+        held
+    }
+
+    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+        Raiser { raised: guard }
+    }
+}
+
+impl fmt::Debug for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Signal").field(&self.target()).finish()
+    }
+}

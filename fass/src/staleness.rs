@@ -1,0 +1,127 @@
+//! How old a sampled value can be, as the commit knows it.
+//!
+//! Let the writer's DAG have period T and a proven bound R. Take a sample at time t
+//! and the latest job k that was complete by then. Job k + 1, released T later, was
+//! not, and is so within R: t < r(k) + T + R. So the *staleness*, counted from the
+//! nominal release of the job that the value is of, is less than T + R; this is the
+//! term of one hop in the end-to-end bound of A. Davare et al., Period Optimization
+//! for Hard Real-time Distributed Automotive Systems, DAC 2007
+//! (doi:10.1145/1278480.1278553).
+//!
+//! It holds from the writer's first completion on, and for as long as jobs come: not
+//! behind the last job of a DAG with a limit, and never for a sporadic writer, whose
+//! signals may stay away.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use sched_dag::{DagLabel, SubtaskId, SubtaskLabel, TaskSet};
+
+use crate::answer::Answer;
+use crate::dag::Dag;
+use crate::latest::AnyLatest;
+
+/// How old the value that a subtask samples can be at its start.
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Sample, SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let period = Duration::from_millis(10);
+/// let taking = |name, ms| SubtaskAttributes::named(name).wcet(Duration::from_millis(ms));
+/// let writer = create_dag();
+/// writer.name("writer").jobs(3).relative_deadline(period);
+/// writer.register_periodic_subtask(|| (1,), vec!["pose"], period, taking("localize", 2));
+/// let pose = writer.latest::<i32>("pose");
+/// let reader = create_dag();
+/// reader.name("reader").jobs(3).relative_deadline(period);
+/// reader.using(pose.sample()).register_periodic_subtask(
+///     |_: Option<Sample<'_, i32>>| (),
+///     vec![],
+///     period,
+///     taking("plan", 1),
+/// );
+/// let commit = finish_create_dags(&[writer, reader]).unwrap();
+/// assert!(commit.staleness()[0].bound.is_some_and(|bound| bound >= Duration::from_millis(12)));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Staleness {
+    /// The DAG of the subtask that samples.
+    pub reader_dag: DagLabel,
+    /// The subtask that samples.
+    pub reader: SubtaskLabel,
+    /// The DAG that writes.
+    pub writer_dag: DagLabel,
+    /// The topic.
+    pub topic: String,
+    /// The time, never reached, from the nominal release of the job that the value is
+    /// of to the start of the instance that samples it. `None` if the writer has no
+    /// proven bound, or is sporadic.
+    pub bound: Option<Duration>,
+}
+
+/// Returns the staleness of each sample of all DAGs.
+pub(crate) fn of_all(dags: &[Dag], task_set: &TaskSet, answers: &[Answer]) -> Vec<Staleness> {
+    let mut found = Vec::new();
+    for (dag, reader) in dags.iter().zip(answers) {
+        for (subtask, latest) in &dag.draft.borrow().samples {
+            let Some(writer) = writer_of(dags, &**latest) else {
+                continue;
+            };
+            let model = &task_set.dags()[writer];
+            let period = Duration::from_nanos(model.period_ns());
+            let response = answers[writer].verdict.bound();
+            let bound = response.filter(|_| !model.is_sporadic());
+            found.push(Staleness {
+                reader_dag: reader.dag.clone(),
+                reader: label_of(dag, *subtask),
+                writer_dag: answers[writer].dag.clone(),
+                topic: latest.topic().into(),
+                bound: bound.and_then(|response| period.checked_add(response)),
+            });
+        }
+    }
+    found
+}
+
+/// Returns the position of the DAG whose topic a latest value is of.
+pub(crate) fn writer_of(dags: &[Dag], latest: &dyn AnyLatest) -> Option<usize> {
+    let is_it = |offered: &alloc::rc::Rc<dyn AnyLatest>| {
+        core::ptr::addr_eq(alloc::rc::Rc::as_ptr(offered), latest)
+    };
+    dags.iter()
+        .position(|dag| dag.draft.borrow().latest.iter().any(is_it))
+}
+
+/// Returns the label of a registered subtask.
+pub(crate) fn label_of(dag: &Dag, subtask: usize) -> SubtaskLabel {
+    let draft = dag.draft.borrow();
+    let spec = draft.spec.subtasks.get(subtask);
+    SubtaskLabel {
+        id: SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX)),
+        name: spec.map(|spec| spec.name.clone()).unwrap_or_default(),
+    }
+}
+
+impl fmt::Display for Staleness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            reader_dag,
+            reader,
+            writer_dag,
+            topic,
+            bound,
+        } = self;
+        write!(
+            f,
+            "{reader} of {reader_dag} samples topic `{topic}` of {writer_dag}, "
+        )?;
+        match bound {
+            Some(bound) => write!(f, "less than {} ns old", bound.as_nanos()),
+            None => f.write_str("of unknown age"),
+        }
+    }
+}

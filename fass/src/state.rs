@@ -1,0 +1,220 @@
+//! States: what several subtasks of one DAG share from job to job.
+//!
+//! A closure may keep what it alone needs. What *several* functions need, such as a
+//! pose that one estimates and another corrects, is a [`State`]: declared with
+//! [`Dag::state`], and used by the subtasks that say so at registration
+//! ([`Dag::using`]). So the flow is in the model, where a mutex hides it.
+//!
+//! # What is guaranteed
+//!
+//! - In each job the users take turns in one order, the same in every run: that of
+//!   the DAG's paths and, where there is none, that of registration. Readers
+//!   between two updates may run at the same time. The commit adds the precedence
+//!   edges that this takes, and the analysis sees them
+//!   (`sched-dag/src/verify/states.rs` has the rule).
+//! - Job k + 1 finds what job k left: a DAG whose subtasks share a state has one job
+//!   in flight. A `Dag::in_flight` beyond 1 is then refused.
+//! - Nobody waits for a state in mid-function, so there is no blocking to account
+//!   for, and no priority is inverted.
+//!
+//! # What is not
+//!
+//! - A subtask that is registered before the updater sees what the job before left.
+//! - Jobs do not overlap as in a pipeline. Where they must, let one subtask own the
+//!   state and send what others need along an edge.
+//! - A state does not leave its DAG. Between DAGs there is the [latest
+//!   value](crate::Latest).
+
+use alloc::rc::Rc;
+use alloc::sync::Arc;
+use core::cell::RefCell;
+use core::fmt;
+
+use sched_dag::{StateSpec, StateUser};
+
+use crate::cell::{Changing, Looking, Shared};
+use crate::dag::Dag;
+use crate::draft::Draft;
+use crate::uses::{Uses, sealed};
+
+/// A state that subtasks of one DAG share. Made by [`Dag::state`].
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let dag = create_dag();
+/// dag.name("odometry").jobs(3);
+/// let period = Duration::from_millis(10);
+/// let distance = dag.state("distance", 0_u32);
+///
+/// dag.register_periodic_subtask(|| (5_u32,), vec!["step"], period, SubtaskAttributes::named("wheel"));
+/// dag.using(distance.update()).register_subtask(
+///     |distance: &mut u32, (step,): (u32,)| {
+///         *distance += step;
+///         (step,)
+///     },
+///     vec!["step"],
+///     vec!["moved"],
+///     SubtaskAttributes::named("add"),
+/// );
+/// dag.using(distance.read()).register_sink_subtask(
+///     |distance: &u32, (moved,): (u32,)| assert_eq!(distance % moved, 0),
+///     vec!["moved"],
+///     period,
+///     SubtaskAttributes::named("show"),
+/// );
+/// finish_create_dags(&[dag]).unwrap();
+/// machine.run();
+/// ```
+#[derive(Clone)]
+pub struct State<T> {
+    draft: Rc<RefCell<Draft>>,
+    /// The position among the DAG's states.
+    position: usize,
+    value: Arc<Shared<T>>,
+}
+
+/// The use of a [`State`] that may change it: the function gets a `&mut T`. Made
+/// by [`State::update`].
+#[derive(Debug)]
+pub struct Update<T>(State<T>);
+
+/// The use of a [`State`] that only reads it: the function gets a `&T`. Made by
+/// [`State::read`].
+#[derive(Debug)]
+pub struct Read<T>(State<T>);
+
+impl<T: Send + Sync + 'static> State<T> {
+    /// Returns the use of a subtask that may change the state.
+    ///
+    /// See [`State`].
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    pub fn update(&self) -> Update<T> {
+        Update(self.handle())
+    }
+
+    /// Returns the use of a subtask that only reads the state. Readers between two
+    /// updates may run at the same time.
+    ///
+    /// See [`State`].
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    pub fn read(&self) -> Read<T> {
+        Read(self.handle())
+    }
+
+    fn handle(&self) -> Self {
+        Self {
+            draft: Rc::clone(&self.draft),
+            position: self.position,
+            value: Arc::clone(&self.value),
+        }
+    }
+
+    /// Notes a use, and returns the value that the subtask will claim.
+    fn note(&self, dag: &Dag, subtask: usize, updates: bool) -> Arc<Shared<T>> {
+        let user = StateUser { subtask, updates };
+        dag.draft.borrow_mut().spec.states[self.position]
+            .users
+            .push(user);
+        Arc::clone(&self.value)
+    }
+}
+
+impl<T> State<T> {
+    fn is_of(&self, dag: &Dag) -> bool {
+        Rc::ptr_eq(&self.draft, &dag.draft)
+    }
+}
+
+impl Dag {
+    /// Adds a state that subtasks of this DAG share, with its value before job 0.
+    ///
+    /// A subtask uses it by [`using`](Self::using). See [`State`] for what is
+    /// guaranteed.
+    ///
+    /// ```
+    /// let dag = fass::create_dag();
+    /// let pose = dag.state("pose", (0.0, 0.0));
+    /// ```
+    #[track_caller]
+    #[must_use = "a state that no subtask uses is a fault at commit"]
+    pub fn state<T: Send + Sync + 'static>(&self, name: &str, initial: T) -> State<T> {
+        let mut draft = self.open();
+        let position = draft.spec.states.len();
+        draft.spec.states.push(StateSpec {
+            name: name.into(),
+            users: Default::default(),
+        });
+        State {
+            draft: Rc::clone(&self.draft),
+            position,
+            value: Arc::new(Shared::new(initial)),
+        }
+    }
+}
+
+impl<T> sealed::Sealed for Update<T> {}
+
+impl<T: Send + Sync + 'static> Uses for Update<T> {
+    type Borrowed<'a> = &'a mut T;
+    type Held = Arc<Shared<T>>;
+    type Guard<'a> = Changing<'a, T>;
+
+    fn is_of(&self, dag: &Dag) -> bool {
+        self.0.is_of(dag)
+    }
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        self.0.note(dag, subtask, true)
+    }
+
+    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+        held.change().unwrap_or_else(|| refuse())
+    }
+
+    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+        &mut *guard
+    }
+}
+
+impl<T> sealed::Sealed for Read<T> {}
+
+impl<T: Send + Sync + 'static> Uses for Read<T> {
+    type Borrowed<'a> = &'a T;
+    type Held = Arc<Shared<T>>;
+    type Guard<'a> = Looking<'a, T>;
+
+    fn is_of(&self, dag: &Dag) -> bool {
+        self.0.is_of(dag)
+    }
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        self.0.note(dag, subtask, false)
+    }
+
+    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+        held.look().unwrap_or_else(|| refuse())
+    }
+
+    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+        &*guard
+    }
+}
+
+fn refuse() -> ! {
+    panic!(
+        "a state is in use by another subtask: the platform started the instance before \
+         all its predecessors were complete"
+    )
+}
+
+impl<T> fmt::Debug for State<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("State").field(&self.position).finish()
+    }
+}

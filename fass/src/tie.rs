@@ -1,0 +1,64 @@
+//! The third step of the commit: from verified DAGs to a plan.
+//!
+//! Edges get their rings, functions become bodies, signals learn their DAG, and
+//! latest values get their writers. All has been verified, so nothing can fail.
+
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use sched_dag::{DagId, DagSpec, SubtaskSpec, TaskSet};
+
+use crate::dag::Dag;
+use crate::plan::{Body, Plan};
+use crate::topic::Wiring;
+
+/// The plans made so far.
+static PLANS: AtomicU64 = AtomicU64::new(0);
+
+/// Turns verified DAGs into a plan, and closes their handles.
+pub(crate) fn tie(dags: &[Dag], task_set: TaskSet) -> Plan {
+    let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
+    let bodies = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
+        .map(|((id, dag), verified)| {
+            let (spec, make_bodies, latest, effects) = {
+                let mut draft = dag.draft.borrow_mut();
+                draft.is_committed = true;
+                let name = draft.spec.name.clone();
+                let named = DagSpec {
+                    name,
+                    ..DagSpec::default()
+                };
+                let spec = core::mem::replace(&mut draft.spec, named);
+                if let Some(signal) = &draft.signal {
+                    signal.set(number, id);
+                }
+                let effects = core::mem::take(&mut draft.effects);
+                let make_bodies = core::mem::take(&mut draft.make_bodies);
+                (spec, make_bodies, draft.latest.clone(), effects)
+            };
+            let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
+            let mut wiring = Wiring::new(&spec, &latest, slots);
+            let make = |(subtask, make_body): (usize, crate::subtask::MakeBody)| -> Body {
+                make_body(&mut wiring, subtask)
+            };
+            let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
+            for (subtask, effect) in effects {
+                bodies[subtask].add_effects([effect]);
+            }
+            for latest in latest {
+                let writes = |subtask: &SubtaskSpec| {
+                    (subtask.outputs.iter()).any(|port| port.topic == latest.topic())
+                };
+                if let Some(writer) = spec.subtasks.iter().position(writes) {
+                    bodies[writer].add_effects(latest.effects());
+                }
+            }
+            bodies
+        })
+        .collect();
+    Plan {
+        task_set,
+        number,
+        bodies,
+    }
+}

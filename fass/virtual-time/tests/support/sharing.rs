@@ -1,0 +1,43 @@
+//! What the tests of sharing subtasks need: short words, and a look from inside.
+
+#![allow(dead_code, reason = "each test uses a part of this")]
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use fass::{Occupation, SubtaskAttributes, execute_for};
+
+pub(crate) use super::{ms, named};
+
+pub(crate) fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
+    named(name).wcet(ms(wcet_ms))
+}
+
+pub(crate) fn work(time_ms: u64) {
+    execute_for(ms(time_ms), Occupation::Spin);
+}
+
+/// What functions saw, kept for the test.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen<T>(Arc<Mutex<Vec<T>>>);
+
+impl<T> Default for Seen<T> {
+    fn default() -> Self {
+        Self(Arc::default())
+    }
+}
+
+impl<T: Clone> Seen<T> {
+    pub(crate) fn add(&self, seen: T) {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(seen);
+    }
+
+    pub(crate) fn all(&self) -> Vec<T> {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+}

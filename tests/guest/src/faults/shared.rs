@@ -1,0 +1,141 @@
+//! The cases of what subtasks share: states, latest values, signals.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use fass::{Dag, Raiser, Sample, SubtaskAttributes, Unique, create_dag};
+
+use super::{PERIOD, named, sound, source};
+
+pub(super) fn activations_differ() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    let attributes = SubtaskAttributes::named("press");
+    let _ = dag.register_sporadic_subtask(|| (1_u32,), vec!["button"], PERIOD, attributes);
+    let attributes = SubtaskAttributes::named("store");
+    let inputs = vec!["points", "button"];
+    dag.register_sink_subtask(|(_, _): (u32, u32)| (), inputs, PERIOD, attributes);
+    vec![dag]
+}
+
+pub(super) fn duplicate_state() -> Vec<Dag> {
+    let dag = sound("lidar", "points");
+    for _ in 0..2 {
+        let _ = dag.state("map", 0_u32);
+    }
+    vec![dag]
+}
+
+pub(super) fn unused_state() -> Vec<Dag> {
+    let dag = sound("lidar", "points");
+    let _ = dag.state("map", 0_u32);
+    vec![dag]
+}
+
+pub(super) fn state_never_updated() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    let map = dag.state("map", 0_u32);
+    let attributes = SubtaskAttributes::named("store");
+    let store = |_: &u32, (_,): (u32,)| ();
+    dag.using(map.read())
+        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+    vec![dag]
+}
+
+pub(super) fn state_used_twice() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    let map = dag.state("map", 0_u32);
+    let attributes = SubtaskAttributes::named("store");
+    let store = |(_, _): (&mut u32, &u32), (_,): (u32,)| ();
+    dag.using((map.update(), map.read())).register_sink_subtask(
+        store,
+        vec!["points"],
+        PERIOD,
+        attributes,
+    );
+    vec![dag]
+}
+
+pub(super) fn state_over_jobs() -> Vec<Dag> {
+    let dag = named("lidar");
+    dag.in_flight(2);
+    let map = dag.state("map", 0_u32);
+    let read = |map: &mut u32| (*map,);
+    let attributes = SubtaskAttributes::named("read");
+    dag.using(map.update())
+        .register_periodic_subtask(read, vec!["points"], PERIOD, attributes);
+    let attributes = SubtaskAttributes::named("store");
+    let store = |_: &u32, (_,): (u32,)| ();
+    dag.using(map.read())
+        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+    vec![dag]
+}
+
+/// A second DAG that samples a topic of the first, if it does.
+pub(super) fn latest(topic: &str, samples: bool) -> Vec<Dag> {
+    let lidar = sound("lidar", "points");
+    let latest = lidar.latest::<u32>(topic);
+    if !samples {
+        return vec![lidar];
+    }
+    let planner = named("planner");
+    planner.relative_deadline(PERIOD);
+    let plan = |_: Option<Sample<'_, u32>>| ();
+    let attributes = SubtaskAttributes::named("plan");
+    planner
+        .using(latest.sample())
+        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+    vec![lidar, planner]
+}
+
+pub(super) fn latest_type_mismatch() -> Vec<Dag> {
+    let lidar = sound("lidar", "points");
+    let points = lidar.latest::<f64>("points");
+    let planner = named("planner");
+    planner.relative_deadline(PERIOD);
+    let plan = |_: Option<Sample<'_, f64>>| ();
+    let attributes = SubtaskAttributes::named("plan");
+    planner
+        .using(points.sample())
+        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+    vec![lidar, planner]
+}
+
+pub(super) fn latest_of_moved() -> Vec<Dag> {
+    let lidar = named("lidar");
+    lidar.relative_deadline(PERIOD);
+    let attributes = SubtaskAttributes::named("read");
+    let read = || (Unique::new(1_u32),);
+    lidar.register_periodic_subtask(read, vec!["points"], PERIOD, attributes);
+    let points = lidar.latest::<Unique<u32>>("points");
+    let planner = named("planner");
+    planner.relative_deadline(PERIOD);
+    let plan = |(_, _): (
+        Option<Sample<'_, Unique<u32>>>,
+        Option<Sample<'_, Unique<u32>>>,
+    )| ();
+    let attributes = SubtaskAttributes::named("plan");
+    planner
+        .using((points.sample(), points.sample()))
+        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+    vec![lidar, planner]
+}
+
+pub(super) fn latest_not_committed() -> Vec<Dag> {
+    let mut dags = latest("points", true);
+    dags.remove(0);
+    dags
+}
+
+pub(super) fn signal_not_committed() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    let alarm = create_dag().sporadic(PERIOD);
+    let attributes = SubtaskAttributes::named("store");
+    let store = |mut alarm: Raiser<'_>, (_,): (u32,)| alarm.raise();
+    dag.using(alarm.raising())
+        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+    vec![dag]
+}
