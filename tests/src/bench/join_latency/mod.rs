@@ -129,10 +129,9 @@ const MOST_BOOTS: usize = 6;
 /// Measures one condition: in deterministic mode until two boots agree, or
 /// [`MOST_BOOTS`] have been tried; then it says so and keeps the first.
 ///
-/// Counted time in QEMU 7.2 with several processors is not deterministic to the
-/// last bit: now and then an interrupt comes a few nanoseconds late, and two cores
-/// that meet at a lock then do so in the other order. Nothing of the host reaches
-/// the guest, so the cause is outside it; which, is not known.
+/// Two boots agree as the kernel removes from counted time what depends on the host
+/// (its `machine::counted_time`). That rests on how QEMU 7.2 works, so it is checked
+/// wherever figures are made.
 fn measure(
     plan: &Plan,
     condition: &Condition,
