@@ -3,7 +3,8 @@
 //! They hold the promises that no unit test can: the image's weight, no
 //! package but our own, `unsafe` only where it may stand, no file too long,
 //! nothing for the formatter, the linter and the documentation to complain
-//! of, and a guest under KVM where KVM works.
+//! of, a hand-off of no more instructions than its baseline, and a guest under
+//! KVM where KVM works.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 use super::libtest::Plan;
 use super::tally::Tally;
 use super::{lint, unsafe_places};
+use crate::bench::hand_off;
 use crate::image::{self, MOST_STRIPPED_BYTES};
 use crate::probe;
 use crate::qemu::PROGRAM;
@@ -60,6 +62,10 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
         if plan.wants(&name) {
             tally.add(&name, image_is_light(&app));
         }
+    }
+    let name = "the hand-off takes no more instructions than its baseline";
+    if plan.wants(name) {
+        tally.add(name, hand_off::check());
     }
     let name = "a guest runs under KVM";
     if plan.wants(name) {

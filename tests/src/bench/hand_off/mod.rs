@@ -79,6 +79,7 @@ pub fn check() -> Result<(), String> {
         Ok(Request::Help(_)) => return Err("the options of the check ask for help".into()),
         Err(error) => return Err(error.to_string()),
     };
+    install::ensure_qemu()?;
     let before = baseline::read(&plan.baseline)?;
     let now = measure_mode(&plan, Mode::Deterministic)?;
     let comparison = report::comparison(&now, &before);

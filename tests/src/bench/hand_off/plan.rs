@@ -10,6 +10,9 @@ use crate::system;
 /// The options of a baseline: it is of the defaults of these.
 const SIZES: &[&str] = &["jobs", "chain", "branches", "layered", "seed", "append"];
 
+/// Memory for 10,000 subtasks, each of which may need a stack, in MiB.
+const SCALE_MIB: u64 = 3000;
+
 /// What one boot measures.
 #[derive(Clone, Debug)]
 pub(super) struct Boot {
@@ -137,7 +140,7 @@ impl Boot {
     pub(super) fn of_scale(cores: u64, jobs: u64, sizes: &str) -> Boot {
         Boot {
             cores,
-            memory_mib: 1024,
+            memory_mib: SCALE_MIB,
             words: format!("part=workloads jobs={jobs} {sizes}"),
             counts_wakeups: false,
         }
