@@ -4,6 +4,13 @@
 //! a run it stays in the buffer until an idle core sends it, byte by byte, so
 //! that no subtask ever waits for a serial port; what no longer fits is dropped
 //! and counted, never silently.
+//!
+//! With `console=on` on the command line a person can talk to the kernel during a
+//! run; that is [`session`].
+
+mod command;
+mod input;
+pub(crate) mod session;
 
 use core::fmt::{self, Write};
 use core::sync::atomic::{AtomicBool, Ordering};

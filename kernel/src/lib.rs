@@ -41,6 +41,7 @@
 
 extern crate alloc;
 
+mod background;
 pub mod console;
 mod containment;
 mod contexts;

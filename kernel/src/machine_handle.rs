@@ -5,10 +5,14 @@ use core::fmt;
 use core::panic::Location;
 use core::time::Duration;
 
+use alloc::format;
 use alloc::string::String;
 
 use fass::{CommitError, Platform, Policy, Preemption};
+use sched_dag::DagId;
 
+use crate::background::{Background, Wishes};
+use crate::console::session;
 use crate::machine::interrupts_off;
 use crate::memory::heap;
 use crate::options::{Options, UsageError};
@@ -25,6 +29,8 @@ pub struct Machine {
     pub(crate) module: Option<&'static [u8]>,
     /// Whether each run's trace is printed after it.
     pub(crate) dumps_trace: bool,
+    /// What people want to see, and say, during a run.
+    pub(crate) wishes: Wishes,
     /// How many runs have ended.
     pub(crate) runs: Cell<u64>,
 }
@@ -50,6 +56,8 @@ pub enum Ending {
     Commit(CommitError),
     /// Something else went wrong, in words; QEMU exits with 35.
     Failure(String),
+    /// A person has ended the run at the console; QEMU exits with 33.
+    Shutdown,
 }
 
 impl From<UsageError> for Ending {
@@ -70,6 +78,7 @@ impl fmt::Display for Ending {
             Self::Usage(error) => error.fmt(f),
             Self::Commit(error) => error.fmt(f),
             Self::Failure(message) => f.write_str(message),
+            Self::Shutdown => f.write_str("shut down at the console"),
         }
     }
 }
@@ -125,6 +134,9 @@ impl Machine {
     /// # Errors
     ///
     /// [`Ending::Failure`] if nothing has been committed since the last run.
+    /// [`Ending::Shutdown`] if a person has ended the run at the console: then each
+    /// DAG has ended the jobs that it had in flight and released no more. If that
+    /// run broke a rule of the model, it is a failure instead.
     pub fn run(&self) -> Result<Run, Ending> {
         /// Time for the cores to get ready between now and the first release.
         const LEAD_NS: u64 = 100_000;
@@ -144,10 +156,11 @@ impl Machine {
         let locks_before = execution::lock_acquisitions();
         console::defer();
         execution::arm_next_event();
-        let mut progress = Progress { total, printed: 0 };
+        let mut background = Background::begin(self.wishes, total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();
-        worker::wait_in_background(|| progress.print_when_due());
+        worker::wait_in_background(|| background.step());
+        let shuts_down = background.end();
         let longest = interrupts_off::take_longest();
         let allocations = heap::usage().allocations - allocations_before;
         let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
@@ -162,6 +175,9 @@ impl Machine {
         }
         if self.dumps_trace {
             trace::dump(&run, self.runs.replace(self.runs.get() + 1));
+        }
+        if shuts_down {
+            return Err(shutdown(&run));
         }
         Ok(run)
     }
@@ -203,6 +219,17 @@ impl Machine {
     }
 }
 
+/// Reports a run that a person has ended, and returns how its app ends.
+fn shutdown(run: &Run) -> Ending {
+    for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
+        session::emit(dag, model.name(), &run.snapshot(dag));
+    }
+    match run.violations().count() {
+        0 => Ending::Shutdown,
+        count => Ending::Failure(format!("shut down at the console, with {count} violations")),
+    }
+}
+
 /// Prints the longest section of a run without interrupts.
 fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
     let place = fmt::from_fn(|f| write!(f, "{}:{}", place.file(), place.line()));
@@ -213,27 +240,4 @@ fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
     json::emit("interrupts_off", |line| {
         line.number("longest_ns", longest_ns).text("place", &place);
     });
-}
-
-/// Progress lines, one for each twentieth of the jobs.
-struct Progress {
-    total: u64,
-    printed: u64,
-}
-
-impl Progress {
-    /// Prints how many jobs have ended, if that is a step further and the next
-    /// event leaves time for it.
-    fn print_when_due(&mut self) {
-        const TIME_TO_PRINT_NS: u64 = 1_000_000;
-        let done = execution::jobs_ended();
-        let step = (self.total / 20).max(1);
-        let quiet_until = machine::clock::now_ns() + TIME_TO_PRINT_NS;
-        if done >= self.printed + step && execution::next_event_ns() > quiet_until {
-            self.printed = done;
-            json::emit("progress", |line| {
-                line.number("done", done).number("total", self.total);
-            });
-        }
-    }
 }

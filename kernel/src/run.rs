@@ -3,7 +3,7 @@
 use sched_dag::record::{Record, Violation};
 use sched_dag::{DagId, DagStatistics, TaskSet};
 
-use crate::execution::Execution;
+use crate::execution::{Execution, Snapshot};
 
 /// A run that has ended: its model, its times and its counts.
 pub struct Run {
@@ -64,6 +64,11 @@ impl Run {
     #[must_use]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
         self.execution.scheduler().statistics(dag)
+    }
+
+    /// Returns how a DAG has ended.
+    pub(crate) fn snapshot(&self, dag: DagId) -> Snapshot {
+        Snapshot::of(self.execution.scheduler(), dag)
     }
 
     /// Returns every breach of the model's rules.

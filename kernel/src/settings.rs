@@ -9,18 +9,21 @@
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | how many events each core keeps; 0: none | 4096 |
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
+//! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
+//! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
 //! | `mode=...` | the host's name for what time means; `deterministic`: timers settle, see `machine::counted_time` | |
 
 use alloc::format;
 
 use fass::{Overheads, Policy, Preemption};
 
+use crate::background::{Echo, Wishes};
 use crate::machine::{counted_time, interrupts_off};
 use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
 
 /// The words, for messages.
-pub(crate) const WORDS: [&str; 8] = [
+pub(crate) const WORDS: [&str; 10] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -28,6 +31,8 @@ pub(crate) const WORDS: [&str; 8] = [
     "trace",
     "trace_events",
     "measure",
+    "console",
+    "status",
     "mode",
 ];
 
@@ -39,17 +44,20 @@ const PREEMPTIONS: [(&str, Preemption); 2] =
 /// 128 KiB a core.
 const TRACE_EVENTS: u64 = 4096;
 
-/// What the words say about tracing; all else is set where it belongs.
+/// What the words say about tracing and the background; all else is set where it
+/// belongs.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tracing {
+pub(crate) struct Settings {
     /// How many events each core keeps.
     pub(crate) events: usize,
     /// Whether each run's trace is printed after it.
     pub(crate) dump: bool,
+    /// What else people want to see, and say.
+    pub(crate) wishes: Wishes,
 }
 
 /// Takes the kernel's words and does what they say.
-pub(crate) fn apply(options: &Options<'_>) -> Result<Tracing, UsageError> {
+pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     KERNEL.set_policy(options.choice("policy", &POLICIES)?);
     KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
     KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
@@ -62,9 +70,19 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Tracing, UsageError> {
         counted_time::enable();
     }
     let events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
-    Ok(Tracing {
+    let status_s = options.number("status", 0..=86_400, 0)?;
+    let consoles = [
+        ("off", None),
+        ("on", Some(Echo::Off)),
+        ("echo", Some(Echo::On)),
+    ];
+    Ok(Settings {
         events: usize::try_from(events).unwrap_or(0),
         dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
+        wishes: Wishes {
+            console: options.choice("console", &consoles)?,
+            status_ns: status_s * 1_000_000_000,
+        },
     })
 }
 

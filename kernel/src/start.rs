@@ -175,12 +175,13 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         .command_line()
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
-    let tracing = settings::apply(&options)?;
-    trace::create(this_core::all().len(), tracing.events);
+    let settings = settings::apply(&options)?;
+    trace::create(this_core::all().len(), settings.events);
     app(&Machine {
         options,
         module: module_bytes(info),
-        dumps_trace: tracing.dump,
+        dumps_trace: settings.dump,
+        wishes: settings.wishes,
         runs: Cell::new(0),
     })
 }
@@ -188,7 +189,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
 /// Prints how the app ended, as the last line, and stops the machine.
 fn end(result: Result<(), Ending>) -> ! {
     let (status, word) = match &result {
-        Ok(()) => (exit::Status::Success, "success"),
+        Ok(()) | Err(Ending::Shutdown) => (exit::Status::Success, "success"),
         Err(Ending::Usage(_)) => (exit::Status::Usage, "usage"),
         Err(_) => (exit::Status::Failure, "failure"),
     };
@@ -204,7 +205,9 @@ fn end(result: Result<(), Ending>) -> ! {
     }
     json::emit("verdict", |line| {
         line.text("status", word);
-        if let Err(ending) = &result {
+        if let Err(ending) = &result
+            && status != exit::Status::Success
+        {
             line.text("reason", ending);
         }
     });

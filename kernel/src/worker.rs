@@ -119,6 +119,15 @@ pub(crate) fn set_heartbeats(period_ns: u64) {
     beat(this_core::get(), clock::now_ns());
 }
 
+/// Gives core 0, which executes this outside any instance, a heartbeat each
+/// `period_ns`. Returns what it had.
+pub(crate) fn set_own_heartbeat(period_ns: u64) -> u64 {
+    let core = this_core::get();
+    let before_ns = core.heartbeat_ns.swap(period_ns, Ordering::Relaxed);
+    beat(core, clock::now_ns());
+    before_ns
+}
+
 /// Returns the timer interrupts that all cores have taken since boot.
 pub(crate) fn timer_interrupts() -> u64 {
     let counts = this_core::all().iter().map(|core| &core.timer_interrupts);

@@ -37,7 +37,7 @@ pub(crate) fn note_start(assignment: &Assignment, start_ns: u64) {
 }
 
 /// Converts a time on the clock to the run's time.
-pub(super) fn since_epoch(time_ns: u64) -> u64 {
+pub(crate) fn since_epoch(time_ns: u64) -> u64 {
     time_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
 }
 

@@ -7,6 +7,7 @@
 //!
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
+mod control;
 mod core_set;
 mod events;
 mod placement;
@@ -26,7 +27,10 @@ use sched_dag::{Instance, Scheduler, SchedulerOptions, TaskSet};
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
 use crate::{contexts, trace};
-pub(crate) use events::{arm_next_event, complete, fail, find_work, interrupt, note_start};
+pub(crate) use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
+pub(crate) use events::{
+    arm_next_event, complete, fail, find_work, interrupt, note_start, since_epoch,
+};
 use placement::Placement;
 pub(crate) use status::{
     budget_ns, is_finished, jobs_ended, lock_acquisitions, names, next_event_ns, running, try_names,
@@ -65,6 +69,8 @@ enum Event {
     Completed(Instance),
     /// The instance was ended by a fault, and its DAG ends with it.
     Failed(Instance),
+    /// A person wants a change.
+    Control(Control),
 }
 
 /// A run, from its launch until its record is taken.

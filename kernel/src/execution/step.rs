@@ -38,6 +38,7 @@ impl Execution {
             Event::Time => {}
             Event::Completed(instance) => moment.complete(instance, &mut watcher),
             Event::Failed(instance) => moment.fail(instance, &mut watcher),
+            Event::Control(control) => control.apply(&mut moment, &mut watcher),
         }
         let mut woken = CoreSet::default();
         let due_ns = *dispatch_due_ns.get_or_insert(now_ns.saturating_add(KERNEL.coincidence_ns()));

@@ -1,7 +1,9 @@
 //! The first serial port: a 16550 at I/O port 0x3f8, by polling.
 //!
 //! Polling, because output comes at boot, at the end, on a panic, or from an
-//! idle core byte by byte; an interrupt for each byte would only disturb.
+//! idle core byte by byte; an interrupt for each byte would only disturb. Input
+//! comes from a person, for whom an idle core looks now and then; the sender waits
+//! while the port's FIFO of 16 bytes is full, or bytes are lost.
 //! Registers: National Semiconductor PC16550D data sheet, 8.0.
 
 use super::port;
@@ -43,4 +45,18 @@ pub(crate) fn send(byte: u8) {
     }
     // SAFETY: the data register of this module's device.
     unsafe { port::write_u8(BASE, byte) };
+}
+
+/// Takes a byte that has been received, if there is one.
+pub(crate) fn receive() -> Option<u8> {
+    const DATA_READY: u8 = 1 << 0;
+    /// What a port reads as that does not exist.
+    const ABSENT: u8 = 0xff;
+    // SAFETY: reading the line status of this module's device.
+    let status = unsafe { port::read_u8(BASE + 5) };
+    if status & DATA_READY == 0 || status == ABSENT {
+        return None;
+    }
+    // SAFETY: the data register of this module's device.
+    Some(unsafe { port::read_u8(BASE) })
 }

@@ -9,9 +9,10 @@
 //! Times are nanoseconds since the run's epoch.
 
 mod dump;
+mod load;
 mod ring;
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicU8, Ordering};
 
 use alloc::boxed::Box;
 
@@ -20,6 +21,7 @@ use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 use crate::machine::once::Once;
 use crate::machine::this_core;
 pub(crate) use dump::{dump, latest};
+pub(crate) use load::loads_permille;
 use ring::Ring;
 
 /// What has happened. The words of the machine lines are the names in lower case.
@@ -88,12 +90,20 @@ pub(crate) struct Event {
 
 static RINGS: Once<Box<[Ring]>> = Once::new();
 
+/// There is no room for events.
+const NO_ROOM: u8 = 0;
+/// Events are counted and not kept.
+const OFF: u8 = 1;
+/// Events are recorded.
+const ON: u8 = 2;
+
 /// Whether events are recorded.
-static ENABLED: AtomicBool = AtomicBool::new(true);
+static RECORDING: AtomicU8 = AtomicU8::new(NO_ROOM);
 
 /// Makes a ring of `events` events for each core. With 0 nothing is recorded.
 pub(crate) fn create(cores: usize, events: usize) {
-    ENABLED.store(events > 0, Ordering::Relaxed);
+    let recording = if events > 0 { ON } else { NO_ROOM };
+    RECORDING.store(recording, Ordering::Relaxed);
     // A second call would come from a second boot, which there is not.
     let _ = RINGS.set((0..cores).map(|_| Ring::new(events)).collect());
 }
@@ -126,13 +136,42 @@ pub(crate) fn job(what: What, time_ns: u64, dag: DagId, job: u64) {
 }
 
 fn record(event: Event) {
-    if !ENABLED.load(Ordering::Relaxed) {
+    let recording = RECORDING.load(Ordering::Relaxed);
+    if recording == NO_ROOM {
         return;
     }
     let here = this_core::get().index as usize;
     if let Some(ring) = RINGS.get().and_then(|rings| rings.get(here)) {
-        ring.push(event);
+        match recording {
+            ON => ring.push(event),
+            _ => ring.pass(),
+        }
     }
+}
+
+/// Reports whether there is room for events.
+pub(crate) fn has_room() -> bool {
+    all_rings().iter().any(Ring::has_room)
+}
+
+/// Records events from now on, or forgets those so far and records no more. So
+/// what is missing of a trace is always the oldest of each core, which is what
+/// readers of a trace can deal with. Does nothing if there is no room.
+pub(crate) fn record_events(on: bool) {
+    if !has_room() || on == is_recording() {
+        return;
+    }
+    if !on {
+        RECORDING.store(OFF, Ordering::Relaxed);
+    }
+    all_rings().iter().for_each(Ring::forget);
+    if on {
+        RECORDING.store(ON, Ordering::Release);
+    }
+}
+
+fn is_recording() -> bool {
+    RECORDING.load(Ordering::Relaxed) == ON
 }
 
 /// Forgets all events. To be called while no run is going on.

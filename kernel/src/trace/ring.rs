@@ -1,6 +1,6 @@
 //! The events of one core, the latest ones only.
 
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU64, Ordering, fence};
 
 use alloc::boxed::Box;
 
@@ -19,9 +19,14 @@ pub(super) struct Ring {
     events: Box<[Words]>,
     /// How many events were ever written since the last [`clear`](Self::clear).
     written: AtomicU64,
+    /// The number of the first event that was not forgotten.
+    first: AtomicU64,
 }
 
 const NO_SUBTASK: u64 = 0xffff_ffff;
+
+/// Stands where the number of a [`What`] does, and is none.
+const NOT_KEPT: u64 = 0xff;
 
 /// What is written, by number; the inverse of `What as u8`.
 const WHATS: [What; 14] = [
@@ -47,6 +52,7 @@ impl Ring {
         Self {
             events: (0..capacity).map(|_| empty()).collect(),
             written: AtomicU64::new(0),
+            first: AtomicU64::new(0),
         }
     }
 
@@ -70,20 +76,64 @@ impl Ring {
         self.written.store(written + 1, Ordering::Release);
     }
 
+    /// Counts an event and does not keep it.
+    pub(super) fn pass(&self) {
+        let written = self.written.load(Ordering::Relaxed);
+        if let Some(place) = self.events.get(self.index(written)) {
+            place[3].store(NOT_KEPT, Ordering::Relaxed);
+            self.written.store(written + 1, Ordering::Release);
+        }
+    }
+
+    /// Begins anew. Not while events are written.
     pub(super) fn clear(&self) {
+        self.first.store(0, Ordering::Release);
         self.written.store(0, Ordering::Release);
     }
 
-    /// Returns how many events made way for later ones.
+    /// Forgets all events up to now, and counts them as lost. May be called while
+    /// events are written.
+    pub(super) fn forget(&self) {
+        let written = self.written.load(Ordering::Acquire);
+        self.first.store(written, Ordering::Release);
+    }
+
+    /// Reports whether an event has room.
+    pub(super) fn has_room(&self) -> bool {
+        !self.events.is_empty()
+    }
+
+    /// Returns how many events are not there any more: they made way for later
+    /// ones, were forgotten, or were not kept.
     pub(super) fn lost(&self) -> u64 {
         let written = self.written.load(Ordering::Acquire);
-        written.saturating_sub(self.events.len() as u64)
+        written.saturating_sub(self.iter().count() as u64)
     }
 
     /// Returns the events that are left, the oldest first.
     pub(super) fn iter(&self) -> impl Iterator<Item = Event> {
         let written = self.written.load(Ordering::Acquire);
-        (self.lost()..written).filter_map(|number| self.read(number))
+        (self.oldest(written)..written).filter_map(|number| self.read(number))
+    }
+
+    /// Does as [`iter`](Self::iter) while events are written: leaves out the ones
+    /// that are overwritten meanwhile.
+    pub(super) fn iter_meanwhile(&self) -> impl Iterator<Item = Event> {
+        let written = self.written.load(Ordering::Acquire);
+        (self.oldest(written)..written).filter_map(|number| {
+            let event = self.read(number)?;
+            // The words were read before the number of the latest event is.
+            fence(Ordering::Acquire);
+            let written = self.written.load(Ordering::Relaxed);
+            // Where it is equal, the very place may just be written.
+            (written < number + self.events.len() as u64).then_some(event)
+        })
+    }
+
+    /// Returns the number of the oldest event that may be there.
+    fn oldest(&self, written: u64) -> u64 {
+        let kept = written.saturating_sub(self.events.len() as u64);
+        kept.max(self.first.load(Ordering::Acquire))
     }
 
     fn read(&self, number: u64) -> Option<Event> {
@@ -152,6 +202,34 @@ mod tests {
             .zip(WHATS)
             .map(|(number, what)| (what, (number % 2 == 0).then_some(SubtaskId(9))));
         assert!(read.into_iter().eq(expected));
+    }
+
+    #[test]
+    fn what_is_forgotten_or_not_kept_counts_as_lost() {
+        let ring = Ring::new(4);
+        ring.push(event(0, What::Ready, None));
+        ring.push(event(1, What::Ready, None));
+        ring.forget();
+        assert_eq!((ring.iter().count(), ring.lost()), (0, 2));
+        ring.pass();
+        ring.push(event(3, What::Ready, None));
+        let times = |ring: &Ring| ring.iter().map(|event| event.time_ns).collect::<Vec<_>>();
+        assert_eq!((times(&ring), ring.lost()), (vec![3], 3));
+        (4..9).for_each(|time| ring.push(event(time, What::Ready, None)));
+        assert_eq!((times(&ring), ring.lost()), (vec![5, 6, 7, 8], 5));
+        ring.clear();
+        assert_eq!((ring.iter().count(), ring.lost()), (0, 0));
+    }
+
+    #[test]
+    fn whoever_reads_meanwhile_leaves_out_what_may_be_overwritten() {
+        let ring = Ring::new(3);
+        (0..3).for_each(|time| ring.push(event(time, What::Ready, None)));
+        let times: Vec<_> = ring.iter_meanwhile().map(|event| event.time_ns).collect();
+        assert_eq!(times, [1, 2]);
+        let mut reader = ring.iter_meanwhile();
+        ring.push(event(3, What::Ready, None));
+        assert_eq!(reader.next().map(|event| event.time_ns), Some(2));
     }
 
     #[test]

@@ -1,0 +1,56 @@
+//! Status lines: how a run does, now and then.
+//!
+//! The load of each core is computed from the trace, so that counting it costs
+//! nothing between two lines. Where the trace holds less than that time, the load
+//! is of what it holds; where events are not recorded there is none.
+
+use sched_dag::DagId;
+
+use super::progress::is_quiet;
+use crate::machine::clock;
+use crate::{execution, json, trace};
+
+/// When and what to print.
+#[derive(Debug)]
+pub(super) struct Status {
+    period_ns: u64,
+    total: u64,
+    /// When the last line was printed.
+    last_ns: u64,
+}
+
+impl Status {
+    /// Begins with the first line due after `period_ns`.
+    pub(super) fn begin(period_ns: u64, total: u64) -> Self {
+        Self {
+            period_ns,
+            total,
+            last_ns: clock::now_ns(),
+        }
+    }
+
+    /// Prints a line if one is due and the next event leaves time for it.
+    pub(super) fn print_when_due(&mut self) {
+        let now_ns = clock::now_ns();
+        if now_ns < self.last_ns.saturating_add(self.period_ns) || !is_quiet() {
+            return;
+        }
+        let [from_ns, to_ns] = [self.last_ns, now_ns].map(execution::since_epoch);
+        self.last_ns = now_ns;
+        let misses = (0..)
+            .map_while(|dag| execution::snapshot(DagId(dag)))
+            .map(|dag| dag.statistics.misses)
+            .sum::<u64>();
+        let loads = || trace::loads_permille(from_ns, to_ns);
+        json::emit("status", |line| {
+            line.number("time_ns", to_ns)
+                .number("done", execution::jobs_ended())
+                .number("total", self.total)
+                .number("misses", misses)
+                .list("load_permille", loads());
+            if let Some(end_ns) = execution::nominal_end_ns() {
+                line.number("left_ns", end_ns.saturating_sub(to_ns));
+            }
+        });
+    }
+}

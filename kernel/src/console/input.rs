@@ -1,0 +1,114 @@
+//! Lines from bytes: what a person types, put together.
+
+/// The longest line, in bytes.
+const LONGEST: usize = 120;
+
+const BACKSPACE: u8 = 0x08;
+const DELETE: u8 = 0x7f;
+
+/// A line that is being typed.
+#[derive(Debug)]
+pub(super) struct Input {
+    bytes: [u8; LONGEST],
+    length: usize,
+    is_too_long: bool,
+}
+
+/// What a byte has come to.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Typed<'a> {
+    /// The line goes on.
+    Nothing,
+    /// The line is complete.
+    Line(&'a str),
+    /// The line is complete, and longer than lines may be.
+    TooLong,
+    /// The line is complete, and not UTF-8.
+    NotText,
+}
+
+impl Input {
+    pub(super) const fn new() -> Self {
+        Self {
+            bytes: [0; LONGEST],
+            length: 0,
+            is_too_long: false,
+        }
+    }
+
+    /// Takes a byte. A line ends with `\r` or `\n`; an empty one is nothing, and
+    /// so `\r\n` ends one line.
+    pub(super) fn take(&mut self, byte: u8) -> Typed<'_> {
+        match byte {
+            b'\r' | b'\n' => {
+                let length = core::mem::take(&mut self.length);
+                if core::mem::take(&mut self.is_too_long) {
+                    return Typed::TooLong;
+                }
+                match core::str::from_utf8(&self.bytes[..length]).map(str::trim) {
+                    Ok("") => Typed::Nothing,
+                    Ok(line) => Typed::Line(line),
+                    Err(_) => Typed::NotText,
+                }
+            }
+            BACKSPACE | DELETE => {
+                self.length = self.length.saturating_sub(1);
+                Typed::Nothing
+            }
+            byte => {
+                match self.bytes.get_mut(self.length) {
+                    Some(place) => {
+                        *place = byte;
+                        self.length += 1;
+                    }
+                    None => self.is_too_long = true,
+                }
+                Typed::Nothing
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Types all and returns what came of it in words.
+    fn typed(text: &[u8]) -> Vec<String> {
+        let mut input = Input::new();
+        let mut lines = Vec::new();
+        for byte in text {
+            match input.take(*byte) {
+                Typed::Nothing => {}
+                Typed::Line(line) => lines.push(line.into()),
+                Typed::TooLong => lines.push("(too long)".into()),
+                Typed::NotText => lines.push("(not text)".into()),
+            }
+        }
+        lines
+    }
+
+    #[test]
+    fn a_line_ends_with_any_line_end_and_empty_ones_are_nothing() {
+        assert_eq!(
+            typed(b"one\rtwo\nthree\r\n\n  \n four \nfi"),
+            ["one", "two", "three", "four"]
+        );
+    }
+
+    #[test]
+    fn what_is_typed_wrongly_can_be_taken_back() {
+        assert_eq!(typed(b"\x7fhelx\x08p\n"), ["help"]);
+    }
+
+    #[test]
+    fn a_line_too_long_or_no_text_is_refused_as_a_whole() {
+        let long = [b'x'; LONGEST + 1];
+        let mut text = long.to_vec();
+        text.extend(b"\nhelp\n\xff\ndags\n");
+        assert_eq!(typed(&text), ["(too long)", "help", "(not text)", "dags"]);
+        text.truncate(LONGEST);
+        text.push(b'\n');
+        assert_eq!(typed(&text)[0].len(), LONGEST);
+    }
+}
