@@ -5,7 +5,7 @@
 //! tool itself is killed, so nothing is left behind in any case.
 
 use std::io;
-use std::process::{self, Command, ExitStatus};
+use std::process::{self, ChildStdin, Command, ExitStatus};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -64,6 +64,11 @@ impl Child {
             }
             thread::sleep(PAUSE);
         }
+    }
+
+    /// Takes the child's standard input, if that is a pipe and was not taken.
+    pub fn input(&mut self) -> Option<ChildStdin> {
+        self.process.stdin.take()
     }
 
     /// Returns the time since the start.

@@ -13,15 +13,19 @@
 //! Whatever goes wrong ends in a panic that shows the end of the serial log
 //! and where all of it lies. A good run's log is removed.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Write;
 use std::path::Path;
+use std::process::ChildStdin;
+use std::rc::Rc;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::image::{self, Image};
 use crate::install;
-use crate::outcome::{Outcome, boot};
+use crate::outcome::{Outcome, boot_with_input};
 use crate::protocol::Status;
 use crate::qemu::{Machine, Mode, Qemu};
 use crate::system;
@@ -36,6 +40,8 @@ pub struct Guest {
     qemu: Qemu,
     words: Vec<String>,
     limit: Duration,
+    /// What to say at the console, each once a line with such a text has come.
+    conversation: Vec<(String, String)>,
 }
 
 impl Guest {
@@ -48,6 +54,7 @@ impl Guest {
             qemu: Qemu::default(),
             words: Vec::new(),
             limit: LIMIT,
+            conversation: Vec::new(),
         }
     }
 
@@ -93,6 +100,16 @@ impl Guest {
         self
     }
 
+    /// Gives the guest a console. Each pair is a text to wait for, in any line that
+    /// comes after what was said before, and what to say then.
+    #[must_use]
+    pub fn conversation(mut self, conversation: &[(&str, &str)]) -> Guest {
+        let owned = |&(text, answer): &(&str, &str)| (text.into(), answer.into());
+        self.conversation = conversation.iter().map(owned).collect();
+        self.qemu.has_input = true;
+        self.word("console=on")
+    }
+
     /// Sets how long the guest may take in wall time.
     #[must_use]
     pub fn limit(mut self, limit: Duration) -> Guest {
@@ -115,7 +132,11 @@ impl Guest {
             let mode = format!("mode={}", qemu.mode);
             let words = std::iter::once(&mode).chain(&self.words);
             qemu.guest_words = words.cloned().collect::<Vec<_>>().join(" ");
-            boot(&qemu, &image.path, &log, self.limit, |_| {})
+            let mut talk = Talk::new(&self.conversation);
+            let input = talk.input.clone();
+            let connect = |pipe| *input.borrow_mut() = pipe;
+            let show = |line: &str| talk.hear(line);
+            boot_with_input(&qemu, &image.path, &log, self.limit, connect, show)
         };
         run().unwrap_or_else(|error: String| panic!("`{}` did not boot: {error}", self.package))
     }
@@ -152,6 +173,35 @@ impl Guest {
         }
         let _ = fs::remove_file(&outcome.log);
         outcome
+    }
+}
+
+/// A conversation that goes on.
+struct Talk<'g> {
+    left: std::slice::Iter<'g, (String, String)>,
+    input: Rc<RefCell<Option<ChildStdin>>>,
+}
+
+impl<'g> Talk<'g> {
+    fn new(conversation: &'g [(String, String)]) -> Talk<'g> {
+        Talk {
+            left: conversation.iter(),
+            input: Rc::default(),
+        }
+    }
+
+    /// Says what is to be said after such a line.
+    fn hear(&mut self, line: &str) {
+        let Some((text, answer)) = self.left.as_slice().first() else {
+            return;
+        };
+        if let Some(pipe) = self.input.borrow_mut().as_mut()
+            && line.contains(text)
+        {
+            self.left.next();
+            // If the guest is gone, its outcome says so.
+            let _ = writeln!(pipe, "{answer}");
+        }
     }
 }
 

@@ -9,6 +9,7 @@
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::ChildStdin;
 use std::time::Duration;
 
 use crate::places::Places;
@@ -59,9 +60,27 @@ pub fn boot(
     image: &Path,
     log: &Path,
     limit: Duration,
+    show: impl FnMut(&str),
+) -> Result<Outcome, String> {
+    boot_with_input(qemu, image, log, limit, drop, show)
+}
+
+/// Does as [`boot`], and hands `talk` the way to the guest's serial port, if the
+/// guest has one, as soon as it runs.
+///
+/// # Errors
+///
+/// As [`boot`].
+pub fn boot_with_input(
+    qemu: &Qemu,
+    image: &Path,
+    log: &Path,
+    limit: Duration,
+    talk: impl FnOnce(Option<ChildStdin>),
     mut show: impl FnMut(&str),
 ) -> Result<Outcome, String> {
     let mut running = qemu.start(image, log)?;
+    talk(running.input());
     let mut tail = Tail::new(log);
     let ending = running.wait(limit, || tail.follow(&mut show));
     tail.finish(&mut show);

@@ -8,7 +8,8 @@
 //!
 //! Serial output goes to a file, for that loses nothing, whereas a slow pipe
 //! drops bytes. The guest ends its run by writing to the port of QEMU's
-//! `isa-debug-exit` device, see [`Ending`].
+//! `isa-debug-exit` device, see [`Ending`]. Input to the serial port, for the
+//! console, comes from us through a pipe.
 
 mod process;
 
@@ -155,6 +156,8 @@ pub struct Qemu {
     pub guest_words: String,
     /// A file to leave in the guest's memory.
     pub module: Option<PathBuf>,
+    /// Hand what is written to [`Running::input`] to the guest's serial port.
+    pub has_input: bool,
     /// Wait for a debugger on TCP port 1234 before the first instruction.
     pub wait_for_debugger: bool,
 }
@@ -170,6 +173,7 @@ impl Default for Qemu {
             memory_mib: 32,
             guest_words: String::new(),
             module: None,
+            has_input: false,
             wait_for_debugger: false,
         }
     }
@@ -191,7 +195,14 @@ impl Qemu {
         }
         // A comma would end the file's name in QEMU's syntax unless doubled.
         let serial = serial.display().to_string().replace(',', ",,");
-        arguments.extend(["-serial".into(), format!("file:{serial}")]);
+        if self.has_input {
+            // The log file gets every byte; QEMU's own output goes nowhere.
+            let port = format!("stdio,id=console,signal=off,logfile={serial}");
+            arguments.extend(["-chardev".into(), port]);
+            arguments.extend(["-serial", "chardev:console"].map(String::from));
+        } else {
+            arguments.extend(["-serial".into(), format!("file:{serial}")]);
+        }
         let exit_device = "isa-debug-exit,iobase=0xf4,iosize=0x04";
         arguments.extend(["-device", exit_device].map(String::from));
         arguments.extend(["-nodefaults", "-no-user-config"].map(String::from));
@@ -213,7 +224,7 @@ impl Qemu {
             .ok_or_else(|| format!("there is no program `{name}`; install QEMU or name another"))?;
         let mut command = crate::child::bound_to_us(&program);
         command.args(self.arguments(image, serial));
-        Running::start(command, serial)
+        Running::start(command, serial, self.has_input)
     }
 }
 
@@ -252,7 +263,19 @@ mod tests {
             assert!(line.contains(part), "`{part}` is not in `{line}`");
         }
         assert!(!line.contains("-gdb"));
+        assert!(!line.contains("stdio"));
         assert!(!line.contains("-initrd"));
+    }
+
+    #[test]
+    fn a_guest_with_input_still_writes_to_the_file() {
+        let line = line(&Qemu {
+            has_input: true,
+            ..Qemu::default()
+        });
+        let port = "-chardev stdio,id=console,signal=off,logfile=a,,b.log -serial chardev:console";
+        assert!(line.contains(port), "{line}");
+        assert!(!line.contains("file:a"));
     }
 
     #[test]

@@ -10,6 +10,8 @@
 
 mod folder;
 mod screen;
+mod seeing;
+mod status;
 mod table;
 
 use std::fs::{self, File};
@@ -22,7 +24,7 @@ use crate::dag_file::{self, Prepared};
 use crate::image;
 use crate::install;
 use crate::options::{Parsed, Request, UsageError};
-use crate::outcome::{Outcome, boot};
+use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::Status;
 use crate::qemu::{LEAST_MEMORY_MIB, Machine, Mode, PROGRAM, Qemu};
@@ -134,7 +136,8 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
             screen.show(line);
         }
     };
-    let outcome = boot(&qemu, &image, &log.path, limit, show);
+    let talk = seeing::relay;
+    let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
     if let Some(file) = options.text("trace") {
@@ -191,6 +194,10 @@ fn choose_mode(options: &Parsed, program: &Path) -> Result<(Mode, Option<String>
     match named {
         None => match probe::kvm(program) {
             Ok(()) => Ok((Mode::Kvm, Some("a guest ran under KVM".into()))),
+            // A person needs time to type.
+            Err(why) if options.is_given("console") => {
+                Ok((Mode::Threads, Some(format!("KVM is of no use here: {why}"))))
+            }
             Err(why) => Ok((
                 Mode::Deterministic,
                 Some(format!("KVM is of no use here: {why}")),
@@ -220,6 +227,7 @@ fn describe(
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
     words.extend(options.is_given("trace").then(|| "trace=dump".into()));
+    words.extend(seeing::guest_words(options));
     words.extend(options.text("append").map(String::from));
     Qemu {
         program: program.into(),
@@ -229,6 +237,7 @@ fn describe(
         memory_mib,
         guest_words: words.join(" "),
         module: dags.map(|dags| dags.module.clone()),
+        has_input: options.is_given("console"),
         wait_for_debugger: options.is_given("gdb"),
     }
 }
@@ -239,8 +248,9 @@ fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
     let jobs = options.number("jobs").unwrap_or(200);
     let usual = dags.map_or(120 + jobs, |dags| dags.limit_s);
     let seconds = options.number("timeout").unwrap_or(usual);
-    if options.is_given("gdb") {
-        // A person at a debugger takes all day.
+    let is_short = options.is_given("timeout");
+    if options.is_given("gdb") || options.is_given("console") && !is_short {
+        // A person takes all day.
         return Duration::from_secs(86_400);
     }
     Duration::from_secs(seconds)

@@ -44,6 +44,9 @@ pub const WCET_OF_ENDS: Duration = Duration::from_millis(1);
 /// virtual processor can lose its core to others for long.
 pub const BUDGET: Duration = Duration::from_secs(5);
 
+/// The most jobs in flight.
+pub const MOST_IN_FLIGHT: u32 = 256;
+
 /// The most parallel subtasks: the sink's arguments are a tuple.
 pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
 
@@ -52,7 +55,7 @@ pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
 pub struct Workload {
     /// The number N of parallel subtasks, 1 to [`MOST_PARALLEL`].
     pub parallel: usize,
-    /// The number of jobs.
+    /// The number of jobs; 0: without end.
     pub jobs: u64,
     /// The seed of the execution times.
     pub seed: u64,
@@ -73,8 +76,13 @@ impl Workload {
     #[must_use]
     pub fn build(&self) -> (Dag, Joins) {
         let dag = create_dag();
-        dag.name("fork-join").jobs(self.jobs);
-        dag.in_flight(u32::try_from(self.jobs).unwrap_or(u32::MAX).clamp(1, 256));
+        dag.name("fork-join").in_flight(match self.jobs {
+            0 => MOST_IN_FLIGHT,
+            jobs => u32::try_from(jobs).map_or(MOST_IN_FLIGHT, |jobs| jobs.min(MOST_IN_FLIGHT)),
+        });
+        if self.jobs > 0 {
+            dag.jobs(self.jobs);
+        }
 
         let mut next_job = 0u64;
         let source = move || {

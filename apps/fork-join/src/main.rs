@@ -33,7 +33,10 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     println!("Its mean load is 25.5 / 25: backlog and deadline misses grow with the jobs.");
     let mut all = Vec::new();
     for workload in &workloads {
-        println!("N = {}: {} jobs ...", workload.parallel, workload.jobs);
+        match workload.jobs {
+            0 => println!("N = {}: until the console ends it ...", workload.parallel),
+            jobs => println!("N = {}: {jobs} jobs ...", workload.parallel),
+        }
         let (dag, joins) = workload.build();
         for answer in finish_create_dags(&[dag])?.answers() {
             println!("  {answer}");
@@ -58,7 +61,7 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
     let options = machine.options();
     let most_parallel = MOST_PARALLEL as u64;
     let subtasks = options.numbers("subtasks", 1..=most_parallel, &[2, 4, 6])?;
-    let jobs = options.number("jobs", 1..=1_000_000, 200)?;
+    let jobs = options.number("jobs", 0..=1_000_000, 200)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
     let occupation = options.choice(
         "occupy",

@@ -6,6 +6,7 @@
 extern crate alloc;
 
 mod checksum;
+mod endless;
 mod kernel_crimes;
 mod preemption;
 mod storm;
@@ -18,7 +19,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 11] = [
+const TESTS: [(&str, Test); 12] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -34,6 +35,7 @@ const TESTS: [(&str, Test); 11] = [
         |_| unpunished(kernel_crimes::fault_doubly()),
     ),
     ("preemption", preemption::run),
+    ("endless", endless::run),
     ("storm", storm::run),
 ];
 

@@ -12,7 +12,7 @@ use std::ffi::OsString;
 use std::fmt;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{ChildStdin, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use crate::child::{Child, Waited};
@@ -73,7 +73,11 @@ pub struct Running {
 
 impl Running {
     /// Starts `command` with its streams away from the terminal.
-    pub(super) fn start(mut command: Command, serial: &Path) -> Result<Running, String> {
+    pub(super) fn start(
+        mut command: Command,
+        serial: &Path,
+        has_input: bool,
+    ) -> Result<Running, String> {
         let file_error = |path: &Path| {
             let path = path.display().to_string();
             move |error| format!("cannot write `{path}`: {error}; name a file elsewhere")
@@ -85,7 +89,11 @@ impl Running {
         let errors = File::create(&complaints).map_err(file_error(&complaints))?;
 
         command
-            .stdin(Stdio::null())
+            .stdin(if has_input {
+                Stdio::piped()
+            } else {
+                Stdio::null()
+            })
             .stdout(Stdio::null())
             .stderr(errors);
         let child = Child::start(&mut command)
@@ -110,6 +118,11 @@ impl Running {
             Waited::TimedOut => Ending::TimedOut(limit),
             Waited::GivenUp => Ending::TooMuchOutput,
         }
+    }
+
+    /// Takes the way to the guest's serial port, if it has one and it was not taken.
+    pub fn input(&mut self) -> Option<ChildStdin> {
+        self.child.input()
     }
 
     /// Returns the time since the start.

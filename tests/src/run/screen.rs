@@ -3,8 +3,9 @@
 //! Lines for people and machine lines go to standard output in the order of
 //! the serial log, so that `grep '^{'` works there as on the log itself.
 //! Progress lines become one line on standard error that renews itself if
-//! that is a terminal, and otherwise a line each tenth of the way. A fault at
-//! an address gets a line of our own that names the function.
+//! that is a terminal, and otherwise a line each tenth of the way. Status lines
+//! take its place on a terminal. A fault at an address gets a line of our own that
+//! names the function.
 
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::path::Path;
@@ -12,6 +13,8 @@ use std::path::Path;
 use crate::options::Parsed;
 use crate::places::Places;
 use crate::protocol::{MachineLine, read_line};
+
+use super::status::StatusLine;
 
 /// The width of the bar.
 const BAR: u64 = 30;
@@ -24,6 +27,7 @@ pub(super) struct Screen {
     traces: bool,
     on_terminal: bool,
     bar_is_shown: bool,
+    status: StatusLine,
     tenths_shown: u64,
     places: Places,
 }
@@ -32,12 +36,14 @@ impl Screen {
     pub(super) fn new(options: &Parsed, image: &Path) -> Screen {
         Screen {
             people: !options.is_given("json"),
-            machine: !options.is_given("plain"),
+            machine: !options.is_given("plain")
+                && (options.is_given("json") || !options.is_given("console")),
             quiet: options.is_given("quiet"),
             // Who wants them in a file does not want megabytes of them here.
             traces: !options.is_given("trace"),
             on_terminal: stderr().is_terminal(),
             bar_is_shown: false,
+            status: StatusLine::default(),
             tenths_shown: 0,
             places: Places::new(image),
         }
@@ -59,11 +65,12 @@ impl Screen {
     pub(super) fn show(&mut self, line: &str) {
         // The number is for messages only, and the judge makes those.
         let read = read_line(0, line);
-        if let Some(Ok(machine)) = &read
-            && machine.kind == "progress"
-        {
-            self.advance(machine);
-            return;
+        if let Some(Ok(machine)) = &read {
+            match machine.kind.as_str() {
+                "progress" => return self.advance(machine),
+                "status" if self.on_terminal => return self.show_status(machine),
+                _ => {}
+            }
         }
         if let Some(Ok(machine)) = &read
             && machine.kind.starts_with("trace")
@@ -90,6 +97,13 @@ impl Screen {
     pub(super) fn end(&mut self) {
         if std::mem::take(&mut self.bar_is_shown) {
             let _ = write!(stderr(), "\r\x1b[K");
+        }
+    }
+
+    fn show_status(&mut self, line: &MachineLine) {
+        if let Some(text) = self.status.text(line).filter(|_| !self.quiet) {
+            let _ = write!(stderr(), "\r\x1b[K{text}");
+            self.bar_is_shown = true;
         }
     }
 

@@ -47,11 +47,12 @@ pub static RUN: Command = Command {
             name: "jobs",
             short: None,
             takes: Takes::Number {
-                least: 1,
+                least: 0,
                 most: 1_000_000,
             },
             default: "",
-            help: "Jobs that each DAG releases; the default is 200 for fork-join, 50 for --dag.",
+            help: "Jobs that each DAG releases; the default is 200 for fork-join, 50 for --dag; \
+                   0, for fork-join: no end, which is for --console.",
         },
         Opt {
             name: "seed",
@@ -198,6 +199,14 @@ pub static RUN: Command = Command {
             default: "",
             help: "Keep the serial log in this file, with the trace of each run, which is not \
                    shown; ./scripts/check-trace FILE judges it.",
+        },
+        Opt {
+            name: "console",
+            short: None,
+            takes: Takes::Nothing,
+            default: "",
+            help: "Talk to the kernel while it runs: type `help`. Real time unless --mode says \
+                   otherwise, no timeout unless --timeout does, no machine lines unless --json.",
         },
         Opt {
             name: "append",

@@ -1,0 +1,56 @@
+//! What a person sees of a run beside its lines, and says to it.
+//!
+//! The console's input comes from standard input, byte by byte; the terminal
+//! itself shows and edits the line. The status is asked for only where a person
+//! looks: what a guest prints changes its times, and a run whose output goes to a
+//! file or a pipe must not depend on who started it.
+
+use std::io::{ErrorKind, IsTerminal, Read, Write, stderr, stdin, stdout};
+use std::process::ChildStdin;
+use std::thread;
+
+use crate::options::Parsed;
+
+/// Returns the guest's words for what the options ask for.
+pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
+    let mut words = Vec::new();
+    if options.is_given("console") {
+        words.push("console=on".into());
+    } else if is_watched(options) {
+        words.push("status=1".into());
+    }
+    words
+}
+
+/// Reports whether a person watches, and does not talk meanwhile.
+fn is_watched(options: &Parsed) -> bool {
+    let silent = ["quiet", "json", "gdb"];
+    stdout().is_terminal()
+        && stderr().is_terminal()
+        && !silent.into_iter().any(|name| options.is_given(name))
+}
+
+/// Hands standard input on to the guest's serial port, until either ends.
+pub(super) fn relay(input: Option<ChildStdin>) {
+    let Some(mut input) = input else {
+        return;
+    };
+    // The thread is not waited for: it may stand in a read for ever, and ends with
+    // the tool.
+    thread::spawn(move || {
+        let mut bytes = [0; 256];
+        loop {
+            match stdin().read(&mut bytes) {
+                Ok(0) => break,
+                Ok(count) => {
+                    let sent = input.write_all(&bytes[..count]);
+                    if sent.and_then(|()| input.flush()).is_err() {
+                        break;
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => break,
+            }
+        }
+    });
+}
