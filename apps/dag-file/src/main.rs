@@ -34,6 +34,9 @@ const WORDS: [&str; 8] = [
     "show",
 ];
 
+/// Time for the cores to get ready.
+const LEAD_NS: u64 = 1_000_000;
+
 /// What the command line says beside how a set is run.
 struct Wishes {
     settings: Settings,
@@ -50,7 +53,9 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     for set in &file.sets {
         let (settings, epoch) = (&wishes.settings, Epoch::default());
         let dags = build(set, settings, &epoch);
-        let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
+        // What is wrong with the DAGs is wrong with the file that we were given.
+        let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph())
+            .map_err(|error| usage(format!("DAG file: {error}")))?;
         if wishes.for_people {
             for warning in commit.warnings() {
                 println!("warning: {warning}");
@@ -71,9 +76,6 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let complaint = reports.iter().find_map(complaint);
     complaint.map_or(Ok(()), |text| Err(Ending::Failure(text)))
 }
-
-/// Time for the cores to get ready.
-const LEAD_NS: u64 = 1_000_000;
 
 fn usage(message: impl Into<String>) -> Ending {
     Ending::Usage(UsageError::new(message))

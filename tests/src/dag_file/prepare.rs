@@ -89,6 +89,14 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         length,
     };
     let file = load(Path::new(path), &import)?;
+    let memory_mib = memory_mib(&file, length);
+    if memory_mib > MOST_MEMORY_MIB && !options.is_given("memory") {
+        return Err(refuse(format!(
+            "{path}: its {} subtasks and their jobs need {memory_mib} MiB, and a guest has \
+             {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
+            file.most_subtasks()
+        )));
+    }
     let module = system::new_log("dag-file")
         .map_err(refuse)?
         .with_extension("dag");
@@ -105,7 +113,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         words.push(OVERHEADS.into());
     }
     Ok(Some(Prepared {
-        memory_mib: memory_mib(&file, length),
+        memory_mib,
         limit_s: limit_s(&file, length),
         file,
         module,
@@ -129,11 +137,13 @@ fn instances(set: &Set, length: Length) -> u64 {
     set.dags.iter().map(of).fold(0, u64::saturating_add)
 }
 
-/// A quarter of memory is for stacks and what a core needs, and of the rest records
-/// may take half: so that much is needed for a set's subtasks, each with a stack and
-/// its bodies and edges, and for the records of its instances.
+/// The most memory in MiB: a guest has its stacks and its heap below 3 GiB.
+const MOST_MEMORY_MIB: u64 = 3072;
+
+/// Returns how much memory a file needs. A quarter of it becomes stacks, of which
+/// each subtask has one, and the rest the heap, of which records may take half.
 fn memory_mib(file: &DagFile, length: Length) -> u64 {
-    const OF_A_SUBTASK: u64 = 96 << 10;
+    const OF_A_SUBTASK: u64 = 4 * (65 << 10);
     const OF_AN_INSTANCE: u64 = 192;
     const MIB: u64 = 1 << 20;
     let subtasks = file.most_subtasks() as u64;

@@ -1,0 +1,156 @@
+//! DAG files on the machine: generated ones run by the rules, and what is wrong with
+//! a file the guest finds out itself.
+
+use std::fs;
+use std::path::PathBuf;
+
+use dag_file::Length;
+use harness::dag_file::{Import, load};
+use harness::protocol::Status;
+use harness::{Guest, Outcome, system};
+
+const GOOD: &str = "dag x period 10ms\nsubtask a wcet 2ms\nsubtask b wcet 3ms\nedge a -> b\nend\n";
+
+/// Boots the app with a file of `content`, which must end in `status`.
+fn boot(content: &[u8], words: &str, status: Status) -> Outcome {
+    let file = system::new_log("dag-file").expect("a folder for logs");
+    let module = file.with_extension("dag");
+    fs::write(&module, content).expect("a file in it");
+    let guest = Guest::new("dag-file").cores(4).module(&module);
+    let outcome = words.split(' ').fold(guest, Guest::word).end_in(status);
+    let _ = fs::remove_file(&module);
+    outcome
+}
+
+fn refusal(content: &[u8], words: &str) -> String {
+    let outcome = boot(content, words, Status::Usage);
+    outcome.transcript.verdict().expect("it ended so").reason
+}
+
+/// A generated file as the guest gets it.
+fn generated(name: &str) -> String {
+    let path: PathBuf = system::workspace().join("tests/data/rd-gen").join(name);
+    let import = Import {
+        unit_ns: 1_000_000,
+        graph: None,
+        cores: 4,
+        length: Length::Jobs(20),
+    };
+    load(&path, &import).expect("it is well formed").to_string()
+}
+
+#[test]
+fn generated_dags_run_without_violation() {
+    for (name, dags) in [
+        ("fifo_05.yaml", 1),
+        ("gnp_03.yaml", 1),
+        ("chain_04.yaml", 3),
+    ] {
+        for words in [
+            "policy=static",
+            "policy=edf execution=uniform:0.2..1 seed=7",
+        ] {
+            let words = format!("jobs=20 {words}");
+            let outcome = boot(generated(name).as_bytes(), &words, Status::Success);
+            let set = outcome
+                .transcript
+                .of_kind("dag_set")
+                .next()
+                .expect("a line");
+            assert_eq!(set.number_at("violations"), Some(0), "{name}: {}", set.text);
+            assert_eq!(
+                set.number_at("allocations"),
+                Some(0),
+                "{name}: {}",
+                set.text
+            );
+            assert_eq!(set.number_at("dags"), Some(dags), "{name}: {}", set.text);
+            for dag in outcome.transcript.of_kind("dag_run") {
+                assert_eq!(dag.number_at("completed"), Some(20), "{}", dag.text);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bound_holds_with_the_overheads_stated() {
+    let words = "jobs=20 overheads_ns=300,900,2000";
+    let outcome = boot(generated("gnp_03.yaml").as_bytes(), words, Status::Success);
+    let line = outcome
+        .transcript
+        .of_kind("dag_run")
+        .next()
+        .expect("a line");
+    let tightness = line.number_at("tightness_permille").expect("a bound");
+    assert!((900..=1000).contains(&tightness), "{}", line.text);
+}
+
+#[test]
+fn a_truncated_file_is_refused_by_the_guest() {
+    let whole = generated("chain_04.yaml");
+    for length in [whole.len() - "end\n".len(), whole.len() / 2, 30] {
+        let reason = refusal(&whole.as_bytes()[..length], "jobs=1");
+        assert!(reason.starts_with("DAG file, line "), "{reason}");
+    }
+    let all_but_end = refusal(&whole.as_bytes()[..whole.len() - 4], "jobs=1");
+    assert!(
+        all_but_end.contains("the file ends where `end` should be"),
+        "{all_but_end}"
+    );
+}
+
+#[test]
+fn what_is_wrong_is_said_with_its_line() {
+    let cycle = GOOD.replace("end", "edge b -> a\nend");
+    for (content, words, reason) in [
+        (
+            "",
+            "jobs=1",
+            "no DAG file; give one with `qemu -initrd FILE`",
+        ),
+        (
+            "\n",
+            "jobs=1",
+            "DAG file, line 2: the file ends where a `dag` record should be",
+        ),
+        (&cycle, "jobs=1", "DAG file, line 5: dag `x` has a cycle"),
+        (
+            GOOD,
+            "execution=often",
+            "`execution`: `often`: give wcet, uniform:0.2..1",
+        ),
+        (
+            GOOD,
+            "jobs=1 seconds=1",
+            "`jobs` and `seconds` exclude each other",
+        ),
+        (GOOD, "jbos=1", "`jbos` is no option"),
+    ] {
+        let found = refusal(content.as_bytes(), words);
+        assert!(found.contains(reason), "{found}\n  not: {reason}");
+    }
+    let found = refusal(b"dag x period 1ms\n\xff\xfe", "jobs=1");
+    assert_eq!(found, "DAG file, line 2: it is not UTF-8 text");
+}
+
+#[test]
+fn misses_are_a_failure_only_where_none_may_be_missed() {
+    let late = GOOD.replace("period 10ms", "period 10ms deadline 4ms");
+    boot(late.as_bytes(), "jobs=3", Status::Success);
+    let outcome = boot(late.as_bytes(), "jobs=3 deadlines=strict", Status::Failure);
+    let reason = outcome.transcript.verdict().expect("it ended so").reason;
+    assert_eq!(reason, "dag `x` missed 3 deadlines, and none may be missed");
+}
+
+#[test]
+fn more_subtasks_than_memory_are_refused() {
+    let mut many = String::from("dag many period 1s\n");
+    for number in 0..2000 {
+        many += &format!("subtask s{number} wcet 1us\n");
+    }
+    let reason = refusal(format!("{many}end\n").as_bytes(), "jobs=1");
+    assert!(
+        reason.contains("2000 subtasks and 4 cores need"),
+        "{reason}"
+    );
+}

@@ -1,0 +1,202 @@
+//! `run --dag` as a person calls it with a file that is wrong: refused before
+//! anything boots, as FILE:LINE, offender and remedy, with exit code 2.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use harness::system::workspace;
+
+/// Writes a file of this test's own.
+fn file(name: &str, text: &str) -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::write(&path, text).expect("the test's folder takes a file");
+    path
+}
+
+fn run(words: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    command.arg("run").args(words);
+    command.output().expect("the tool can be started")
+}
+
+/// Returns what the tool says of a file that it refuses.
+fn refusal(words: &[&str]) -> String {
+    let output = run(words);
+    let said = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(output.stdout, b"", "{said}");
+    said
+}
+
+#[test]
+fn a_broken_file_is_2_and_named_with_its_line() {
+    let node = "nodes:\n- id: 0\n  execution_time: 5\n  period: 9\n- id: 1\n  execution_time: 2\n";
+    let link = |source, target| format!("- source: {source}\n  target: {target}\n");
+    let dag = "dag x period 10ms\nsubtask a wcet 1ms\nsubtask b wcet 1ms\nedge a -> b\n";
+    let graph = r#"{"graphs":[{"name":"g","c":[1,2],"edges":[[0,1],[1,0]]}]}"#;
+    for (name, text, words) in [
+        (
+            "cycle.dag",
+            format!("{dag}edge b -> a\nend"),
+            "cycle.dag:5: dag `x` has a cycle: subtask `a` -> subtask `b` -> subtask `a`; remove one",
+        ),
+        (
+            "cycle.yaml",
+            format!("{node}links:\n{}{}", link(0, 1), link(1, 0)),
+            "cycle.yaml:10: dag `cycle` has a cycle",
+        ),
+        (
+            "cycle.json",
+            graph.into(),
+            "cycle.json:1: dag `g` has a cycle",
+        ),
+        (
+            "key.dag",
+            format!("{dag}subtask c wect 1ms\nend"),
+            "key.dag:5: unknown key `wect`; a subtask has",
+        ),
+        (
+            "key.yaml",
+            node.replace("period", "perod"),
+            "key.yaml:4: unknown key `perod`; a node has",
+        ),
+        (
+            "missing.dag",
+            format!("{dag}edge a -> z\nend"),
+            "missing.dag:5: no subtask `z` stands before this line",
+        ),
+        (
+            "missing.yaml",
+            format!("{node}links:\n{}", link(0, 7)),
+            "missing.yaml:9: target: there is no node `7`; add it",
+        ),
+        (
+            "negative.dag",
+            dag.replace("10ms", "-10ms"),
+            "negative.dag:1: period: `-10ms` is negative; give",
+        ),
+        (
+            "negative.yaml",
+            node.replace("5", "-5"),
+            "negative.yaml:3: execution_time: `-5` is negative",
+        ),
+        (
+            "overflow.dag",
+            dag.replace("10ms", "99999999999s"),
+            "overflow.dag:1: period: `99999999999s` is more than 64 bits",
+        ),
+        (
+            "overflow.yaml",
+            node.replace("5", "99999999999999"),
+            "overflow.yaml:3: execution_time: `99999999999999` units of 1ms",
+        ),
+        (
+            "late.dag",
+            format!(
+                "{}end",
+                dag.replace("10ms", "500000000s offset 18000000000s")
+            ),
+            "late.dag:1: the deadline of the first job of dag `x`",
+        ),
+        (
+            "empty.dag",
+            String::new(),
+            "empty.dag:1: the file ends where a `dag` record should be; it is empty",
+        ),
+        (
+            "empty.yaml",
+            String::new(),
+            "empty.yaml:1: the file is empty",
+        ),
+        (
+            "cut.dag",
+            dag.into(),
+            "cut.dag:5: the file ends where `end` should be; a part of it is missing",
+        ),
+    ] {
+        let path = file(name, &text);
+        let said = refusal(&["--dag", path.to_str().expect("UTF-8")]);
+        assert!(
+            said.starts_with("run: ") && said.contains(words),
+            "{said}  not: {words}"
+        );
+        assert!(said.contains(&format!("{}:", path.display())), "{said}");
+    }
+}
+
+#[test]
+fn options_that_do_not_fit_are_2() {
+    let good = file("good.dag", "dag x period 1ms\nsubtask a wcet 1us\nend\n");
+    let good = good.to_str().expect("UTF-8");
+    for (words, reason) in [
+        (
+            vec!["--dag", "/no/such.dag"],
+            "/no/such.dag: cannot be read",
+        ),
+        (
+            vec!["--execution", "wcet"],
+            "`--execution` needs `--dag FILE`",
+        ),
+        (
+            vec!["--dag", good, "--app", "soak"],
+            "`--app` and `--dag` exclude each other",
+        ),
+        (
+            vec!["--dag", good, "--jobs", "1", "--seconds", "1"],
+            "`--jobs` and `--seconds` exclude",
+        ),
+        (
+            vec!["--dag", good, "--execution", "most"],
+            "`--execution`: `most`: give wcet, uniform:",
+        ),
+        (
+            vec!["--dag", good, "--unit", "1"],
+            "`--unit`: `1` has no unit",
+        ),
+        (
+            vec!["--dag", good, "--graph", "g"],
+            "`--graph g` is for a set of task graphs",
+        ),
+    ] {
+        let said = refusal(&words);
+        assert!(said.contains(reason), "{said}  not: {reason}");
+    }
+}
+
+#[test]
+fn too_many_subtasks_for_any_guest_are_2() {
+    let mut text = String::from("dag many period 1s\n");
+    for number in 0..20_000 {
+        text += &format!("subtask s{number} wcet 1us\n");
+    }
+    let path = file("many.dag", &format!("{text}end\n"));
+    let said = refusal(&["--dag", path.to_str().expect("UTF-8")]);
+    assert!(
+        said.contains("its 20000 subtasks and their jobs need 5"),
+        "{said}"
+    );
+}
+
+#[test]
+fn every_format_is_printed_as_ours() {
+    let data = workspace().join("tests/data");
+    let (yaml, json) = (data.join("rd-gen/gnp_01.yaml"), data.join("stg50.json"));
+    for words in [
+        vec!["--print-dag", "--dag", yaml.to_str().expect("UTF-8")],
+        vec![
+            "--print-dag",
+            "--graph",
+            "50/rand0008",
+            "--dag",
+            json.to_str().expect("UTF-8"),
+        ],
+    ] {
+        let output = run(&words);
+        assert_eq!(output.status.code(), Some(0));
+        let printed = String::from_utf8(output.stdout).expect("UTF-8");
+        let again = file("printed.dag", &printed);
+        let output = run(&["--print-dag", "--dag", again.to_str().expect("UTF-8")]);
+        assert_eq!(String::from_utf8(output.stdout).expect("UTF-8"), printed);
+    }
+}
