@@ -147,3 +147,15 @@ fn a_refusal_names_line_offender_and_remedy() {
         assert!(message.contains(words), "{message}\n  not: {words}");
     }
 }
+
+#[test]
+fn the_example_of_the_documentation_is_read() {
+    let page = include_str!("../../../../docs/dag-file.md");
+    let example = page
+        .split("```text\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next());
+    let file = parse(example.unwrap()).unwrap();
+    let names = file.sets[0].dags.iter().map(|dag| dag.spec.name.as_str());
+    assert_eq!(names.collect::<Vec<_>>(), ["camera", "control"]);
+}
