@@ -132,8 +132,10 @@ pub(crate) struct Wiring {
     edges_of_inputs: Vec<Vec<usize>>,
     /// For each subtask the topics of its output ports.
     outputs: Vec<Vec<String>>,
-    /// The edges that carry signals: numbers, predecessors and successors.
-    signals: Vec<(usize, usize, usize)>,
+    /// For each subtask the edges that lead to it carrying signals.
+    signals_to: Vec<Vec<usize>>,
+    /// For each subtask the edges that lead from it carrying signals.
+    signals_from: Vec<Vec<usize>>,
     /// For each latest value its topic, and where the writer puts it: a
     /// `Vec<Box<dyn Stage<T>>>`.
     stages: Vec<(String, Box<dyn Any>)>,
@@ -161,18 +163,21 @@ impl Wiring {
             .map(|subtask| subtask.outputs.iter().map(|port| port.topic.clone()))
             .map(Iterator::collect)
             .collect();
-        let signals: Vec<_> = (edges..)
-            .zip(&spec.edges)
-            .map(|(edge, &(earlier, later))| (edge, earlier, later))
-            .collect();
-        edges += signals.len();
+        let none = || alloc::vec![Vec::new(); spec.subtasks.len()];
+        let (mut signals_to, mut signals_from) = (none(), none());
+        for (edge, &(earlier, later)) in (edges..).zip(&spec.edges) {
+            signals_to[later].push(edge);
+            signals_from[earlier].push(edge);
+        }
+        edges += spec.edges.len();
         Self {
             in_flight,
             ends: (0..edges).map(|_| None).collect(),
             edges_of_topic,
             edges_of_inputs,
             outputs,
-            signals,
+            signals_to,
+            signals_from,
             stages: (latest.iter())
                 .map(|latest| (latest.topic().into(), latest.stages()))
                 .collect(),
@@ -184,20 +189,15 @@ impl Wiring {
         &mut self,
         subtask: usize,
     ) -> (Vec<Subscriber<Signal>>, Publisher<Signal>) {
-        let (mut to, mut from) = (Vec::new(), Vec::new());
-        for (edge, earlier, later) in core::mem::take(&mut self.signals) {
-            if later == subtask {
-                to.push(Subscriber(self.reader(edge)));
-            } else if earlier == subtask {
-                from.push(self.writer(edge));
-            }
-            self.signals.push((edge, earlier, later));
-        }
+        let to = core::mem::take(&mut self.signals_to[subtask]);
+        let from = core::mem::take(&mut self.signals_from[subtask]);
+        let readers = to.into_iter().map(|edge| Subscriber(self.reader(edge)));
+        let readers = readers.collect();
         let publisher = Publisher {
-            writers: from.into(),
+            writers: from.into_iter().map(|edge| self.writer(edge)).collect(),
             stages: Box::default(),
         };
-        (to, publisher)
+        (readers, publisher)
     }
 
     /// Returns the ends of subtask number `subtask`, to be taken port by port.
