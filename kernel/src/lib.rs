@@ -49,6 +49,7 @@ mod contexts;
 pub mod entry;
 mod event;
 mod execution;
+mod graph;
 pub mod json;
 mod lock;
 mod machine;

@@ -7,7 +7,7 @@ use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemptio
 use sched_dag::SchedulerOptions;
 
 use crate::machine::{clock, this_core};
-use crate::{execution, worker};
+use crate::{execution, graph, worker};
 
 /// The one kernel, as `fass` sees it.
 pub(crate) struct Kernel {
@@ -130,6 +130,7 @@ impl Platform for Kernel {
             preemption: self.preemption(),
             cores: self.cores(),
         };
+        graph::dump(&plan.task_set, options);
         execution::prepare(plan, options)
     }
 }

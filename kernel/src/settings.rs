@@ -8,6 +8,7 @@
 //! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | how many events each core keeps; 0: none | 4096 |
+//! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
 //! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
@@ -18,18 +19,20 @@ use alloc::format;
 use fass::{Overheads, Policy, Preemption};
 
 use crate::background::{Echo, Wishes};
+use crate::graph;
 use crate::machine::{counted_time, interrupts_off};
 use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
 
 /// The words, for messages.
-pub(crate) const WORDS: [&str; 10] = [
+pub(crate) const WORDS: [&str; 11] = [
     "policy",
     "preemption",
     "budget_factor",
     "overheads_ns",
     "trace",
     "trace_events",
+    "graph",
     "measure",
     "console",
     "status",
@@ -62,6 +65,9 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
     KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
     KERNEL.set_overheads(overheads(options)?);
+    if options.choice("graph", &[("keep", false), ("dump", true)])? {
+        graph::enable();
+    }
     if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
         interrupts_off::enable();
     }

@@ -98,6 +98,7 @@ pub mod record;
 mod scheduler;
 mod spec;
 mod task_set;
+mod topic;
 mod verify;
 pub mod virtual_time;
 
@@ -110,6 +111,7 @@ pub use scheduler::{
 };
 pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
+pub use topic::Topic;
 pub use verify::{
     CommitOptions, ConstructionPolicy, Count, DagLabel, Direction, Fault, MAX_ARITY, Rejected,
     SubtaskLabel, Time, Verified, Warning, verify,

@@ -8,6 +8,7 @@ use alloc::string::String;
 
 use crate::ids::{DagId, SubtaskId};
 use crate::policy::{Activation, OverrunPolicy, Priority};
+use crate::topic::Topic;
 
 /// All DAG tasks of one commit.
 #[derive(Clone, Debug)]
@@ -33,6 +34,7 @@ pub struct Dag {
     pub(crate) successors: Adjacency,
     pub(crate) topological_order: Box<[SubtaskId]>,
     pub(crate) state_precedences: Box<[StatePrecedence]>,
+    pub(crate) topics: Box<[Topic]>,
 }
 
 /// An edge that two subtasks have because they share a state.
@@ -177,6 +179,13 @@ impl Dag {
     #[must_use]
     pub fn successors(&self, subtask: SubtaskId) -> &[SubtaskId] {
         self.successors.of(subtask)
+    }
+
+    /// Returns the topics, in the order of their writers. Edges that were stated
+    /// without a topic have none.
+    #[must_use]
+    pub fn topics(&self) -> &[Topic] {
+        &self.topics
     }
 
     /// Returns the subtasks in an order in which every predecessor comes first.

@@ -18,6 +18,7 @@
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`guest`]: all that for a test;
 //! - [`trace`]: what happened in a run, held against the model's rules;
+//! - [`dot`]: committed DAGs as a picture;
 //! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
@@ -29,6 +30,7 @@
 pub mod bench;
 pub mod child;
 pub mod dag_file;
+pub mod dot;
 pub mod elf;
 pub mod fault_page;
 pub mod guest;

@@ -141,7 +141,14 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
     if let Some(file) = options.text("trace") {
-        screen.say(&format!("trace: `./scripts/check-trace {file}` judges it"));
+        screen.say(&format!(
+            "trace: `./scripts/check-trace {file}` judges it, `./scripts/trace {file}` draws it"
+        ));
+    }
+    let drawn = seeing::write_dot(options, &outcome);
+    if outcome.judge().is_ok() {
+        // Otherwise there are worse news.
+        drawn.map_err(Refusal::Failure)?;
     }
     Ok(Booted {
         outcome,

@@ -2,14 +2,14 @@
 
 use core::fmt;
 
-use sched_dag::{Dag, OverrunPolicy, SubtaskId};
+use sched_dag::{Dag, SubtaskId};
 
 use super::ring::Ring;
 use super::{Event, WORDS, all_rings};
-use crate::json;
 use crate::machine::this_core;
 use crate::platform::KERNEL;
 use crate::run::Run;
+use crate::{graph, json};
 use fass::{Platform, Policy, Preemption};
 
 /// The most events on one line.
@@ -109,46 +109,7 @@ fn as_json(event: Event) -> impl fmt::Display {
 }
 
 fn dump_dag(number: u32, dag: &Dag) {
-    let overrun = match dag.overrun() {
-        OverrunPolicy::Queue => "queue",
-        OverrunPolicy::Skip => "skip",
-        OverrunPolicy::Abort => "abort",
-    };
-    let subtasks = || {
-        dag.subtasks().iter().map(|subtask| {
-            fmt::from_fn(move |f| {
-                let non_preemptive = u8::from(subtask.is_non_preemptive());
-                let priority = subtask.priority().0;
-                write!(
-                    f,
-                    "[{},{priority},{non_preemptive},",
-                    json::quoted(subtask.name())
-                )?;
-                match subtask.wcet_ns() {
-                    Some(wcet_ns) => write!(f, "{wcet_ns}]"),
-                    None => f.write_str("null]"),
-                }
-            })
-        })
-    };
-    let edges = || {
-        (0..)
-            .map(SubtaskId)
-            .take(dag.subtasks().len())
-            .flat_map(move |from| {
-                let successors = dag.successors(from).iter();
-                successors.map(move |to| fmt::from_fn(move |f| write!(f, "[{},{}]", from.0, to.0)))
-            })
-    };
     json::emit("trace_dag", |line| {
-        line.number("dag", number)
-            .text("name", dag.name())
-            .number("period_ns", dag.period_ns())
-            .number("relative_deadline_ns", dag.relative_deadline_ns())
-            .number("offset_ns", dag.offset_ns())
-            .number("in_flight", dag.in_flight())
-            .text("overrun", overrun)
-            .list("subtasks", subtasks())
-            .list("edges", edges());
+        graph::describe(line, number, dag);
     });
 }

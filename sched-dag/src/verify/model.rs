@@ -13,6 +13,7 @@ use crate::policy::Priority;
 use crate::priorities::ranks;
 use crate::spec::DagSpec;
 use crate::task_set::{Adjacency, Dag, Subtask, TaskSet};
+use crate::topic::topics_of;
 
 /// Makes the model, or notes that the derived priorities do not fit.
 ///
@@ -122,6 +123,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         successors: graph.successors,
         topological_order: topological_order.into_boxed_slice(),
         state_precedences: state_precedences.into_boxed_slice(),
+        topics: topics_of(spec),
     }
 }
 

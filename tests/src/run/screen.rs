@@ -25,6 +25,7 @@ pub(super) struct Screen {
     machine: bool,
     quiet: bool,
     traces: bool,
+    graphs: bool,
     on_terminal: bool,
     bar_is_shown: bool,
     status: StatusLine,
@@ -39,8 +40,9 @@ impl Screen {
             machine: !options.is_given("plain")
                 && (options.is_given("json") || !options.is_given("console")),
             quiet: options.is_given("quiet"),
-            // Who wants them in a file does not want megabytes of them here.
+            // Who wants these in a file does not want megabytes of them here.
             traces: !options.is_given("trace"),
+            graphs: !options.is_given("dot"),
             on_terminal: stderr().is_terminal(),
             bar_is_shown: false,
             status: StatusLine::default(),
@@ -73,8 +75,8 @@ impl Screen {
             }
         }
         if let Some(Ok(machine)) = &read
-            && machine.kind.starts_with("trace")
-            && !self.traces
+            && (machine.kind.starts_with("trace") && !self.traces
+                || machine.kind == "graph" && !self.graphs)
         {
             return;
         }

@@ -5,11 +5,14 @@
 //! looks: what a guest prints changes its times, and a run whose output goes to a
 //! file or a pipe must not depend on who started it.
 
+use std::fs;
 use std::io::{ErrorKind, IsTerminal, Read, Write, stderr, stdin, stdout};
 use std::process::ChildStdin;
 use std::thread;
 
+use crate::dot;
 use crate::options::Parsed;
+use crate::outcome::Outcome;
 
 /// Returns the guest's words for what the options ask for.
 pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
@@ -19,6 +22,7 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     } else if is_watched(options) {
         words.push("status=1".into());
     }
+    words.extend(options.is_given("dot").then(|| "graph=dump".into()));
     words
 }
 
@@ -28,6 +32,19 @@ fn is_watched(options: &Parsed) -> bool {
     stdout().is_terminal()
         && stderr().is_terminal()
         && !silent.into_iter().any(|name| options.is_given(name))
+}
+
+/// Writes the DAGs that a run has committed, if the options ask for it.
+///
+/// # Errors
+///
+/// In words: there are none, or the file cannot be written.
+pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<(), String> {
+    let Some(file) = options.text("dot") else {
+        return Ok(());
+    };
+    let text = dot::text(&outcome.transcript)?;
+    fs::write(file, text).map_err(|error| format!("`--dot {file}`: cannot be written: {error}"))
 }
 
 /// Hands standard input on to the guest's serial port, until either ends.

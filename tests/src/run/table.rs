@@ -201,6 +201,13 @@ pub static RUN: Command = Command {
                    shown; ./scripts/check-trace FILE judges it.",
         },
         Opt {
+            name: "dot",
+            short: None,
+            takes: Takes::Text("FILE"),
+            default: "",
+            help: "Write the committed DAGs to this file, for Graphviz: `dot -Tsvg FILE`.",
+        },
+        Opt {
             name: "console",
             short: None,
             takes: Takes::Nothing,

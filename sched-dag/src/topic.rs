@@ -1,0 +1,100 @@
+//! The topics of a verified DAG, for those who show the graph.
+//!
+//! Scheduling needs the edges alone, which are in [`Dag`](crate::Dag). What they
+//! carry is kept beside, as it was stated.
+
+use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use crate::ids::{SubtaskId, to_u32};
+use crate::spec::DagSpec;
+
+/// A named, typed bundle of edges from one subtask to others of its DAG.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topic {
+    /// The name.
+    pub name: String,
+    /// The name of the message's type, as the compiler gives it.
+    pub type_name: &'static str,
+    /// The subtask that writes it.
+    pub writer: SubtaskId,
+    /// The subtasks that read it, ascending.
+    pub readers: Box<[SubtaskId]>,
+    /// Whether subtasks, of any DAG, also read its latest value.
+    pub is_sampled: bool,
+}
+
+/// Collects the topics of a DAG without fault, in the order of their writers and,
+/// within a writer, of its outputs.
+pub(crate) fn topics_of(spec: &DagSpec) -> Box<[Topic]> {
+    let mut readers: BTreeMap<&str, Vec<SubtaskId>> = BTreeMap::new();
+    for (subtask, reader) in spec.subtasks.iter().enumerate() {
+        for port in &reader.inputs {
+            let of_topic = readers.entry(&port.topic).or_default();
+            of_topic.push(SubtaskId(to_u32(subtask)));
+        }
+    }
+    let is_sampled = |name: &str| spec.latest.iter().any(|latest| latest.port.topic == name);
+    let mut topics = Vec::new();
+    for (writer, of) in spec.subtasks.iter().enumerate() {
+        for port in &of.outputs {
+            let readers = readers.remove(port.topic.as_str()).unwrap_or_default();
+            topics.push(Topic {
+                name: port.topic.clone(),
+                type_name: port.type_name,
+                writer: SubtaskId(to_u32(writer)),
+                readers: readers.into_boxed_slice(),
+                is_sampled: is_sampled(&port.topic),
+            });
+        }
+    }
+    topics.into_boxed_slice()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::{SubtaskSpec, TopicPort};
+    use alloc::vec;
+    use core::any::TypeId;
+
+    fn ports(names: &[&str]) -> Vec<TopicPort> {
+        let port = |name: &&str| TopicPort {
+            topic: (*name).into(),
+            type_id: TypeId::of::<u8>(),
+            type_name: "u8",
+            can_fan_out: true,
+        };
+        names.iter().map(port).collect()
+    }
+
+    fn subtask(inputs: &[&str], outputs: &[&str]) -> SubtaskSpec {
+        SubtaskSpec {
+            inputs: ports(inputs),
+            outputs: ports(outputs),
+            ..SubtaskSpec::default()
+        }
+    }
+
+    #[test]
+    fn each_topic_has_its_writer_and_all_its_readers() {
+        let spec = DagSpec {
+            subtasks: vec![
+                subtask(&["b"], &[]),
+                subtask(&[], &["b", "a"]),
+                subtask(&["a", "b"], &[]),
+            ],
+            ..DagSpec::default()
+        };
+        let topics = topics_of(&spec);
+        let [b, a] = &topics[..] else {
+            panic!("{topics:?}");
+        };
+        assert_eq!((a.name.as_str(), a.writer), ("a", SubtaskId(1)));
+        assert_eq!(*a.readers, [SubtaskId(2)]);
+        assert_eq!(*b.readers, [SubtaskId(0), SubtaskId(2)]);
+        assert_eq!((b.type_name, b.is_sampled), ("u8", false));
+    }
+}
