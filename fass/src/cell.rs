@@ -56,7 +56,6 @@
 //! > `SET` with `Release`. After `SET` nobody writes. Readers read only after
 //! > an `Acquire` load gave `SET`.
 
-use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -73,26 +72,24 @@ const EMPTY_SLOT: u64 = 0;
 /// If `slots` is 0.
 pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
     assert!(slots > 0, "an edge needs at least one slot");
-    let ring = Arc::new(Ring {
-        slots: (0..slots).map(|_| Slot::empty()).collect(),
-    });
+    let slots: Arc<[Slot<T>]> = (0..slots).map(|_| Slot::empty()).collect();
     let writer = Writer {
-        ring: Arc::clone(&ring),
+        slots: Arc::clone(&slots),
         next: 0,
     };
-    (writer, Reader { ring, next: 0 })
+    (writer, Reader { slots, next: 0 })
 }
 
 /// The writing end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Writer<T> {
-    ring: Arc<Ring<T>>,
+    slots: Arc<[Slot<T>]>,
     /// The slot to look at first.
     next: usize,
 }
 
 /// The reading end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Reader<T> {
-    ring: Arc<Ring<T>>,
+    slots: Arc<[Slot<T>]>,
     /// The slot to look at first.
     next: usize,
 }
@@ -100,11 +97,12 @@ pub(crate) struct Reader<T> {
 impl<T> Writer<T> {
     /// Puts the value of `job` into a free slot, or gives the value back if all
     /// are taken (or `job` is `u64::MAX`, which has no turn).
+    #[inline]
     pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
         let Some(turn) = job.checked_add(1) else {
             return Err(value);
         };
-        let Some(slot) = self.ring.find(&mut self.next, EMPTY_SLOT) else {
+        let Some(slot) = find(&self.slots, &mut self.next, EMPTY_SLOT) else {
             return Err(value);
         };
         let place = slot.value.get().cast::<T>();
@@ -119,8 +117,9 @@ impl<T> Writer<T> {
 impl<T> Reader<T> {
     /// Moves the value of `job` out of its slot, or returns `None` if no slot
     /// holds that very job's value.
+    #[inline]
     pub(crate) fn take(&mut self, job: u64) -> Option<T> {
-        let slot = self.ring.find(&mut self.next, job.checked_add(1)?)?;
+        let slot = find(&self.slots, &mut self.next, job.checked_add(1)?)?;
         let place = slot.value.get().cast::<T>();
         // SAFETY: by the turn invariant a slot with a turn other than 0 is
         // initialised and the reader's alone, and `&mut self` makes us the only
@@ -132,11 +131,7 @@ impl<T> Reader<T> {
     }
 }
 
-/// The slots that the two ends share.
-struct Ring<T> {
-    slots: Box<[Slot<T>]>,
-}
-
+/// A slot, which the two ends share.
 struct Slot<T> {
     turn: AtomicU64,
     value: UnsafeCell<MaybeUninit<T>>,
@@ -145,24 +140,36 @@ struct Slot<T> {
 // SAFETY: the value is reached through the two ends only, which follow the turn
 // invariant; a value is thereby handed from one thread to another but never
 // shared, which is why `T: Send` is enough.
-unsafe impl<T: Send> Sync for Ring<T> {}
+unsafe impl<T: Send> Sync for Slot<T> {}
 
-impl<T> Ring<T> {
-    /// Finds a slot with the given turn, from slot `next` on and round the ring
-    /// once, and moves `next` behind it. Its look at the turn is an `Acquire`.
-    fn find(&self, next: &mut usize, turn: u64) -> Option<&Slot<T>> {
-        for _ in 0..self.slots.len() {
-            let slot = &self.slots[*next];
-            *next += 1;
-            if *next == self.slots.len() {
-                *next = 0;
-            }
-            if slot.turn.load(Ordering::Acquire) == turn {
-                return Some(slot);
-            }
-        }
-        None
+/// Finds a slot with the given turn, from slot `next` on and round the ring
+/// once, and moves `next` behind it. Its look at the turn is an `Acquire`.
+#[inline]
+fn find<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
+    let slot = slots.get(*next)?;
+    // Nearly always it is the first one.
+    if slot.turn.load(Ordering::Acquire) != turn {
+        return search(slots, next, turn);
     }
+    *next = after(slots, *next);
+    Some(slot)
+}
+
+#[cold]
+fn search<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
+    for _ in 0..slots.len() {
+        let slot = &slots[*next];
+        *next = after(slots, *next);
+        if slot.turn.load(Ordering::Acquire) == turn {
+            return Some(slot);
+        }
+    }
+    None
+}
+
+/// Returns the slot after one, round the ring.
+fn after<T>(slots: &[Slot<T>], slot: usize) -> usize {
+    if slot + 1 == slots.len() { 0 } else { slot + 1 }
 }
 
 impl<T> Slot<T> {

@@ -15,9 +15,7 @@
 //! use after another, on whatever cores.
 
 use alloc::sync::Arc;
-use core::future::poll_fn;
 use core::sync::atomic::{AtomicU8, AtomicU64, Ordering};
-use core::task::Poll;
 
 /// What the platform grants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,19 +62,18 @@ impl Gate {
         self.0.phase.store(phase, Ordering::Relaxed);
     }
 
-    /// Waits until the gate is open and passes it.
-    pub(crate) async fn pass(&self) -> Grant {
-        poll_fn(|_| {
-            let job = self.job();
-            let grant = match self.0.phase.load(Ordering::Relaxed) {
-                RUN => Grant::Run(job),
-                DISCARD => Grant::Discard(job),
-                _ => return Poll::Pending,
-            };
-            self.0.phase.store(PASSED, Ordering::Relaxed);
-            Poll::Ready(grant)
-        })
-        .await
+    /// Passes the gate if it is open. If it is not, whoever polls again has opened
+    /// it before, so no waker needs to be kept.
+    #[inline]
+    pub(crate) fn pass(&self) -> Option<Grant> {
+        let job = self.job();
+        let grant = match self.0.phase.load(Ordering::Relaxed) {
+            RUN => Grant::Run(job),
+            DISCARD => Grant::Discard(job),
+            _ => return None,
+        };
+        self.0.phase.store(PASSED, Ordering::Relaxed);
+        Some(grant)
     }
 
     /// Closes the gate behind a grant that has been carried out.
@@ -98,27 +95,21 @@ impl Gate {
 #[cfg(test)]
 mod tests {
     use super::{Gate, Grant};
-    use core::pin::pin;
-    use core::task::{Context, Poll, Waker};
 
     #[test]
     fn a_closed_gate_lets_nobody_pass() {
         let gate = Gate::new();
-        let mut context = Context::from_waker(Waker::noop());
-        let mut pass = pin!(gate.pass());
-        assert_eq!(pass.as_mut().poll(&mut context), Poll::Pending);
-        assert_eq!(pass.as_mut().poll(&mut context), Poll::Pending);
+        assert_eq!(gate.pass(), None);
+        assert_eq!(gate.pass(), None);
     }
 
     #[test]
     fn one_grant_passes_once() {
         let gate = Gate::new();
-        let mut context = Context::from_waker(Waker::noop());
         gate.open(Grant::Run(7));
         assert!(!gate.is_closed());
-        let first = pin!(gate.pass()).poll(&mut context);
-        assert_eq!(first, Poll::Ready(Grant::Run(7)));
-        assert_eq!(pin!(gate.pass()).poll(&mut context), Poll::Pending);
+        assert_eq!(gate.pass(), Some(Grant::Run(7)));
+        assert_eq!(gate.pass(), None);
         assert!(!gate.is_closed(), "open until the end is reported");
         gate.close();
         assert!(gate.is_closed());

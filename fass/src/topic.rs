@@ -43,14 +43,9 @@ impl<T> Subscriber<T> {
     ///
     /// If the value is not there, which means that the platform started the
     /// instance before a predecessor was complete.
+    #[inline]
     pub(crate) fn recv(&mut self, job: u64) -> T {
-        let Some(value) = self.0.take(job) else {
-            panic!(
-                "an input of job {job} is missing: the platform started the instance \
-                 before all its predecessors were complete"
-            );
-        };
-        value
+        self.0.take(job).unwrap_or_else(|| missing(job))
     }
 
     /// Drops the value of `job` if it has arrived.
@@ -84,6 +79,7 @@ impl<T: Message> Publisher<T> {
     /// If no slot is free, which means that the platform cancelled an
     /// instance and did not discard its inputs, or let more jobs be in flight
     /// than the plan says.
+    #[inline]
     pub(crate) fn send(&mut self, job: u64, value: T) {
         let Self { writers, stages } = self;
         // The commit refuses several readers of a type that gives `None`.
@@ -112,12 +108,27 @@ impl<T: Message> Publisher<T> {
     }
 }
 
+#[inline]
 fn put<T>(writer: &mut Writer<T>, job: u64, value: T) {
-    assert!(
-        writer.put(job, value).is_ok(),
+    if writer.put(job, value).is_err() {
+        no_free_slot(job);
+    }
+}
+
+#[cold]
+fn missing(job: u64) -> ! {
+    panic!(
+        "an input of job {job} is missing: the platform started the instance before all \
+         its predecessors were complete"
+    )
+}
+
+#[cold]
+fn no_free_slot(job: u64) -> ! {
+    panic!(
         "an output of job {job} finds no free slot: the platform cancelled an instance \
          without discarding its inputs, or exceeded the jobs in flight"
-    );
+    )
 }
 
 /// The edges of one DAG while the commit ties them.

@@ -19,6 +19,8 @@
 //! [`Body`](crate::Body).
 
 use alloc::vec::Vec;
+use core::future::{poll_fn, ready};
+use core::task::Poll;
 
 use crate::gate::{Gate, Grant};
 use crate::message::{Message, MessageType};
@@ -78,11 +80,12 @@ pub trait MulSend {
     /// The tuple that one job's outputs form.
     type Items;
 
-    /// Puts each item into its topic for the instance's job and ends the instance.
+    /// Puts each item into its topic for the instance's job and ends the instance,
+    /// at once: the future has nothing left to do.
     ///
     /// # Panics
     ///
-    /// When polled, if no slot is free: the platform did not discard the inputs
+    /// If no slot is free: the platform did not discard the inputs
     /// of a cancelled instance.
     ///
     /// ```
@@ -232,29 +235,34 @@ macro_rules! implement_arity {
             impl<$($Item: Message),*> MulRecv for Subscribers<($(Subscriber<$Item>,)*)> {
                 type Items = ($($Item,)*);
 
-                async fn recv_all(&mut self) -> Self::Items {
-                    let ($($end,)*) = &mut self.ends;
-                    loop {
-                        match self.gate.pass().await {
-                            Grant::Run(job) => return ($($end.recv(job),)*),
-                            Grant::Discard(job) => {
+                #[inline]
+                fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send {
+                    poll_fn(move |_| {
+                        let ($($end,)*) = &mut self.ends;
+                        match self.gate.pass() {
+                            Some(Grant::Run(job)) => Poll::Ready(($($end.recv(job),)*)),
+                            Some(Grant::Discard(job)) => {
                                 $($end.discard(job);)*
                                 self.gate.close();
+                                Poll::Pending
                             }
+                            None => Poll::Pending,
                         }
-                    }
+                    })
                 }
             }
 
             impl<$($Item: Message),*> MulSend for Publishers<($(Publisher<$Item>,)*)> {
                 type Items = ($($Item,)*);
 
-                async fn send_all(&mut self, items: Self::Items) {
+                #[inline]
+                fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send {
                     let job = self.gate.job();
                     let ($($item,)*) = items;
                     let ($($end,)*) = &mut self.ends;
                     $($end.send(job, $item);)*
                     self.gate.close();
+                    ready(())
                 }
             }
 

@@ -19,6 +19,8 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::convert::Infallible;
 use core::fmt;
+use core::future::poll_fn;
+use core::task::Poll;
 
 use crate::draft::Draft;
 use crate::gate::{Gate, Grant};
@@ -76,7 +78,8 @@ async fn create_subtask<F: FnMut(u64)>(
     gate: Gate,
 ) -> Infallible {
     loop {
-        match gate.pass().await {
+        let grant = poll_fn(|_| gate.pass().map_or(Poll::Pending, Poll::Ready)).await;
+        match grant {
             Grant::Run(job) => {
                 before.iter_mut().for_each(|edge| {
                     edge.recv(job);
