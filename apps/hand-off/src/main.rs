@@ -31,6 +31,12 @@ fn main(machine: &Machine) -> Result<(), Ending> {
                 measure::budgets(machine, subtasks, plan.jobs)?;
             }
         }
+        Part::Traced => {
+            for &parallel in &plan.branches {
+                measure::fork_join(machine, parallel, plan.jobs)?;
+            }
+            measure::preemption(machine, plan.jobs)?;
+        }
         Part::Elsewhere => {
             measure::woken_cores(machine, plan.jobs)?;
             measure::joins(machine, plan.jobs)?;
@@ -63,12 +69,15 @@ enum Part {
     Workloads,
     /// What needs a second core.
     Elsewhere,
+    /// What is worth looking at in a trace.
+    Traced,
 }
 
-const PARTS: [(&str, Part); 3] = [
+const PARTS: [(&str, Part); 4] = [
     ("hand-off", Part::HandOff),
     ("workloads", Part::Workloads),
     ("elsewhere", Part::Elsewhere),
+    ("traced", Part::Traced),
 ];
 
 /// What is to be measured.

@@ -12,20 +12,32 @@ use std::path::Path;
 use super::figure::Figure;
 use crate::json;
 
-/// When a figure has grown, in words; [`has_grown`] says the same.
-pub(super) const MARGIN_RULE: &str = "grown: on one core median or p99 by more than 3 % and 4 instructions, on several the median \
+/// When a figure has grown, in words; [`margin`] says the same.
+pub(super) const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
+     instructions, the jitter by 20; a commit by more than 10 %; on several cores the median \
      by more than 10 % and 40";
 
+/// Returns by how much a figure may be larger: so many per cent, and in any case so
+/// many instructions a step, for of a few instructions one is many per cent.
+fn margin(figure: &Figure) -> (u128, u128) {
+    match &*figure.figure {
+        // One more in each step is a change.
+        _ if figure.is_count() => (3, 0),
+        _ if figure.cores > 1 => (10, 40),
+        "commit" => (10, 0),
+        // A difference of two times that have margins of their own.
+        "release_jitter" => (3, 20),
+        _ => (3, 4),
+    }
+}
+
 fn has_grown(now: &Figure, before: &Figure) -> bool {
-    let (percent, instructions) = if now.cores == 1 { (3, 4) } else { (10, 40) };
+    let (percent, instructions) = margin(now);
     let grows = |now_is: u64, was: u64| {
         // Both for the same number of steps.
         let was = u128::from(was) * u128::from(now.per) / u128::from(before.per);
         let growth = u128::from(now_is).saturating_sub(was);
-        // Of a few instructions, one is many per cent. A count of events has no such
-        // excuse: one more in each step is a change.
-        let least = if now.is_count() { 0 } else { instructions };
-        growth > u128::from(now.per) * least && growth * 100 > was * percent
+        growth > u128::from(now.per) * instructions && growth * 100 > was * percent
     };
     grows(now.median, before.median) || (now.cores == 1 && grows(now.p99, before.p99))
 }

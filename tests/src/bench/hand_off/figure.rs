@@ -34,6 +34,18 @@ const NAMES: &[(&str, &str)] = &[
     ("locks", "takings of the scheduler's lock, per instance"),
     ("sink_wakeups", "times the sink was made ready, per job"),
     (
+        "request_to_suspended",
+        "preemption request -> the preempted suspended",
+    ),
+    (
+        "suspended_to_start",
+        "suspended -> preemptor started: switch of contexts",
+    ),
+    (
+        "finish_to_resumed",
+        "preemptor finished -> the preempted resumed",
+    ),
+    (
         "preempted_to_start",
         "preempted -> preemptor's first instruction",
     ),

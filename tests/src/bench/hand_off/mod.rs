@@ -7,7 +7,7 @@
 //!
 //! - `table`, `plan`: what is to be measured;
 //! - `figure`, `baseline`: what was, and what it was before;
-//! - `wakeups`: what only the trace can tell;
+//! - `traced`: what only the trace can tell;
 //! - `report`, `scale`: the tables.
 
 mod baseline;
@@ -16,7 +16,7 @@ mod plan;
 mod report;
 mod scale;
 mod table;
-mod wakeups;
+mod traced;
 
 use std::fs;
 use std::path::Path;
@@ -182,8 +182,8 @@ fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String>
             outcome.tail()
         ));
     }
-    let figures = if what.counts_wakeups {
-        wakeups::count(&outcome.transcript, what.cores)?
+    let figures = if what.is_traced {
+        traced::read_all(&outcome.serial, what.cores)?
     } else {
         Figure::read_all(&outcome.transcript, what.cores)?
     };

@@ -19,8 +19,8 @@ pub(super) struct Boot {
     pub(super) cores: u64,
     memory_mib: u64,
     words: String,
-    /// Whether its trace tells what is to be counted, rather than its figures.
-    pub(super) counts_wakeups: bool,
+    /// Whether its trace tells what was measured, rather than its own figures.
+    pub(super) is_traced: bool,
 }
 
 /// Everything that is to be measured.
@@ -123,14 +123,15 @@ fn boots(options: &Parsed) -> Vec<Boot> {
         cores,
         memory_mib: 256,
         words: format!("part={part} {words} {}", text("append")),
-        counts_wakeups: part == "workloads",
+        is_traced: part == "traced",
     };
     // A trace shows what it shows in a few jobs.
-    let wakeups = format!("jobs=20 chain=2 layered=3 branches={branches} trace=dump");
+    let traced = format!("jobs=20 branches={branches} trace=dump");
     vec![
         boot(1, "hand-off", format!("jobs={jobs} {sizes}")),
-        boot(1, "workloads", wakeups),
+        boot(1, "traced", traced.clone()),
         boot(2, "elsewhere", format!("jobs={jobs}")),
+        boot(2, "traced", traced),
     ]
 }
 
@@ -142,7 +143,7 @@ impl Boot {
             cores,
             memory_mib: SCALE_MIB,
             words: format!("part=workloads jobs={jobs} {sizes}"),
-            counts_wakeups: false,
+            is_traced: false,
         }
     }
 
@@ -155,5 +156,37 @@ impl Boot {
             guest_words: format!("mode={mode} {}", self.words),
             ..Qemu::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Plan;
+    use crate::bench::hand_off::table::TABLE;
+    use crate::options::Request;
+
+    fn plan(line: &str) -> Result<Plan, String> {
+        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
+        match TABLE.parse(&words) {
+            Ok(Request::Work(options)) => Plan::new(&options),
+            other => panic!("`{line}`: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn sizes_become_words_of_the_guest() {
+        let plan = plan("--mode deterministic --branches 3,5 --jobs 7").unwrap();
+        let words = &plan.boots[0].words;
+        assert!(words.contains("part=hand-off jobs=7 chain=64 branches=3,5 layered=1000 seed=1"));
+        assert!(plan.boots.iter().any(|boot| boot.cores == 2));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let refused = |line| plan(line).unwrap_err();
+        assert!(refused("--compare --jobs 5").contains("the default of `--jobs`"));
+        assert!(refused("--compare --mode threads").contains("leave `--mode` out"));
+        assert!(refused("--save-baseline --mode threads").contains("`--save-baseline`"));
+        assert!(refused("--scale --compare").contains("for no baseline"));
     }
 }

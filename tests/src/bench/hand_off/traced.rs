@@ -1,0 +1,170 @@
+//! What only the trace can tell: wake-ups, and the parts of a preemption.
+//!
+//! A system that wakes a sink for each of its inputs makes N wake-ups of a join of N.
+//! Here a sink is made ready once, when its last predecessor has finished; the trace
+//! has an event for each time. Of a preemption it has the kernel's own times of
+//! request, suspension, start, finish and continuation, which no body can see.
+
+use std::collections::BTreeMap;
+
+use sched_dag::DagId;
+
+use super::figure::Figure;
+use crate::trace::model::{Event, Run, Word};
+use crate::trace::read;
+
+/// The preemptor's DAG in the runs that have one.
+const PREEMPTOR: DagId = DagId(0);
+
+/// Reads all figures of a boot that has dumped its trace.
+pub(super) fn read_all(log: &str, cores: u64) -> Result<Vec<Figure>, String> {
+    let runs = read(log).map_err(|malformed| malformed.to_string())?;
+    if runs.iter().any(|run| run.lost > 0) {
+        return Err("the trace has lost events; measure fewer jobs".into());
+    }
+    let mut figures = wakeups(&runs, cores);
+    let preemptions = runs.iter().filter(|run| is_of(run, "preemptor"));
+    figures.extend(preemptions.flat_map(|run| preemption(run, cores)));
+    if figures.is_empty() {
+        return Err("the trace shows no fork-join and no preemption".into());
+    }
+    Ok(figures)
+}
+
+fn is_of(run: &Run, name: &str) -> bool {
+    run.dags.first().is_some_and(|dag| dag.name == name)
+}
+
+/// Counts how often sinks of fork-joins are made ready.
+fn wakeups(runs: &[Run], cores: u64) -> Vec<Figure> {
+    // By number of branches: wake-ups and jobs.
+    let mut counts: BTreeMap<usize, (u64, u64)> = BTreeMap::new();
+    for run in runs.iter().filter(|run| is_of(run, "fork-join")) {
+        let sink = run.dags[0].subtasks.len() - 1;
+        let count =
+            |is_it: &dyn Fn(&&Event) -> bool| run.events.iter().filter(is_it).count() as u64;
+        let (ready, jobs) = counts.entry(sink - 1).or_default();
+        *ready += count(&|event| {
+            event.word == Word::Ready && event.subtask.is_some_and(|of| of.index() == sink)
+        });
+        *jobs += count(&|event| event.word == Word::Released);
+    }
+    let counts = counts.into_iter().filter(|(_, (_, jobs))| *jobs > 0);
+    counts
+        .map(|(branches, (ready, jobs))| Figure {
+            cores,
+            workload: format!("fork-join-{branches}"),
+            figure: "sink_wakeups".into(),
+            per: jobs,
+            median: ready,
+            p99: ready,
+            max: ready,
+        })
+        .collect()
+}
+
+/// Takes preemptions apart: on one core, or on others than that with the timer.
+fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
+    const PARTS: [&str; 3] = [
+        "request_to_suspended",
+        "suspended_to_start",
+        "finish_to_resumed",
+    ];
+    let mut samples: [Vec<u64>; 3] = Default::default();
+    // A trace is in order of time only core by core.
+    let mut events = run.events.clone();
+    events.sort_by_key(|event| event.time_ns);
+    let requests = events.iter().enumerate();
+    let requests = requests.filter(|(_, event)| {
+        event.word == Word::Request
+            && event.dag == PREEMPTOR
+            && (cores == 1 || event.core.index() > 0)
+    });
+    for (place, request) in requests {
+        // What happened next on that core, each after the one before.
+        let mut later = events[place..].iter();
+        let mut next = |word, of_preemptor: bool| {
+            let event = later.find(|event| {
+                event.word == word
+                    && event.core == request.core
+                    && (event.dag == PREEMPTOR) == of_preemptor
+            })?;
+            Some(event.time_ns)
+        };
+        let times = [
+            next(Word::Suspend, false),
+            next(Word::Start, true),
+            next(Word::Finish, true),
+            next(Word::Resume, false),
+        ];
+        let [Some(suspended), Some(start), Some(finish), Some(resumed)] = times else {
+            continue;
+        };
+        samples[0].push(suspended - request.time_ns);
+        samples[1].push(start - suspended);
+        samples[2].push(resumed - finish);
+    }
+    let workload = if cores == 1 {
+        "preemption"
+    } else {
+        "preemption of another core"
+    };
+    let figures = PARTS.iter().zip(samples);
+    figures
+        .filter_map(|(part, mut samples)| {
+            samples.sort_unstable();
+            let rank = |percent: usize| samples.get((samples.len() * percent).div_ceil(100) - 1);
+            Some(Figure {
+                cores,
+                workload: workload.into(),
+                figure: (*part).into(),
+                per: 1,
+                max: *samples.last()?,
+                median: *rank(50)?,
+                p99: *rank(99)?,
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::read_all;
+
+    fn log(name: &str, events: &str) -> String {
+        format!(
+            r#"{{"kind":"trace_begin","policy":"static","preemption":"on","cores":1,"run":0}}
+{{"kind":"trace_dag","dag":0,"name":"{name}","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,null],["b",1,0,null],["c",2,0,null]],"edges":[[0,1],[1,2]]}}
+{{"kind":"trace_dag","dag":1,"name":"low","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",9,0,null]],"edges":[]}}
+{{"kind":"trace","events":[{events}]}}
+{{"kind":"trace_end","events":{},"lost":0,"lost_by_core":[0],"complete":true}}
+"#,
+            events.matches("[").count()
+        )
+    }
+
+    #[test]
+    fn counts_how_often_the_sink_is_made_ready() {
+        let events = r#"[0,"released",0,0,0,-1],[1,"ready",0,0,0,1],[2,"ready",0,0,0,2],[3,"start",0,0,0,2],[4,"ready",0,0,0,2]"#;
+        let figures = read_all(&log("fork-join", events), 1).unwrap();
+        assert_eq!(figures.len(), 1);
+        let figure = &figures[0];
+        assert_eq!(
+            (&*figure.workload, figure.per, figure.median),
+            ("fork-join-1", 1, 2)
+        );
+    }
+
+    #[test]
+    fn takes_a_preemption_apart() {
+        let events = r#"[10,"request",0,0,0,0],[13,"suspend",0,1,0,0],[20,"start",0,0,0,0],[30,"finish",0,0,0,0],[45,"resume",0,1,0,0]"#;
+        let figures = read_all(&log("preemptor", events), 1).unwrap();
+        let medians: Vec<u64> = figures.iter().map(|figure| figure.median).collect();
+        assert_eq!(medians, [3, 7, 15]);
+    }
+
+    #[test]
+    fn a_trace_of_something_else_is_refused() {
+        assert!(read_all("", 1).unwrap_err().contains("shows no fork-join"));
+    }
+}
