@@ -1,6 +1,7 @@
-//! A person at the console: a conversation with a guest that runs until it is told
-//! to end.
+//! What people see of a guest and say to it: a conversation at the console with a
+//! guest that runs until it is told to end, its status, and its graph.
 
+use harness::json::Value;
 use harness::protocol::MachineLine;
 use harness::{Guest, Mode, Outcome};
 
@@ -123,5 +124,69 @@ fn a_trace_that_was_off_for_a_while_holds_what_came_after() {
         let findings = harness::trace::check(run, 1_000_000_000);
         let texts: Vec<String> = findings.breaches.iter().map(ToString::to_string).collect();
         assert_eq!(texts, [""; 0], "{}", outcome.tail());
+    }
+}
+
+#[test]
+fn each_commit_prints_its_dags_if_asked() {
+    let guest = Guest::new("fork-join").word("jobs=2").word("subtasks=2,3");
+    let outcome = guest.cores(4).word("graph=dump").succeed();
+    let lines: Vec<_> = outcome.transcript.of_kind("graph").collect();
+    let [first, second] = lines[..] else {
+        panic!("{} lines\n{}", lines.len(), outcome.tail());
+    };
+    assert_eq!(first.number_at("commit"), Some(0));
+    assert_eq!(second.number_at("commit"), Some(1));
+    let names = |list: &str| -> Vec<String> {
+        let elements = first.value.get(list).expect(list).elements();
+        let name = |element: &Value| element.elements()[0].as_text().map(String::from);
+        elements.iter().filter_map(name).collect()
+    };
+    assert_eq!(
+        names("subtasks"),
+        ["source", "parallel-0", "parallel-1", "sink"]
+    );
+    assert_eq!(names("topics"), ["job", "part-0", "part-1"]);
+    let topics = first.value.get("topics").expect("topics").elements();
+    let expected = harness::json::parse(r#"["job","u64",0,[1,2],0]"#).expect("JSON");
+    assert_eq!(topics[0], expected);
+
+    let dot = harness::dot::text(&outcome.transcript).expect("good lines");
+    assert!(
+        dot.contains("c0_d0_s0 -> c0_d0_s2 [label=\"job: u64\"];"),
+        "{dot}"
+    );
+    assert!(
+        dot.contains("label=\"parallel-0\\nWCET 50 ms\\npriority 1\""),
+        "{dot}"
+    );
+    assert_eq!(dot.matches("subgraph").count(), 2);
+}
+
+#[test]
+fn the_status_is_printed_only_if_asked_for() {
+    let guest = Guest::new("fork-join")
+        .word("jobs=120")
+        .word("subtasks=2")
+        .cores(4);
+    let outcome = guest.clone().succeed();
+    assert_eq!(outcome.transcript.of_kind("status").count(), 0);
+    let outcome = guest.word("status=1").succeed();
+    let lines: Vec<_> = outcome.transcript.of_kind("status").collect();
+    // 120 jobs every 25 ms take three seconds at least.
+    assert!(lines.len() >= 2, "{}", outcome.tail());
+    let mut done = 0;
+    for line in &lines {
+        assert_eq!(line.number_at("total"), Some(120));
+        let now = line.number_at("done").expect("a count");
+        assert!(done <= now && now <= 120, "{}", line.text);
+        done = now;
+        let loads = line.value.get("load_permille").expect("loads").elements();
+        let loads: Vec<u64> = loads.iter().filter_map(Value::as_u64).collect();
+        assert_eq!(loads.len(), 4, "{}", line.text);
+        // Two subtasks of 25.5 ms every 25 ms keep about two cores busy.
+        let sum: u64 = loads.iter().sum();
+        assert!((1000..=4000).contains(&sum), "{}", line.text);
+        assert!(loads.iter().all(|&load| load <= 1000), "{}", line.text);
     }
 }
