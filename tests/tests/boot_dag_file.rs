@@ -74,7 +74,7 @@ fn generated_dags_run_without_violation() {
 
 #[test]
 fn a_bound_holds_with_the_overheads_stated() {
-    let words = "jobs=20 overheads_ns=300,900,2000";
+    let words = "jobs=20 overheads_ns=1000,10000,4000";
     let outcome = boot(generated("gnp_03.yaml").as_bytes(), words, Status::Success);
     let line = outcome
         .transcript

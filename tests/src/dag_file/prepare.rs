@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use dag_file::time::parse_ns;
-use dag_file::{DagFile, Execution, Length, Set};
+use dag_file::{DagFile, Execution, FileDag, Length, Set};
 
 use super::load::{Import, load};
 use crate::options::Parsed;
@@ -24,9 +24,12 @@ const COMPANIONS: [&str; 6] = [
 /// The jobs of each DAG if nobody says how many.
 const JOBS: u64 = 50;
 
-/// What the kernel costs at most, measured in deterministic mode: a context switch,
-/// a dispatch, an interrupt. The commit adds it to WCETs before it bounds anything.
-const OVERHEADS: &str = "overheads_ns=300,900,2000";
+/// Returns the word for what the kernel costs at most, as measured in deterministic
+/// mode: a context switch, a dispatch, an interrupt. The commit adds it to WCETs before
+/// it bounds anything. A dispatch may wait for those of all cores, which take turns.
+fn overheads(cores: u64) -> String {
+    format!("overheads_ns=1000,{},4000", 2500 * cores)
+}
 
 /// A file that is ready to be booted.
 #[derive(Debug)]
@@ -82,14 +85,15 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     };
     let unit_ns = unit_ns.map_err(|why| refuse(format!("`--unit`: {why}")))?;
     let length = length(options);
+    let cores = options.number("cores").unwrap_or(1);
     let import = Import {
         unit_ns,
         graph: options.text("graph").map(String::from),
-        cores: u32::try_from(options.number("cores").unwrap_or(1)).unwrap_or(u32::MAX),
+        cores: u32::try_from(cores).unwrap_or(u32::MAX),
         length,
     };
     let file = load(Path::new(path), &import)?;
-    let memory_mib = memory_mib(&file, length);
+    let memory_mib = memory_mib(&file, length, cores);
     if memory_mib > MOST_MEMORY_MIB && !options.is_given("memory") {
         return Err(refuse(format!(
             "{path}: its {} subtasks and their jobs need {memory_mib} MiB, and a guest has \
@@ -110,7 +114,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         .text("append")
         .is_some_and(|words| words.contains("overheads_ns="))
     {
-        words.push(OVERHEADS.into());
+        words.push(overheads(cores));
     }
     Ok(Some(Prepared {
         memory_mib,
@@ -128,11 +132,11 @@ fn length(options: &Parsed) -> Length {
     }
 }
 
-/// Returns the instances of a set that a run has in all.
-fn instances(set: &Set, length: Length) -> u64 {
-    let of = |dag: &dag_file::FileDag| {
+/// Returns the jobs and instances of a set that a run has in all: its records.
+fn records(set: &Set, length: Length) -> u64 {
+    let of = |dag: &FileDag| {
         let jobs = length.jobs(&dag.spec);
-        jobs.saturating_mul(dag.subtasks.len() as u64)
+        jobs.saturating_mul(dag.subtasks.len() as u64 + 1)
     };
     set.dags.iter().map(of).fold(0, u64::saturating_add)
 }
@@ -141,25 +145,27 @@ fn instances(set: &Set, length: Length) -> u64 {
 const MOST_MEMORY_MIB: u64 = 3072;
 
 /// Returns how much memory a file needs. A quarter of it becomes stacks, of which
-/// each subtask has one, and the rest the heap, of which records may take half.
-fn memory_mib(file: &DagFile, length: Length) -> u64 {
+/// each subtask has one and each core a few, and the rest the heap, of which records may take half.
+fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
+    const OF_A_CORE: u64 = 4 * (336 << 10);
     const OF_A_SUBTASK: u64 = 4 * (65 << 10);
-    const OF_AN_INSTANCE: u64 = 192;
+    const OF_A_RECORD: u64 = 256;
     const MIB: u64 = 1 << 20;
     let subtasks = file.most_subtasks() as u64;
-    let instances = file.sets.iter().map(|set| instances(set, length));
+    let records = file.sets.iter().map(|set| records(set, length));
     let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
-        .saturating_add(instances.max().unwrap_or(0).saturating_mul(OF_AN_INSTANCE));
-    24 + bytes.div_ceil(MIB)
+        .saturating_add(records.max().unwrap_or(0).saturating_mul(OF_A_RECORD))
+        .saturating_add(cores.saturating_mul(OF_A_CORE));
+    12 + bytes.div_ceil(MIB)
 }
 
 /// Two minutes, the time that all jobs span and the time that they would take on
-/// one core, and a second for every 500 instances.
+/// one core, and a second for every 500 records.
 fn limit_s(file: &DagFile, length: Length) -> u64 {
     const NS_PER_S: u128 = 1_000_000_000;
     let mut seconds = 120_u128;
     for set in &file.sets {
-        seconds += u128::from(instances(set, length) / 500);
+        seconds += u128::from(records(set, length) / 500);
         for dag in &set.dags {
             let jobs = u128::from(length.jobs(&dag.spec));
             let wcets = dag
@@ -173,4 +179,34 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
         }
     }
     u64::try_from(seconds).unwrap_or(u64::MAX).min(86_400)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{limit_s, memory_mib};
+    use dag_file::{DagFile, Length, parse};
+
+    fn file(subtasks: usize) -> DagFile {
+        let subtasks = (0..subtasks).map(|number| format!("subtask s{number} wcet 1ms\n"));
+        let subtasks: String = subtasks.collect();
+        parse(&format!("dag x period 1s\n{subtasks}end")).unwrap()
+    }
+
+    #[test]
+    fn memory_grows_with_subtasks_records_and_cores() {
+        let usual = memory_mib(&file(20), Length::Jobs(50), 8);
+        assert!(usual <= 32, "{usual}");
+        // A quarter of it holds 10,000 stacks of 64 KiB.
+        assert!(memory_mib(&file(10_000), Length::Jobs(1), 1) >= 4 * 625);
+        let long = memory_mib(&file(20), Length::Jobs(1_000_000), 8);
+        assert!(long > 21 * 200, "{long}");
+        assert!(memory_mib(&file(20), Length::Jobs(50), 64) > 2 * usual);
+        assert!(memory_mib(&file(1), Length::Jobs(u64::MAX), 8) > long);
+    }
+
+    #[test]
+    fn the_limit_has_room_for_real_time() {
+        assert_eq!(limit_s(&file(1), Length::Jobs(100)), 120 + 100);
+        assert_eq!(limit_s(&file(1), Length::Jobs(u64::MAX)), 86_400);
+    }
 }
