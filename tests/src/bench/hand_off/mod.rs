@@ -131,8 +131,8 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
 /// Counts what more cores and more subtasks cost.
 fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
     let image = image::build("hand-off").map_err(|error| error.to_string())?;
-    let count = |cores, sizes: &str| {
-        let boot = Boot::of_scale(cores, scale.jobs, sizes);
+    let count = |cores, largest, sizes: &str| {
+        let boot = Boot::of_scale(cores, scale.jobs, largest, sizes);
         let figures = measure(&boot, Mode::Deterministic, &image.path)?;
         for figure in &figures {
             println!("{}", figure.machine_line(Mode::Deterministic));
@@ -141,11 +141,11 @@ fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
     };
     let mut by_cores = Vec::new();
     for &cores in &scale.cores {
-        by_cores.push((cores, count(cores, scale::SIZES)?));
+        by_cores.push((cores, count(cores, scale::LARGEST, scale::SIZES)?));
     }
     let mut by_subtasks = Vec::new();
     for &subtasks in &scale.subtasks {
-        by_subtasks.push((subtasks, count(1, &scale::sizes(subtasks))?));
+        by_subtasks.push((subtasks, count(1, subtasks, &scale::sizes(subtasks))?));
     }
     println!("medians of the instructions that all cores together executed:");
     print!("{}", scale::by_cores(&by_cores));

@@ -10,8 +10,11 @@ use crate::system;
 /// The options of a baseline: it is of the defaults of these.
 const SIZES: &[&str] = &["jobs", "chain", "branches", "layered", "seed", "append"];
 
-/// Memory for 10,000 subtasks, each of which may need a stack, in MiB.
-const SCALE_MIB: u64 = 3000;
+/// Returns the memory, in MiB, for DAGs of so many subtasks: each needs a stack, each
+/// core two, and the kernel leaves a quarter of the memory for stacks.
+fn memory_mib(subtasks: u64, cores: u64) -> u64 {
+    256.max((subtasks + 2 * cores) * 3 / 10)
+}
 
 /// What one boot measures.
 #[derive(Clone, Debug)]
@@ -92,15 +95,24 @@ impl Plan {
             PathBuf::from,
         );
         let scale = options.is_given("scale").then(|| Scale::new(options));
-        let other = ["compare", "save-baseline", "mode"];
-        match other.iter().find(|name| options.is_given(name)) {
-            Some(other) if scale.is_some() => {
-                return Err(format!(
-                    "`--scale` with `--{other}`: it counts instructions, for no baseline; leave \
-                     one of them out"
-                ));
-            }
-            _ => {}
+        let (idle, reason) = if scale.is_some() {
+            let others = ["compare", "save-baseline", "baseline", "mode", "append"];
+            let idle = others
+                .iter()
+                .chain(SIZES.iter().filter(|size| **size != "jobs"));
+            let idle: Vec<&str> = idle.copied().collect();
+            (
+                idle,
+                "it counts instructions at sizes of its own, for no baseline",
+            )
+        } else {
+            (vec!["cores", "subtasks"], "these are sizes for `--scale`")
+        };
+        if let Some(name) = idle.iter().find(|name| options.is_given(name)) {
+            let with = if scale.is_some() { "with" } else { "without" };
+            return Err(format!(
+                "`--{name}` {with} `--scale`: {reason}; leave `--{name}` out"
+            ));
         }
         Ok(Plan {
             modes,
@@ -119,9 +131,12 @@ fn boots(options: &Parsed) -> Vec<Boot> {
     let [jobs, chain, branches, layered, seed] =
         ["jobs", "chain", "branches", "layered", "seed"].map(text);
     let sizes = format!("chain={chain} branches={branches} layered={layered} seed={seed}");
+    let numbers = [chain, layered].map(|sizes| sizes.split(','));
+    let numbers = numbers.into_iter().flatten().map(str::parse);
+    let largest = numbers.filter_map(Result::ok).max().unwrap_or(0);
     let boot = |cores, part: &str, words: String| Boot {
         cores,
-        memory_mib: 256,
+        memory_mib: memory_mib(largest, cores),
         words: format!("part={part} {words} {}", text("append")),
         is_traced: part == "traced",
     };
@@ -137,11 +152,11 @@ fn boots(options: &Parsed) -> Vec<Boot> {
 
 impl Boot {
     /// Returns a boot that runs the workloads alone, for what their size and the
-    /// number of cores cost.
-    pub(super) fn of_scale(cores: u64, jobs: u64, sizes: &str) -> Boot {
+    /// number of cores cost; `largest` is the most subtasks of a DAG among them.
+    pub(super) fn of_scale(cores: u64, jobs: u64, largest: u64, sizes: &str) -> Boot {
         Boot {
             cores,
-            memory_mib: SCALE_MIB,
+            memory_mib: memory_mib(largest, cores),
             words: format!("part=workloads jobs={jobs} {sizes}"),
             is_traced: false,
         }
@@ -187,6 +202,9 @@ mod tests {
         assert!(refused("--compare --jobs 5").contains("the default of `--jobs`"));
         assert!(refused("--compare --mode threads").contains("leave `--mode` out"));
         assert!(refused("--save-baseline --mode threads").contains("`--save-baseline`"));
-        assert!(refused("--scale --compare").contains("for no baseline"));
+        assert!(refused("--scale --compare").contains("leave `--compare` out"));
+        assert!(refused("--scale --chain 5").contains("leave `--chain` out"));
+        assert!(refused("--cores 5").contains("without `--scale`"));
+        assert!(plan("--scale --cores 5 --jobs 9").is_ok());
     }
 }

@@ -12,6 +12,9 @@ use super::figure::Figure;
 /// The sizes of the workloads when the cores vary.
 pub(super) const SIZES: &str = "chain=64 branches=16 layered=1000";
 
+/// The most subtasks among them.
+pub(super) const LARGEST: u64 = 1000;
+
 /// The columns: workload, figure, heading.
 type Column = (&'static str, &'static str, &'static str);
 
