@@ -8,7 +8,7 @@ use core::time::Duration;
 use alloc::format;
 use alloc::string::String;
 
-use fass::{CommitError, Platform, Policy, Preemption};
+use fass::{CommitError, Platform, Policy, Preemption, Signal};
 use sched_dag::DagId;
 
 use crate::background::{Background, Wishes};
@@ -31,6 +31,8 @@ pub struct Machine {
     pub(crate) dumps_trace: bool,
     /// What people want to see, and say, during a run.
     pub(crate) wishes: Wishes,
+    /// What bytes of input raise during a run: a plan and a DAG of it.
+    pub(crate) input: Cell<Option<(u64, DagId)>>,
     /// How many runs have ended.
     pub(crate) runs: Cell<u64>,
 }
@@ -156,7 +158,7 @@ impl Machine {
         let locks_before = execution::lock_acquisitions();
         console::defer();
         execution::arm_next_event();
-        let mut background = Background::begin(self.wishes, total);
+        let mut background = Background::begin(self.wishes.with_input(self.input.get()), total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();
         worker::wait_in_background(|| background.step());
@@ -180,6 +182,25 @@ impl Machine {
             return Err(shutdown(&run));
         }
         Ok(run)
+    }
+
+    /// Lets each byte that the serial port receives during runs raise a signal, in
+    /// place of the signal named before. With `console=on` bytes are the console's
+    /// and raise nothing.
+    ///
+    /// Core 0 looks for bytes when it has nothing else to do, so one may count up to
+    /// 20 ms late, and later where that core is busy.
+    ///
+    /// # Panics
+    ///
+    /// If the signal's DAG is not committed.
+    pub fn raise_on_input(&self, signal: &Signal) {
+        let target = signal.target();
+        assert!(
+            target.is_some(),
+            "a signal is connected before its dag is committed; commit the dag first"
+        );
+        self.input.set(target);
     }
 
     /// Interrupts every core each `period` from now on, beside what scheduling

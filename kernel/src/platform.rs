@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
-use sched_dag::SchedulerOptions;
+use sched_dag::{DagId, SchedulerOptions};
 
 use crate::machine::{clock, this_core};
 use crate::{execution, graph, worker};
@@ -122,6 +122,10 @@ impl Platform for Kernel {
             Occupation::Spin => worker::spin(ns),
             Occupation::Hold => worker::hold(ns),
         }
+    }
+
+    fn raise(&self, plan: u64, dag: DagId) {
+        execution::raise(plan, dag);
     }
 
     fn launch(&self, plan: Plan) -> Result<(), LaunchError> {

@@ -86,6 +86,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
         events: usize::try_from(events).unwrap_or(0),
         dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
         wishes: Wishes {
+            input: None,
             console: options.choice("console", &consoles)?,
             status_ns: status_s * 1_000_000_000,
         },

@@ -182,6 +182,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         module: module_bytes(info),
         dumps_trace: settings.dump,
         wishes: settings.wishes,
+        input: Cell::new(None),
         runs: Cell::new(0),
     })
 }

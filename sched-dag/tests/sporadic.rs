@@ -29,7 +29,7 @@ struct Run {
 }
 
 impl Observer for Run {
-    fn signalled(&mut self, _dag: DagId, release_ns: Option<u64>) {
+    fn signalled(&mut self, _dag: DagId, _job: u64, release_ns: Option<u64>) {
         self.arrivals.push((self.now_ns, release_ns));
     }
 

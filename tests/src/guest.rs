@@ -103,11 +103,18 @@ impl Guest {
     /// Gives the guest a console. Each pair is a text to wait for, in any line that
     /// comes after what was said before, and what to say then.
     #[must_use]
-    pub fn conversation(mut self, conversation: &[(&str, &str)]) -> Guest {
+    pub fn conversation(self, conversation: &[(&str, &str)]) -> Guest {
+        self.typing(conversation).word("console=on")
+    }
+
+    /// As [`conversation`](Self::conversation), without a console: what is said goes
+    /// to the app.
+    #[must_use]
+    pub fn typing(mut self, conversation: &[(&str, &str)]) -> Guest {
         let owned = |&(text, answer): &(&str, &str)| (text.into(), answer.into());
         self.conversation = conversation.iter().map(owned).collect();
         self.qemu.has_input = true;
-        self.word("console=on")
+        self
     }
 
     /// Sets how long the guest may take in wall time.

@@ -285,7 +285,7 @@ impl Observer for Runner<'_> {
         recorder.at(release_ns, EventKind::Skipped { dag, job });
     }
 
-    fn signalled(&mut self, dag: DagId, release_ns: Option<u64>) {
+    fn signalled(&mut self, dag: DagId, _job: u64, release_ns: Option<u64>) {
         let now_ns = self.now_ns;
         if let Some(recorder) = self.recorder() {
             recorder.at(now_ns, EventKind::Signalled { dag, release_ns });

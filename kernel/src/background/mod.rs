@@ -4,12 +4,15 @@
 //! console's conversation. All this is core 0's background, which is suspended
 //! whenever the core has an instance to run: it delays nothing but itself.
 
+mod listener;
 mod progress;
 mod status;
 
 use crate::console::session::{self, Session};
 use crate::worker;
+use listener::Listener;
 use progress::Progress;
+use sched_dag::DagId;
 use status::Status;
 
 /// What the command line says about the background.
@@ -19,6 +22,15 @@ pub(crate) struct Wishes {
     pub(crate) console: Option<Echo>,
     /// The time between two lines of kind `status`; 0: none.
     pub(crate) status_ns: u64,
+    /// What each byte of input raises: a plan's number and a sporadic DAG of it.
+    pub(crate) input: Option<(u64, DagId)>,
+}
+
+impl Wishes {
+    /// Adds what bytes of input raise.
+    pub(crate) const fn with_input(self, input: Option<(u64, DagId)>) -> Self {
+        Self { input, ..self }
+    }
 }
 
 /// Whether the console sends back what is typed.
@@ -36,6 +48,7 @@ pub(crate) struct Background {
     progress: Progress,
     status: Option<Status>,
     session: Option<Session>,
+    listener: Option<Listener>,
     /// The heartbeat that the core had before, if it has another one now.
     heartbeat_before_ns: Option<u64>,
 }
@@ -44,7 +57,7 @@ impl Background {
     /// Begins the background of a run of `total` jobs; 0: no one knows how many.
     pub(crate) fn begin(wishes: Wishes, total: u64) -> Self {
         let periods = [
-            wishes.console.map(|_| session::PERIOD_NS),
+            (wishes.console.is_some() || wishes.input.is_some()).then_some(session::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
         ];
         let period_ns = periods.into_iter().flatten().min();
@@ -54,6 +67,8 @@ impl Background {
             progress: Progress::new(total),
             status: (wishes.status_ns > 0).then(|| Status::begin(wishes.status_ns, total)),
             session: wishes.console.map(|echo| Session::new(echo == Echo::On)),
+            // What a person says to the console is no event.
+            listener: (wishes.input.filter(|_| wishes.console.is_none())).map(Listener::new),
         }
     }
 
@@ -65,6 +80,9 @@ impl Background {
         }
         if let Some(session) = &mut self.session {
             session.step();
+        }
+        if let Some(listener) = &self.listener {
+            listener.step();
         }
     }
 

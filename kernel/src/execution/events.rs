@@ -54,7 +54,10 @@ pub(crate) fn complete(finished: Assignment, start_ns: u64, finish_ns: u64) -> W
         return Work::Rest;
     };
     let here = here();
-    let Assignment { instance, body, .. } = finished;
+    let Assignment {
+        instance, mut body, ..
+    } = finished;
+    execution.signals.take(&mut body, finish_ns);
     trace::instance(What::Finish, since_epoch(finish_ns), here, instance);
     execution.placement.finish(here.index(), instance, body);
     if let Some(record) = execution.record.instance_mut(instance) {

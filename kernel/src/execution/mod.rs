@@ -11,6 +11,7 @@ mod control;
 mod core_set;
 mod events;
 mod placement;
+mod signals;
 mod status;
 mod step;
 mod watcher;
@@ -22,7 +23,7 @@ use alloc::sync::Arc;
 
 use fass::{Body, LaunchError, Plan};
 use sched_dag::record::Record;
-use sched_dag::{Instance, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{DagId, Instance, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
@@ -32,6 +33,8 @@ pub(crate) use events::{
     arm_next_event, complete, fail, find_work, interrupt, note_start, since_epoch,
 };
 use placement::Placement;
+use signals::Signals;
+pub(crate) use signals::raise;
 pub(crate) use status::{
     budget_ns, is_finished, jobs_ended, lock_acquisitions, names, next_event_ns, running, try_names,
 };
@@ -69,6 +72,8 @@ enum Event {
     Completed(Instance),
     /// The instance was ended by a fault, and its DAG ends with it.
     Failed(Instance),
+    /// A sporadic DAG gets a signal from outside.
+    Signalled(DagId),
     /// A person wants a change.
     Control(Control),
 }
@@ -86,6 +91,7 @@ pub(crate) struct Execution {
     /// When the next dispatch is due, on the clock, if it waits for further events
     /// of the instant in hand.
     dispatch_due_ns: Option<u64>,
+    signals: Signals,
 }
 
 static EXECUTION: SpinLock<Option<Execution>> = SpinLock::new(None);
@@ -121,6 +127,7 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
              there is memory for; register fewer subtasks or give the machine more memory"
         ))
     })?;
+    let signals = Signals::new(&plan);
     let execution = Execution {
         scheduler: Scheduler::new(Arc::new(plan.task_set), options),
         placement: Placement::new(plan.bodies, cores),
@@ -128,6 +135,7 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         record,
         latest_ns: 0,
         dispatch_due_ns: None,
+        signals,
     };
     *EXECUTION.lock() = Some(execution);
     Ok(())
@@ -156,6 +164,7 @@ pub(crate) fn begin(epoch_ns: u64) -> Option<u64> {
     let execution = place.as_mut()?;
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
     trace::clear();
+    execution.begin_signals();
     JOBS_ENDED.store(0, Ordering::Relaxed);
     execution.publish();
     let jobs = execution

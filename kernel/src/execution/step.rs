@@ -29,6 +29,7 @@ impl Execution {
             record,
             latest_ns,
             dispatch_due_ns,
+            signals,
             ..
         } = self;
         *latest_ns = since_epoch(now_ns).max(*latest_ns);
@@ -36,8 +37,12 @@ impl Execution {
         let mut moment = scheduler.at(*latest_ns);
         match event {
             Event::Time => {}
-            Event::Completed(instance) => moment.complete(instance, &mut watcher),
+            Event::Completed(instance) => {
+                moment.complete(instance, &mut watcher);
+                signals.send(&mut moment, &mut watcher);
+            }
             Event::Failed(instance) => moment.fail(instance, &mut watcher),
+            Event::Signalled(dag) => moment.signal(dag, &mut watcher),
             Event::Control(control) => control.apply(&mut moment, &mut watcher),
         }
         let mut woken = CoreSet::default();

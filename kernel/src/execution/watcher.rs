@@ -60,6 +60,14 @@ impl Observer for Watcher<'_> {
         }
     }
 
+    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
+        let what = match release_ns {
+            Some(_) => What::Signalled,
+            None => What::Dropped,
+        };
+        trace::job(what, self.now_ns(), dag, job);
+    }
+
     fn ready(&mut self, instance: Instance) {
         let now_ns = self.now_ns();
         trace::instance(What::Ready, now_ns, here(), instance);

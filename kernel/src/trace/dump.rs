@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use sched_dag::{Dag, SubtaskId};
+use sched_dag::{Dag, DagId, SubtaskId};
 
 use super::ring::Ring;
 use super::{Event, WORDS, all_rings};
@@ -32,7 +32,7 @@ pub(crate) fn dump(run: &Run, number: u64) {
             .number("run", number);
     });
     for (number, dag) in (0u32..).zip(run.task_set().dags()) {
-        dump_dag(number, dag);
+        dump_dag(number, dag, run);
     }
     for ring in all_rings() {
         let mut events = ring.iter().peekable();
@@ -108,8 +108,17 @@ fn as_json(event: Event) -> impl fmt::Display {
     })
 }
 
-fn dump_dag(number: u32, dag: &Dag) {
+fn dump_dag(number: u32, dag: &Dag, run: &Run) {
     json::emit("trace_dag", |line| {
         graph::describe(line, number, dag);
+        if dag.is_sporadic() {
+            // There is no grid that says when jobs were due.
+            let jobs = (0u64..).zip(run.record().jobs(DagId(number)));
+            let releases = jobs.filter_map(|(job, of)| Some((job, of.release_ns?)));
+            line.flag("sporadic", true).list(
+                "releases",
+                releases.map(|(job, ns)| fmt::from_fn(move |f| write!(f, "[{job},{ns}]"))),
+            );
+        }
     });
 }

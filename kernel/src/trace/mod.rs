@@ -56,10 +56,14 @@ pub(crate) enum What {
     Finish,
     /// The instance was ended by a fault.
     Ended,
+    /// A signal came, which lets a sporadic DAG's job be due.
+    Signalled,
+    /// A signal came while one was kept for the job, or no job was left.
+    Dropped,
 }
 
 /// The words of the machine lines, by [`What`]'s number.
-const WORDS: [&str; 14] = [
+const WORDS: [&str; 16] = [
     "released",
     "queued",
     "skipped",
@@ -74,6 +78,8 @@ const WORDS: [&str; 14] = [
     "resume",
     "finish",
     "ended",
+    "signalled",
+    "dropped",
 ];
 
 /// Something that happened.

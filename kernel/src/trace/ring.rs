@@ -29,7 +29,7 @@ const NO_SUBTASK: u64 = 0xffff_ffff;
 const NOT_KEPT: u64 = 0xff;
 
 /// What is written, by number; the inverse of `What as u8`.
-const WHATS: [What; 14] = [
+const WHATS: [What; 16] = [
     What::Released,
     What::Queued,
     What::Skipped,
@@ -44,6 +44,8 @@ const WHATS: [What; 14] = [
     What::Resume,
     What::Finish,
     What::Ended,
+    What::Signalled,
+    What::Dropped,
 ];
 
 impl Ring {

@@ -121,6 +121,11 @@ impl Jobs {
         self.oldest == self.next && self.waiting() == 0 && (self.ended || none_ahead)
     }
 
+    /// Returns the job that a signal is for, or that one is kept for.
+    pub(super) fn signal_job(&self) -> u64 {
+        self.next_due - self.waiting().min(1)
+    }
+
     /// Lets the next job of a sporadic DAG be due at `now_ns`, or as soon after it
     /// as the minimum inter-arrival time allows, and returns that time. `None` if
     /// the signal is dropped: an earlier one is still kept, or no job is left.

@@ -25,10 +25,11 @@ pub trait Observer {
         let _ = (dag, job, release_ns);
     }
 
-    /// A sporadic DAG got a signal, which lets its next job be released at
-    /// `release_ns`, now or later; `None`: the signal is dropped.
-    fn signalled(&mut self, dag: DagId, release_ns: Option<u64>) {
-        let _ = (dag, release_ns);
+    /// A sporadic DAG got a signal, which lets job `job` be due at `release_ns`,
+    /// now or later; `None`: the signal is dropped, and `job` is the one that an
+    /// earlier signal is kept for, or that will not be.
+    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
+        let _ = (dag, job, release_ns);
     }
 
     /// All that the instance waits for has happened (R2).
@@ -92,8 +93,8 @@ impl<O: Observer + ?Sized> Observer for &mut O {
         (**self).skipped(dag, job, release_ns);
     }
 
-    fn signalled(&mut self, dag: DagId, release_ns: Option<u64>) {
-        (**self).signalled(dag, release_ns);
+    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
+        (**self).signalled(dag, job, release_ns);
     }
 
     fn ready(&mut self, instance: Instance) {

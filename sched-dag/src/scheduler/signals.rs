@@ -38,12 +38,13 @@ impl Scheduler {
             dag.0
         );
         let state = &mut self.dags[dag.index()];
+        let job = state.jobs.signal_job();
         let release_ns = state.jobs.signal(model, self.now_ns);
         state.statistics.signals += 1;
         if release_ns.is_none() {
             state.statistics.dropped_signals += 1;
         }
-        observer.signalled(dag, release_ns);
+        observer.signalled(dag, job, release_ns);
         self.set_timer(dag);
     }
 }

@@ -9,6 +9,7 @@ mod checksum;
 mod endless;
 mod kernel_crimes;
 mod preemption;
+mod sharing;
 mod storm;
 
 use faults::crimes::{CRIMES, Unpunished};
@@ -19,7 +20,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 12] = [
+const TESTS: [(&str, Test); 13] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -36,6 +37,7 @@ const TESTS: [(&str, Test); 12] = [
     ),
     ("preemption", preemption::run),
     ("endless", endless::run),
+    ("sharing", sharing::run),
     ("storm", storm::run),
 ];
 

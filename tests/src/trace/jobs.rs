@@ -11,7 +11,8 @@
 //! miss: that is a breach only if more than the bound lies between.
 //!
 //! A job that was aborted, or cut short by its DAG's end, is complete with its
-//! last instance, too; whether it missed its deadline is not judged.
+//! last instance, too; whether it missed its deadline is not judged. That of a
+//! sporadic job is judged where the trace states its nominal release.
 
 use sched_dag::{DagId, Instance, SubtaskId};
 
@@ -74,6 +75,7 @@ pub(super) fn judge(view: &View<'_>, bound_ns: u64, breaches: &mut Vec<Breach>) 
             history,
         };
         breaches.extend(judge.off_the_grid());
+        breaches.extend(judge.too_soon());
         breaches.extend(judge.released_and_skipped());
         breaches.extend(judge.never_released());
         breaches.extend(judge.completed());
@@ -149,6 +151,24 @@ impl Judge<'_> {
         let (word, time_ns) = early?;
         let what = format!("is {word} before its release time {nominal_ns} ns");
         Some(self.breach(Rule::Release, time_ns, &what))
+    }
+
+    /// A sporadic DAG's jobs are due at least T apart, and never before O.
+    fn too_soon(&self) -> Option<Breach> {
+        let dag = &self.view.run.dags[self.dag.index()];
+        let releases = dag.sporadic.as_ref()?;
+        let release_ns = *releases.times_ns.get(&self.job)?;
+        let before = releases.times_ns.range(..self.job).next_back();
+        let earliest_ns = before.map_or(dag.offset_ns, |(_, before_ns)| {
+            before_ns.saturating_add(dag.period_ns)
+        });
+        // An estimated release may be a little later than the nominal one.
+        let slack_ns = if releases.are_exact { 0 } else { self.bound_ns };
+        (release_ns.saturating_add(slack_ns) < earliest_ns).then(|| {
+            let what =
+                format!("is due before {earliest_ns} ns, the earliest by its DAG's distance");
+            self.breach(Rule::Release, release_ns, &what)
+        })
     }
 
     fn released_and_skipped(&self) -> Option<Breach> {
@@ -252,6 +272,13 @@ impl Judge<'_> {
     }
 
     fn missed(&self) -> Option<Breach> {
+        let sporadic = &self.view.run.dags[self.dag.index()].sporadic;
+        if sporadic
+            .as_ref()
+            .is_some_and(|releases| !releases.are_exact)
+        {
+            return None;
+        }
         let deadline_ns = self.view.run.deadline_ns(self.dag, self.job);
         let finish_ns = self.finish_ns();
         if let Some(missed) = self.history.missed {

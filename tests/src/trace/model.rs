@@ -9,6 +9,8 @@
 //! those of the scheduler in a step that was made on that core; only `request`
 //! names another core, the one that shall switch.
 
+use std::collections::BTreeMap;
+
 use sched_dag::{CoreId, DagId, Instance, Policy, Preemption, SubtaskId};
 
 /// One run of one boot.
@@ -47,10 +49,22 @@ pub struct Dag {
     pub relative_deadline_ns: u64,
     /// The offset O.
     pub offset_ns: u64,
+    /// Of a sporadic DAG, when its jobs were due; `None`: the grid says.
+    pub sporadic: Option<Releases>,
     /// The subtasks by number.
     pub subtasks: Vec<Subtask>,
     /// For each subtask its direct predecessors, ascending.
     pub predecessors: Vec<Vec<SubtaskId>>,
+}
+
+/// The releases of a sporadic DAG's jobs.
+#[derive(Clone, Debug, Default)]
+pub struct Releases {
+    /// The nominal release times by job; else when the scheduler first dealt with
+    /// the job, which is a little later.
+    pub times_ns: BTreeMap<u64, u64>,
+    /// Whether the trace states the nominal ones.
+    pub are_exact: bool,
 }
 
 /// A subtask of a DAG.
@@ -112,11 +126,15 @@ pub enum Word {
     Finish,
     /// The instance was ended by a fault, and its DAG with it.
     Ended,
+    /// A signal came for the sporadic DAG's job.
+    Signalled,
+    /// A signal came while one was kept for the job, or no job was left.
+    Dropped,
 }
 
 impl Word {
     /// All words as the trace spells them.
-    pub const ALL: [(&str, Word); 14] = [
+    pub const ALL: [(&str, Word); 16] = [
         ("released", Word::Released),
         ("queued", Word::Queued),
         ("skipped", Word::Skipped),
@@ -131,6 +149,8 @@ impl Word {
         ("resume", Word::Resume),
         ("finish", Word::Finish),
         ("ended", Word::Ended),
+        ("signalled", Word::Signalled),
+        ("dropped", Word::Dropped),
     ];
 
     /// Finds a word by its spelling.
@@ -151,10 +171,12 @@ impl Word {
     #[must_use]
     pub fn is_of_job(self) -> bool {
         use Word::{Aborted, Completed, Missed, Queued, Released, Skipped};
-        matches!(
-            self,
-            Released | Queued | Skipped | Aborted | Missed | Completed
-        )
+        let is_signal = matches!(self, Word::Signalled | Word::Dropped);
+        is_signal
+            || matches!(
+                self,
+                Released | Queued | Skipped | Aborted | Missed | Completed
+            )
     }
 
     /// Reports whether it really happened on a core, beside the scheduler's
@@ -176,10 +198,14 @@ impl Event {
 }
 
 impl Run {
-    /// Returns the nominal release time O + kT of a job.
+    /// Returns the nominal release time O + kT of a job, or that of a sporadic one;
+    /// 0 if nothing is known of that.
     #[must_use]
     pub fn release_ns(&self, dag: DagId, job: u64) -> u64 {
         let dag = &self.dags[dag.index()];
+        if let Some(releases) = &dag.sporadic {
+            return releases.times_ns.get(&job).copied().unwrap_or(0);
+        }
         dag.period_ns
             .saturating_mul(job)
             .saturating_add(dag.offset_ns)

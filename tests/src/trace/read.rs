@@ -5,9 +5,11 @@
 //! `docs/serial-protocol.md` says is [`Malformed`] with its line, so that a
 //! damaged log is never taken for a good run or for a breach.
 
+use std::collections::BTreeMap;
+
 use sched_dag::{CoreId, DagId, Policy, Preemption, SubtaskId};
 
-use super::model::{Dag, Event, Run, Subtask, Word};
+use super::model::{Dag, Event, Releases, Run, Subtask, Word};
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
 use replay::lines::Malformed;
@@ -121,10 +123,45 @@ fn add_dag(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
         period_ns: line.number("period_ns")?,
         relative_deadline_ns: line.number("relative_deadline_ns")?,
         offset_ns: line.number("offset_ns")?,
+        sporadic: releases(line)?,
         subtasks,
         predecessors,
     });
     Ok(())
+}
+
+/// Reads the releases of a sporadic DAG.
+fn releases(line: &Line<'_>) -> Result<Option<Releases>, Malformed> {
+    if line.0.value.get("sporadic").and_then(Value::as_bool) != Some(true) {
+        return Ok(None);
+    }
+    let mut times_ns = BTreeMap::new();
+    for release in line.elements("releases")? {
+        let pair: Option<Vec<u64>> = release.elements().iter().map(Value::as_u64).collect();
+        let Some(&[job, time_ns]) = pair.as_deref() else {
+            return Err(line.malformed("a release is a pair of a job and a time"));
+        };
+        times_ns.insert(job, time_ns);
+    }
+    Ok(Some(Releases {
+        are_exact: !times_ns.is_empty(),
+        times_ns,
+    }))
+}
+
+/// Where the trace does not state a sporadic DAG's releases, takes for them when
+/// the scheduler first dealt with each job.
+fn estimate_releases(run: &mut Run) {
+    for event in &run.events {
+        let is_due = matches!(event.word, Word::Released | Word::Queued | Word::Skipped);
+        if let Some(releases) = &mut run.dags[event.dag.index()].sporadic
+            && is_due
+            && !releases.are_exact
+        {
+            let time_ns = releases.times_ns.entry(event.job).or_insert(event.time_ns);
+            *time_ns = event.time_ns.min(*time_ns);
+        }
+    }
 }
 
 fn subtask(line: &Line<'_>, value: &Value) -> Result<Subtask, Malformed> {
@@ -200,6 +237,7 @@ fn end(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
         let reason = "`lost_by_core` is not a list of a count for each core";
         run.lost_by_core = Some(counts.ok_or_else(|| line.malformed(reason))?);
     }
+    estimate_releases(run);
     // Each core's events are in the order of time.
     let pairs = run.events.windows(2);
     let back = pairs.filter(|pair| pair[1].time_ns < pair[0].time_ns);

@@ -103,7 +103,8 @@ impl<'r> View<'r> {
     fn sort_by_job(&mut self, breaches: &mut Vec<Breach>) {
         for &(event, moment) in &self.events {
             let (dag, job) = (event.dag, event.job);
-            if event.word.is_of_job() {
+            let is_signal = matches!(event.word, Word::Signalled | Word::Dropped);
+            if event.word.is_of_job() && !is_signal {
                 let history = self.jobs.entry((dag, job)).or_default();
                 breaches.extend(history.note(self.run, &event, moment));
             }

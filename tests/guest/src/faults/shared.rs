@@ -103,6 +103,9 @@ pub(super) fn latest_type_mismatch() -> Vec<Dag> {
     vec![lidar, planner]
 }
 
+/// A sample of what can only be moved.
+type Key<'a> = Option<Sample<'a, Unique<u32>>>;
+
 pub(super) fn latest_of_moved() -> Vec<Dag> {
     let lidar = named("lidar");
     lidar.relative_deadline(PERIOD);
@@ -112,10 +115,7 @@ pub(super) fn latest_of_moved() -> Vec<Dag> {
     let points = lidar.latest::<Unique<u32>>("points");
     let planner = named("planner");
     planner.relative_deadline(PERIOD);
-    let plan = |(_, _): (
-        Option<Sample<'_, Unique<u32>>>,
-        Option<Sample<'_, Unique<u32>>>,
-    )| ();
+    let plan = |(_, _): (Key<'_>, Key<'_>)| ();
     let attributes = SubtaskAttributes::named("plan");
     planner
         .using((points.sample(), points.sample()))

@@ -46,6 +46,8 @@ fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) 
             Word::Skipped => "skip",
             Word::Aborted => "abort",
             Word::Missed => "MISS",
+            Word::Signalled => "signal for",
+            Word::Dropped => "signal dropped,",
             _ => continue,
         };
         let name = format!("{what} #{}", event.job);

@@ -1,0 +1,61 @@
+//! States, latest values and signals on the machine.
+
+use harness::protocol::MachineLine;
+use harness::{Guest, Mode, Outcome};
+
+fn sharing(policy: &str) -> Guest {
+    let policy = format!("policy={policy}");
+    let guest = Guest::new("guest-tests").word("test=sharing").word(&policy);
+    guest.cores(3).word("trace=dump")
+}
+
+fn line(outcome: &Outcome) -> &MachineLine {
+    let mut lines = outcome.transcript.of_kind("sharing");
+    lines.next().expect("the test's line")
+}
+
+fn number(outcome: &Outcome, name: &str) -> u64 {
+    line(outcome).number_at(name).expect("a number")
+}
+
+#[test]
+fn samples_are_whole_and_signals_keep_their_distance() {
+    for policy in ["static", "edf"] {
+        let outcome = sharing(policy).succeed();
+        assert_eq!(number(&outcome, "violations"), 0);
+        assert_eq!(number(&outcome, "allocations"), 0);
+        // 600 ms in which 120 values come; `often` looks 200 times, `seldom` 90.
+        let (often, seldom) = (number(&outcome, "often"), number(&outcome, "seldom"));
+        assert!((115..=120).contains(&often), "{often}");
+        assert!((83..=90).contains(&seldom), "{seldom}");
+        // A signal every 7 ms for 630 ms, and one answer every 20 ms.
+        assert_eq!(number(&outcome, "signals"), 90);
+        let (answers, dropped) = (number(&outcome, "answers"), number(&outcome, "dropped"));
+        assert!((31..=33).contains(&answers), "{answers}");
+        assert_eq!(answers + dropped, 90);
+        let runs = harness::trace::read(&outcome.serial).expect("a trace");
+        let findings = harness::trace::check(&runs[0], 1_000_000);
+        assert_eq!(findings.breaches, [], "{policy}");
+    }
+}
+
+#[test]
+fn samples_are_whole_where_cores_really_run_side_by_side() {
+    // A busy host lets budgets run out.
+    let guest = sharing("edf").mode(Mode::Threads).word("budget_factor=0");
+    let outcome = guest.succeed();
+    assert_eq!(number(&outcome, "violations"), 0);
+    assert_eq!(number(&outcome, "signals"), 90);
+}
+
+#[test]
+fn bytes_release_a_dag() {
+    // Each text ends its line: two bytes, of which the second comes early.
+    let typed = [
+        ("\"kind\":\"listening\"", "a"),
+        ("\"kind\":\"progress\"", "b"),
+    ];
+    let outcome = sharing("edf").word("input=yes").typing(&typed).succeed();
+    assert_eq!(number(&outcome, "answers_to_bytes"), 3);
+    assert_eq!(number(&outcome, "violations"), 0);
+}
