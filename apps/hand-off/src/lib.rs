@@ -1,7 +1,7 @@
 //! Workloads of empty bodies, and the stamps that measure what is between them.
 //!
 //! A *body* here does nothing but read the clock, so the time between two bodies
-//! is the system's alone. [`Shape`] describes the graphs, purely; [`build`] makes
+//! is the system's alone. [`Shape`] describes the graphs, purely; [`build()`] makes
 //! DAGs of them through the same API that every app uses; [`Stamps`] holds the
 //! times that the bodies have read.
 //!
