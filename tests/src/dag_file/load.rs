@@ -74,3 +74,63 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
     }
     Ok(file)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{parse, rd_gen, stg};
+    use crate::system::workspace;
+    use dag_file::Malformed;
+
+    /// Changes, drops or repeats a part of a text, differently for each number.
+    fn damaged(text: &str, number: u64) -> String {
+        // Two steps of a linear congruential generator (Knuth's MMIX).
+        let next = |state: u64| {
+            state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407)
+        };
+        let (one, other) = (next(number), next(next(number)));
+        let below =
+            |number: u64, most: usize| usize::try_from(number >> 33).unwrap_or(0) % most.max(1);
+        let from = below(one, text.len());
+        let to = (from + below(other, 12)).min(text.len());
+        match number % 4 {
+            0 => format!("{}{}", &text[..from], &text[to..]),
+            1 => format!("{}{}{}", &text[..to], &text[from..to], &text[to..]),
+            2 => format!(
+                "{}{}{}",
+                &text[..from],
+                ["-", "#", "\n", "9", " ", "'"][below(other, 6)],
+                &text[from..]
+            ),
+            _ => text[..from].into(),
+        }
+    }
+
+    #[test]
+    fn no_damage_makes_a_reader_panic_or_lose_its_line() {
+        let data = workspace().join("tests/data");
+        let yaml = std::fs::read_to_string(data.join("rd-gen/chain_03.yaml")).unwrap();
+        let json = r#"{"graphs":[{"name":"g","c":[0,3,4,0],"edges":[[0,1],[1,2],[2,3]],"optimal":{"2":7}}]}"#;
+        let ours = rd_gen::read(&yaml, "x", 1000).unwrap().to_string();
+        let in_file = |faults: &[Malformed], text: &str, number: u64| {
+            let lines = text.lines().count() + 1;
+            let is_in = |fault: &Malformed| (1..=lines).contains(&fault.line);
+            assert!(faults.iter().all(is_in), "damage {number}: {faults:?}");
+        };
+        for number in 0..4000 {
+            let text = damaged(&yaml, number);
+            if let Err(faults) = rd_gen::read(&text, "x", 1000) {
+                in_file(&faults, &text, number);
+            }
+            let text = damaged(&ours, number);
+            if let Err(fault) = parse(&text) {
+                in_file(&[fault], &text, number);
+            }
+            let text = damaged(json, number);
+            if let Err(fault) = stg::read(&text, None, 1000) {
+                in_file(&[fault], &text, number);
+            }
+        }
+    }
+}

@@ -97,7 +97,7 @@ mod tests {
         let all = [makespan(2, 100), makespan(4, 125)];
         let text = table(&all);
         assert!(
-            text.contains("100 / 100 = 1.000       125 / 100 = 1.250"),
+            text.contains("100 / 100 = 1.000     125 / 100 = 1.250"),
             "{text}"
         );
         assert!(text.contains("2 cores: 1 of 1 optimal"), "{text}");
