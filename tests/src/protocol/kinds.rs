@@ -61,6 +61,22 @@ pub const KINDS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "autoware",
+        &[
+            "subtasks",
+            "jobs",
+            "violations",
+            "deadline_misses",
+            "allocations",
+            "hot_path_ns.max",
+            "hot_path_bound_ns",
+            "to_vehicle_ns.max",
+            "to_vehicle_bound_ns",
+            "repeated",
+            "unused",
+        ],
+    ),
+    (
         "fork_join",
         &[
             "subtasks",

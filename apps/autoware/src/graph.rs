@@ -1,0 +1,282 @@
+//! The six DAGs.
+
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::Cell;
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+
+use fass::{Dag, Latest, Sample, SubtaskAttributes, create_dag};
+
+use crate::crunch::Crunch;
+use crate::{WCET_OF_ENDS, Workload};
+
+/// The lidar job that a value goes back to, if any: what all topics carry.
+pub type Origin = Option<u64>;
+
+/// What a sampling function gets.
+type Sampled<'a> = Option<Sample<'a, Origin>>;
+
+/// The periods of the drivers and of the planner's timer.
+const LIDAR: Duration = Duration::from_millis(100);
+const MAP: Duration = Duration::from_millis(120);
+const SETTINGS: Duration = Duration::from_millis(25);
+const VISUALIZER: Duration = Duration::from_millis(60);
+
+/// The system, built and not committed.
+#[derive(Debug)]
+pub struct System {
+    /// The DAGs: `lidar`, `map`, `settings`, `visualizer`, `route`, `behaviour`.
+    pub dags: Vec<Dag>,
+    /// For each job of `behaviour` the lidar job whose obstacles it has acted on;
+    /// `u64::MAX`: none.
+    pub acted_on: Arc<[AtomicU64]>,
+}
+
+/// Builds subtasks one after the other, each with its own execution times.
+struct Builder<'w> {
+    workload: &'w Workload,
+    subtasks: Cell<u64>,
+}
+
+impl Workload {
+    /// Builds the six DAGs.
+    #[must_use]
+    pub fn build(&self) -> System {
+        let build = Builder {
+            workload: self,
+            subtasks: Cell::new(0),
+        };
+        let (map, point_cloud_map) = build.map();
+        let (settings, cluster_settings) =
+            build.driver("settings", "EuclideanClusterSettings", SETTINGS);
+        let (visualizer, goal) = build.driver("visualizer", "Visualizer", VISUALIZER);
+        let (lidar, obstacles, pose) = build.lidar(&point_cloud_map, &cluster_settings);
+        let (route, routes) = build.route(&goal, &pose);
+        let (behaviour, acted_on) = build.behaviour(&obstacles, &pose, &routes);
+        System {
+            dags: vec![lidar, map, settings, visualizer, route, behaviour],
+            acted_on,
+        }
+    }
+}
+
+/// A part's topic has its writer's name, as in the original.
+impl Builder<'_> {
+    fn dag(&self, name: &str, period: Duration) -> Dag {
+        let dag = create_dag();
+        dag.name(name)
+            .jobs(self.jobs(period))
+            .relative_deadline(period);
+        dag
+    }
+
+    /// Returns the jobs of a DAG in the time in which the lidars have theirs.
+    fn jobs(&self, period: Duration) -> u64 {
+        let jobs = u128::from(self.workload.jobs);
+        let jobs = (jobs * LIDAR.as_nanos()).div_ceil(period.as_nanos());
+        u64::try_from(jobs).unwrap_or(u64::MAX)
+    }
+
+    /// Returns the attributes and the work of a subtask with `pieces` of work.
+    fn worker(&self, name: &str, pieces: u32) -> (SubtaskAttributes, Crunch) {
+        let crunch = Crunch::new(
+            self.workload,
+            self.subtasks.replace(self.subtasks.get() + 1),
+        );
+        let wcet = self.workload.crunch * pieces;
+        (SubtaskAttributes::named(name).wcet(wcet), crunch)
+    }
+
+    fn end(name: &str) -> SubtaskAttributes {
+        SubtaskAttributes::named(name).wcet(WCET_OF_ENDS)
+    }
+
+    /// Registers a source that writes where its values come from.
+    fn source(
+        dag: &Dag,
+        name: &str,
+        period: Duration,
+        mut origin: impl FnMut() -> Origin + Send + 'static,
+    ) {
+        dag.register_periodic_subtask(move || (origin(),), vec![name], period, Self::end(name));
+    }
+
+    /// Registers a transform: one input, one piece of work, one output.
+    fn transform(&self, dag: &Dag, input: &str, name: &str) {
+        let (attributes, mut crunch) = self.worker(name, 1);
+        let transform = move |(origin,): (Origin,)| {
+            crunch.work();
+            (origin,)
+        };
+        dag.register_subtask(transform, vec![input], vec![name], attributes);
+    }
+
+    /// Registers a fusion of two topics of one DAG.
+    fn fusion(&self, dag: &Dag, inputs: [&str; 2], name: &str) {
+        let (attributes, mut crunch) = self.worker(name, 1);
+        let fusion = move |(one, other): (Origin, Origin)| {
+            crunch.work();
+            (one.or(other),)
+        };
+        dag.register_subtask(fusion, inputs.to_vec(), vec![name], attributes);
+    }
+
+    /// A DAG of one driver.
+    fn driver(&self, dag_name: &str, name: &str, period: Duration) -> (Dag, Latest<Origin>) {
+        let dag = self.dag(dag_name, period);
+        Self::source(&dag, name, period, || None);
+        let latest = dag.latest(name);
+        (dag, latest)
+    }
+
+    fn map(&self) -> (Dag, Latest<Origin>) {
+        let dag = self.dag("map", MAP);
+        Self::source(&dag, "PointCloudMap", MAP, || None);
+        self.transform(&dag, "PointCloudMap", "PointCloudMapLoader");
+        let latest = dag.latest("PointCloudMapLoader");
+        (dag, latest)
+    }
+
+    /// Returns the DAG, the obstacles and the pose.
+    fn lidar(
+        &self,
+        map: &Latest<Origin>,
+        settings: &Latest<Origin>,
+    ) -> (Dag, Latest<Origin>, Latest<Origin>) {
+        let dag = self.dag("lidar", LIDAR);
+        for driver in ["FrontLidarDriver", "RearLidarDriver"] {
+            let mut next = 0;
+            Self::source(&dag, driver, LIDAR, move || {
+                next += 1;
+                Some(next - 1)
+            });
+        }
+        self.transform(&dag, "FrontLidarDriver", "PointsTransformerFront");
+        self.transform(&dag, "RearLidarDriver", "PointsTransformerRear");
+        let both = ["PointsTransformerFront", "PointsTransformerRear"];
+        self.fusion(&dag, both, "PointCloudFusion");
+        self.transform(&dag, "PointCloudFusion", "VoxelGridDownsampler");
+        self.transform(&dag, "PointCloudFusion", "RayGroundFilter");
+
+        let (attributes, mut crunch) = self.worker("NDTLocalizer", 1);
+        dag.using(map.sample()).register_subtask(
+            move |_: Sampled<'_>, (points,): (Origin,)| {
+                crunch.work();
+                (points,)
+            },
+            vec!["VoxelGridDownsampler"],
+            vec!["NDTLocalizer"],
+            attributes,
+        );
+
+        // Two independent transforms in one node.
+        let (attributes, mut crunch) = self.worker("EuclideanClusterDetector", 2);
+        dag.using(settings.sample()).register_subtask(
+            move |_: Sampled<'_>, (points,): (Origin,)| {
+                crunch.work();
+                crunch.work();
+                (points, points)
+            },
+            vec!["RayGroundFilter"],
+            vec!["EuclideanClusterDetector", "EuclideanIntersection"],
+            attributes,
+        );
+        self.transform(&dag, "EuclideanClusterDetector", "ObjectCollisionEstimator");
+        dag.register_sink_subtask(
+            |(_,): (Origin,)| (),
+            vec!["EuclideanIntersection"],
+            LIDAR,
+            Self::end("IntersectionOutput"),
+        );
+        let obstacles = dag.latest("ObjectCollisionEstimator");
+        let pose = dag.latest("NDTLocalizer");
+        (dag, obstacles, pose)
+    }
+
+    /// Returns the DAG and what its four planners write.
+    fn route(&self, goal: &Latest<Origin>, pose: &Latest<Origin>) -> (Dag, [Latest<Origin>; 4]) {
+        let dag = self.dag("route", LIDAR);
+        Self::source(&dag, "Lanelet2Map", LIDAR, || None);
+        let (attributes, mut crunch) = self.worker("Lanelet2GlobalPlanner", 1);
+        dag.using((goal.sample(), pose.sample()))
+            .register_periodic_subtask(
+                move |(_, pose): (Sampled<'_>, Sampled<'_>)| {
+                    crunch.work();
+                    (pose.and_then(|pose| *pose.value),)
+                },
+                vec!["Lanelet2GlobalPlanner"],
+                LIDAR,
+                attributes,
+            );
+        let inputs = ["Lanelet2GlobalPlanner", "Lanelet2Map"];
+        self.fusion(&dag, inputs, "Lanelet2MapLoader");
+        self.transform(&dag, "Lanelet2MapLoader", "ParkingPlanner");
+        self.transform(&dag, "Lanelet2MapLoader", "LanePlanner");
+        let latest = [
+            "Lanelet2GlobalPlanner",
+            "Lanelet2MapLoader",
+            "ParkingPlanner",
+            "LanePlanner",
+        ]
+        .map(|topic| dag.latest(topic));
+        (dag, latest)
+    }
+
+    /// Returns the DAG and what each of its jobs has acted on.
+    fn behaviour(
+        &self,
+        obstacles: &Latest<Origin>,
+        pose: &Latest<Origin>,
+        [global, loader, parking, lane]: &[Latest<Origin>; 4],
+    ) -> (Dag, Arc<[AtomicU64]>) {
+        let dag = self.dag("behaviour", LIDAR);
+        let (attributes, mut crunch) = self.worker("BehaviorPlanner", 1);
+        let uses = (
+            obstacles.sample(),
+            pose.sample(),
+            global.sample(),
+            loader.sample(),
+            parking.sample(),
+            lane.sample(),
+        );
+        dag.using(uses).register_periodic_subtask(
+            move |(obstacles, ..): (
+                Sampled<'_>,
+                Sampled<'_>,
+                Sampled<'_>,
+                Sampled<'_>,
+                Sampled<'_>,
+                Sampled<'_>,
+            )| {
+                // Sampled at the start, so what comes meanwhile is for the next job.
+                let origin = obstacles.and_then(|obstacles| *obstacles.value);
+                crunch.work();
+                (origin,)
+            },
+            vec!["BehaviorPlanner"],
+            LIDAR,
+            attributes,
+        );
+        self.transform(&dag, "BehaviorPlanner", "MPCController");
+        let inputs = ["MPCController", "BehaviorPlanner"];
+        self.fusion(&dag, inputs, "VehicleInterface");
+        let jobs = (0..self.jobs(LIDAR)).map(|_| AtomicU64::new(u64::MAX));
+        let acted_on: Arc<[AtomicU64]> = jobs.collect();
+        let mut places = 0..;
+        let keep = Arc::clone(&acted_on);
+        dag.register_sink_subtask(
+            move |(origin,): (Origin,)| {
+                let place = places.next().and_then(|job: usize| keep.get(job));
+                if let (Some(place), Some(job)) = (place, origin) {
+                    place.store(job, Ordering::Relaxed);
+                }
+            },
+            vec!["VehicleInterface"],
+            LIDAR,
+            Self::end("VehicleDBWSystem"),
+        );
+        (dag, acted_on)
+    }
+}
