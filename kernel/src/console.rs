@@ -99,6 +99,17 @@ pub(crate) fn send_pending_byte() -> bool {
     any
 }
 
+/// Sends bytes that wait for as long as the port takes them without a wait; not
+/// more than a few lines.
+pub(crate) fn send_what_goes_at_once() {
+    const MOST_BYTES: usize = 512;
+    for _ in 0..MOST_BYTES {
+        if !serial::is_ready() || !send_pending_byte() {
+            break;
+        }
+    }
+}
+
 /// Leaves text to idle cores from now on.
 pub(crate) fn defer() {
     DEFERRED.store(true, Ordering::Relaxed);

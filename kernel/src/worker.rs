@@ -8,7 +8,7 @@ use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu};
-use crate::{console, containment, contexts};
+use crate::{background, console, containment, contexts};
 
 /// The time between two signs of life of core 0. Without any alarm anywhere a
 /// virtual machine whose time is virtual would stand still forever.
@@ -68,11 +68,12 @@ fn rest(core: &Core) {
 }
 
 /// Waits until the run has ended, as the background of core 0: whenever there is
-/// work for the core, this is suspended.
-pub(crate) fn wait_in_background(mut when_idle: impl FnMut()) {
+/// work for the core, this is suspended. `when_idle` reports whether it has more to
+/// do at once.
+pub(crate) fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
     while !execution::is_finished() {
-        when_idle();
-        if console::send_pending_byte() {
+        let has_more = when_idle();
+        if console::send_pending_byte() || has_more {
             continue;
         }
         cpu::disable_interrupts();
@@ -93,6 +94,9 @@ pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {
     timer::take_due(Alarm::Hold, now_ns);
     if timer::take_due(Alarm::Heartbeat, now_ns) {
         beat(core, now_ns);
+        if core.index == 0 {
+            background::beat(now_ns);
+        }
     }
     if timer::take_due(Alarm::Schedule, now_ns) {
         execution::interrupt(interrupted, now_ns, true);

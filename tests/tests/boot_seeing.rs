@@ -128,6 +128,28 @@ fn a_trace_that_was_off_for_a_while_holds_what_came_after() {
 }
 
 #[test]
+fn a_person_is_heard_and_told_under_overload() {
+    // Two subtasks of 25.5 ms every 25 ms: this core never comes to its background.
+    let guest = Guest::new("fork-join").word("jobs=0").word("subtasks=2");
+    let said = "console\",\"command\"";
+    let conversation = [
+        ("\"kind\":\"status\"", "help"),
+        (said, "stats"),
+        (said, "stop fork-join"),
+        (said, "shutdown"),
+    ];
+    let outcome = guest.word("status=1").conversation(&conversation).succeed();
+    assert!(answers(&outcome).iter().all(|(_, accepted)| *accepted));
+    let status = outcome.transcript.of_kind("status").next().expect("one");
+    let loads = status.value.get("load_permille").expect("loads").elements();
+    assert!(loads[0].as_u64() > Some(950), "{}", status.text);
+    let last = *statuses(&outcome, "fork-join")
+        .last()
+        .expect("the last one");
+    assert_eq!(last.number_at("released"), last.number_at("completed"));
+}
+
+#[test]
 fn each_commit_prints_its_dags_if_asked() {
     let guest = Guest::new("fork-join").word("jobs=2").word("subtasks=2,3");
     let outcome = guest.cores(4).word("graph=dump").succeed();

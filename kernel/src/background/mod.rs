@@ -3,13 +3,22 @@
 //! It prints progress, the status if the command line asks for it, and holds the
 //! console's conversation. All this is core 0's background, which is suspended
 //! whenever the core has an instance to run: it delays nothing but itself.
+//!
+//! Under overload that may be for ever, and then a person wants most to see what
+//! goes on, and to stop it. So if the background has not come to run for
+//! [`STARVED_NS`], core 0's heartbeat does a *slice* of the status and the console
+//! instead: one line, a few microseconds.
 
 mod listener;
 mod progress;
 mod status;
 
+use core::sync::atomic::{AtomicU64, Ordering};
+
 use crate::console::session::{self, Session};
-use crate::worker;
+use crate::machine::clock;
+use crate::machine::spinlock::SpinLock;
+use crate::{console, worker};
 use listener::Listener;
 use progress::Progress;
 use sched_dag::DagId;
@@ -42,13 +51,52 @@ pub(crate) enum Echo {
     Off,
 }
 
+/// For how long the background may not run before the heartbeat helps out.
+const STARVED_NS: u64 = 200_000_000;
+
+/// What is done in slices, by the background or by the heartbeat.
+#[derive(Debug)]
+struct Sliced {
+    status: Option<Status>,
+    session: Option<Session>,
+}
+
+static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {
+    status: None,
+    session: None,
+});
+
+/// When the background ran last, on the clock; `u64::MAX` if there are no slices.
+static RAN_NS: AtomicU64 = AtomicU64::new(u64::MAX);
+
+impl Sliced {
+    /// Does a slice. Reports whether there is more to do at once.
+    fn slice(&mut self, is_starved: bool) -> bool {
+        if let Some(status) = &mut self.status {
+            status.print_when_due(is_starved);
+        }
+        self.session.as_mut().is_some_and(Session::slice)
+    }
+}
+
+/// Does a slice in core 0's heartbeat, if the background does not come to it.
+pub(crate) fn beat(now_ns: u64) {
+    if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
+        return;
+    }
+    if let Some(mut sliced) = SLICED.try_lock() {
+        sliced.slice(true);
+    }
+    console::send_what_goes_at_once();
+}
+
 /// The background of one run.
 #[derive(Debug)]
 pub(crate) struct Background {
     progress: Progress,
-    status: Option<Status>,
-    session: Option<Session>,
     listener: Option<Listener>,
+    /// Whether [`SLICED`] has something to do.
+    is_sliced: bool,
     /// The heartbeat that the core had before, if it has another one now.
     heartbeat_before_ns: Option<u64>,
 }
@@ -62,28 +110,34 @@ impl Background {
         ];
         let period_ns = periods.into_iter().flatten().min();
         let period_ns = period_ns.filter(|&period_ns| period_ns < worker::HEARTBEAT_NS);
+        let is_sliced = wishes.console.is_some() || wishes.status_ns > 0;
+        if is_sliced {
+            *SLICED.lock() = Sliced {
+                status: (wishes.status_ns > 0).then(|| Status::begin(wishes.status_ns, total)),
+                session: wishes.console.map(|echo| Session::new(echo == Echo::On)),
+            };
+            RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
+        }
         Self {
             heartbeat_before_ns: period_ns.map(worker::set_own_heartbeat),
             progress: Progress::new(total),
-            status: (wishes.status_ns > 0).then(|| Status::begin(wishes.status_ns, total)),
-            session: wishes.console.map(|echo| Session::new(echo == Echo::On)),
+            is_sliced,
             // What a person says to the console is no event.
             listener: (wishes.input.filter(|_| wishes.console.is_none())).map(Listener::new),
         }
     }
 
-    /// Does what is due.
-    pub(crate) fn step(&mut self) {
+    /// Does what is due. Reports whether there is more to do at once.
+    pub(crate) fn step(&mut self) -> bool {
         self.progress.print_when_due();
-        if let Some(status) = &mut self.status {
-            status.print_when_due();
-        }
-        if let Some(session) = &mut self.session {
-            session.step();
-        }
         if let Some(listener) = &self.listener {
             listener.step();
         }
+        if !self.is_sliced {
+            return false;
+        }
+        RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
+        SLICED.lock().slice(false)
     }
 
     /// Ends it. Reports whether a person has asked for the machine to shut down.
@@ -91,7 +145,10 @@ impl Background {
         if let Some(before_ns) = self.heartbeat_before_ns {
             worker::set_own_heartbeat(before_ns);
         }
-        self.session
-            .is_some_and(|session| session.is_shutting_down())
+        RAN_NS.store(u64::MAX, Ordering::Relaxed);
+        let mut sliced = SLICED.lock();
+        sliced.status = None;
+        let session = sliced.session.take();
+        session.is_some_and(|session| session.is_shutting_down())
     }
 }

@@ -10,6 +10,9 @@ use super::progress::is_quiet;
 use crate::machine::clock;
 use crate::{execution, json, trace};
 
+/// So many of each core's events are read where time is short.
+const FEW_EVENTS: u64 = 128;
+
 /// When and what to print.
 #[derive(Debug)]
 pub(super) struct Status {
@@ -29,10 +32,12 @@ impl Status {
         }
     }
 
-    /// Prints a line if one is due and the next event leaves time for it.
-    pub(super) fn print_when_due(&mut self) {
+    /// Prints a line if one is due and the next event leaves time for it, or it is
+    /// not to be waited for.
+    pub(super) fn print_when_due(&mut self, is_starved: bool) {
         let now_ns = clock::now_ns();
-        if now_ns < self.last_ns.saturating_add(self.period_ns) || !is_quiet() {
+        let is_due = now_ns >= self.last_ns.saturating_add(self.period_ns);
+        if !is_due || !(is_starved || is_quiet()) {
             return;
         }
         let [from_ns, to_ns] = [self.last_ns, now_ns].map(execution::since_epoch);
@@ -41,7 +46,9 @@ impl Status {
             .map_while(|dag| execution::snapshot(DagId(dag)))
             .map(|dag| dag.statistics.misses)
             .sum::<u64>();
-        let loads = || trace::loads_permille(from_ns, to_ns);
+        // In an interrupt's handler there is no time to read whole rings.
+        let most = if is_starved { FEW_EVENTS } else { u64::MAX };
+        let loads = || trace::loads_permille(from_ns, to_ns, most);
         json::emit("status", |line| {
             line.number("time_ns", to_ns)
                 .number("done", execution::jobs_ended())

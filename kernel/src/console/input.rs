@@ -12,6 +12,8 @@ pub(super) struct Input {
     bytes: [u8; LONGEST],
     length: usize,
     is_too_long: bool,
+    /// The length of the line that was complete last, until the next one begins.
+    complete: usize,
 }
 
 /// What a byte has come to.
@@ -33,7 +35,14 @@ impl Input {
             bytes: [0; LONGEST],
             length: 0,
             is_too_long: false,
+            complete: 0,
         }
+    }
+
+    /// Returns the line that was complete last, unless another one has begun.
+    pub(super) fn line(&self) -> &str {
+        let line = core::str::from_utf8(&self.bytes[..self.complete]);
+        line.map_or("", str::trim)
     }
 
     /// Takes a byte. A line ends with `\r` or `\n`; an empty one is nothing, and
@@ -42,6 +51,7 @@ impl Input {
         match byte {
             b'\r' | b'\n' => {
                 let length = core::mem::take(&mut self.length);
+                self.complete = length;
                 if core::mem::take(&mut self.is_too_long) {
                     return Typed::TooLong;
                 }
@@ -56,6 +66,7 @@ impl Input {
                 Typed::Nothing
             }
             byte => {
+                self.complete = 0;
                 match self.bytes.get_mut(self.length) {
                     Some(place) => {
                         *place = byte;
@@ -94,6 +105,17 @@ mod tests {
             typed(b"one\rtwo\nthree\r\n\n  \n four \nfi"),
             ["one", "two", "three", "four"]
         );
+    }
+
+    #[test]
+    fn a_line_stays_until_the_next_one_begins() {
+        let mut input = Input::new();
+        b" stats \n".iter().for_each(|byte| {
+            input.take(*byte);
+        });
+        assert_eq!(input.line(), "stats");
+        input.take(b'x');
+        assert_eq!(input.line(), "");
     }
 
     #[test]

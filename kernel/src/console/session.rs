@@ -1,9 +1,9 @@
 //! The conversation with a person during a run.
 //!
-//! It takes place in core 0's background, so it never keeps an instance waiting,
-//! but for a few microseconds of the scheduler's lock; and it gets only the time
-//! that core 0 has left. It hears at most [`PERIOD_NS`] late, as far as core 0 is
-//! idle then. Nothing is allocated.
+//! It goes on in slices, each of a few microseconds, in core 0's background, so that
+//! it keeps no instance waiting; or in its heartbeat, if the background does not come
+//! to run. Nothing is allocated. (Only a shutdown takes longer: a step of the
+//! scheduler for each DAG.)
 //!
 //! Each command is answered by lines for people and by one machine line of kind
 //! `console`; `dags` and `stats` print a line of kind `dag_status` for each DAG.
@@ -14,16 +14,15 @@ use sched_dag::{Dag, DagId, TaskSet};
 
 use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
-use super::send_pending_byte;
 use crate::execution::{self, Control, Snapshot, State};
 use crate::machine::serial;
 use crate::{json, println, trace};
 
-/// How often core 0 looks for bytes while it is idle.
+/// How often core 0 looks for bytes, at least.
 pub(crate) const PERIOD_NS: u64 = 20_000_000;
 
-/// The most bytes that are taken at a time: the port may not end to have some.
-const MOST_BYTES: usize = 256;
+/// The most bytes that a slice takes: what the port's FIFO holds.
+const MOST_BYTES: usize = 16;
 
 /// A conversation.
 #[derive(Debug)]
@@ -31,6 +30,16 @@ pub(crate) struct Session {
     input: Input,
     echoes: bool,
     is_shutting_down: bool,
+    listing: Option<Listing>,
+}
+
+/// DAGs that are still to be listed, each in a slice of its own.
+#[derive(Clone, Copy, Debug)]
+struct Listing {
+    next: DagId,
+    /// The first one that is not to be listed.
+    end: DagId,
+    print: fn(&Dag, &Snapshot),
 }
 
 impl Session {
@@ -40,6 +49,7 @@ impl Session {
             input: Input::new(),
             echoes,
             is_shutting_down: false,
+            listing: None,
         }
     }
 
@@ -48,43 +58,76 @@ impl Session {
         self.is_shutting_down
     }
 
-    /// Takes what was typed and answers it.
-    pub(crate) fn step(&mut self) {
+    /// Does a little: prints one DAG's line, or takes a few bytes and answers what
+    /// they complete. Reports whether there is more to do at once.
+    pub(crate) fn slice(&mut self) -> bool {
         let Some(task_set) = execution::task_set() else {
-            return;
+            return false;
         };
+        if let Some(listing) = self.listing {
+            self.listing = listing.print_one(&task_set);
+            if self.listing.is_none() {
+                accept(self.input.line());
+            }
+            return true;
+        }
+        if self.is_shutting_down {
+            end_what_is_idle(&task_set);
+        }
         for _ in 0..MOST_BYTES {
             let Some(byte) = serial::receive() else {
-                break;
+                return false;
             };
             if self.echoes {
                 crate::print!("{}", char::from(if byte == b'\r' { b'\n' } else { byte }));
             }
             match self.input.take(byte) {
                 Typed::Nothing => continue,
-                Typed::Line(line) => {
-                    if answer(line, &task_set) == Command::Shutdown {
-                        self.is_shutting_down = true;
-                    }
-                }
+                Typed::Line(line) => match answer(line, &task_set) {
+                    Answer::Given => {}
+                    Answer::List(listing) => self.listing = Some(listing),
+                    Answer::ShutsDown => self.is_shutting_down = true,
+                },
                 Typed::TooLong => refuse("", &"the line is too long; no command is"),
                 Typed::NotText => refuse("", &"the line is not UTF-8"),
             }
-            flush();
+            break;
         }
-        if self.is_shutting_down {
-            end_what_is_idle(&task_set);
-        }
+        true
     }
 }
 
-/// Answers a line and returns its command; if it is none, [`Command::Help`].
-fn answer<'l>(line: &'l str, task_set: &TaskSet) -> Command<'l> {
+impl Listing {
+    /// Prints the next DAG's lines and returns what is left to be listed.
+    fn print_one(self, task_set: &TaskSet) -> Option<Listing> {
+        let (dag, model) = (self.next, task_set.dag(self.next));
+        if let Some(snapshot) = execution::snapshot(dag) {
+            crate::print!("  dag {} ", dag.0);
+            (self.print)(model, &snapshot);
+            emit(dag, model.name(), &snapshot);
+        }
+        let next = DagId(dag.0 + 1);
+        (next < self.end).then_some(Listing { next, ..self })
+    }
+}
+
+/// What has become of a line.
+enum Answer {
+    /// It was answered.
+    Given,
+    /// The DAGs are to be listed.
+    List(Listing),
+    /// The run shall end.
+    ShutsDown,
+}
+
+/// Answers a line.
+fn answer(line: &str, task_set: &TaskSet) -> Answer {
     let command = match parse(line) {
         Ok(command) => command,
         Err(refusal) => {
             refuse(line, &refusal);
-            return Command::Help;
+            return Answer::Given;
         }
     };
     match command {
@@ -94,41 +137,36 @@ fn answer<'l>(line: &'l str, task_set: &TaskSet) -> Command<'l> {
             }
             accept(line);
         }
-        Command::Dags => list(line, task_set, None, describe),
-        Command::Stats(name) => list(line, task_set, name, count),
+        Command::Dags => return list(line, task_set, None, describe),
+        Command::Stats(name) => return list(line, task_set, name, count),
         Command::Trace(true) if !trace::has_room() => {
-            refuse(
-                line,
-                &"there is no room for events; boot with `trace_events=4096`",
-            );
+            let why = "there is no room for events; boot with `trace_events=4096`";
+            refuse(line, &why);
         }
         Command::Trace(on) => {
             trace::record_events(on);
-            println!(
-                "{}",
-                if on {
-                    "events are recorded"
-                } else {
-                    "no events are recorded"
-                }
-            );
+            let what = if on { "events" } else { "no events" };
+            println!("{what} are recorded");
             accept(line);
         }
-        Command::Stop(name) => change(
-            line,
-            task_set,
-            name,
-            Control::Pause,
-            "releases no more jobs",
-        ),
+        Command::Stop(name) => {
+            change(
+                line,
+                task_set,
+                name,
+                Control::Pause,
+                "releases no more jobs",
+            );
+        }
         Command::Start(name) => change(line, task_set, name, Control::Resume, "releases jobs"),
         Command::Shutdown => {
             println!("shutting down: nothing more is released; what is in flight goes on");
             ids(task_set).for_each(|dag| execution::control(Control::Pause(dag)));
             accept(line);
+            return Answer::ShutsDown;
         }
     }
-    command
+    Answer::Given
 }
 
 /// Ends each DAG that has nothing in flight; when all are, the run is over.
@@ -142,22 +180,22 @@ fn end_what_is_idle(task_set: &TaskSet) {
     }
 }
 
-/// Prints a line of each DAG, or of the one that is named.
-fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Dag, &Snapshot)) {
-    let chosen = match name.map(|name| find(task_set, name)) {
+/// Lets each DAG be listed, or the one that is named.
+fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Dag, &Snapshot)) -> Answer {
+    let chosen = match name.map(|name| find(task_set, name).ok_or(name)) {
         None => None,
-        Some(Some(dag)) => Some(dag),
-        Some(None) => return unknown(line, name.unwrap_or_default()),
-    };
-    for dag in ids(task_set).filter(|dag| chosen.is_none_or(|chosen| chosen == *dag)) {
-        if let Some(snapshot) = execution::snapshot(dag) {
-            crate::print!("  dag {} ", dag.0);
-            print(task_set.dag(dag), &snapshot);
-            emit(dag, task_set.dag(dag).name(), &snapshot);
-            flush();
+        Some(Ok(dag)) => Some(dag),
+        Some(Err(name)) => {
+            unknown(line, name);
+            return Answer::Given;
         }
-    }
-    accept(line);
+    };
+    let all = u32::try_from(task_set.dags().len()).unwrap_or(u32::MAX);
+    Answer::List(Listing {
+        next: chosen.unwrap_or(DagId(0)),
+        end: chosen.map_or(DagId(all), |dag| DagId(dag.0 + 1)),
+        print,
+    })
 }
 
 fn describe(dag: &Dag, snapshot: &Snapshot) {
@@ -265,9 +303,4 @@ fn refuse(line: &str, why: &dyn Display) {
             .flag("accepted", false)
             .text("reason", why);
     });
-}
-
-/// Sends all that waits: more than the buffer holds may be said.
-fn flush() {
-    while send_pending_byte() {}
 }

@@ -32,19 +32,24 @@ pub(crate) fn initialize() {
 /// The wait is bounded: a port that never gets ready (because there is none)
 /// costs its bytes, not the kernel.
 pub(crate) fn send(byte: u8) {
-    const TRANSMITTER_EMPTY: u8 = 1 << 5;
     /// Several times the 1.4 ms that a full FIFO of 16 bytes takes.
     const MOST_POLLS: u32 = 100_000;
     for _ in 0..MOST_POLLS {
-        // SAFETY: reading the line status of this module's device.
-        let status = unsafe { port::read_u8(BASE + 5) };
-        if status & TRANSMITTER_EMPTY != 0 {
+        if is_ready() {
             break;
         }
         super::cpu::relax();
     }
     // SAFETY: the data register of this module's device.
     unsafe { port::write_u8(BASE, byte) };
+}
+
+/// Reports whether a byte can be sent without a wait.
+pub(crate) fn is_ready() -> bool {
+    const TRANSMITTER_EMPTY: u8 = 1 << 5;
+    // SAFETY: reading the line status of this module's device.
+    let status = unsafe { port::read_u8(BASE + 5) };
+    status & TRANSMITTER_EMPTY != 0
 }
 
 /// Takes a byte that has been received, if there is one.

@@ -1,24 +1,21 @@
 //! How busy the cores were, from their rings, also while events are recorded.
 
-use super::ring::Ring;
 use super::{Event, What, all_rings, is_recording};
 
 /// Returns for each core for which part of a time, in thousandths, it had an
 /// instance; nothing if events are not recorded. Where a core's ring does not
-/// reach back to `from_ns`, the part is of what it holds.
-pub(crate) fn loads_permille(from_ns: u64, to_ns: u64) -> impl Iterator<Item = u64> {
+/// reach back to `from_ns`, the part is of what it holds, or of its latest `most`
+/// events.
+pub(crate) fn loads_permille(from_ns: u64, to_ns: u64, most: u64) -> impl Iterator<Item = u64> {
     let rings = if is_recording() { all_rings() } else { &[] };
     rings.iter().map(move |ring| {
-        let from_ns = match oldest_ns(ring) {
-            Some(oldest_ns) if ring.lost() > 0 => from_ns.max(oldest_ns),
+        let mut events = ring.iter_meanwhile(most).peekable();
+        let from_ns = match events.peek() {
+            Some(oldest) if !ring.is_whole(most) => from_ns.max(oldest.time_ns),
             _ => from_ns,
         };
-        load_permille(ring.iter_meanwhile(), from_ns, to_ns)
+        load_permille(events, from_ns, to_ns)
     })
-}
-
-fn oldest_ns(ring: &Ring) -> Option<u64> {
-    ring.iter_meanwhile().next().map(|event| event.time_ns)
 }
 
 /// Computes one core's load from its events, which are in the order of time.

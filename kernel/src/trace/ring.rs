@@ -118,11 +118,12 @@ impl Ring {
         (self.oldest(written)..written).filter_map(|number| self.read(number))
     }
 
-    /// Does as [`iter`](Self::iter) while events are written: leaves out the ones
-    /// that are overwritten meanwhile.
-    pub(super) fn iter_meanwhile(&self) -> impl Iterator<Item = Event> {
+    /// Does as [`iter`](Self::iter) for the latest `most` events while events are
+    /// written: leaves out the ones that are overwritten meanwhile.
+    pub(super) fn iter_meanwhile(&self, most: u64) -> impl Iterator<Item = Event> {
         let written = self.written.load(Ordering::Acquire);
-        (self.oldest(written)..written).filter_map(|number| {
+        let oldest = self.oldest(written).max(written.saturating_sub(most));
+        (oldest..written).filter_map(|number| {
             let event = self.read(number)?;
             // The words were read before the number of the latest event is.
             fence(Ordering::Acquire);
@@ -130,6 +131,12 @@ impl Ring {
             // Where it is equal, the very place may just be written.
             (written < number + self.events.len() as u64).then_some(event)
         })
+    }
+
+    /// Reports whether the latest `most` events are all that ever happened.
+    pub(super) fn is_whole(&self, most: u64) -> bool {
+        let written = self.written.load(Ordering::Acquire);
+        self.oldest(written) == 0 && written <= most
     }
 
     /// Returns the number of the oldest event that may be there.
@@ -227,9 +234,12 @@ mod tests {
     fn whoever_reads_meanwhile_leaves_out_what_may_be_overwritten() {
         let ring = Ring::new(3);
         (0..3).for_each(|time| ring.push(event(time, What::Ready, None)));
-        let times: Vec<_> = ring.iter_meanwhile().map(|event| event.time_ns).collect();
+        let times: Vec<_> = ring.iter_meanwhile(9).map(|event| event.time_ns).collect();
         assert_eq!(times, [1, 2]);
-        let mut reader = ring.iter_meanwhile();
+        let latest = ring.iter_meanwhile(1).next();
+        assert_eq!(latest.map(|event| event.time_ns), Some(2));
+        assert!(ring.is_whole(3) && !ring.is_whole(2));
+        let mut reader = ring.iter_meanwhile(9);
         ring.push(event(3, What::Ready, None));
         assert_eq!(reader.next().map(|event| event.time_ns), Some(2));
     }
