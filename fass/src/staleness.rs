@@ -9,8 +9,8 @@
 //! (doi:10.1145/1278480.1278553).
 //!
 //! It holds from the writer's first completion on, and for as long as jobs come: not
-//! behind the last job of a DAG with a limit, and never for a sporadic writer, whose
-//! signals may stay away.
+//! behind the last job of a DAG with a limit, nor while one is paused or after it was
+//! ended, and never for a sporadic writer, whose signals may stay away.
 
 use alloc::string::String;
 use alloc::vec::Vec;

@@ -141,6 +141,22 @@ impl<U: Uses> Using<'_, U> {
     }
 
     /// Does as [`Dag::register_sporadic_subtask`].
+    ///
+    /// ```
+    /// # use core::time::Duration;
+    /// # use fass::{SubtaskAttributes, create_dag};
+    /// let dag = create_dag();
+    /// let presses = dag.state("presses", 0_u64);
+    /// let button = dag.using(presses.update()).register_sporadic_subtask(
+    ///     |presses: &mut u64| {
+    ///         *presses += 1;
+    ///         (*presses,)
+    ///     },
+    ///     vec!["presses"],
+    ///     Duration::from_millis(50),
+    ///     SubtaskAttributes::named("button"),
+    /// );
+    /// ```
     #[track_caller]
     pub fn register_sporadic_subtask<F, Ret>(
         self,
@@ -194,6 +210,15 @@ impl<U: Uses> Using<'_, U> {
     }
 
     /// Does as [`Dag::register_untyped_subtask`].
+    ///
+    /// ```
+    /// # use fass::{SubtaskAttributes, create_dag};
+    /// let dag = create_dag();
+    /// let log = dag.state("log", Vec::with_capacity(16));
+    /// let append = |log: &mut Vec<u64>, job| log.push(job);
+    /// dag.using(log.update())
+    ///     .register_untyped_subtask(append, SubtaskAttributes::named("append"));
+    /// ```
     #[track_caller]
     pub fn register_untyped_subtask<F>(self, mut f: F, attributes: SubtaskAttributes) -> Untyped
     where

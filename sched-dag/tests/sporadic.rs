@@ -326,6 +326,14 @@ fn bounds_hold_for_random_signals() {
         let mut driver = VirtualTime::new(Scheduler::new(Arc::clone(&task_set), options));
         assert_eq!(driver.run(&mut run), End::Finished, "seed {seed}");
         assert_eq!(violations(&task_set, &run.record).count(), 0, "seed {seed}");
+        let period_ns = task_set.dags()[sporadic_at].period_ns();
+        let mut earliest_ns = 0;
+        for &(at_ns, release_ns) in &run.arrivals {
+            if let Some(release_ns) = release_ns {
+                assert_eq!(release_ns, at_ns.max(earliest_ns), "seed {seed}");
+                earliest_ns = release_ns + period_ns;
+            }
+        }
         let settings = Settings {
             policy: options.policy,
             preemption: options.preemption,
