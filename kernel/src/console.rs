@@ -6,7 +6,7 @@
 //! and counted, never silently.
 //!
 //! With `console=on` on the command line a person can talk to the kernel during a
-//! run; that is [`session`].
+//! run; that is the module `session`.
 
 mod command;
 mod input;

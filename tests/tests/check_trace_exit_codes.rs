@@ -1,4 +1,5 @@
-//! `check-trace` as a person calls it: what it prints, and its exit codes.
+//! `check-trace` and `trace` as a person calls them: what they print, and their exit
+//! codes.
 
 use std::fs;
 use std::path::PathBuf;
@@ -22,8 +23,12 @@ fn file(name: &str, text: &str) -> PathBuf {
 }
 
 fn check_trace(words: &[&str]) -> Output {
+    call("check-trace", words)
+}
+
+fn call(subcommand: &str, words: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-    command.arg("check-trace").args(words);
+    command.arg(subcommand).args(words);
     command.output().expect("the tool can be started")
 }
 
@@ -95,4 +100,33 @@ fn a_file_without_a_trace_or_with_a_damaged_one_is_2() {
         check_trace(&["--bound-us", "x", "y"]).status.code(),
         Some(2)
     );
+}
+
+#[test]
+fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
+    let log = file("drawn.log", GOOD);
+    let log = log.to_str().unwrap();
+    let output = call("trace", &[log]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let drawn = text(&output.stdout);
+    let value = harness::json::parse(drawn).expect("JSON");
+    assert!(
+        value
+            .get("traceEvents")
+            .is_some_and(|events| events.elements().len() > 10)
+    );
+    let out = file("drawn.json", "");
+    let output = call("trace", &[log, "-o", out.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(fs::read_to_string(&out).expect("written"), drawn);
+    let refused = |words: &[&str]| {
+        let output = call("trace", words);
+        (output.status.code(), text(&output.stderr).to_string())
+    };
+    let (code, said) = refused(&[log, "--run", "3"]);
+    assert_eq!(code, Some(2));
+    assert!(said.ends_with("has no such run; there are 0\n"), "{said}");
+    assert_eq!(refused(&[]).0, Some(2));
+    assert_eq!(refused(&["/no/such/file"]).0, Some(2));
+    assert_eq!(refused(&[log, "-o", "/no/such/folder/file"]).0, Some(1));
 }

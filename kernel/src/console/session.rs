@@ -200,11 +200,11 @@ fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Dag, &Sna
 
 fn describe(dag: &Dag, snapshot: &Snapshot) {
     println!(
-        "`{}`: {}; {} subtasks, {} T = {} us, D = {} us",
+        "`{}`: {}; {} subtasks, {}T = {} us, D = {} us",
         dag.name(),
         word(snapshot.state),
         dag.subtasks().len(),
-        if dag.is_sporadic() { "sporadic," } else { "" },
+        if dag.is_sporadic() { "sporadic, " } else { "" },
         dag.period_ns() / 1000,
         dag.relative_deadline_ns() / 1000
     );

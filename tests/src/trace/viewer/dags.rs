@@ -19,7 +19,8 @@ pub(super) fn draw(view: &View<'_>, prefix: &str, flows: &mut Flows, output: &mu
     flows.draw_again();
     for (dag, model) in (0..).map(DagId).zip(&view.run.dags) {
         let label = format!(
-            "T = {}, D = {}",
+            "{}T = {}, D = {}",
+            model.sporadic.as_ref().map_or("", |_| "sporadic, "),
             milliseconds(model.period_ns),
             milliseconds(model.relative_deadline_ns)
         );

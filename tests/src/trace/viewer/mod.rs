@@ -8,16 +8,16 @@
 //!
 //! - a group `cores` with a track for each core: a slice is one uninterrupted
 //!   piece of an instance's execution, an instant a preemption, or the request
-//!   for one ([`cores`]);
+//!   for one (`cores`);
 //! - a group for each DAG: its releases, deadlines and misses as instants, a
 //!   slice for each job from its nominal release to its completion, and for each
 //!   subtask the slices of its instances from readiness to their end, with what
-//!   they executed inside ([`dags`]);
+//!   they executed inside (`dags`);
 //! - if the trace breaks a rule, a group `breaches` that says where.
 //!
 //! Flows lead along each edge of the graph from an instance's finish to the
 //! start of its successor in the same job, once between cores and once between
-//! subtasks ([`flows`]).
+//! subtasks (`flows`).
 //!
 //! It guarantees that slices of one track nest, and that each flow has both its
 //! ends. Each time is the trace's, in microseconds with three decimals. All runs
