@@ -119,6 +119,7 @@ impl Body {
     ///     body.complete(now_ns, &mut |dag| println!("dag {} gets a signal", dag.0));
     /// }
     /// ```
+    #[inline]
     pub fn complete(&mut self, completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
         for effect in &mut self.effects {
             effect.happen(completed_ns, raise);

@@ -46,7 +46,7 @@ impl Run {
     /// instant from which releases count.
     #[must_use]
     pub const fn record(&self) -> &Record {
-        &self.execution.record
+        self.execution.record()
     }
 
     /// Returns the instant from which releases count, in nanoseconds since the

@@ -40,17 +40,13 @@ pub(crate) fn work() -> Parked {
     }
 }
 
-/// Calls a subtask's function, with interrupts enabled meanwhile. Start and
-/// finish are stamped with interrupts disabled, so that no preemption can stand
-/// between a stamp and what it says.
+/// Calls a subtask's function, with interrupts enabled meanwhile.
 fn run(mut assignment: Assignment) -> Work {
-    let start_ns = clock::now_ns();
-    execution::note_start(&assignment, start_ns);
     cpu::enable_interrupts();
     assignment.run();
-    cpu::disable_interrupts();
+    cpu::disable_enabled_interrupts();
     let finish_ns = clock::now_ns();
-    execution::complete(assignment, start_ns, finish_ns)
+    execution::complete(assignment, finish_ns)
 }
 
 /// Sends waiting text and halts in between, until this core is to look for work.

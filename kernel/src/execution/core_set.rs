@@ -11,6 +11,12 @@ impl CoreSet {
         self.0[(core / 64) as usize] |= 1 << (core % 64);
     }
 
+    pub(super) fn insert_all(&mut self, others: &Self) {
+        for (word, others) in self.0.iter_mut().zip(others.0) {
+            *word |= others;
+        }
+    }
+
     /// Makes each of the cores look for work.
     pub(super) fn wake(&self) {
         for (word, first) in self.0.iter().zip((0..).step_by(64)) {

@@ -11,29 +11,39 @@ use sched_dag::CoreId;
 
 use super::core_set::CoreSet;
 use super::status::note_running;
-use super::{Assignment, EPOCH_NS, EXECUTION, Event, Execution, NEXT_EVENT_NS, Work};
+use super::step::Ended;
+use super::{Assignment, EPOCH_NS, EXECUTION, Event, NEXT_EVENT_NS, Work};
 use crate::machine::interrupt::Interrupted;
+use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, this_core};
-use crate::trace::{self, What};
+use crate::trace::{self, Recorder, What};
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
 pub(crate) fn find_work() -> Work {
-    let mut place = EXECUTION.lock();
-    place.as_mut().map_or(Work::Rest, Execution::find_work)
+    let core = this_core::get();
+    let mut place = EXECUTION.lock_uninterrupted();
+    let execution = place.as_mut();
+    let work = execution.map_or(Work::Rest, |execution| execution.find_work(core));
+    drop(place);
+    begin(core, trace::recorder(CoreId(core.index)), work)
 }
 
-/// Notes that this core starts its instance. Interrupts are disabled.
-pub(crate) fn note_start(assignment: &Assignment, start_ns: u64) {
-    let budget_end_ns = start_ns.saturating_add(assignment.budget_ns);
-    this_core::get().context().set_budget_end(budget_end_ns);
-    timer::set_no_later(Alarm::Budget, budget_end_ns);
-    trace::instance(
-        What::Start,
-        since_epoch(start_ns),
-        here(),
-        assignment.instance,
-    );
+/// Stamps the start of what this core begins. Start and finish are stamped with
+/// interrupts disabled, so that no preemption can stand between a stamp and what
+/// it says.
+#[inline]
+fn begin(core: &Core, recorder: Recorder, mut work: Work) -> Work {
+    if let Work::Run(assignment) = &mut work {
+        let now_ns = clock::now_ns();
+        let budget_end_ns = now_ns.saturating_add(assignment.budget_ns);
+        core.context().set_budget_end(budget_end_ns);
+        timer::set_no_later(Alarm::Budget, budget_end_ns);
+        assignment.start_ns = since_epoch(now_ns);
+        let here = CoreId(core.index);
+        recorder.instance(What::Start, assignment.start_ns, here, assignment.instance);
+    }
+    work
 }
 
 /// Converts a time on the clock to the run's time.
@@ -48,30 +58,42 @@ pub(super) fn here() -> CoreId {
 
 /// Reports that this core has run its instance, and finds what it is to do
 /// next. Interrupts are disabled.
-pub(crate) fn complete(finished: Assignment, start_ns: u64, finish_ns: u64) -> Work {
-    let mut place = EXECUTION.lock();
+pub(crate) fn complete(mut finished: Assignment, finish_ns: u64) -> Work {
+    let core = this_core::get();
+    let here = CoreId(core.index);
+    let recorder = trace::recorder(here);
+    let mut place = EXECUTION.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return Work::Rest;
     };
-    let here = here();
     let Assignment {
-        instance, mut body, ..
+        instance, vertex, ..
     } = finished;
-    execution.signals.take(&mut body, finish_ns);
-    trace::instance(What::Finish, since_epoch(finish_ns), here, instance);
-    execution.placement.finish(here.index(), instance, body);
-    if let Some(record) = execution.record.instance_mut(instance) {
-        record.start_ns = Some(since_epoch(start_ns));
-        record.finish_ns = Some(since_epoch(finish_ns));
-        record.core = Some(here);
-        record.runs += 1;
+    execution.signals.take(&mut finished.body, finish_ns);
+    let finished_ns = since_epoch(finish_ns);
+    execution.note_finish(recorder, here, finished, finished_ns);
+    let mut woken = None;
+    if execution.may_hand_off && execution.signals.are_none() {
+        match execution.hand_off(recorder, core, vertex, finished_ns) {
+            Ended::HandedOff(successor) => {
+                drop(place);
+                return begin(core, recorder, Work::Run(successor));
+            }
+            Ended::Open => woken = Some(execution.step(finish_ns, Event::Time)),
+            Ended::WithNews => woken = Some(execution.announce()),
+            Ended::Quiet => {}
+        }
+    } else {
+        woken = Some(execution.step(finish_ns, Event::Completed(instance)));
     }
-    let woken = execution.step(finish_ns, Event::Completed(instance));
-    let work = execution.find_work();
+    let work = execution.find_work(core);
     drop(place);
-    woken.wake();
-    work
+    if let Some(woken) = woken {
+        woken.wake();
+    }
+    begin(core, recorder, work)
 }
+
 /// Ends this core's instance, and with it its DAG, because of a fault. The
 /// context that ran it must not be resumed. Interrupts are disabled.
 pub(crate) fn fail(now_ns: u64) {
@@ -80,14 +102,16 @@ pub(crate) fn fail(now_ns: u64) {
         return;
     };
     let core = this_core::get();
-    let Some(instance) = execution.placement.lose(core.index as usize) else {
+    let Some(vertex) = execution.books.placement.lose(core.index as usize) else {
         return;
     };
+    let instance = execution.scheduler.instance_of(vertex);
     // Not when the interrupt came: a step may have left events since then.
     let ended_ns = since_epoch(clock::now_ns());
-    trace::instance(What::Ended, ended_ns, CoreId(core.index), instance);
+    let here = CoreId(core.index);
+    trace::recorder(here).instance(What::Ended, ended_ns, here, instance);
     note_running(core, None);
-    if let Some(record) = execution.record.instance_mut(instance) {
+    if let Some(record) = execution.books.record.instance_mut(instance) {
         record.failed_ns = Some(since_epoch(now_ns));
         record.core = Some(CoreId(core.index));
     }

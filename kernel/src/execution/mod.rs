@@ -7,6 +7,7 @@
 //!
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
+mod books;
 mod control;
 mod core_set;
 mod events;
@@ -18,21 +19,21 @@ mod watcher;
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
 
 use fass::{Body, LaunchError, Plan};
 use sched_dag::record::Record;
-use sched_dag::{DagId, Instance, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{DagId, Instance, Scheduler, SchedulerOptions, TaskSet, Vertex};
 
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
+use crate::platform::KERNEL;
 use crate::{contexts, trace};
+use books::Books;
 pub(crate) use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
-pub(crate) use events::{
-    arm_next_event, complete, fail, find_work, interrupt, note_start, since_epoch,
-};
-use placement::Placement;
+pub(crate) use events::{arm_next_event, complete, fail, find_work, interrupt, since_epoch};
 use signals::Signals;
 pub(crate) use signals::raise;
 pub(crate) use status::{
@@ -41,10 +42,14 @@ pub(crate) use status::{
 
 /// An instance that a core runs, with what it takes.
 pub(crate) struct Assignment {
-    pub(crate) instance: Instance,
+    instance: Instance,
+    vertex: Vertex,
     /// The time that it may execute for, `u64::MAX` if for ever.
     budget_ns: u64,
-    body: Body,
+    /// When it started, on the run's time.
+    start_ns: u64,
+    /// Moves between the table and the core, so it is but a pointer.
+    body: Box<Body>,
 }
 
 impl Assignment {
@@ -81,16 +86,15 @@ enum Event {
 /// A run, from its launch until its record is taken.
 pub(crate) struct Execution {
     scheduler: Scheduler,
-    placement: Placement<Body, Parked>,
+    books: Books,
     /// What core 0 does when nothing is assigned to it, while something is.
     background: Option<Parked>,
-    pub(crate) record: Record,
-    /// The scheduler's latest time; it never goes back, although clocks of
-    /// different cores may be read in another order than they get the lock.
-    latest_ns: u64,
     /// When the next dispatch is due, on the clock, if it waits for further events
     /// of the instant in hand.
     dispatch_due_ns: Option<u64>,
+    /// Whether a completion may be all of a step: no dispatch is owed, nor ever
+    /// waits.
+    may_hand_off: bool,
     signals: Signals,
 }
 
@@ -128,13 +132,13 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         ))
     })?;
     let signals = Signals::new(&plan);
+    let bodies = plan.bodies.into_iter().flatten();
     let execution = Execution {
+        books: Books::new(&plan.task_set, record, bodies, cores),
         scheduler: Scheduler::new(Arc::new(plan.task_set), options),
-        placement: Placement::new(plan.bodies, cores),
         background: None,
-        record,
-        latest_ns: 0,
         dispatch_due_ns: None,
+        may_hand_off: KERNEL.coincidence_ns() == 0,
         signals,
     };
     *EXECUTION.lock() = Some(execution);
@@ -185,6 +189,11 @@ impl Execution {
     /// Returns the scheduler, for its model and its counters.
     pub(crate) const fn scheduler(&self) -> &Scheduler {
         &self.scheduler
+    }
+
+    /// Returns the times of all jobs and instances.
+    pub(crate) const fn record(&self) -> &Record {
+        &self.books.record
     }
 
     /// Returns the model.

@@ -9,15 +9,16 @@
 //! its *place*.
 //!
 //! A subtask has at most one started instance at a time (R2), so places are kept
-//! by subtask: its body rests in the table, or is with a core, or lies on the
-//! stack of a suspended context.
+//! by subtask, and a subtask's [`Vertex`] says which instance is meant: its body
+//! rests in the table, or is with a core, or lies on the stack of a suspended
+//! context.
 //!
 //! Everything here runs under the execution's lock; it is generic over bodies
 //! and contexts so that the tests run on the host.
 
-use alloc::vec::Vec;
+use alloc::boxed::Box;
 
-use sched_dag::{CoreId, Decision, Instance};
+use sched_dag::{CoreId, Vertex};
 
 /// Where a subtask's body is.
 #[derive(Debug)]
@@ -37,8 +38,8 @@ enum Place<Body, Parked> {
 pub(super) enum Next<Body, Parked> {
     /// Nothing is there for it to do.
     Nothing,
-    /// It starts this instance.
-    Start(Instance, Body),
+    /// It starts an instance of this subtask.
+    Start(Vertex, Body),
     /// It goes on with this context.
     Continue(Parked),
 }
@@ -46,94 +47,95 @@ pub(super) enum Next<Body, Parked> {
 /// The places of all subtasks, and what each core has and should have.
 #[derive(Debug)]
 pub(super) struct Placement<Body, Parked> {
-    places: Vec<Vec<Place<Body, Parked>>>,
-    targets: Vec<Option<Instance>>,
-    currents: Vec<Option<Instance>>,
+    places: Box<[Place<Body, Parked>]>,
+    seats: Box<[Seat]>,
+}
+
+/// What one core has, and what it should have.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seat {
+    current: Option<Vertex>,
+    target: Option<Vertex>,
 }
 
 impl<Body, Parked> Placement<Body, Parked> {
-    /// Puts all bodies to rest.
-    pub(super) fn new(bodies: Vec<Vec<Body>>, cores: usize) -> Self {
-        let rest = |bodies: Vec<Body>| bodies.into_iter().map(Place::Resting).collect();
+    /// Puts all bodies, those of each vertex in turn, to rest.
+    pub(super) fn new(bodies: impl Iterator<Item = Body>, cores: usize) -> Self {
         Self {
-            places: bodies.into_iter().map(rest).collect(),
-            targets: alloc::vec![None; cores],
-            currents: alloc::vec![None; cores],
+            places: bodies.map(Place::Resting).collect(),
+            seats: alloc::vec![Seat::default(); cores].into_boxed_slice(),
         }
     }
 
-    /// Takes note of a decision of the scheduler.
-    pub(super) fn decide(&mut self, decision: Decision) {
-        self.targets[decision.core().index()] = match decision {
-            Decision::Start { instance, .. } | Decision::Resume { instance, .. } => Some(instance),
-            Decision::Preempt { .. } => None,
-        };
+    /// Takes note of what the scheduler wants a core to run.
+    pub(super) fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
+        self.seats[core.index()].target = target;
     }
 
     /// Takes note that core `core` has finished its current instance.
-    pub(super) fn finish(&mut self, core: usize, instance: Instance, body: Body) {
-        self.currents[core] = None;
-        *self.place(instance) = Place::Resting(body);
-        self.forget_target(core, instance);
+    #[inline]
+    pub(super) fn finish(&mut self, core: usize, vertex: Vertex, body: Body) {
+        self.seats[core].current = None;
+        *self.place(vertex) = Place::Resting(body);
+        self.forget_target(core, vertex);
     }
 
-    /// Takes note that core `core`'s current instance was ended, and returns it.
-    /// Its body stays on the stack of a context that is never resumed.
-    pub(super) fn lose(&mut self, core: usize) -> Option<Instance> {
-        let instance = self.currents[core].take()?;
-        *self.place(instance) = Place::Lost;
-        self.forget_target(core, instance);
-        Some(instance)
+    /// Takes note that core `core`'s current instance was ended, and returns its
+    /// vertex. Its body stays on the stack of a context that is never resumed.
+    pub(super) fn lose(&mut self, core: usize) -> Option<Vertex> {
+        let vertex = self.seats[core].current.take()?;
+        *self.place(vertex) = Place::Lost;
+        self.forget_target(core, vertex);
+        Some(vertex)
     }
 
-    /// The scheduler knows that `instance` has ended: nobody is to run it.
-    fn forget_target(&mut self, core: usize, instance: Instance) {
-        let wants_it = |target: &Option<Instance>| *target == Some(instance);
+    /// The scheduler knows that the instance has ended: nobody is to run it.
+    fn forget_target(&mut self, core: usize, vertex: Vertex) {
+        let wants_it = |seat: &Seat| seat.target == Some(vertex);
         // Nearly always the core that ran it; another one if it was about to move.
-        let place = match wants_it(&self.targets[core]) {
-            true => Some(&mut self.targets[core]),
-            false => self.targets.iter_mut().find(|target| wants_it(target)),
+        let seat = match wants_it(&self.seats[core]) {
+            true => Some(&mut self.seats[core]),
+            false => self.seats.iter_mut().find(|seat| wants_it(seat)),
         };
-        if let Some(target) = place {
-            *target = None;
+        if let Some(seat) = seat {
+            seat.target = None;
         }
     }
 
     /// Reports whether core `core` has an instance that it should give up.
     pub(super) fn must_suspend(&self, core: usize) -> bool {
-        self.currents[core].is_some() && self.currents[core] != self.targets[core]
+        let Seat { current, target } = self.seats[core];
+        current.is_some() && current != target
     }
 
     /// Reports whether core `core` has nothing and should have something.
     pub(super) fn is_wanted(&self, core: usize) -> bool {
-        self.currents[core].is_none() && self.targets[core].is_some()
+        let Seat { current, target } = self.seats[core];
+        current.is_none() && target.is_some()
     }
 
     /// Takes core `core`'s current instance away from it, if it has one. To be
     /// followed by [`suspend`](Self::suspend), as soon as its context is known.
-    pub(super) fn detach(&mut self, core: usize) -> Option<Instance> {
-        self.currents[core].take()
+    pub(super) fn detach(&mut self, core: usize) -> Option<Vertex> {
+        self.seats[core].current.take()
     }
 
     /// Takes note that `context` holds a detached instance. Returns the core
     /// that has been waiting for it, if there is one.
-    pub(super) fn suspend(&mut self, instance: Instance, context: Parked) -> Option<CoreId> {
-        *self.place(instance) = Place::Suspended(context);
-        let waits = |target: &Option<Instance>| *target == Some(instance);
-        (0..)
-            .map(CoreId)
-            .zip(&self.targets)
-            .find_map(|(core, target)| waits(target).then_some(core))
+    pub(super) fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
+        *self.place(vertex) = Place::Suspended(context);
+        let mut seats = (0..).map(CoreId).zip(&self.seats);
+        seats.find_map(|(core, seat)| (seat.target == Some(vertex)).then_some(core))
     }
 
     /// Gives core `core`, which has no current instance, what it should have, if
     /// that is suspended.
     pub(super) fn take_suspended(&mut self, core: usize) -> Option<Parked> {
-        let instance = self.targets[core]?;
-        let place = self.place(instance);
+        let vertex = self.seats[core].target?;
+        let place = self.place(vertex);
         match core::mem::replace(place, Place::Running) {
             Place::Suspended(context) => {
-                self.currents[core] = Some(instance);
+                self.seats[core].current = Some(vertex);
                 Some(context)
             }
             other => {
@@ -145,12 +147,12 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// Gives core `core`, which has no current instance, what it should have.
     pub(super) fn next(&mut self, core: usize) -> Next<Body, Parked> {
-        let Some(instance) = self.targets[core] else {
+        let Some(vertex) = self.seats[core].target else {
             return Next::Nothing;
         };
-        let place = self.place(instance);
+        let place = self.place(vertex);
         let next = match core::mem::replace(place, Place::Running) {
-            Place::Resting(body) => Next::Start(instance, body),
+            Place::Resting(body) => Next::Start(vertex, body),
             Place::Suspended(context) => Next::Continue(context),
             // The core that still has it will say when it no longer has.
             Place::Running => return Next::Nothing,
@@ -159,75 +161,72 @@ impl<Body, Parked> Placement<Body, Parked> {
                 return Next::Nothing;
             }
         };
-        self.currents[core] = Some(instance);
+        self.seats[core].current = Some(vertex);
         next
     }
 
-    /// Returns core `core`'s current instance.
-    pub(super) fn current(&self, core: usize) -> Option<Instance> {
-        self.currents[core]
+    /// Lets a core, which has no current instance, have one of this subtask and
+    /// start it. `None`, and nothing is changed, if it is suspended.
+    #[inline]
+    pub(super) fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
+        let place = self.place(vertex);
+        match core::mem::replace(place, Place::Running) {
+            Place::Resting(body) => {
+                self.seats[core.index()] = Seat {
+                    current: Some(vertex),
+                    target: Some(vertex),
+                };
+                Some(body)
+            }
+            other => {
+                *place = other;
+                None
+            }
+        }
+    }
+
+    /// Returns the vertex of core `core`'s current instance.
+    pub(super) fn current(&self, core: usize) -> Option<Vertex> {
+        self.seats[core].current
     }
 
     /// Returns the body of a subtask of which no instance has started.
-    pub(super) fn resting(&mut self, instance: Instance) -> Option<&mut Body> {
-        match self.place(instance) {
+    pub(super) fn resting(&mut self, vertex: Vertex) -> Option<&mut Body> {
+        match self.place(vertex) {
             Place::Resting(body) => Some(body),
             _ => None,
         }
     }
 
-    fn place(&mut self, instance: Instance) -> &mut Place<Body, Parked> {
-        &mut self.places[instance.dag.index()][instance.subtask.index()]
+    fn place(&mut self, vertex: Vertex) -> &mut Place<Body, Parked> {
+        &mut self.places[vertex.index()]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sched_dag::{DagId, SubtaskId};
 
     type Cores = Placement<char, &'static str>;
 
-    const X: Instance = Instance {
-        dag: DagId(0),
-        job: 3,
-        subtask: SubtaskId(0),
-    };
-    const Y: Instance = Instance {
-        dag: DagId(0),
-        job: 2,
-        subtask: SubtaskId(1),
-    };
+    const X: Vertex = Vertex(0);
+    const Y: Vertex = Vertex(1);
 
-    fn start(core: u32, instance: Instance) -> Decision {
-        Decision::Start {
-            core: CoreId(core),
-            instance,
-        }
-    }
-
-    fn resume(core: u32, instance: Instance) -> Decision {
-        Decision::Resume {
-            core: CoreId(core),
-            instance,
-        }
-    }
-
-    fn preempt(core: u32, instance: Instance) -> Decision {
-        Decision::Preempt {
-            core: CoreId(core),
-            instance,
+    impl Cores {
+        /// Takes note of a decision to run, or to preempt if `target` is `None`.
+        fn decide(&mut self, core: u32, target: Option<Vertex>) {
+            self.set_target(CoreId(core), target);
         }
     }
 
     /// Two cores; core 0 runs `X`, and the scheduler wants `Y` there instead.
     fn about_to_preempt() -> Cores {
-        let mut cores = Cores::new(vec![vec!['x', 'y']], 2);
-        cores.decide(start(0, X));
+        let mut cores = Cores::new(['x', 'y'].into_iter(), 2);
+        cores.decide(0, Some(X));
         assert_eq!(cores.next(0), Next::Start(X, 'x'));
         assert!(!cores.must_suspend(0));
-        cores.decide(preempt(0, X));
-        cores.decide(start(0, Y));
+        cores.decide(0, None);
+        cores.decide(0, Some(Y));
         assert!(cores.must_suspend(0));
         cores
     }
@@ -244,7 +243,7 @@ mod tests {
         let mut cores = about_to_preempt();
         assert_eq!(suspend(&mut cores, "context of x"), None);
         assert_eq!(cores.next(0), Next::Start(Y, 'y'));
-        cores.decide(resume(1, X));
+        cores.decide(1, Some(X));
         assert!(cores.is_wanted(1));
         assert_eq!(cores.next(1), Next::Continue("context of x"));
         cores.finish(1, X, 'x');
@@ -263,7 +262,7 @@ mod tests {
     #[test]
     fn a_core_waits_for_an_instance_that_another_still_has() {
         let mut cores = about_to_preempt();
-        cores.decide(resume(1, X));
+        cores.decide(1, Some(X));
         assert_eq!(cores.next(1), Next::Nothing);
         assert_eq!(suspend(&mut cores, "context of x"), Some(CoreId(1)));
         assert_eq!(cores.next(1), Next::Continue("context of x"));
@@ -272,7 +271,7 @@ mod tests {
     #[test]
     fn an_instance_wanted_elsewhere_may_finish_where_it_is() {
         let mut cores = about_to_preempt();
-        cores.decide(resume(1, X));
+        cores.decide(1, Some(X));
         cores.finish(0, X, 'x');
         assert_eq!(cores.next(1), Next::Nothing);
         assert_eq!(cores.next(0), Next::Start(Y, 'y'));
@@ -281,10 +280,10 @@ mod tests {
     #[test]
     fn a_preemption_that_is_taken_back_changes_nothing() {
         let mut cores = about_to_preempt();
-        cores.decide(preempt(0, Y));
-        cores.decide(resume(0, X));
+        cores.decide(0, None);
+        cores.decide(0, Some(X));
         assert!(!cores.must_suspend(0));
-        cores.decide(resume(1, Y));
+        cores.decide(1, Some(Y));
         assert_eq!(cores.next(1), Next::Start(Y, 'y'));
     }
 
@@ -292,7 +291,7 @@ mod tests {
     fn a_lost_instance_is_never_run_again() {
         let mut cores = about_to_preempt();
         assert_eq!(cores.lose(0), Some(X));
-        cores.decide(resume(1, X));
+        cores.decide(1, Some(X));
         assert_eq!(cores.next(1), Next::Nothing);
         assert!(cores.resting(X).is_none());
         assert_eq!(cores.next(0), Next::Start(Y, 'y'));

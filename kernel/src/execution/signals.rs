@@ -9,10 +9,12 @@ use alloc::vec::Vec;
 use fass::{Body, Plan};
 use sched_dag::{DagId, Moment, Observer};
 
+use super::events::here;
 use super::watcher::Watcher;
 use super::{EXECUTION, Event, Execution, status};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu, this_core};
+use crate::trace;
 
 /// The signals of a run that are on their way to its scheduler.
 pub(super) struct Signals {
@@ -45,6 +47,11 @@ impl Signals {
         }
     }
 
+    /// Reports whether none is on its way.
+    pub(super) const fn are_none(&self) -> bool {
+        self.raised.is_empty()
+    }
+
     /// Passes the signals taken on.
     pub(super) fn send(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
         for dag in self.raised.drain(..) {
@@ -58,12 +65,17 @@ impl Execution {
     pub(super) fn begin_signals(&mut self) {
         let Self {
             scheduler,
-            placement,
-            record,
+            books,
             signals,
             ..
         } = self;
-        let mut watcher = Watcher { record, placement };
+        let here = here();
+        let mut watcher = Watcher {
+            books,
+            recorder: trace::recorder(here),
+            here,
+            has_job_news: false,
+        };
         signals.has_begun = true;
         signals.send(&mut scheduler.at(0), &mut watcher);
     }

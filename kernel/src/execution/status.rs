@@ -82,8 +82,8 @@ pub(super) fn note_running(core: &Core, instance: Option<Instance>) {
 }
 /// Returns how long an instance may execute for, `u64::MAX` if for ever.
 pub(crate) fn budget_ns(instance: Instance) -> u64 {
-    EXECUTION
-        .lock()
-        .as_ref()
-        .map_or(u64::MAX, |execution| execution.budget_ns(instance))
+    let place = EXECUTION.lock();
+    place.as_ref().map_or(u64::MAX, |execution| {
+        execution.books.budget_ns(execution.books.vertex(instance))
+    })
 }

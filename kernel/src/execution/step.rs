@@ -2,7 +2,10 @@
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::{CoreId, Decision, Instance};
+use alloc::boxed::Box;
+
+use fass::Body;
+use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
 
 use super::core_set::CoreSet;
 use super::events::{arm_next_event, here, since_epoch};
@@ -12,29 +15,125 @@ use super::watcher::Watcher;
 use super::{Assignment, EPOCH_NS, Event, Execution, FINISHED, NEXT_EVENT_NS, Work};
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
+use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, this_core};
 use crate::platform::KERNEL;
-use crate::trace::{self, What};
+use crate::trace::{self, Recorder, What};
 use crate::worker;
 
+/// What comes of [`Execution::hand_off`].
+pub(super) enum Ended {
+    /// The core has its next instance, and nothing else is to do.
+    HandedOff(Assignment),
+    /// The scheduler's step is not over.
+    Open,
+    /// When the next event is due may have changed; then the core may have a
+    /// target.
+    WithNews,
+    /// The core may have a target.
+    Quiet,
+}
+
 impl Execution {
+    /// Notes that this core has finished its instance.
+    #[inline]
+    pub(super) fn note_finish(
+        &mut self,
+        recorder: Recorder,
+        here: CoreId,
+        finished: Assignment,
+        finish_ns: u64,
+    ) {
+        let Assignment {
+            instance,
+            vertex,
+            start_ns,
+            body,
+            ..
+        } = finished;
+        recorder.instance(What::Finish, finish_ns, here, instance);
+        self.books.placement.finish(here.index(), vertex, body);
+        if let Some(record) = self.books.record.instance_mut(instance) {
+            record.start_ns = Some(start_ns);
+            record.finish_ns = Some(finish_ns);
+            record.core = Some(here);
+            record.runs += 1;
+        }
+    }
+
+    /// Lets the scheduler know that this core has finished an instance, and gives
+    /// the core the next one at once if nothing else is to be decided.
+    #[inline]
+    pub(super) fn hand_off(
+        &mut self,
+        recorder: Recorder,
+        core: &Core,
+        finished: Vertex,
+        finish_ns: u64,
+    ) -> Ended {
+        let here = CoreId(core.index);
+        let Self {
+            scheduler, books, ..
+        } = self;
+        let mut watcher = Watcher {
+            books,
+            recorder,
+            here,
+            has_job_news: false,
+        };
+        let done = scheduler.hand_off(finish_ns, here, finished, &mut watcher);
+        let has_job_news = watcher.has_job_news;
+        match done {
+            HandOff::Open => return Ended::Open,
+            HandOff::To(vertex, decision) => {
+                if !has_job_news && let Some(body) = books.placement.start(here, vertex) {
+                    let instance = decision.instance();
+                    note_running(core, Some(instance));
+                    return Ended::HandedOff(self.assignment(instance, vertex, body));
+                }
+                books.placement.set_target(here, Some(vertex));
+            }
+            HandOff::Idle => {}
+        }
+        if has_job_news {
+            Ended::WithNews
+        } else {
+            Ended::Quiet
+        }
+    }
+
+    #[inline]
+    fn assignment(&self, instance: Instance, vertex: Vertex, body: Box<Body>) -> Assignment {
+        Assignment {
+            instance,
+            vertex,
+            budget_ns: self.books.budget_ns(vertex),
+            start_ns: 0,
+            body,
+        }
+    }
+
     /// Makes one step of the scheduler and returns which other cores have to
     /// look at what they should run.
     pub(super) fn step(&mut self, now_ns: u64, event: Event) -> CoreSet {
-        let here = this_core::get().index;
+        let here = here();
+        let recorder = trace::recorder(here);
         let Self {
             scheduler,
-            placement,
-            record,
-            latest_ns,
+            books,
             dispatch_due_ns,
+            may_hand_off,
             signals,
             ..
         } = self;
-        *latest_ns = since_epoch(now_ns).max(*latest_ns);
-        let mut watcher = Watcher { record, placement };
-        let mut moment = scheduler.at(*latest_ns);
+        let mut watcher = Watcher {
+            books,
+            recorder,
+            here,
+            has_job_news: false,
+        };
+        let mut moment = scheduler.at(since_epoch(now_ns));
         match event {
             Event::Time => {}
             Event::Completed(instance) => {
@@ -45,35 +144,43 @@ impl Execution {
             Event::Signalled(dag) => moment.signal(dag, &mut watcher),
             Event::Control(control) => control.apply(&mut moment, &mut watcher),
         }
-        let mut woken = CoreSet::default();
         let due_ns = *dispatch_due_ns.get_or_insert(now_ns.saturating_add(KERNEL.coincidence_ns()));
         if now_ns < due_ns {
-            self.announce(&mut woken);
-            return woken;
+            self.may_hand_off = false;
+            return self.announce();
         }
         *dispatch_due_ns = None;
+        *may_hand_off = KERNEL.coincidence_ns() == 0;
+        let mut woken = CoreSet::default();
         let mut preempted = None;
         for decision in moment.release_due(&mut watcher).dispatch() {
-            placement.decide(*decision);
             let (core, instance) = (decision.core(), decision.instance());
+            let vertex = books.vertex(instance);
             if let Decision::Preempt { .. } = decision {
+                books.placement.set_target(core, None);
                 preempted = Some(core);
-                if let Some(record) = record.instance_mut(instance) {
+                if let Some(record) = books.record.instance_mut(instance) {
                     record.preemptions += 1;
                 }
-            } else if preempted == Some(core) {
-                trace::instance(What::Request, since_epoch(clock::now_ns()), core, instance);
+            } else {
+                books.placement.set_target(core, Some(vertex));
+                if preempted == Some(core) {
+                    let time_ns = since_epoch(clock::now_ns());
+                    recorder.instance(What::Request, time_ns, core, instance);
+                }
             }
-            if core.0 != here {
+            if core != here {
                 woken.insert(core.0);
             }
         }
-        self.announce(&mut woken);
+        woken.insert_all(&self.announce());
         woken
     }
 
-    /// Publishes the next event, and sees to it that core 0 waits for it.
-    fn announce(&self, woken: &mut CoreSet) {
+    /// Publishes the next event, and sees to it that core 0 waits for it: returns
+    /// it if it has to be woken for that.
+    pub(super) fn announce(&self) -> CoreSet {
+        let mut woken = CoreSet::default();
         let earlier = NEXT_EVENT_NS.load(Ordering::Relaxed);
         self.publish();
         if this_core::get().index == 0 {
@@ -81,6 +188,7 @@ impl Execution {
         } else if NEXT_EVENT_NS.load(Ordering::Relaxed) < earlier || is_finished() {
             woken.insert(0);
         }
+        woken
     }
 
     /// Lets everyone see when the next event is, and whether there is any.
@@ -95,25 +203,32 @@ impl Execution {
     }
 
     /// Finds what this core, which runs nothing, is to do.
-    pub(super) fn find_work(&mut self) -> Work {
-        let core = this_core::get();
+    pub(super) fn find_work(&mut self, core: &Core) -> Work {
         let here = core.index as usize;
-        let work = match self.placement.next(here) {
-            Next::Start(instance, body) => Work::Run(Assignment {
-                instance,
-                budget_ns: self.budget_ns(instance),
-                body,
-            }),
+        match self.books.placement.next(here) {
+            Next::Start(vertex, body) => {
+                let instance = self.scheduler.instance_of(vertex);
+                note_running(core, Some(instance));
+                Work::Run(self.assignment(instance, vertex, body))
+            }
             Next::Continue(context) => {
                 self.note_resumed(&context, clock::now_ns());
+                note_running(core, self.current(here));
                 Work::Continue(context)
             }
             // Only core 0 has a background, and only while it does other work.
-            Next::Nothing if here == 0 => self.background.take().map_or(Work::Rest, Work::Continue),
-            Next::Nothing => Work::Rest,
-        };
-        note_running(core, self.placement.current(here));
-        work
+            Next::Nothing => {
+                note_running(core, None);
+                let background = self.background.take_if(|_| here == 0);
+                background.map_or(Work::Rest, Work::Continue)
+            }
+        }
+    }
+
+    /// Returns the instance that a core has.
+    pub(super) fn current(&self, core: usize) -> Option<Instance> {
+        let vertex = self.books.placement.current(core)?;
+        Some(self.scheduler.instance_of(vertex))
     }
 
     /// Makes the core whose interrupt is being handled leave what it should no
@@ -122,30 +237,32 @@ impl Execution {
         let core = this_core::get();
         let here = core.index as usize;
         let is_background = core.context().is_background();
-        let leaves_background = is_background && self.placement.is_wanted(here);
-        if !self.placement.must_suspend(here) && !leaves_background {
+        let leaves_background = is_background && self.books.placement.is_wanted(here);
+        if !self.books.placement.must_suspend(here) && !leaves_background {
             return None;
         }
-        let suspended = self.placement.detach(here);
-        if let Some(instance) = suspended {
+        let suspended = self.books.placement.detach(here);
+        if let Some(vertex) = suspended {
             // Not when the interrupt came: its step has left events since then.
             let time_ns = since_epoch(clock::now_ns());
-            trace::instance(What::Suspend, time_ns, CoreId(core.index), instance);
+            let instance = self.scheduler.instance_of(vertex);
+            let here = CoreId(core.index);
+            trace::recorder(here).instance(What::Suspend, time_ns, here, instance);
         }
-        let next = match self.placement.take_suspended(here) {
+        let next = match self.books.placement.take_suspended(here) {
             Some(context) => {
                 self.note_resumed(&context, now_ns);
                 context
             }
             None => worker::new_context(),
         };
-        note_running(core, self.placement.current(here));
+        note_running(core, self.current(here));
         let last = interrupted.exchange(next);
         match suspended {
-            Some(instance) => {
+            Some(vertex) => {
                 last.note_suspended(now_ns);
                 timer::set(Alarm::Hold, u64::MAX);
-                self.placement.suspend(instance, last)
+                self.books.placement.suspend(vertex, last)
             }
             None => {
                 self.background = Some(last);
@@ -154,23 +271,14 @@ impl Execution {
         }
     }
 
-    /// Returns how long an instance may execute for, `u64::MAX` if for ever.
-    pub(super) fn budget_ns(&self, instance: Instance) -> u64 {
-        let subtask = self.task_set().dag(instance.dag).subtask(instance.subtask);
-        subtask
-            .budget_ns()
-            .or_else(|| KERNEL.budget_of_wcet(subtask.wcet_ns()?))
-            .unwrap_or(u64::MAX)
-    }
-
     /// Notes that this core's current instance continues in `context`.
     fn note_resumed(&self, context: &Parked, now_ns: u64) {
         context.note_resumed(now_ns);
         timer::set_no_later(Alarm::Budget, context.budget_end_ns());
         let here = here();
-        if let Some(instance) = self.placement.current(here.index()) {
+        if let Some(instance) = self.current(here.index()) {
             let time_ns = since_epoch(clock::now_ns());
-            trace::instance(What::Resume, time_ns, here, instance);
+            trace::recorder(here).instance(What::Resume, time_ns, here, instance);
         }
     }
 }

@@ -37,7 +37,12 @@ pub(crate) fn now_ns() -> u64 {
 /// Converts nanoseconds to ticks of the local APIC's timer, at least 1; longer
 /// times than it can count give its longest.
 pub(crate) fn apic_ticks(ns: u64) -> u32 {
-    let ticks = scale(ns, APIC_TICKS_PER_NS.load(Ordering::Relaxed));
+    /// Three days, which no timer of 32 bits can count.
+    const LONGEST_NS: u64 = 1 << 48;
+    let ticks = scale(
+        ns.min(LONGEST_NS),
+        APIC_TICKS_PER_NS.load(Ordering::Relaxed),
+    );
     u32::try_from(ticks).unwrap_or(u32::MAX).max(1)
 }
 
@@ -46,10 +51,14 @@ pub(crate) fn ticks_to_ns(ticks: u64) -> u64 {
     scale(ticks, NS_PER_TICK.load(Ordering::Relaxed))
 }
 
-/// Multiplies by a factor in 2^-32; saturates after 584 years.
+/// Multiplies by a factor in 2^-32. Right for 584 years.
 fn scale(value: u64, factor: u64) -> u64 {
     let product = u128::from(value) * u128::from(factor);
-    u64::try_from(product >> 32).unwrap_or(u64::MAX)
+    // Reading the clock is on every path: no check for what cannot be.
+    #[allow(clippy::cast_possible_truncation)]
+    {
+        (product >> 32) as u64
+    }
 }
 
 /// Measures the rates, with time 0 at counter value `base`, and returns the

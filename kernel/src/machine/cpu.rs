@@ -23,6 +23,14 @@ pub(crate) fn disable_interrupts() -> bool {
     were_enabled
 }
 
+/// Disables interrupts where they are known to be enabled.
+#[track_caller]
+pub(crate) fn disable_enabled_interrupts() {
+    // SAFETY: clearing the interrupt flag delays interrupts and changes no memory.
+    unsafe { asm!("cli") };
+    interrupts_off::begin(Location::caller());
+}
+
 /// Reports whether interrupts are enabled on this processor.
 pub(crate) fn are_interrupts_enabled() -> bool {
     let were_enabled = disable_interrupts();

@@ -52,11 +52,18 @@ impl<T> SpinLock<T> {
     #[track_caller]
     pub(crate) fn lock(&self) -> SpinLockGuard<'_, T> {
         let interrupts_were_enabled = cpu::disable_interrupts();
+        let mut guard = self.lock_uninterrupted();
+        guard.interrupts_were_enabled = interrupts_were_enabled;
+        guard
+    }
+
+    /// Does as [`lock`](Self::lock) where interrupts are disabled, and leaves them so.
+    pub(crate) fn lock_uninterrupted(&self) -> SpinLockGuard<'_, T> {
         let ticket = self.next.fetch_add(1, Ordering::Relaxed);
         while self.serving.load(Ordering::Acquire) != ticket {
             cpu::relax();
         }
-        self.guard(interrupts_were_enabled)
+        self.guard(false)
     }
 
     /// Takes the data if it is free.

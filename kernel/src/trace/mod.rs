@@ -12,14 +12,11 @@ mod dump;
 mod load;
 mod ring;
 
-use core::sync::atomic::{AtomicU8, Ordering};
-
 use alloc::boxed::Box;
 
 use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
 use crate::machine::once::Once;
-use crate::machine::this_core;
 pub(crate) use dump::{dump, latest};
 pub(crate) use load::loads_permille;
 use ring::Ring;
@@ -96,61 +93,59 @@ pub(crate) struct Event {
 
 static RINGS: Once<Box<[Ring]>> = Once::new();
 
-/// There is no room for events.
-const NO_ROOM: u8 = 0;
-/// Events are counted and not kept.
-const OFF: u8 = 1;
-/// Events are recorded.
-const ON: u8 = 2;
-
-/// Whether events are recorded.
-static RECORDING: AtomicU8 = AtomicU8::new(NO_ROOM);
-
-/// Makes a ring of `events` events for each core. With 0 nothing is recorded.
+/// Makes a ring of `events` events, or up to the next power of two, for each core.
+/// With 0 nothing is recorded.
 pub(crate) fn create(cores: usize, events: usize) {
-    let recording = if events > 0 { ON } else { NO_ROOM };
-    RECORDING.store(recording, Ordering::Relaxed);
+    let new_ring = || Ring::new(events.checked_next_power_of_two().unwrap_or(events));
     // A second call would come from a second boot, which there is not.
-    let _ = RINGS.set((0..cores).map(|_| Ring::new(events)).collect());
+    let _ = match events {
+        0 => RINGS.set((0..cores).map(|_| Ring::new(0)).collect()),
+        _ => RINGS.set((0..cores).map(|_| new_ring()).collect()),
+    };
 }
 
-/// Records that something happened to an instance, to or for core `core`.
-/// Interrupts are disabled.
-pub(crate) fn instance(what: What, time_ns: u64, core: CoreId, instance: Instance) {
-    let Instance { dag, job, subtask } = instance;
-    record(Event {
-        time_ns,
-        what,
-        core,
-        dag,
-        job,
-        subtask: Some(subtask),
-    });
+/// Where one core's events go, looked up once for several of them. For as long as
+/// its holder stays on the core, with interrupts disabled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Recorder(Option<&'static Ring>);
+
+/// Returns where the events of core `here` go, which executes this.
+#[inline]
+pub(crate) fn recorder(here: CoreId) -> Recorder {
+    Recorder(all_rings().get(here.index()))
 }
 
-/// Records that something happened to a job. Interrupts are disabled.
-pub(crate) fn job(what: What, time_ns: u64, dag: DagId, job: u64) {
-    let core = CoreId(this_core::get().index);
-    record(Event {
-        time_ns,
-        what,
-        core,
-        dag,
-        job,
-        subtask: None,
-    });
-}
-
-fn record(event: Event) {
-    let recording = RECORDING.load(Ordering::Relaxed);
-    if recording == NO_ROOM {
-        return;
+impl Recorder {
+    /// Records that something happened to an instance, to or for core `core`.
+    #[inline]
+    pub(crate) fn instance(self, what: What, time_ns: u64, core: CoreId, instance: Instance) {
+        let Instance { dag, job, subtask } = instance;
+        self.record(&Event {
+            time_ns,
+            what,
+            core,
+            dag,
+            job,
+            subtask: Some(subtask),
+        });
     }
-    let here = this_core::get().index as usize;
-    if let Some(ring) = RINGS.get().and_then(|rings| rings.get(here)) {
-        match recording {
-            ON => ring.push(event),
-            _ => ring.pass(),
+
+    /// Records that something happened to a job.
+    pub(crate) fn job(self, what: What, time_ns: u64, core: CoreId, dag: DagId, job: u64) {
+        self.record(&Event {
+            time_ns,
+            what,
+            core,
+            dag,
+            job,
+            subtask: None,
+        });
+    }
+
+    #[inline]
+    fn record(self, event: &Event) {
+        if let Some(ring) = self.0 {
+            ring.push(event);
         }
     }
 }
@@ -167,17 +162,13 @@ pub(crate) fn record_events(on: bool) {
     if !has_room() || on == is_recording() {
         return;
     }
-    if !on {
-        RECORDING.store(OFF, Ordering::Relaxed);
-    }
-    all_rings().iter().for_each(Ring::forget);
-    if on {
-        RECORDING.store(ON, Ordering::Release);
+    for ring in all_rings() {
+        ring.record_events(on);
     }
 }
 
 fn is_recording() -> bool {
-    RECORDING.load(Ordering::Relaxed) == ON
+    all_rings().iter().all(Ring::is_on)
 }
 
 /// Forgets all events. To be called while no run is going on.

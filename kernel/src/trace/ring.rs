@@ -19,6 +19,8 @@ pub(super) struct Ring {
     events: Box<[Words]>,
     /// How many events were ever written since the last [`clear`](Self::clear).
     written: AtomicU64,
+    /// [`NOT_KEPT`] while recording is off, else 0.
+    not_kept: AtomicU64,
     /// The number of the first event that was not forgotten.
     first: AtomicU64,
 }
@@ -49,42 +51,34 @@ const WHATS: [What; 16] = [
 ];
 
 impl Ring {
+    /// Makes a ring with room for `capacity` events, a power of two or 0.
     pub(super) fn new(capacity: usize) -> Self {
+        debug_assert!(capacity == 0 || capacity.is_power_of_two());
         let empty = || [const { AtomicU64::new(0) }; 4];
         Self {
             events: (0..capacity).map(|_| empty()).collect(),
             written: AtomicU64::new(0),
+            not_kept: AtomicU64::new(0),
             first: AtomicU64::new(0),
         }
     }
 
-    pub(super) fn push(&self, event: Event) {
+    /// Writes an event; while recording is off, counts it only.
+    #[inline]
+    pub(super) fn push(&self, event: &Event) {
         let written = self.written.load(Ordering::Relaxed);
-        let Some(place) = self.events.get(self.index(written)) else {
+        let Some(words) = self.events.get(self.index(written)) else {
             return;
         };
         let subtask = event
             .subtask
             .map_or(NO_SUBTASK, |subtask| u64::from(subtask.0));
-        let words = [
-            event.time_ns,
-            event.job,
-            u64::from(event.dag.0) << 32 | subtask,
-            u64::from(event.core.0) << 8 | event.what as u64,
-        ];
-        for (place, word) in place.iter().zip(words) {
-            place.store(word, Ordering::Relaxed);
-        }
+        words[0].store(event.time_ns, Ordering::Relaxed);
+        words[1].store(event.job, Ordering::Relaxed);
+        words[2].store(u64::from(event.dag.0) << 32 | subtask, Ordering::Relaxed);
+        let what = event.what as u64 | self.not_kept.load(Ordering::Relaxed);
+        words[3].store(u64::from(event.core.0) << 8 | what, Ordering::Relaxed);
         self.written.store(written + 1, Ordering::Release);
-    }
-
-    /// Counts an event and does not keep it.
-    pub(super) fn pass(&self) {
-        let written = self.written.load(Ordering::Relaxed);
-        if let Some(place) = self.events.get(self.index(written)) {
-            place[3].store(NOT_KEPT, Ordering::Relaxed);
-            self.written.store(written + 1, Ordering::Release);
-        }
     }
 
     /// Begins anew. Not while events are written.
@@ -93,11 +87,22 @@ impl Ring {
         self.written.store(0, Ordering::Release);
     }
 
-    /// Forgets all events up to now, and counts them as lost. May be called while
-    /// events are written.
-    pub(super) fn forget(&self) {
+    /// Records events from now on, or not, and forgets those up to now, which count
+    /// as lost. May be called while events are written.
+    pub(super) fn record_events(&self, on: bool) {
+        if !on {
+            self.not_kept.store(NOT_KEPT, Ordering::Relaxed);
+        }
         let written = self.written.load(Ordering::Acquire);
         self.first.store(written, Ordering::Release);
+        if on {
+            self.not_kept.store(0, Ordering::Release);
+        }
+    }
+
+    /// Reports whether events are recorded.
+    pub(super) fn is_on(&self) -> bool {
+        self.not_kept.load(Ordering::Relaxed) == 0
     }
 
     /// Reports whether an event has room.
@@ -161,9 +166,15 @@ impl Ring {
         })
     }
 
+    /// Returns an event's place: a mask, as the length is a power of two, or 0.
+    #[inline]
     fn index(&self, number: u64) -> usize {
-        // A ring holds far fewer than 2^32 events.
-        usize::try_from(number % (self.events.len() as u64).max(1)).unwrap_or(usize::MAX)
+        let mask = (self.events.len() as u64).wrapping_sub(1);
+        // Less than the length, unless that is 0.
+        #[allow(clippy::cast_possible_truncation)]
+        {
+            (number & mask) as usize
+        }
     }
 }
 
@@ -184,12 +195,12 @@ mod tests {
 
     #[test]
     fn keeps_the_latest_events_and_counts_the_lost_ones() {
-        let ring = Ring::new(3);
+        let ring = Ring::new(4);
         assert_eq!(ring.iter().count(), 0);
-        let events: Vec<_> = (0..5)
+        let events: Vec<_> = (0..6)
             .map(|time| event(time, What::Ready, Some(7)))
             .collect();
-        events.iter().for_each(|event| ring.push(*event));
+        events.iter().for_each(|event| ring.push(event));
         assert_eq!(ring.lost(), 2);
         assert!(ring.iter().eq(events[2..].iter().copied()));
         ring.clear();
@@ -198,10 +209,10 @@ mod tests {
 
     #[test]
     fn reads_back_every_kind_of_event() {
-        let ring = Ring::new(WHATS.len());
+        let ring = Ring::new(WHATS.len().next_power_of_two());
         for (number, what) in (0..).zip(WHATS) {
             assert_eq!(what as u64, number, "{what:?} stands at its number");
-            ring.push(event(number, what, (number % 2 == 0).then_some(9)));
+            ring.push(&event(number, what, (number % 2 == 0).then_some(9)));
         }
         let read: Vec<_> = ring
             .iter()
@@ -216,15 +227,17 @@ mod tests {
     #[test]
     fn what_is_forgotten_or_not_kept_counts_as_lost() {
         let ring = Ring::new(4);
-        ring.push(event(0, What::Ready, None));
-        ring.push(event(1, What::Ready, None));
-        ring.forget();
+        ring.push(&event(0, What::Ready, None));
+        ring.push(&event(1, What::Ready, None));
+        ring.record_events(false);
         assert_eq!((ring.iter().count(), ring.lost()), (0, 2));
-        ring.pass();
-        ring.push(event(3, What::Ready, None));
+        ring.push(&event(2, What::Ready, None));
+        assert_eq!((ring.iter().count(), ring.lost()), (0, 3));
+        ring.record_events(true);
+        ring.push(&event(3, What::Ready, None));
         let times = |ring: &Ring| ring.iter().map(|event| event.time_ns).collect::<Vec<_>>();
         assert_eq!((times(&ring), ring.lost()), (vec![3], 3));
-        (4..9).for_each(|time| ring.push(event(time, What::Ready, None)));
+        (4..9).for_each(|time| ring.push(&event(time, What::Ready, None)));
         assert_eq!((times(&ring), ring.lost()), (vec![5, 6, 7, 8], 5));
         ring.clear();
         assert_eq!((ring.iter().count(), ring.lost()), (0, 0));
@@ -232,22 +245,22 @@ mod tests {
 
     #[test]
     fn whoever_reads_meanwhile_leaves_out_what_may_be_overwritten() {
-        let ring = Ring::new(3);
-        (0..3).for_each(|time| ring.push(event(time, What::Ready, None)));
+        let ring = Ring::new(4);
+        (0..4).for_each(|time| ring.push(&event(time, What::Ready, None)));
         let times: Vec<_> = ring.iter_meanwhile(9).map(|event| event.time_ns).collect();
-        assert_eq!(times, [1, 2]);
+        assert_eq!(times, [1, 2, 3]);
         let latest = ring.iter_meanwhile(1).next();
-        assert_eq!(latest.map(|event| event.time_ns), Some(2));
-        assert!(ring.is_whole(3) && !ring.is_whole(2));
+        assert_eq!(latest.map(|event| event.time_ns), Some(3));
+        assert!(ring.is_whole(4) && !ring.is_whole(3));
         let mut reader = ring.iter_meanwhile(9);
-        ring.push(event(3, What::Ready, None));
+        ring.push(&event(4, What::Ready, None));
         assert_eq!(reader.next().map(|event| event.time_ns), Some(2));
     }
 
     #[test]
     fn a_ring_without_room_takes_nothing() {
         let ring = Ring::new(0);
-        ring.push(event(1, What::Start, None));
+        ring.push(&event(1, What::Start, None));
         assert_eq!(ring.iter().count(), 0);
     }
 }

@@ -192,13 +192,15 @@ impl Record {
     }
 
     /// Returns an instance's times to be filled in, `None` if it is not recorded.
+    #[inline]
     pub fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
         let dag = self.dags.get_mut(instance.dag.index())?;
         let job = usize::try_from(instance.job).ok()?;
-        let index = job
-            .checked_mul(dag.subtasks)?
-            .checked_add(instance.subtask.index())?;
-        dag.instances.get_mut(index)
+        if job >= dag.jobs.len() || instance.subtask.index() >= dag.subtasks {
+            return None;
+        }
+        dag.instances
+            .get_mut(job * dag.subtasks + instance.subtask.index())
     }
 
     /// Returns a job's times to be filled in, `None` if it is not recorded.

@@ -24,18 +24,23 @@ pub(super) struct Cores {
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Occupation {
-    Idle,
-    /// By an instance that keeps the core.
-    Fixed(Key),
-    /// By an instance that may be preempted.
-    Preemptible(Key),
+struct Occupation {
+    /// The key of what runs, or ran last.
+    key: Key,
+    is_idle: bool,
+    may_be_preempted: bool,
 }
+
+const IDLE: Occupation = Occupation {
+    key: Key::NONE,
+    is_idle: true,
+    may_be_preempted: false,
+};
 
 impl Cores {
     pub(super) fn new(cores: u32) -> Self {
         Self {
-            occupations: vec![Occupation::Idle; cores as usize].into_boxed_slice(),
+            occupations: vec![IDLE; cores as usize].into_boxed_slice(),
             // Core 0 is on top.
             idle: (0..cores).rev().map(CoreId).collect(),
         }
@@ -47,10 +52,8 @@ impl Cores {
     }
 
     pub(super) fn running(&self, core: CoreId) -> Option<Key> {
-        match self.occupations[core.index()] {
-            Occupation::Idle => None,
-            Occupation::Fixed(key) | Occupation::Preemptible(key) => Some(key),
-        }
+        let occupation = self.occupations[core.index()];
+        (!occupation.is_idle).then_some(occupation.key)
     }
 
     /// Reports whether any core is idle.
@@ -64,26 +67,26 @@ impl Cores {
     }
 
     /// Gives a core, which is not among the idle ones, an instance.
+    #[inline]
     pub(super) fn run(&mut self, core: CoreId, key: Key, may_be_preempted: bool) {
-        self.occupations[core.index()] = match may_be_preempted {
-            true => Occupation::Preemptible(key),
-            false => Occupation::Fixed(key),
+        self.occupations[core.index()] = Occupation {
+            key,
+            is_idle: false,
+            may_be_preempted,
         };
     }
 
     /// Makes a core idle.
     pub(super) fn free(&mut self, core: CoreId) {
-        self.occupations[core.index()] = Occupation::Idle;
+        self.occupations[core.index()] = IDLE;
         self.idle.push(core);
     }
 
     /// Returns the largest key among the instances that may be preempted.
     pub(super) fn largest_preemptible(&self) -> Option<(CoreId, Key)> {
         let occupations = self.occupations.iter().enumerate();
-        let keys = occupations.filter_map(|(core, occupation)| match occupation {
-            Occupation::Preemptible(key) => Some((*key, core)),
-            _ => None,
-        });
+        let preemptible = occupations.filter(|(_, occupation)| occupation.may_be_preempted);
+        let keys = preemptible.map(|(core, occupation)| (occupation.key, core));
         keys.max().map(|(key, core)| (CoreId(to_u32(core)), key))
     }
 }

@@ -46,6 +46,7 @@ impl Scheduler {
     }
 
     /// Gives a core an instance that is ready.
+    #[inline]
     pub(super) fn give(&mut self, core: CoreId, key: Key, vertex: u32) -> Decision {
         let instance = key.instance();
         let vertex = self.vertices.get_mut(vertex);

@@ -46,6 +46,7 @@ impl Scheduler {
     /// # Panics
     ///
     /// If no instance of the vertex has started, or it has ended before.
+    #[inline]
     pub fn hand_off(
         &mut self,
         now_ns: u64,
@@ -74,6 +75,7 @@ impl Scheduler {
     }
 
     /// Reports whether the instant can end with a hand-off.
+    #[inline]
     fn concerns_one_core(&self) -> bool {
         let is_due = (self.timers.peek()).is_some_and(|(event_ns, _)| event_ns <= self.now_ns);
         let concerns_others = self.fresh > 1 && self.cores.count() > 1;

@@ -5,10 +5,10 @@
 //! are released at that instant (R3), so such a job ends by the same rules as
 //! any other, only without running.
 
-use super::jobs::{Job, Jobs};
+use super::jobs::Job;
 use super::key::Key;
 use super::ready_queue::ReadyQueue;
-use super::vertices::{Phase, Vertex};
+use super::vertices::{Phase, Vertex, Vertices};
 use super::{JobOutcome, Observer, Scheduler};
 use crate::ids::{DagId, Instance};
 use crate::policy::Policy;
@@ -58,8 +58,7 @@ impl Scheduler {
         let job = state.jobs.job(sequence);
         for source in task_set.dag(dag).sources() {
             let number = state.first_vertex + source.0;
-            if vertices.release(number, sequence) {
-                let vertex = vertices.get_mut(number);
+            if let Some(vertex) = vertices.arrive(number, sequence) {
                 line_up(options.policy, number, vertex, job, ready, observer);
                 *fresh += 1;
             }
@@ -88,9 +87,12 @@ impl Scheduler {
 
     /// Ends the instance that a vertex is doing, and all that are cancelled by
     /// that.
+    #[inline]
     pub(super) fn end(&mut self, vertex: u32, observer: &mut impl Observer) {
         self.end_one(vertex, observer);
-        self.end_all(observer);
+        if !self.ending.is_empty() {
+            self.end_all(observer);
+        }
     }
 
     /// Ends all instances in `ending`.
@@ -106,7 +108,8 @@ impl Scheduler {
 
     /// Tells the successors that the instance has ended, and ends its job if no
     /// instance of that is left.
-    fn end_one(&mut self, vertex: u32, observer: &mut impl Observer) {
+    #[inline(always)]
+    fn end_one(&mut self, number: u32, observer: &mut impl Observer) {
         let Self {
             options,
             dags,
@@ -116,22 +119,48 @@ impl Scheduler {
             fresh,
             ..
         } = self;
-        let dag = vertices.get(vertex).dag;
-        let jobs: &mut Jobs = &mut dags[dag.index()].jobs;
-        let sequence = vertices.end(vertex, jobs.next, |next, vertex| {
+        let ended = vertices.end(number);
+        let (dag, sequence) = (ended.dag, ended.progress);
+        let jobs = &mut dags[dag.index()].jobs;
+        let is_cut = jobs.is_cut(sequence);
+        let overlaps = sequence + 1 < jobs.next;
+        let job = jobs.job_mut(sequence);
+        job.unfinished -= 1;
+        let is_last = job.unfinished == 0;
+        for place in Vertices::successors(&ended) {
+            let next = vertices.successor(place);
+            if let Some(successor) = vertices.arrive(next, sequence) {
+                if is_cut {
+                    observer.cancelled(successor.instance(job));
+                    ending.push(next);
+                } else {
+                    line_up(options.policy, next, successor, job, ready, observer);
+                    *fresh += 1;
+                }
+            }
+        }
+        if overlaps {
+            self.go_on_to_next_job(number, observer);
+        }
+        if is_last {
+            self.end_job(dag, sequence, observer);
+        }
+    }
+
+    /// Lets a vertex whose instance has ended go on with the next job, which is in
+    /// flight, if that waits for nothing else.
+    fn go_on_to_next_job(&mut self, number: u32, observer: &mut impl Observer) {
+        if let Some(vertex) = self.vertices.next_is_ready(number) {
+            let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
             if jobs.is_cut(vertex.progress) {
                 observer.cancelled(vertex.instance(job));
-                ending.push(next);
+                self.ending.push(number);
             } else {
-                line_up(options.policy, next, vertex, job, ready, observer);
-                *fresh += 1;
+                let policy = self.options.policy;
+                line_up(policy, number, vertex, job, &mut self.ready, observer);
+                self.fresh += 1;
             }
-        });
-        let job = jobs.job_mut(sequence);
-        job.unfinished -= 1;
-        if job.unfinished == 0 {
-            self.end_job(dag, sequence, observer);
         }
     }
 
@@ -182,6 +211,7 @@ impl Scheduler {
 }
 
 /// Puts the next instance of a vertex, which is ready, in line.
+#[inline(always)]
 fn line_up(
     policy: Policy,
     number: u32,

@@ -92,10 +92,12 @@ impl Jobs {
     }
 
     /// Returns the job in flight with a sequence number.
+    #[inline]
     pub(super) fn job(&self, sequence: u64) -> &Job {
         &self.in_flight[self.slot(sequence)]
     }
 
+    #[inline]
     pub(super) fn job_mut(&mut self, sequence: u64) -> &mut Job {
         &mut self.in_flight[self.slot(sequence)]
     }

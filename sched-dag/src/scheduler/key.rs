@@ -18,6 +18,14 @@ pub(super) struct Key {
 }
 
 impl Key {
+    /// Fills places that hold no key.
+    pub(super) const NONE: Self = Self {
+        urgency: u64::MAX,
+        dag: DagId(0),
+        job: 0,
+        subtask: SubtaskId(0),
+    };
+
     pub(super) const fn new(urgency: u64, instance: Instance) -> Self {
         let Instance { dag, job, subtask } = instance;
         Self {
@@ -37,19 +45,5 @@ impl Key {
             dag, job, subtask, ..
         } = self;
         Instance { dag, job, subtask }
-    }
-}
-
-impl Default for Key {
-    fn default() -> Self {
-        let (dag, subtask) = (DagId(0), SubtaskId(0));
-        Self::new(
-            0,
-            Instance {
-                dag,
-                job: 0,
-                subtask,
-            },
-        )
     }
 }

@@ -32,11 +32,16 @@ use crate::task_set::{Dag, TaskSet};
 /// The instances in line. At most one of a vertex waits at a time.
 #[derive(Debug)]
 pub(super) struct ReadyQueue {
-    front: Option<(Key, u32)>,
+    front: Key,
+    /// The vertex of the front, or [`NOBODY`].
+    front_vertex: u32,
     /// How many are in the rest.
-    others: usize,
+    others: u32,
     rest: Rest,
 }
+
+/// Stands for a vertex where there is none.
+const NOBODY: u32 = u32::MAX;
 
 #[derive(Debug)]
 enum Rest {
@@ -59,40 +64,67 @@ impl ReadyQueue {
             rank(vertices);
             Rest::Ranked {
                 ranks: BitSet::new(vertices.len()),
-                waiting: vec![(Key::default(), 0); vertices.len()].into_boxed_slice(),
+                waiting: vec![(Key::NONE, 0); vertices.len()].into_boxed_slice(),
             }
         } else {
             Rest::Keyed(IndexedHeap::new(vertices.len()))
         };
+        Self::of(rest)
+    }
+
+    const fn of(rest: Rest) -> Self {
         Self {
-            front: None,
+            front: Key::NONE,
+            front_vertex: NOBODY,
             others: 0,
             rest,
         }
     }
 
     /// Returns the smallest key.
+    #[inline]
     pub(super) fn peek(&self) -> Option<Key> {
-        match self.front {
-            Some((key, _)) => Some(key),
-            None if self.others == 0 => None,
-            None => self.rest.peek(),
+        if self.front_vertex != NOBODY {
+            return Some(self.front);
         }
+        if self.others == 0 {
+            return None;
+        }
+        self.rest.peek()
     }
 
     /// Puts an instance of a vertex in line.
+    #[inline]
     pub(super) fn insert(&mut self, vertex: u32, key: Key) {
+        let is_empty = self.front_vertex == NOBODY && self.others == 0;
+        if is_empty {
+            (self.front, self.front_vertex) = (key, vertex);
+        } else {
+            self.insert_among_others(vertex, key);
+        }
+    }
+
+    fn insert_among_others(&mut self, vertex: u32, key: Key) {
         if self.peek().is_some_and(|first| first < key) {
             self.insert_behind(vertex, key);
-        } else if let Some((key, vertex)) = self.front.replace((key, vertex)) {
-            self.insert_behind(vertex, key);
+            return;
+        }
+        let earlier = (self.front_vertex, self.front);
+        (self.front, self.front_vertex) = (key, vertex);
+        if earlier.0 != NOBODY {
+            self.insert_behind(earlier.0, earlier.1);
         }
     }
 
     /// Takes the instance with the smallest key out.
+    #[inline]
     pub(super) fn pop(&mut self) -> Option<(Key, u32)> {
-        if self.front.is_some() || self.others == 0 {
-            return self.front.take();
+        if self.front_vertex != NOBODY {
+            let vertex = core::mem::replace(&mut self.front_vertex, NOBODY);
+            return Some((self.front, vertex));
+        }
+        if self.others == 0 {
+            return None;
         }
         self.others -= 1;
         self.rest.pop()
@@ -100,8 +132,8 @@ impl ReadyQueue {
 
     /// Takes the instance of a vertex out, which waits.
     pub(super) fn remove(&mut self, vertex: u32, urgency: u64) {
-        if self.front.is_some_and(|(_, front)| front == vertex) {
-            self.front = None;
+        if self.front_vertex == vertex {
+            self.front_vertex = NOBODY;
             return;
         }
         self.others -= 1;
@@ -191,13 +223,9 @@ mod tests {
     fn queues() -> [ReadyQueue; 2] {
         let ranked = Rest::Ranked {
             ranks: BitSet::new(100),
-            waiting: vec![(Key::default(), 0); 100].into_boxed_slice(),
+            waiting: vec![(Key::NONE, 0); 100].into_boxed_slice(),
         };
-        [ranked, Rest::Keyed(IndexedHeap::new(100))].map(|rest| ReadyQueue {
-            front: None,
-            others: 0,
-            rest,
-        })
+        [ranked, Rest::Keyed(IndexedHeap::new(100))].map(ReadyQueue::of)
     }
 
     #[test]

@@ -21,6 +21,7 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use super::jobs::Job;
 use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
@@ -122,49 +123,53 @@ impl Vertices {
         &mut self.vertices[vertex as usize]
     }
 
-    /// Counts the release of a source in a job, and reports whether the instance
-    /// is ready.
-    pub(super) fn release(&mut self, source: u32, sequence: u64) -> bool {
-        arrive(&mut self.counters, self.vertices[source as usize], sequence)
+    /// Ends the instance that a vertex is doing. What thereby may have become
+    /// ready are its [`successors`](Self::successors) in the same job, which are to
+    /// be told by [`arrive`](Self::arrive), and its own next instance.
+    #[inline]
+    pub(super) fn end(&mut self, vertex: u32) -> Vertex {
+        let own = &mut self.vertices[vertex as usize];
+        let ended = *own;
+        own.phase = Phase::Absent;
+        own.progress += 1;
+        self.counters[ended.counter(ended.progress)] = ended.initial;
+        ended
     }
 
-    /// Ends the instance that a vertex is doing, calls `ready` for each vertex
-    /// whose next instance thereby is ready, and returns the sequence number.
-    ///
-    /// `released` is the sequence number of the next job to be released.
-    pub(super) fn end(
-        &mut self,
-        vertex: u32,
-        released: u64,
-        mut ready: impl FnMut(u32, &mut Vertex),
-    ) -> u64 {
-        let Self {
-            vertices,
-            successors,
-            counters,
-        } = self;
-        let own = &mut vertices[vertex as usize];
-        let sequence = own.progress;
-        own.phase = Phase::Absent;
-        own.progress = sequence + 1;
-        let own = *own;
-        counters[own.counter(sequence)] = own.initial;
-        let [from, to] = own.successors;
-        for &successor in &successors[from as usize..to as usize] {
-            let next = &mut vertices[successor as usize];
-            if arrive(counters, *next, sequence) {
-                ready(successor, next);
-            }
-        }
-        if sequence + 1 < released && counters[own.counter(sequence + 1)] == 0 {
-            ready(vertex, &mut vertices[vertex as usize]);
-        }
-        sequence
+    /// Returns where the successors of a vertex stand, for [`successor`](Self::successor).
+    #[inline]
+    pub(super) fn successors(vertex: &Vertex) -> Range<usize> {
+        let [from, to] = vertex.successors;
+        from as usize..to as usize
+    }
+
+    /// Returns the successor at a place.
+    #[inline]
+    pub(super) fn successor(&self, place: usize) -> u32 {
+        self.successors[place]
+    }
+
+    /// Counts one predecessor, or the release, of a vertex's instance in a job,
+    /// and returns the vertex if the instance is ready.
+    #[inline]
+    pub(super) fn arrive(&mut self, vertex: u32, sequence: u64) -> Option<&mut Vertex> {
+        let vertex = &mut self.vertices[vertex as usize];
+        let counter = &mut self.counters[vertex.counter(sequence)];
+        *counter -= 1;
+        (*counter == 0 && vertex.progress == sequence).then_some(vertex)
+    }
+
+    /// Returns a vertex if its next instance, of a job that is released, waits for
+    /// no predecessor.
+    pub(super) fn next_is_ready(&mut self, vertex: u32) -> Option<&mut Vertex> {
+        let vertex = &mut self.vertices[vertex as usize];
+        (self.counters[vertex.counter(vertex.progress)] == 0).then_some(vertex)
     }
 }
 
 impl Vertex {
     /// Returns the vertex's part of a job.
+    #[inline]
     pub(super) const fn instance(&self, job: &Job) -> Instance {
         Instance {
             dag: self.dag,
@@ -173,7 +178,8 @@ impl Vertex {
         }
     }
 
-    fn counter(self, sequence: u64) -> usize {
+    #[inline]
+    fn counter(&self, sequence: u64) -> usize {
         let slot = sequence & u64::from(self.slot_mask);
         // The slot is less than a count that came from a u32.
         #[allow(clippy::cast_possible_truncation)]
@@ -181,14 +187,6 @@ impl Vertex {
             self.counters as usize + slot as usize
         }
     }
-}
-
-/// Counts one predecessor, or the release, of a vertex's instance in a job, and
-/// reports whether the instance is ready.
-fn arrive(counters: &mut [u32], vertex: Vertex, sequence: u64) -> bool {
-    let counter = &mut counters[vertex.counter(sequence)];
-    *counter -= 1;
-    *counter == 0 && vertex.progress == sequence
 }
 
 /// Returns the number of slots for the jobs in flight of a DAG: a power of two,
