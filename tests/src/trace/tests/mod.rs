@@ -8,6 +8,7 @@ mod dispatch;
 mod lost;
 mod malformed;
 mod rules;
+mod sporadic;
 
 use super::model::{Event, Run, Word};
 use super::{Findings, check, read};
