@@ -92,6 +92,7 @@ extern crate alloc;
 
 pub mod analysis;
 mod ids;
+mod order;
 mod policy;
 mod priorities;
 pub mod record;

@@ -20,6 +20,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::ids::{SubtaskId, to_u32};
+use crate::order::sorted_by_key;
 use crate::policy::Priority;
 use crate::task_set::{Adjacency, Dag};
 
@@ -61,12 +62,11 @@ pub(crate) fn ranks(
     let known: Option<Vec<u64>> = wcets_ns.iter().copied().collect();
     let weights = known.unwrap_or_else(|| vec![1; wcets_ns.len()]);
     let paths = remaining_paths(&weights, successors, topological_order);
-    let mut order: Vec<u32> = (0..to_u32(paths.len())).collect();
     // Stable, so equal paths stay in the order of registration.
-    order.sort_by_key(|&subtask| core::cmp::Reverse(paths[subtask as usize]));
+    let order = sorted_by_key(paths.len(), |subtask| core::cmp::Reverse(paths[subtask]));
     let mut ranks = vec![0; paths.len()];
     for (rank, &subtask) in order.iter().enumerate() {
-        ranks[subtask as usize] = to_u32(rank);
+        ranks[subtask] = to_u32(rank);
     }
     ranks
 }

@@ -21,6 +21,7 @@ use super::long_paths::long_paths;
 use super::melani::constrained;
 use super::ratio::Ratio;
 use super::task::Task;
+use crate::order::sort;
 
 /// Who gets which cores.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,7 +88,7 @@ fn place(tasks: &[&Task], mut light: Vec<usize>, cores: u32) -> Option<Vec<Vec<u
         let task = tasks[position];
         (task.volume_ns(), task.relative_deadline_ns())
     };
-    light.sort_by(|&one, &other| {
+    sort(&mut light, &mut |one, other| {
         let ((volume, deadline), (volume2, deadline2)) = (density(one), density(other));
         let first = u128::from(volume) * u128::from(deadline2);
         let second = u128::from(volume2) * u128::from(deadline);

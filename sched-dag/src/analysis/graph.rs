@@ -17,6 +17,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::task::Task;
+use crate::order::sorted_by_key;
 
 impl Task {
     /// Returns the bottom level of each subtask.
@@ -49,9 +50,9 @@ impl Task {
     #[must_use]
     pub fn by_bottom_level(&self) -> Vec<usize> {
         let levels = self.bottom_levels();
-        let mut order: Vec<usize> = (0..self.subtask_count()).collect();
-        order.sort_by_key(|&subtask| (core::cmp::Reverse(levels[subtask]), subtask));
-        order
+        sorted_by_key(self.subtask_count(), |subtask| {
+            core::cmp::Reverse(levels[subtask])
+        })
     }
 
     /// Returns a longest path for the given weights; ties go to the smallest

@@ -49,6 +49,7 @@ use super::response::{Blocking, Unsolved};
 use super::set::{Failure, Set, Solution};
 use super::task::{Task, TaskError};
 use crate::ids::{DagId, SubtaskId};
+use crate::order::sorted_by_key;
 use crate::policy::Policy;
 use crate::task_set::{Dag, TaskSet};
 
@@ -158,11 +159,10 @@ impl<'a> Case<'a> {
         relation: Relation,
         settings: &'a Settings,
     ) -> Self {
-        let mut order: Vec<usize> = (0..members.len()).collect();
-        match settings.policy {
-            Policy::StaticPriority => order.sort_by_key(|&dag| (relation.most_urgent(dag), dag)),
-            Policy::Edf => order.sort_by_key(|&dag| (tasks[dag].relative_deadline_ns(), dag)),
-        }
+        let order = sorted_by_key(members.len(), |dag| match settings.policy {
+            Policy::StaticPriority => u64::from(relation.most_urgent(dag)),
+            Policy::Edf => tasks[dag].relative_deadline_ns(),
+        });
         let mut case = Self {
             all,
             members,
@@ -246,8 +246,7 @@ impl<'a> Case<'a> {
             && self.settings.policy == Policy::StaticPriority
             && subtasks.len() <= SUBTASK_LIMIT
         {
-            let mut order: Vec<usize> = (0..subtasks.len()).collect();
-            order.sort_by_key(|&subtask| (subtasks[subtask].priority().0, subtask));
+            let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
             if let Some(bound_ns) = intra_task(task, &order, cores)
                 && bound_ns < best.bound_ns
             {

@@ -26,6 +26,7 @@ use super::heap::IndexedHeap;
 use super::key::Key;
 use super::vertices::Vertices;
 use crate::ids::to_u32;
+use crate::order::{sorted, sorted_by_key};
 use crate::policy::Policy;
 use crate::task_set::{Dag, TaskSet};
 
@@ -183,19 +184,19 @@ impl Rest {
 /// Reports whether the subtasks of a DAG, as far as they wait together, are in
 /// the same order whatever jobs they do.
 fn has_ranks(dag: &Dag) -> bool {
-    let mut priorities: Vec<_> = dag.subtasks().iter().map(|s| s.priority().0).collect();
-    priorities.sort_unstable();
+    let priorities: Vec<_> = dag.subtasks().iter().map(|s| s.priority().0).collect();
+    let priorities = sorted(&priorities);
     dag.in_flight() == 1 || priorities.windows(2).all(|pair| pair[0] != pair[1])
 }
 
 /// Replaces each vertex's priority by its place in the order of (priority, DAG,
 /// subtask).
 fn rank(vertices: &mut Vertices) {
-    let mut order: Vec<_> = (0..to_u32(vertices.len())).collect();
     // Vertices count DAG by DAG, within a DAG by subtask, and the sort is stable.
-    order.sort_by_key(|&vertex| vertices.get(vertex).urgency);
+    let urgency = |vertex| vertices.get(to_u32(vertex)).urgency;
+    let order = sorted_by_key(vertices.len(), urgency);
     for (rank, vertex) in (0..).zip(order) {
-        vertices.get_mut(vertex).urgency = rank;
+        vertices.get_mut(to_u32(vertex)).urgency = rank;
     }
 }
 

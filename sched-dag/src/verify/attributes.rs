@@ -12,6 +12,7 @@ use super::label::{DagLabel, SubtaskLabel};
 use super::options::CommitOptions;
 use super::states::is_shared;
 use super::warning::Warning;
+use crate::order::sorted;
 use crate::policy::{Policy, Priority};
 use crate::spec::DagSpec;
 
@@ -221,8 +222,7 @@ fn warn_of_equal_priorities(specs: &[DagSpec], findings: &mut Findings) {
             );
         }
     }
-    given.sort_unstable();
-    for group in given.chunk_by(|one, other| one.0 == other.0) {
+    for group in sorted(&given).chunk_by(|one, other| one.0 == other.0) {
         if group.len() > 1 {
             let label = |&(_, dag, index): &_| {
                 (

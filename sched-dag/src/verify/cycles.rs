@@ -17,6 +17,7 @@ use alloc::vec::Vec;
 
 use super::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
+use crate::order::{sorted, sorted_by_key};
 
 /// How many edges all searches of one graph may visit.
 const BUDGET: usize = 4_000_000;
@@ -95,14 +96,17 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
                     }
                 }
                 if knot.len() > 1 {
-                    knot.sort_unstable();
-                    knots.push(knot);
+                    knots.push(sorted(&knot));
                 }
             }
         }
     }
-    knots.sort_unstable();
-    knots
+    // They have no member in common, so the first ones tell them apart.
+    let order = sorted_by_key(knots.len(), |knot| knots[knot].first().copied());
+    order
+        .iter()
+        .map(|&knot| core::mem::take(&mut knots[knot]))
+        .collect()
 }
 
 struct Search<'a> {

@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use super::fault::Fault;
 use super::warning::Warning;
+use crate::order::sorted_by_key;
 
 /// What has been found so far.
 #[derive(Default)]
@@ -25,9 +26,14 @@ impl Findings {
 
     /// Returns the faults in the order of the DAGs and, within a DAG, in the
     /// order of the checks.
-    pub(super) fn into_parts(mut self) -> (Vec<Fault>, Vec<Warning>) {
-        self.faults.sort_by_key(|&(dag, _)| dag);
-        let faults = self.faults.into_iter().map(|(_, fault)| fault).collect();
-        (faults, self.warnings)
+    pub(super) fn into_parts(self) -> (Vec<Fault>, Vec<Warning>) {
+        let order = sorted_by_key(self.faults.len(), |fault| self.faults[fault].0);
+        let mut faults: Vec<_> = self
+            .faults
+            .into_iter()
+            .map(|(_, fault)| Some(fault))
+            .collect();
+        let faults = order.into_iter().filter_map(|fault| faults[fault].take());
+        (faults.collect(), self.warnings)
     }
 }

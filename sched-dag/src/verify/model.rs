@@ -9,6 +9,7 @@ use super::findings::Findings;
 use super::label::DagLabel;
 use super::shape::Shape;
 use crate::ids::{SubtaskId, to_u32};
+use crate::order::sort_by_key;
 use crate::policy::Priority;
 use crate::priorities::ranks;
 use crate::spec::DagSpec;
@@ -53,7 +54,7 @@ fn priority_bases(specs: &[DagSpec], findings: &mut Findings) -> Vec<u32> {
     let mut order: Vec<usize> = (0..specs.len())
         .filter(|&dag| !has_priorities(&specs[dag]))
         .collect();
-    order.sort_by_key(|&dag| specs[dag].relative_deadline_ns);
+    sort_by_key(&mut order, |dag| specs[dag].relative_deadline_ns);
     let mut bases = alloc::vec![0; specs.len()];
     for dag in order {
         let after = next + specs[dag].subtasks.len() as u64;

@@ -30,6 +30,7 @@ use super::graph::Graph;
 use super::label::{DagLabel, SubtaskLabel};
 use super::shape::Shape;
 use crate::ids::{SubtaskId, to_u32};
+use crate::order::{sort_by_key, sorted_by_key};
 use crate::spec::{DagSpec, StateSpec};
 use crate::task_set::StatePrecedence;
 
@@ -59,7 +60,7 @@ fn check_users(specs: &[DagSpec], dag: usize, state: &StateSpec, findings: &mut 
     let user = |user: usize| SubtaskLabel::new(spec, user);
     let name = || state.name.clone();
     let mut users: Vec<usize> = state.users.iter().map(|user| user.subtask).collect();
-    users.sort_unstable();
+    sort_by_key(&mut users, |user| user);
     match state.users.first() {
         None => findings.fault(
             dag,
@@ -114,8 +115,9 @@ pub(super) fn order_users(spec: &DagSpec, edges: &mut Vec<(u32, u32)>, shape: &m
     }
     let place = places(&shape.graph);
     for state in spec.states.iter().filter(|state| is_shared(state)) {
-        let mut users = state.users.clone();
-        users.sort_by_key(|user| place.get(user.subtask).copied());
+        let place_of = |user: usize| place.get(state.users[user].subtask).copied();
+        let users = sorted_by_key(state.users.len(), place_of);
+        let users: Vec<_> = users.iter().map(|&user| state.users[user]).collect();
         let mut add = |earlier: usize, later: usize| {
             let (earlier, later) = (to_u32(earlier), to_u32(later));
             edges.push((earlier, later));
