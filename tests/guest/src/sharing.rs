@@ -5,7 +5,7 @@
 //! sample it, on other cores as it comes, and check that what they get is whole,
 //! complete, and never older than what they had. One of them raises the signal of
 //! `answers` each time, far more often than that may run. With `input=yes` a DAG of
-//! three jobs waits for bytes from the serial port, too.
+//! two jobs waits for bytes from the serial port, too.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -174,7 +174,7 @@ fn answers(name: &str) -> (Dag, Signal) {
 
 fn answers_to_bytes() -> (Dag, Signal) {
     let dag = create_dag();
-    dag.name("input").jobs(3).relative_deadline(ms(5));
+    dag.name("input").jobs(2).relative_deadline(ms(5));
     let attributes = taking("byte", 500);
     let button = dag.register_sporadic_subtask(|| hold(100), vec![], ms(1), attributes);
     (dag, button)
