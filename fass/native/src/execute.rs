@@ -1,0 +1,35 @@
+//! What a worker executes: the body of a subtask.
+
+use fass::Body;
+use sched_dag::DagId;
+
+/// The function of a subtask, with all that belongs to it.
+pub trait Execute: Send {
+    /// Does the subtask's part of a job.
+    fn run(&mut self, job: u64);
+
+    /// Lets happen what the last [`run`](Self::run) has prepared outside of its DAG,
+    /// at `completed_ns`, and calls `raise` for each signal. Mostly there is nothing.
+    fn complete(&mut self, completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
+        let _ = (completed_ns, raise);
+    }
+}
+
+impl<F: FnMut(u64) + Send + ?Sized> Execute for Box<F> {
+    #[inline]
+    fn run(&mut self, job: u64) {
+        self(job);
+    }
+}
+
+impl Execute for Body {
+    #[inline]
+    fn run(&mut self, job: u64) {
+        Self::run(self, job);
+    }
+
+    #[inline]
+    fn complete(&mut self, completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
+        Self::complete(self, completed_ns, raise);
+    }
+}

@@ -1,0 +1,48 @@
+//! Runs DAGs on the host's threads, job after job, as fast as they go.
+//!
+//! For our purposes a *worker* is a thread that is pinned to one processor and
+//! stands for one core of the model. The workers run the very functions of an app
+//! under the very scheduler of the kernel, on real silicon: so the scheduler can
+//! stand beside libraries that run task graphs on threads. It is meant for
+//! measuring, and for looking for races between functions.
+//!
+//! # Time
+//!
+//! The scheduler's clock is *not* the host's. It stands still while anything runs,
+//! and jumps to the next release when nothing does: jobs follow one another back to
+//! back, whatever their periods, and no clock is read on the way from a completion
+//! to its successor. So no deadline is ever missed. [`fass::now_ns`] is the host's
+//! clock, for functions that measure.
+//!
+//! # What is guaranteed
+//!
+//! - R2, R3 and R5 of the task model, by the same scheduler as everywhere else; R1 on
+//!   the scheduler's clock. [`Native::run_recorded`] writes a run down and checks it.
+//! - What a function has written is visible to the functions of its successors,
+//!   whichever worker runs them.
+//! - After the start nothing is allocated but by the functions themselves.
+//!
+//! # What is not
+//!
+//! - Nothing is preempted: a host's thread cannot give up a function in its middle.
+//!   Each subtask is non-preemptive.
+//! - The host may take a worker's processor away at any time. Workers that wait poll;
+//!   after two thousand rounds they yield, in case there are fewer processors.
+//! - A panic in a function ends the run with that panic. It does not end one DAG.
+#![forbid(unsafe_code)]
+
+mod alone;
+mod execute;
+mod mailbox;
+mod pin;
+mod platform;
+mod recorder;
+mod relax;
+mod run;
+mod team;
+mod watch;
+
+pub use execute::Execute;
+pub use pin::{Pinning, processors};
+pub use platform::Native;
+pub use run::{Closure, Recorded, Report, Setting, run, run_recorded, worker};
