@@ -9,11 +9,13 @@
 //! - [`scheduler`]: the commit, and the cost of a dispatched instance;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
-//! - [`makespan`]: task graphs on the machine, beside their published optima.
+//! - [`makespan`]: task graphs on the machine, beside their published optima;
+//! - [`native`]: the scheduler on this host's own processors.
 
 pub mod hand_off;
 pub mod join_latency;
 pub mod makespan;
+pub mod native;
 pub mod scheduler;
 
 use std::process::ExitCode;
@@ -30,6 +32,8 @@ WHAT is one of:
                  figures, plots and a report; see bench join-latency --help
   makespan       task graphs with published optimal makespans, on the machine; see
                  bench makespan --help
+  native         the scheduler on this host's own processors, in nanoseconds a hop, a job,
+                 an instance; see bench native --help
 
 Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.
 ";
@@ -41,6 +45,7 @@ pub fn bench(words: &[String]) -> ExitCode {
         Some(("hand-off", rest)) => return hand_off::run(rest),
         Some(("join-latency", rest)) => return join_latency::run(rest),
         Some(("makespan", rest)) => return makespan::run(rest),
+        Some(("native", rest)) => return native::run(rest),
         _ => {}
     }
     if words.iter().any(|word| word == "--help" || word == "-h") {

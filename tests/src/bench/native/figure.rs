@@ -1,0 +1,93 @@
+//! One measured quantity, for people and for machines.
+
+use std::fmt::Write;
+
+/// A distribution of times, in nanoseconds.
+pub(super) struct Figure {
+    pub(super) workload: String,
+    /// What is measured: one step of what.
+    pub(super) what: &'static str,
+    /// What runs it.
+    pub(super) runner: String,
+    pub(super) workers: u32,
+    /// Sorted.
+    samples: Vec<f64>,
+}
+
+impl Figure {
+    /// Makes a figure of at least one sample.
+    pub(super) fn new(
+        workload: impl ToString,
+        what: &'static str,
+        runner: impl Into<String>,
+        workers: u32,
+        mut samples: Vec<f64>,
+    ) -> Self {
+        samples.sort_unstable_by(f64::total_cmp);
+        Self {
+            workload: workload.to_string(),
+            what,
+            runner: runner.into(),
+            workers,
+            samples,
+        }
+    }
+
+    fn min(&self) -> f64 {
+        self.samples[0]
+    }
+
+    fn median(&self) -> f64 {
+        self.samples[self.samples.len() / 2]
+    }
+
+    fn p99(&self) -> f64 {
+        self.samples[(self.samples.len() * 99).div_ceil(100) - 1]
+    }
+
+    /// Returns a table of figures.
+    pub(super) fn table(figures: &[Self]) -> String {
+        let mut text = format!(
+            "{:14}{:38}{:18}{:>8}{:>10}{:>10}{:>10}\n",
+            "", "ns", "bodies, policy", "workers", "min", "median", "p99"
+        );
+        let mut last = "";
+        for figure in figures {
+            let name = if figure.workload == last {
+                ""
+            } else {
+                &figure.workload
+            };
+            last = &figure.workload;
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "{name:14}{:38}{:18}{:>8}{:>10.1}{:>10.1}{:>10.1}",
+                figure.what,
+                figure.runner,
+                figure.workers,
+                figure.min(),
+                figure.median(),
+                figure.p99()
+            );
+        }
+        text
+    }
+
+    /// Returns the machine line.
+    pub(super) fn json(&self, pinned: bool) -> String {
+        format!(
+            "{{\"kind\":\"bench\",\"name\":\"native\",\"workload\":\"{}\",\"what\":\"{}\",\
+             \"runner\":\"{}\",\"workers\":{},\"pinned\":{pinned},\"samples\":{},\
+             \"min_ns\":{:.2},\"median_ns\":{:.2},\"p99_ns\":{:.2}}}",
+            self.workload,
+            self.what,
+            self.runner,
+            self.workers,
+            self.samples.len(),
+            self.min(),
+            self.median(),
+            self.p99()
+        )
+    }
+}

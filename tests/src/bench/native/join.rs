@@ -1,0 +1,154 @@
+//! A join across cores: from the last predecessor's return to the sink's start.
+//!
+//! Two branches compute for 2 us, each on its own core; then whichever returns last
+//! has the sink to start. The times are read by the bodies themselves, as their last
+//! and as their first act. What reading the clock costs is measured, too, and
+//! subtracted once: a stamp encloses half of it at either end.
+
+use std::hint::spin_loop;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+use hand_off::Shape;
+use native::{Closure, Setting, worker};
+use sched_dag::Policy;
+
+use super::figure::Figure;
+use super::workload::task_set;
+
+/// How long a branch computes.
+const WORK: Duration = Duration::from_micros(2);
+
+const WORKLOAD: &str = "join of 2 us";
+
+/// One body's times of all jobs, in nanoseconds, and the worker of each.
+#[derive(Debug)]
+struct Stamps {
+    times: Box<[AtomicU64]>,
+    workers: Box<[AtomicU64]>,
+}
+
+impl Stamps {
+    fn new(jobs: usize) -> Arc<Self> {
+        let zeros = || (0..jobs).map(|_| AtomicU64::new(0)).collect();
+        Arc::new(Self {
+            times: zeros(),
+            workers: zeros(),
+        })
+    }
+
+    fn put(&self, job: u64, time_ns: u64) {
+        let place = usize::try_from(job).unwrap_or(usize::MAX);
+        self.times[place].store(time_ns, Relaxed);
+        self.workers[place].store(worker().map_or(0, u64::from), Relaxed);
+    }
+
+    fn get(&self, job: usize) -> (f64, u64) {
+        let time = self.times[job].load(Relaxed);
+        // Differences of them are what is wanted, of a run of seconds.
+        (
+            Duration::from_nanos(time).as_secs_f64() * 1e9,
+            self.workers[job].load(Relaxed),
+        )
+    }
+}
+
+/// Measures so many jobs, and reading the clock.
+pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
+    let count = usize::try_from(jobs).map_err(|_| "too many jobs".to_owned())?;
+    let epoch = Instant::now();
+    let clock = clock(epoch);
+    let [
+        source_end,
+        one_start,
+        one_end,
+        other_start,
+        other_end,
+        sink_start,
+    ] = [(); 6].map(|()| Stamps::new(count));
+    let bodies: Vec<Closure> = vec![
+        end(epoch, &source_end),
+        branch(epoch, &one_start, &one_end),
+        branch(epoch, &other_start, &other_end),
+        end(epoch, &sink_start),
+    ];
+    let setting = Setting {
+        policy: Policy::StaticPriority,
+        workers: 2,
+    };
+    let task_set = task_set(Shape::ForkJoin(2), jobs, setting.policy, setting.workers);
+    let report = native::run(task_set, vec![bodies], setting);
+    if report.statistics[0].completed != jobs {
+        return Err(format!("{WORKLOAD}: not all {jobs} jobs are complete"));
+    }
+    let reading = clock[clock.len() / 2];
+    let (mut joins, mut starts) = (Vec::new(), Vec::new());
+    for job in count / 10..count {
+        let ends = [one_end.get(job), other_end.get(job)];
+        if ends[0].1 == ends[1].1 {
+            continue;
+        }
+        joins.push(sink_start.get(job).0 - ends[0].0.max(ends[1].0) - reading);
+        let source = source_end.get(job);
+        for start in [one_start.get(job), other_start.get(job)] {
+            if start.1 != source.1 {
+                starts.push(start.0 - source.0 - reading);
+            }
+        }
+    }
+    if joins.is_empty() || starts.is_empty() {
+        return Err(format!(
+            "{WORKLOAD}: no join was across cores; give the workers processors of their own"
+        ));
+    }
+    let figure = |what, samples| Figure::new(WORKLOAD, what, "closures, static", 2, samples);
+    Ok(vec![
+        figure("last return -> sink start", joins),
+        figure("source return -> other core's start", starts),
+        Figure::new("", "reading the clock", "", 1, clock),
+    ])
+}
+
+fn now_ns(epoch: Instant) -> u64 {
+    u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX)
+}
+
+fn end(epoch: Instant, stamps: &Arc<Stamps>) -> Closure {
+    let stamps = Arc::clone(stamps);
+    Box::new(move |job| stamps.put(job, now_ns(epoch)))
+}
+
+fn branch(epoch: Instant, start: &Arc<Stamps>, end: &Arc<Stamps>) -> Closure {
+    let (start, end) = (Arc::clone(start), Arc::clone(end));
+    let work_ns = u64::try_from(WORK.as_nanos()).unwrap_or(u64::MAX);
+    Box::new(move |job| {
+        let begun_ns = now_ns(epoch);
+        start.put(job, begun_ns);
+        end.put(job, 0);
+        let ended_ns = loop {
+            let time_ns = now_ns(epoch);
+            if time_ns - begun_ns >= work_ns {
+                break time_ns;
+            }
+            spin_loop();
+        };
+        end.put(job, ended_ns);
+    })
+}
+
+/// Returns what reading the clock takes, sorted.
+fn clock(epoch: Instant) -> Vec<f64> {
+    const READINGS: u32 = 50;
+    let mut samples: Vec<f64> = (0..2_000)
+        .map(|_| {
+            let start = Instant::now();
+            for _ in 0..READINGS {
+                std::hint::black_box(now_ns(epoch));
+            }
+            start.elapsed().as_secs_f64() * 1e9 / f64::from(READINGS)
+        })
+        .collect();
+    samples.sort_unstable_by(f64::total_cmp);
+    samples
+}

@@ -1,0 +1,182 @@
+//! What the scheduler costs on the host's own processors.
+//!
+//! The same scheduler that the kernel runs, driven by threads (crate `native`), on the
+//! graphs of `bench hand-off` with empty bodies. Nothing here is emulated, so the
+//! figures can stand beside those of libraries that run task graphs on threads.
+//!
+//! Other work on the host shows in them. Therefore each figure is measured in many
+//! short *rounds*, spread over several passes, and given as minimum, median and 99th
+//! percentile: the minimum is what the code costs, the others are what the host makes
+//! of it.
+//!
+//! - `workload`: the graphs, as bodies that do nothing;
+//! - `throughput`: rounds of jobs, and what one step of them takes;
+//! - `join`: from the last return to the sink's start, across cores;
+//! - `figure`: a distribution, for people and for machines.
+
+mod figure;
+mod join;
+mod throughput;
+mod workload;
+
+use std::process::ExitCode;
+
+use figure::Figure;
+use workload::Graph;
+
+use crate::options::{Command, Opt, Parsed, Request, Takes};
+
+static TABLE: Command = Command {
+    invocation: "./scripts/bench native",
+    about: "Measures the scheduler on this host's own processors, with empty bodies.",
+    positional: None,
+    options: &[
+        Opt {
+            name: "workers",
+            short: None,
+            takes: Takes::Numbers { least: 1, most: 64 },
+            default: "1,2",
+            help: "The numbers of workers, each a thread with a processor of its own.",
+        },
+        Opt {
+            name: "rounds",
+            short: None,
+            takes: Takes::Number {
+                least: 10,
+                most: 100_000,
+            },
+            default: "300",
+            help: "How many rounds of about 20,000 instances each figure has.",
+        },
+        Opt {
+            name: "jobs",
+            short: None,
+            takes: Takes::Number {
+                least: 100,
+                most: 10_000_000,
+            },
+            default: "20000",
+            help: "The jobs whose joins across cores are measured.",
+        },
+        Opt {
+            name: "only",
+            short: None,
+            takes: Takes::Text("NAMES"),
+            default: "",
+            help: "The workloads, with commas between: chain-64, fork-join-2, fork-join-4, \
+                   fork-join-6, layered-1000, join; all.",
+        },
+    ],
+    notes: "\
+`floor` calls the bodies in topological order, in a loop; `closures` are functions under
+the scheduler, without values; `typed` are functions of fass with a u64 on each edge (of
+layered-1000: without values, but by fass). `static` and `edf` are the policies.
+
+Prints a table and a JSON object for each figure. Times depend on the host and on what
+else it does; compare figures of one run.
+
+Exit code: 0 measured; 1 a run did not complete its jobs; 2 the command line is refused.
+",
+};
+
+/// The name of the joins across cores among the workloads.
+const JOIN: &str = "join";
+
+/// Runs `bench native` with the words after its name.
+pub(super) fn run(words: &[String]) -> ExitCode {
+    let refuse = |line: &str| {
+        eprintln!("bench native: {line}");
+        ExitCode::from(2)
+    };
+    let options = match TABLE.parse(words) {
+        Ok(Request::Work(options)) => options,
+        Ok(Request::Help(text)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => return refuse(&error.to_string()),
+    };
+    match Plan::read(&options) {
+        Ok(plan) => measure(&plan),
+        Err(line) => refuse(&line),
+    }
+}
+
+/// What is to be measured.
+struct Plan {
+    workers: Vec<u32>,
+    rounds: usize,
+    jobs: u64,
+    graphs: Vec<Graph>,
+    with_join: bool,
+}
+
+impl Plan {
+    fn read(options: &Parsed) -> Result<Self, String> {
+        let names: Option<Vec<&str>> = options.text("only").map(|names| names.split(',').collect());
+        let is_wanted = |name: &str| names.as_ref().is_none_or(|names| names.contains(&name));
+        let known: Vec<String> = Graph::ALL.iter().map(Graph::to_string).collect();
+        let of_nothing = names.iter().flatten().find(|name| {
+            let is_graph = known.iter().any(|graph| graph == *name);
+            !is_graph && **name != JOIN
+        });
+        if let Some(name) = of_nothing {
+            return Err(format!(
+                "`--only {name}`: no workload is called so; there are {} and {JOIN}",
+                known.join(", ")
+            ));
+        }
+        let workers = options.text("workers").unwrap_or_default().split(',');
+        let workers: Vec<u32> = workers.filter_map(|number| number.parse().ok()).collect();
+        let most = native::processors().len();
+        if let Some(count) = workers.iter().find(|count| **count as usize > most) {
+            return Err(format!(
+                "`--workers {count}`: this host has {most} processors for us; ask for at most those"
+            ));
+        }
+        let rounds = options.number("rounds").unwrap_or(0);
+        Ok(Self {
+            with_join: is_wanted(JOIN) && workers.contains(&2),
+            workers,
+            rounds: usize::try_from(rounds).unwrap_or(usize::MAX),
+            jobs: options.number("jobs").unwrap_or(0),
+            graphs: Graph::ALL
+                .into_iter()
+                .filter(|graph| is_wanted(&graph.to_string()))
+                .collect(),
+        })
+    }
+}
+
+fn measure(plan: &Plan) -> ExitCode {
+    let mut figures = Vec::new();
+    let mut pinned = true;
+    for &graph in &plan.graphs {
+        match throughput::measure(graph, &plan.workers, plan.rounds) {
+            Ok((of_graph, all_pinned)) => {
+                figures.extend(of_graph);
+                pinned &= all_pinned;
+            }
+            Err(line) => return fail(&line),
+        }
+    }
+    if plan.with_join {
+        match join::measure(plan.jobs) {
+            Ok(of_join) => figures.extend(of_join),
+            Err(line) => return fail(&line),
+        }
+    }
+    print!("{}", Figure::table(&figures));
+    if !pinned {
+        println!("workers were not pinned, as `taskset` (util-linux) is missing or refused");
+    }
+    for figure in &figures {
+        println!("{}", figure.json(pinned));
+    }
+    ExitCode::SUCCESS
+}
+
+fn fail(line: &str) -> ExitCode {
+    eprintln!("bench native: {line}");
+    ExitCode::FAILURE
+}
