@@ -19,7 +19,8 @@
 //! - [`guest`]: all that for a test;
 //! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`dot`]: committed DAGs as a picture;
-//! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak): the subcommands.
+//! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
+//!   [`new_app`](mod@new_app): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
 //! as good that did not say so twice. It uses the standard library only, and
@@ -37,6 +38,7 @@ pub mod guest;
 pub mod image;
 pub mod install;
 pub mod json;
+pub mod new_app;
 pub mod options;
 pub mod oracle;
 pub mod outcome;

@@ -21,6 +21,11 @@ const SUBCOMMANDS: &[(&str, &str, Work)] = &[
         harness::run::run,
     ),
     (
+        "new-app",
+        "make an app of your own under apps/",
+        harness::new_app::new_app,
+    ),
+    (
         "test",
         "run every test, on the host and in QEMU",
         harness::test::test,

@@ -1,0 +1,67 @@
+//! The app's functions, and the DAG that they make.
+//!
+//! Nothing here knows the machine, so the same code is booted (`src/main.rs`)
+//! and tested on the host (`tests/virtual_time.rs`). Put your own functions in
+//! place of these; `docs/guide.md` explains each step.
+
+#![no_std]
+
+extern crate alloc;
+
+use alloc::vec;
+use core::time::Duration;
+
+use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
+
+/// The time between two releases, and the time that each job has.
+pub const PERIOD: Duration = Duration::from_millis(10);
+
+/// Builds the DAG: `sense`, then `brake` and `steer` side by side, then `act`.
+/// It ends after `jobs` jobs.
+#[must_use]
+pub fn build(jobs: u64) -> Dag {
+    let dag = create_dag();
+    dag.name("app-template").jobs(jobs);
+    let mut distance = 100;
+    let sense = move || {
+        work(800);
+        distance -= 1; // a function may keep what it alone needs
+        if distance == 0 {
+            distance = 100;
+        }
+        (distance,)
+    };
+    dag.register_periodic_subtask(sense, vec!["distance"], PERIOD, taking("sense", 1));
+    dag.register_subtask(brake, vec!["distance"], vec!["force"], taking("brake", 3));
+    dag.register_subtask(steer, vec!["distance"], vec!["angle"], taking("steer", 4));
+    dag.register_sink_subtask(act, vec!["force", "angle"], PERIOD, taking("act", 1));
+    dag
+}
+
+/// Brakes the harder the nearer the obstacle is.
+fn brake((distance,): (u32,)) -> (u32,) {
+    work(2_500);
+    (100 - distance,)
+}
+
+/// Steers away from what is near.
+fn steer((distance,): (u32,)) -> (bool,) {
+    work(3_500);
+    (distance < 20,)
+}
+
+/// Acts on both results, which are always of one job.
+fn act((force, turns): (u32, bool)) {
+    work(500);
+    assert_eq!(turns, force > 80, "two jobs were mixed");
+}
+
+/// A subtask's name, and the longest that one call of it takes.
+fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
+    SubtaskAttributes::named(name).wcet(Duration::from_millis(wcet_ms))
+}
+
+/// Stands for a computation that takes so many microseconds.
+fn work(us: u64) {
+    execute_for(Duration::from_micros(us), Occupation::Hold);
+}

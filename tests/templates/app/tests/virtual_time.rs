@@ -1,0 +1,25 @@
+//! The app on the host, in virtual time: the same functions, the same
+//! scheduler, and every run gives the same times.
+
+use fass::{Policy, finish_create_dags};
+use virtual_time::VirtualTime;
+
+#[test]
+fn every_job_is_in_time_and_within_its_bound() {
+    let machine = VirtualTime::new().cores(2).policy(Policy::Edf);
+    let dag = app_template::build(200);
+    let commit = finish_create_dags(&[dag]).expect("the DAG is sound");
+    let bound = commit.answers()[0].verdict.bound().expect("it is proven");
+    assert!(bound <= app_template::PERIOD);
+
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert_eq!(report.statistics[0].completed, 200);
+    assert_eq!(report.statistics[0].misses, 0);
+    for job in &report.jobs {
+        let response_time_ns = job.response_time_ns().expect("it is complete");
+        assert!(u128::from(response_time_ns) <= bound.as_nanos());
+    }
+    // 0.8 ms to sense, 3.5 ms to steer (and meanwhile to brake), 0.5 ms to act
+    assert_eq!(report.jobs[0].response_time_ns(), Some(4_800_000));
+}
