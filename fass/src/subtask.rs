@@ -12,7 +12,8 @@
 
 use alloc::boxed::Box;
 use core::convert::Infallible;
-use core::pin::Pin;
+use core::pin::{Pin, pin};
+use core::task::{Context, Poll, ready};
 
 use crate::gate::Gate;
 use crate::plan::Body;
@@ -42,23 +43,48 @@ where
 
 /// Makes the future of one subtask. Its ends of the topics exist on return.
 fn create_subtask<F, Args, Ret>(
-    mut f: F,
+    f: F,
     wiring: &mut Wiring,
     subtask: usize,
     gate: &Gate,
-) -> impl Future<Output = Infallible> + Send + use<F, Args, Ret>
+) -> Turns<F, Args::Subs, Ret::Pubs>
 where
     F: FnMut(Args) -> Ret + Send + 'static,
     Args: VecToSubs,
     Ret: VecToPubs,
 {
-    let mut subs = <Args as VecToSubs>::gen_subs(wiring.ports(subtask, gate));
-    let mut pubs = <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask, gate));
-    async move {
-        loop {
-            let args = subs.recv_all().await;
-            let results = f(args);
-            pubs.send_all(results).await;
-        }
+    Turns {
+        f,
+        subs: <Args as VecToSubs>::gen_subs(wiring.ports(subtask, gate)),
+        pubs: <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask, gate)),
+    }
+}
+
+/// The figure's loop, one turn a poll: what it would keep from one poll to the next
+/// is only where it waits, and it waits in one place. Written so, a turn does not
+/// begin with finding out where it was, nor end with a look at the closed gate.
+struct Turns<F, Subs, Pubs> {
+    f: F,
+    subs: Subs,
+    pubs: Pubs,
+}
+
+/// Nothing in it is pinned: a turn's futures do not outlive the turn.
+impl<F, Subs, Pubs> Unpin for Turns<F, Subs, Pubs> {}
+
+impl<F, Subs: MulRecv, Pubs: MulSend> Future for Turns<F, Subs, Pubs>
+where
+    F: FnMut(Subs::Items) -> Pubs::Items,
+{
+    type Output = Infallible;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Infallible> {
+        let Self { f, subs, pubs } = self.get_mut();
+        let args = ready!(pin!(subs.recv_all()).poll(context));
+        let results = f(args);
+        // Sending never waits, so there is no turn to be taken up again here.
+        let sent = pin!(pubs.send_all(results)).poll(context);
+        debug_assert!(sent.is_ready());
+        Poll::Pending
     }
 }

@@ -204,7 +204,8 @@ mod tests {
         assert_eq!(
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
-             budget_factor, overheads_ns, trace, trace_events, graph, measure, console, status, mode"
+             budget_factor, overheads_ns, trace, trace_events, graph, measure, \
+             idle, console, status, mode"
         );
     }
 

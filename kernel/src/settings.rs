@@ -9,6 +9,7 @@
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | how many events each core keeps; 0: none | 4096 |
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
+//! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
 //! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
@@ -23,9 +24,10 @@ use crate::graph;
 use crate::machine::{counted_time, interrupts_off};
 use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
+use crate::worker;
 
 /// The words, for messages.
-pub(crate) const WORDS: [&str; 11] = [
+pub(crate) const WORDS: [&str; 12] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -34,6 +36,7 @@ pub(crate) const WORDS: [&str; 11] = [
     "trace_events",
     "graph",
     "measure",
+    "idle",
     "console",
     "status",
     "mode",
@@ -67,6 +70,9 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     KERNEL.set_overheads(overheads(options)?);
     if options.choice("graph", &[("keep", false), ("dump", true)])? {
         graph::enable();
+    }
+    if options.choice("idle", &[("halt", false), ("poll", true)])? {
+        worker::watch_when_idle();
     }
     if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
         interrupts_off::enable();

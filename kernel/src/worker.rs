@@ -1,6 +1,6 @@
 //! What each core does: run what the scheduler assigns to it, else halt.
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::execution::{self, Assignment, Work};
 use crate::machine::context::{Context, Parked};
@@ -49,9 +49,20 @@ fn run(mut assignment: Assignment) -> Work {
     execution::complete(assignment, finish_ns)
 }
 
+/// Lets the cores other than core 0 watch for work instead of halting when they
+/// have none.
+pub(crate) fn watch_when_idle() {
+    WATCHES.store(true, Ordering::Relaxed);
+}
+
+static WATCHES: AtomicBool = AtomicBool::new(false);
+
 /// Sends waiting text and halts in between, until this core is to look for work.
 /// Interrupts are disabled before and after.
 fn rest(core: &Core) {
+    if WATCHES.load(Ordering::Relaxed) {
+        watch(core);
+    }
     while !core.wake.swap(false, Ordering::AcqRel) {
         if console::has_pending() {
             cpu::enable_interrupts();
@@ -61,6 +72,21 @@ fn rest(core: &Core) {
         }
         cpu::disable_interrupts();
     }
+}
+
+/// Watches for another core's word that there is work, which then needs no
+/// interrupt. Interrupts are disabled before and after, and enabled meanwhile.
+fn watch(core: &Core) {
+    core.begin_watch();
+    cpu::enable_interrupts();
+    while !core.wake.load(Ordering::Acquire) {
+        if !console::send_pending_byte() {
+            cpu::relax();
+        }
+    }
+    cpu::disable_interrupts();
+    core.end_watch();
+    keep_beating(core);
 }
 
 /// Waits until the run has ended, as the background of core 0: whenever there is
@@ -134,6 +160,13 @@ pub(crate) fn timer_interrupts() -> u64 {
     counts.map(|count| count.load(Ordering::Relaxed)).sum()
 }
 
+/// Begins the core's heartbeat if it has one now and had none before.
+fn keep_beating(core: &Core) {
+    if !timer::is_set(Alarm::Heartbeat) {
+        beat(core, clock::now_ns());
+    }
+}
+
 fn beat(core: &Core, now_ns: u64) {
     let next_ns = match core.heartbeat_ns.load(Ordering::Relaxed) {
         0 => u64::MAX,
@@ -149,9 +182,7 @@ pub(crate) fn wake_interrupt(interrupted: &mut Interrupted) {
     if core.index == 0 {
         execution::arm_next_event();
     }
-    if !timer::is_set(Alarm::Heartbeat) {
-        beat(core, clock::now_ns());
-    }
+    keep_beating(core);
     execution::interrupt(interrupted, clock::now_ns(), false);
 }
 

@@ -44,6 +44,8 @@ pub(crate) struct Core {
     spare: AtomicPtr<Context>,
     /// Another core has assigned work to this one.
     pub(crate) wake: AtomicBool,
+    /// This core watches `wake`: it needs no interrupt to see it.
+    watches: AtomicBool,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
     pub(crate) alarms: [AtomicU64; 4],
     /// The number of timer interrupts taken.
@@ -74,6 +76,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         ),
         spare: AtomicPtr::new(core::ptr::null_mut()),
         wake: AtomicBool::new(false),
+        watches: AtomicBool::new(false),
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         timer_interrupts: AtomicU64::new(0),
         heartbeat_ns: AtomicU64::new(0),
@@ -197,13 +200,25 @@ pub(crate) fn take_spare_context() -> Option<Parked> {
 }
 
 impl Core {
-    /// Makes this core look for work, by an interrupt unless it is the core that
-    /// executes this.
+    /// Makes this core look for work, by an interrupt unless it watches for the
+    /// word or is the core that executes this.
     pub(crate) fn wake_up(&self) {
-        self.wake.store(true, Ordering::Release);
-        if self.index != get().index {
+        // In one order with what `begin_watch` does: either this core sees there
+        // that it is to wake up, or this sees here that it does not watch yet.
+        self.wake.store(true, Ordering::SeqCst);
+        if self.index != get().index && !self.watches.load(Ordering::SeqCst) {
             local_apic::send(self.apic_id, super::interrupt::vector::WAKE);
         }
+    }
+
+    /// Lets others know that this core watches `wake` from now on.
+    pub(crate) fn begin_watch(&self) {
+        self.watches.store(true, Ordering::SeqCst);
+    }
+
+    /// Lets others know that this core no longer watches `wake`.
+    pub(crate) fn end_watch(&self) {
+        self.watches.store(false, Ordering::SeqCst);
     }
 
     /// Returns the context that runs on this core.
