@@ -13,7 +13,10 @@ use alloc::vec::Vec;
 /// A set of numbers below a limit.
 #[derive(Debug)]
 pub(super) struct BitSet {
-    /// The words with the numbers themselves, then those above, up to one word.
+    /// The one word of the highest level.
+    top: u64,
+    /// The levels below it, the highest first; the last one has the numbers
+    /// themselves, unless the top does.
     levels: Box<[Box<[u64]>]>,
 }
 
@@ -21,35 +24,42 @@ impl BitSet {
     /// Makes an empty set for the numbers `0..limit`.
     pub(super) fn new(limit: usize) -> Self {
         let mut levels = Vec::new();
-        let mut words = limit;
-        loop {
-            words = words.div_ceil(64).max(1);
+        let mut words = limit.div_ceil(64);
+        while words > 1 {
             levels.push(vec![0; words].into_boxed_slice());
-            if words == 1 {
-                break;
-            }
+            words = words.div_ceil(64);
         }
+        levels.reverse();
         Self {
+            top: 0,
             levels: levels.into_boxed_slice(),
         }
     }
 
+    #[inline]
+    pub(super) const fn is_empty(&self) -> bool {
+        self.top == 0
+    }
+
+    #[inline]
     pub(super) fn insert(&mut self, number: usize) {
         let mut place = number;
-        for level in &mut self.levels {
+        for level in self.levels.iter_mut().rev() {
             let word = &mut level[place / 64];
             let was_empty = *word == 0;
             *word |= 1 << (place % 64);
+            place /= 64;
             if !was_empty {
                 return;
             }
-            place /= 64;
         }
+        self.top |= 1 << (place % 64);
     }
 
+    #[inline]
     pub(super) fn remove(&mut self, number: usize) {
         let mut place = number;
-        for level in &mut self.levels {
+        for level in self.levels.iter_mut().rev() {
             let word = &mut level[place / 64];
             *word &= !(1 << (place % 64));
             if *word != 0 {
@@ -57,17 +67,18 @@ impl BitSet {
             }
             place /= 64;
         }
+        self.top &= !(1 << (place % 64));
     }
 
     /// Returns the least number.
+    #[inline]
     pub(super) fn first(&self) -> Option<usize> {
-        let mut place = 0;
-        for level in self.levels.iter().rev() {
-            let word = level[place];
-            if word == 0 {
-                return None;
-            }
-            place = place * 64 + word.trailing_zeros() as usize;
+        if self.is_empty() {
+            return None;
+        }
+        let mut place = self.top.trailing_zeros() as usize;
+        for level in &self.levels {
+            place = place * 64 + level[place].trailing_zeros() as usize;
         }
         Some(place)
     }

@@ -25,10 +25,10 @@ impl Scheduler {
     pub(super) fn decide(&mut self) {
         self.decisions.clear();
         while self.cores.any_idle()
-            && let Some((key, vertex)) = self.ready.pop()
+            && let Some(key) = self.ready.pop()
             && let Some(core) = self.cores.take_idle()
         {
-            let decision = self.give(core, key, vertex);
+            let decision = self.give(core, key);
             self.decisions.push(decision);
         }
         if core::mem::take(&mut self.fresh) == 0 {
@@ -37,19 +37,19 @@ impl Scheduler {
         while let Some(ready) = self.ready.peek()
             && let Some((core, running)) = self.cores.largest_preemptible()
             && ready < running
-            && let Some((key, vertex)) = self.ready.pop()
+            && let Some(key) = self.ready.pop()
         {
             self.preempt(core, running);
-            let decision = self.give(core, key, vertex);
+            let decision = self.give(core, key);
             self.decisions.push(decision);
         }
     }
 
     /// Gives a core an instance that is ready.
     #[inline]
-    pub(super) fn give(&mut self, core: CoreId, key: Key, vertex: u32) -> Decision {
-        let instance = key.instance();
-        let vertex = self.vertices.get_mut(vertex);
+    pub(super) fn give(&mut self, core: CoreId, key: Key) -> Decision {
+        let vertex = self.vertices.get_mut(key.vertex());
+        let instance = vertex.present_instance();
         let decision = match vertex.phase {
             Phase::Preempted => Decision::Resume { core, instance },
             _ => Decision::Start { core, instance },
@@ -61,10 +61,10 @@ impl Scheduler {
 
     /// Puts the instance that runs on a core back in line.
     fn preempt(&mut self, core: CoreId, running: Key) {
-        let instance = running.instance();
-        let vertex = self.vertex(instance).0;
+        let vertex = self.vertices.get_mut(running.vertex());
+        vertex.phase = Phase::Preempted;
+        let instance = vertex.present_instance();
         self.decisions.push(Decision::Preempt { core, instance });
-        self.vertices.get_mut(vertex).phase = Phase::Preempted;
-        self.ready.insert(vertex, running);
+        self.ready.insert(running);
     }
 }

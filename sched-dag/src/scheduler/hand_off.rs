@@ -67,11 +67,11 @@ impl Scheduler {
             return HandOff::Open;
         }
         self.fresh = 0;
-        let Some((key, next)) = self.ready.pop() else {
+        let Some(key) = self.ready.pop() else {
             self.cores.free(core);
             return HandOff::Idle;
         };
-        HandOff::To(Vertex(next), self.give(core, key, next))
+        HandOff::To(Vertex(key.vertex()), self.give(core, key))
     }
 
     /// Reports whether the instant can end with a hand-off.

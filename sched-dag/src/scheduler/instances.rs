@@ -6,12 +6,10 @@
 //! any other, only without running.
 
 use super::jobs::Job;
-use super::key::Key;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
 use super::{JobOutcome, Observer, Scheduler};
 use crate::ids::{DagId, Instance};
-use crate::policy::Policy;
 
 impl Scheduler {
     /// Ends an instance that has started.
@@ -32,7 +30,10 @@ impl Scheduler {
             && jobs.job(vertex.progress).number == instance.job;
         match vertex.phase {
             Phase::Running(core) if in_flight => self.cores.free(core),
-            Phase::Preempted if in_flight => self.ready.remove(number, vertex.urgency),
+            Phase::Preempted if in_flight => {
+                let key = self.ready.key(number, vertex, jobs.job(vertex.progress));
+                self.ready.remove(key);
+            }
             _ => panic!("{instance} {event} and has not started; complete each once, or fail it"),
         }
         number
@@ -47,7 +48,6 @@ impl Scheduler {
     ) {
         let Self {
             task_set,
-            options,
             dags,
             vertices,
             ready,
@@ -59,7 +59,7 @@ impl Scheduler {
         for source in task_set.dag(dag).sources() {
             let number = state.first_vertex + source.0;
             if let Some(vertex) = vertices.arrive(number, sequence) {
-                line_up(options.policy, number, vertex, job, ready, observer);
+                line_up(number, vertex, job, ready, observer);
                 *fresh += 1;
             }
         }
@@ -75,9 +75,9 @@ impl Scheduler {
             let vertex = self.vertices.get_mut(number);
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == Phase::Ready && is_meant {
-                let job = state.jobs.job(vertex.progress).number;
-                self.ready.remove(number, vertex.urgency);
-                observer.cancelled(Instance { dag, job, subtask });
+                let job = state.jobs.job(vertex.progress);
+                self.ready.remove(self.ready.key(number, vertex, job));
+                observer.cancelled(vertex.instance(job));
                 vertex.phase = Phase::Absent;
                 self.ending.push(number);
             }
@@ -111,7 +111,6 @@ impl Scheduler {
     #[inline(always)]
     fn end_one(&mut self, number: u32, observer: &mut impl Observer) {
         let Self {
-            options,
             dags,
             vertices,
             ready,
@@ -134,7 +133,7 @@ impl Scheduler {
                     observer.cancelled(successor.instance(job));
                     ending.push(next);
                 } else {
-                    line_up(options.policy, next, successor, job, ready, observer);
+                    line_up(next, successor, job, ready, observer);
                     *fresh += 1;
                 }
             }
@@ -157,8 +156,7 @@ impl Scheduler {
                 observer.cancelled(vertex.instance(job));
                 self.ending.push(number);
             } else {
-                let policy = self.options.policy;
-                line_up(policy, number, vertex, job, &mut self.ready, observer);
+                line_up(number, vertex, job, &mut self.ready, observer);
                 self.fresh += 1;
             }
         }
@@ -213,19 +211,14 @@ impl Scheduler {
 /// Puts the next instance of a vertex, which is ready, in line.
 #[inline(always)]
 fn line_up(
-    policy: Policy,
     number: u32,
     vertex: &mut Vertex,
     job: &Job,
     ready: &mut ReadyQueue,
     observer: &mut impl Observer,
 ) {
-    let instance = vertex.instance(job);
-    let urgency = match policy {
-        Policy::StaticPriority => vertex.urgency,
-        Policy::Edf => job.deadline_ns,
-    };
     vertex.phase = Phase::Ready;
-    ready.insert(number, Key::new(urgency, instance));
-    observer.ready(instance);
+    vertex.job = job.number;
+    ready.insert(ready.key(number, vertex, job));
+    observer.ready(vertex.instance(job));
 }

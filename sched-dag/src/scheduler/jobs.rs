@@ -21,7 +21,6 @@
 //! judged in the order of their numbers, each once.
 
 use alloc::boxed::Box;
-use alloc::vec;
 
 use super::vertices::slots;
 use crate::ids::to_u32;
@@ -69,14 +68,21 @@ pub(super) struct Job {
     pub(super) deadline_ns: u64,
     /// The instances that have not ended.
     pub(super) unfinished: u32,
+    /// Its slot, counted over all DAGs.
+    pub(super) slot: u32,
     /// Whether its deadline has passed before it was complete.
     pub(super) missed: bool,
 }
 
 impl Jobs {
-    pub(super) fn new(dag: &Dag) -> Self {
+    /// Makes the jobs of a DAG whose slots are counted from `first_slot`.
+    pub(super) fn new(dag: &Dag, first_slot: u32) -> Self {
+        let slots = (first_slot..).take(slots(dag)).map(|slot| Job {
+            slot,
+            ..Job::default()
+        });
         Self {
-            in_flight: vec![Job::default(); slots(dag)].into_boxed_slice(),
+            in_flight: slots.collect(),
             limit: u64::from(dag.in_flight()),
             oldest: 0,
             next: 0,
@@ -183,11 +189,13 @@ impl Jobs {
         self.first_waiting += 1;
         self.next += 1;
         let missed = number < self.judged_waiting;
-        *self.job_mut(sequence) = Job {
+        let job = self.job_mut(sequence);
+        *job = Job {
             number,
             release_ns,
             deadline_ns: release_ns + dag.relative_deadline_ns(),
             unfinished: to_u32(dag.subtasks().len()),
+            slot: job.slot,
             missed,
         };
         if missed {

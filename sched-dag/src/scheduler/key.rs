@@ -2,48 +2,114 @@
 //!
 //! It is absolute: fixed when the instance becomes ready from things fixed at
 //! its job's release, and the same in every comparison, whether the instances
-//! wait or run. It ends in the instance's own numbers, so no two are equal.
+//! wait or run. No two are equal.
+//!
+//! R5 orders by (priority or absolute deadline, DAG, job, subtask). All of that
+//! is one number here, so that one comparison does it. Its low 32 bits are the
+//! vertex, which counts subtasks DAG by DAG; what is above depends on the
+//! [`Order`]:
+//!
+//! | order | 127..96 | 95..64 | 63..32 |
+//! |---|---|---|---|
+//! | `Rank` | rank of (priority, DAG, subtask) | 0 | 0 |
+//! | `Job` | rank of (priority, DAG) | sequence number | of the job |
+//! | `Deadline` | absolute | deadline | slot |
+//!
+//! Two jobs of one DAG have different deadlines, since it has a period, and a
+//! slot is of one DAG and counts DAG by DAG; so (deadline, slot, vertex) is the
+//! order of (deadline, DAG, job, subtask).
 
-use crate::ids::{DagId, Instance, SubtaskId};
+use super::jobs::Job;
+use super::vertices::Vertex;
+
+/// What keys are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// Each subtask has a rank of its own.
+    Rank,
+    /// Subtasks of one DAG may have the same rank; then the older job is first.
+    Job,
+    /// The earlier absolute deadline is first.
+    Deadline,
+}
 
 /// An instance's place in the order of dispatch; the smaller key goes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key {
-    /// The priority's number, or the rank that stands for it; or the absolute
-    /// deadline in nanoseconds.
-    urgency: u64,
-    dag: DagId,
-    job: u64,
-    subtask: SubtaskId,
-}
+pub(super) struct Key(u128);
 
 impl Key {
-    /// Fills places that hold no key.
-    pub(super) const NONE: Self = Self {
-        urgency: u64::MAX,
-        dag: DagId(0),
-        job: 0,
-        subtask: SubtaskId(0),
-    };
+    /// Stands where there is no key; it is larger than any.
+    pub(super) const NONE: Self = Self(u128::MAX);
 
-    pub(super) const fn new(urgency: u64, instance: Instance) -> Self {
-        let Instance { dag, job, subtask } = instance;
-        Self {
-            urgency,
-            dag,
-            job,
-            subtask,
+    /// Makes the key of a vertex's next instance, which is of `job`.
+    #[inline]
+    pub(super) fn new(order: Order, number: u32, vertex: &Vertex, job: &Job) -> Self {
+        match order {
+            Order::Rank => Self::of_parts(u64::from(vertex.rank) << 32, 0, number),
+            Order::Job => {
+                let [high, low] = halves(vertex.progress);
+                Self::of_parts(u64::from(vertex.rank) << 32 | u64::from(high), low, number)
+            }
+            Order::Deadline => Self::of_parts(job.deadline_ns, job.slot, number),
         }
     }
 
-    pub(super) const fn urgency(self) -> u64 {
-        self.urgency
+    #[inline]
+    pub(super) const fn of_parts(first: u64, second: u32, vertex: u32) -> Self {
+        Self((first as u128) << 64 | (second as u128) << 32 | vertex as u128)
     }
 
-    pub(super) const fn instance(self) -> Instance {
-        let Self {
-            dag, job, subtask, ..
-        } = self;
-        Instance { dag, job, subtask }
+    /// Returns the vertex of the instance.
+    #[inline]
+    pub(super) const fn vertex(self) -> u32 {
+        low(self.0)
+    }
+
+    /// Returns what the order `Rank` has made it of before the vertex.
+    #[inline]
+    pub(super) const fn rank(self) -> usize {
+        low(self.0 >> 96) as usize
+    }
+
+    /// Returns what the order `Deadline` has made it of before the vertex.
+    #[inline]
+    pub(super) const fn deadline_and_slot(self) -> (u64, u32) {
+        (upper(self.0), low(self.0 >> 32))
+    }
+}
+
+/// Returns the low 32 bits.
+#[allow(clippy::cast_possible_truncation, reason = "that is its purpose")]
+#[inline]
+const fn low(number: u128) -> u32 {
+    number as u32
+}
+
+/// Returns the high 64 bits.
+#[allow(clippy::cast_possible_truncation, reason = "64 bits are left")]
+#[inline]
+const fn upper(number: u128) -> u64 {
+    (number >> 64) as u64
+}
+
+/// Returns the high and the low half.
+#[inline]
+const fn halves(number: u64) -> [u32; 2] {
+    [low((number >> 32) as u128), low(number as u128)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_compare_part_by_part() {
+        let parts = [(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0), (u64::MAX, 7, 3)];
+        let keys = parts.map(|(first, second, vertex)| Key::of_parts(first, second, vertex));
+        assert!(keys.is_sorted_by(|one, other| one < other));
+        assert_eq!(keys[4].vertex(), 3);
+        assert_eq!(keys[4].deadline_and_slot(), (u64::MAX, 7));
+        assert!(keys[4] < Key::NONE);
+        assert_eq!(halves(0x1_0000_0002), [1, 2]);
     }
 }

@@ -37,6 +37,7 @@
 //! the driver's times; a time earlier than one before counts as that one.
 
 mod bits;
+mod by_deadline;
 mod cores;
 mod decision;
 mod dispatch;
@@ -68,7 +69,6 @@ pub use statistics::DagStatistics;
 use cores::Cores;
 use heap::IndexedHeap;
 use jobs::Jobs;
-use key::Key;
 use ready_queue::ReadyQueue;
 use vertices::Vertices;
 
@@ -138,15 +138,17 @@ impl Scheduler {
             .map(|dag| dag.subtasks().len())
             .max()
             .unwrap_or(0);
-        let mut subtasks = 0;
+        let (mut subtasks, mut slots) = (0, 0);
         let states: Box<[DagState]> = dags
             .iter()
             .map(|dag| {
                 let first_vertex = to_u32(subtasks);
+                let first_slot = to_u32(slots);
                 subtasks += dag.subtasks().len();
+                slots += vertices::slots(dag);
                 DagState {
                     first_vertex,
-                    jobs: Jobs::new(dag),
+                    jobs: Jobs::new(dag, first_slot),
                     statistics: DagStatistics::default(),
                     is_paused: false,
                 }
@@ -197,7 +199,8 @@ impl Scheduler {
     /// If there is no such core.
     #[must_use]
     pub fn running(&self, core: CoreId) -> Option<Instance> {
-        self.cores.running(core).map(Key::instance)
+        let key = self.cores.running(core)?;
+        Some(self.vertices.get(key.vertex()).present_instance())
     }
 
     /// Reports whether every DAG [is over](Self::is_over).

@@ -11,20 +11,21 @@
 //! # The rest
 //!
 //! Under static priority the order of all instances that can ever wait together
-//! is mostly known at commit: then each subtask has a *rank*, keys begin with
-//! it, and the rest is a set of bits, which costs the same however many wait.
-//! That holds unless two subtasks of one DAG share a priority and jobs of that
-//! DAG overlap, because then the job comes before the subtask. In that case, and
-//! under EDF, the rest is a heap.
+//! is mostly known at commit: then each subtask has a *rank*, and the rest is a
+//! set of bits, which costs the same however many wait. That holds unless two
+//! subtasks of one DAG share a priority and jobs of that DAG overlap, because
+//! then the job comes before the subtask. In that case the rest is a heap. Under
+//! EDF it is a heap of jobs.
 
 use alloc::boxed::Box;
-use alloc::vec;
 use alloc::vec::Vec;
 
 use super::bits::BitSet;
+use super::by_deadline::ByDeadline;
 use super::heap::IndexedHeap;
-use super::key::Key;
-use super::vertices::Vertices;
+use super::jobs::Job;
+use super::key::{Key, Order};
+use super::vertices::{Vertex, Vertices};
 use crate::ids::to_u32;
 use crate::order::{sorted, sorted_by_key};
 use crate::policy::Policy;
@@ -33,59 +34,62 @@ use crate::task_set::{Dag, TaskSet};
 /// The instances in line. At most one of a vertex waits at a time.
 #[derive(Debug)]
 pub(super) struct ReadyQueue {
+    /// The smallest key, or none.
     front: Key,
-    /// The vertex of the front, or [`NOBODY`].
-    front_vertex: u32,
     /// How many are in the rest.
     others: u32,
+    order: Order,
     rest: Rest,
 }
 
-/// Stands for a vertex where there is none.
-const NOBODY: u32 = u32::MAX;
-
 #[derive(Debug)]
 enum Rest {
-    /// For keys that begin with a rank.
+    /// For keys that are ranks.
     Ranked {
         ranks: BitSet,
-        /// The key and the vertex of each rank.
-        waiting: Box<[(Key, u32)]>,
+        /// The key of each rank.
+        keys: Box<[Key]>,
     },
+    /// For keys that begin with a deadline.
+    ByDeadline(ByDeadline),
     /// For any keys, by vertex.
     Keyed(IndexedHeap<Key>),
 }
 
 impl ReadyQueue {
-    /// Makes the queue for a set and a policy; gives vertices their ranks where
-    /// it can.
+    /// Makes the queue for a set and a policy; gives vertices their ranks.
     pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut Vertices) -> Self {
-        let is_ranked = policy == Policy::StaticPriority && task_set.dags().iter().all(has_ranks);
-        let rest = if is_ranked {
-            rank(vertices);
-            Rest::Ranked {
-                ranks: BitSet::new(vertices.len()),
-                waiting: vec![(Key::NONE, 0); vertices.len()].into_boxed_slice(),
-            }
-        } else {
-            Rest::Keyed(IndexedHeap::new(vertices.len()))
-        };
-        Self::of(rest)
+        if policy == Policy::Edf {
+            let rest = Rest::ByDeadline(ByDeadline::new(task_set));
+            return Self::of(Order::Deadline, rest);
+        }
+        if task_set.dags().iter().all(has_ranks) {
+            let order = rank(vertices, Order::Rank);
+            return Self::of(Order::Rank, ranked(&order));
+        }
+        rank(vertices, Order::Job);
+        Self::of(Order::Job, Rest::Keyed(IndexedHeap::new(vertices.len())))
     }
 
-    const fn of(rest: Rest) -> Self {
+    const fn of(order: Order, rest: Rest) -> Self {
         Self {
             front: Key::NONE,
-            front_vertex: NOBODY,
             others: 0,
+            order,
             rest,
         }
+    }
+
+    /// Returns the key of a vertex's next instance, which is of `job`.
+    #[inline]
+    pub(super) fn key(&self, number: u32, vertex: &Vertex, job: &Job) -> Key {
+        Key::new(self.order, number, vertex, job)
     }
 
     /// Returns the smallest key.
     #[inline]
     pub(super) fn peek(&self) -> Option<Key> {
-        if self.front_vertex != NOBODY {
+        if self.front != Key::NONE {
             return Some(self.front);
         }
         if self.others == 0 {
@@ -94,35 +98,33 @@ impl ReadyQueue {
         self.rest.peek()
     }
 
-    /// Puts an instance of a vertex in line.
+    /// Puts an instance in line.
     #[inline]
-    pub(super) fn insert(&mut self, vertex: u32, key: Key) {
-        let is_empty = self.front_vertex == NOBODY && self.others == 0;
+    pub(super) fn insert(&mut self, key: Key) {
+        let is_empty = self.front == Key::NONE && self.others == 0;
         if is_empty {
-            (self.front, self.front_vertex) = (key, vertex);
+            self.front = key;
         } else {
-            self.insert_among_others(vertex, key);
+            self.insert_among_others(key);
         }
     }
 
-    fn insert_among_others(&mut self, vertex: u32, key: Key) {
+    fn insert_among_others(&mut self, key: Key) {
         if self.peek().is_some_and(|first| first < key) {
-            self.insert_behind(vertex, key);
+            self.insert_behind(key);
             return;
         }
-        let earlier = (self.front_vertex, self.front);
-        (self.front, self.front_vertex) = (key, vertex);
-        if earlier.0 != NOBODY {
-            self.insert_behind(earlier.0, earlier.1);
+        let earlier = core::mem::replace(&mut self.front, key);
+        if earlier != Key::NONE {
+            self.insert_behind(earlier);
         }
     }
 
     /// Takes the instance with the smallest key out.
     #[inline]
-    pub(super) fn pop(&mut self) -> Option<(Key, u32)> {
-        if self.front_vertex != NOBODY {
-            let vertex = core::mem::replace(&mut self.front_vertex, NOBODY);
-            return Some((self.front, vertex));
+    pub(super) fn pop(&mut self) -> Option<Key> {
+        if self.front != Key::NONE {
+            return Some(core::mem::replace(&mut self.front, Key::NONE));
         }
         if self.others == 0 {
             return None;
@@ -131,52 +133,60 @@ impl ReadyQueue {
         self.rest.pop()
     }
 
-    /// Takes the instance of a vertex out, which waits.
-    pub(super) fn remove(&mut self, vertex: u32, urgency: u64) {
-        if self.front_vertex == vertex {
-            self.front_vertex = NOBODY;
+    /// Takes an instance out, which waits.
+    pub(super) fn remove(&mut self, key: Key) {
+        if self.front == key {
+            self.front = Key::NONE;
             return;
         }
         self.others -= 1;
-        match &mut self.rest {
-            Rest::Ranked { ranks, .. } => ranks.remove(place(urgency)),
-            Rest::Keyed(heap) => heap.remove(vertex as usize),
-        }
+        self.rest.remove(key);
     }
 
-    fn insert_behind(&mut self, vertex: u32, key: Key) {
+    fn insert_behind(&mut self, key: Key) {
         self.others += 1;
-        self.rest.insert(vertex, key);
+        self.rest.insert(key);
     }
 }
 
 impl Rest {
     fn peek(&self) -> Option<Key> {
         match self {
-            Self::Ranked { ranks, waiting } => ranks.first().map(|rank| waiting[rank].0),
+            Self::Ranked { ranks, keys } => ranks.first().map(|rank| keys[rank]),
+            Self::ByDeadline(jobs) => jobs.peek(),
             Self::Keyed(heap) => heap.peek().map(|(key, _)| key),
         }
     }
 
-    fn insert(&mut self, vertex: u32, key: Key) {
+    fn insert(&mut self, key: Key) {
         match self {
-            Self::Ranked { ranks, waiting } => {
-                let rank = place(key.urgency());
-                waiting[rank] = (key, vertex);
-                ranks.insert(rank);
-            }
-            Self::Keyed(heap) => heap.set(vertex as usize, key),
+            Self::Ranked { ranks, .. } => ranks.insert(key.rank()),
+            Self::ByDeadline(jobs) => jobs.insert(key),
+            Self::Keyed(heap) => heap.set(key.vertex() as usize, key),
         }
     }
 
-    fn pop(&mut self) -> Option<(Key, u32)> {
+    fn remove(&mut self, key: Key) {
         match self {
-            Self::Ranked { ranks, waiting } => {
+            Self::Ranked { ranks, .. } => ranks.remove(key.rank()),
+            Self::ByDeadline(jobs) => jobs.remove(key),
+            Self::Keyed(heap) => heap.remove(key.vertex() as usize),
+        }
+    }
+
+    fn pop(&mut self) -> Option<Key> {
+        match self {
+            Self::Ranked { ranks, keys } => {
                 let rank = ranks.first()?;
                 ranks.remove(rank);
-                Some(waiting[rank])
+                Some(keys[rank])
             }
-            Self::Keyed(heap) => heap.pop().map(|(key, vertex)| (key, to_u32(vertex))),
+            Self::ByDeadline(jobs) => {
+                let key = jobs.peek()?;
+                jobs.remove(key);
+                Some(key)
+            }
+            Self::Keyed(heap) => heap.pop().map(|(key, _)| key),
         }
     }
 }
@@ -190,68 +200,72 @@ fn has_ranks(dag: &Dag) -> bool {
 }
 
 /// Replaces each vertex's priority by its place in the order of (priority, DAG,
-/// subtask).
-fn rank(vertices: &mut Vertices) {
+/// subtask), or of (priority, DAG) if the job comes next; returns the vertices in
+/// that order.
+fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
     // Vertices count DAG by DAG, within a DAG by subtask, and the sort is stable.
-    let urgency = |vertex| vertices.get(to_u32(vertex)).urgency;
+    let urgency = |vertex| vertices.get(to_u32(vertex)).rank;
     let order = sorted_by_key(vertices.len(), urgency);
-    for (rank, vertex) in (0..).zip(order) {
-        vertices.get_mut(to_u32(vertex)).urgency = rank;
+    let order: Vec<u32> = order.into_iter().map(to_u32).collect();
+    let mut rank = 0;
+    let mut last = None;
+    for &number in &order {
+        let vertex = vertices.get_mut(number);
+        let group = (vertex.rank, vertex.dag);
+        if last.is_some_and(|last| kind == Order::Rank || last != group) {
+            rank += 1;
+        }
+        last = Some(group);
+        vertex.rank = rank;
     }
+    order
 }
 
-/// Returns a rank as an index.
-fn place(rank: u64) -> usize {
-    usize::try_from(rank).expect("there are fewer ranks than vertices in memory")
+/// Makes the rest for vertices in the order of their ranks.
+fn ranked(order: &[u32]) -> Rest {
+    let keys = (0u64..).zip(order);
+    Rest::Ranked {
+        ranks: BitSet::new(order.len()),
+        keys: keys
+            .map(|(rank, &vertex)| Key::of_parts(rank << 32, 0, vertex))
+            .collect(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ids::{DagId, Instance, SubtaskId};
 
-    fn key(urgency: u64) -> Key {
-        Key::new(
-            urgency,
-            Instance {
-                dag: DagId(0),
-                job: 0,
-                subtask: SubtaskId(0),
-            },
-        )
+    fn key(number: u32) -> Key {
+        Key::of_parts(u64::from(number) << 32, 0, number)
     }
 
     fn queues() -> [ReadyQueue; 2] {
-        let ranked = Rest::Ranked {
-            ranks: BitSet::new(100),
-            waiting: vec![(Key::NONE, 0); 100].into_boxed_slice(),
-        };
-        [ranked, Rest::Keyed(IndexedHeap::new(100))].map(ReadyQueue::of)
+        let order: Vec<u32> = (0..100).collect();
+        [
+            ReadyQueue::of(Order::Rank, ranked(&order)),
+            ReadyQueue::of(Order::Job, Rest::Keyed(IndexedHeap::new(100))),
+        ]
     }
 
     #[test]
     fn pops_ascending_however_inserts_pops_and_removals_mix() {
         for mut queue in queues() {
             for number in 0..100u32 {
-                let urgency = (number * 37) % 100;
-                queue.insert(urgency, key(u64::from(urgency)));
+                queue.insert(key((number * 37) % 100));
                 if number % 3 == 0 {
                     let first = queue.peek();
-                    let (popped, vertex) = queue.pop().expect("one waits");
+                    let popped = queue.pop().expect("one waits");
                     assert_eq!(Some(popped), first);
-                    queue.insert(vertex, popped);
+                    queue.insert(popped);
                 }
             }
             for vertex in (0..100).step_by(4) {
-                queue.remove(vertex, u64::from(vertex));
+                queue.remove(key(vertex));
             }
             let popped: Vec<_> = core::iter::from_fn(|| queue.pop()).collect();
             assert_eq!(popped.len(), 75);
-            assert!(
-                popped
-                    .iter()
-                    .all(|(key, vertex)| key.urgency() == u64::from(*vertex))
-            );
+            assert!(popped.iter().all(|&popped| popped == key(popped.vertex())));
             assert!(popped.is_sorted());
         }
     }
@@ -259,10 +273,10 @@ mod tests {
     #[test]
     fn the_front_may_be_removed() {
         for mut queue in queues() {
-            queue.insert(7, key(7));
-            queue.insert(3, key(3));
-            queue.remove(3, 3);
-            assert_eq!(queue.pop(), Some((key(7), 7)));
+            queue.insert(key(7));
+            queue.insert(key(3));
+            queue.remove(key(3));
+            assert_eq!(queue.pop(), Some(key(7)));
             assert_eq!(queue.pop(), None);
         }
     }

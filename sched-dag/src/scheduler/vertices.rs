@@ -41,14 +41,18 @@ pub(super) enum Phase {
     Preempted,
 }
 
-/// One subtask.
+/// One subtask, in one cache line.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Vertex {
     pub(super) phase: Phase,
     /// The sequence number of the job that it has to do next, or is doing.
     pub(super) progress: u64,
-    /// What orders it under static priority.
-    pub(super) urgency: u64,
+    /// The number of the job that it is doing.
+    pub(super) job: u64,
+    /// What orders it under static priority: first the priority itself, later the
+    /// [`ReadyQueue`](super::ready_queue::ReadyQueue)'s rank.
+    pub(super) rank: u32,
     pub(super) dag: DagId,
     pub(super) subtask: SubtaskId,
     /// Whether a started instance may lose its core.
@@ -91,7 +95,8 @@ impl Vertices {
                 vertices.push(Vertex {
                     phase: Phase::Absent,
                     progress: 0,
-                    urgency: u64::from(attributes.priority().0),
+                    job: 0,
+                    rank: attributes.priority().0,
                     dag: id,
                     subtask,
                     is_preemptible: preemption == Preemption::Enabled
@@ -174,6 +179,16 @@ impl Vertex {
         Instance {
             dag: self.dag,
             job: job.number,
+            subtask: self.subtask,
+        }
+    }
+
+    /// Returns the instance that it is doing, which is ready or has started.
+    #[inline]
+    pub(super) const fn present_instance(&self) -> Instance {
+        Instance {
+            dag: self.dag,
+            job: self.job,
             subtask: self.subtask,
         }
     }

@@ -1,0 +1,78 @@
+//! Ready instances in the order of their deadlines.
+//!
+//! All instances of a job have the deadline of the job. So it is jobs that are put
+//! in order, by a heap, and each has a set of bits for its subtasks: a job with a
+//! hundred ready subtasks is one entry of the heap, not a hundred.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use super::bits::BitSet;
+use super::heap::IndexedHeap;
+use super::key::Key;
+use super::vertices::slots;
+use crate::ids::to_u32;
+use crate::task_set::TaskSet;
+
+/// Instances by the absolute deadline, then by the slot of the job, then by vertex.
+#[derive(Debug)]
+pub(super) struct ByDeadline {
+    /// The deadlines of the jobs that have ready instances, by slot.
+    jobs: IndexedHeap<(u64, u32)>,
+    /// By slot.
+    lines: Box<[Line]>,
+}
+
+/// The ready instances of one job in flight.
+#[derive(Debug)]
+struct Line {
+    /// The first vertex of its DAG.
+    first: u32,
+    /// The ready ones, counted from there.
+    subtasks: BitSet,
+}
+
+impl ByDeadline {
+    pub(super) fn new(task_set: &TaskSet) -> Self {
+        let mut lines = Vec::new();
+        let mut first = 0;
+        for dag in task_set.dags() {
+            let subtasks = dag.subtasks().len();
+            lines.extend((0..slots(dag)).map(|_| Line {
+                first: to_u32(first),
+                subtasks: BitSet::new(subtasks),
+            }));
+            first += subtasks;
+        }
+        Self {
+            jobs: IndexedHeap::new(lines.len()),
+            lines: lines.into_boxed_slice(),
+        }
+    }
+
+    pub(super) fn insert(&mut self, key: Key) {
+        let (deadline_ns, slot) = key.deadline_and_slot();
+        let line = &mut self.lines[slot as usize];
+        if line.subtasks.is_empty() {
+            self.jobs.set(slot as usize, (deadline_ns, slot));
+        }
+        line.subtasks.insert((key.vertex() - line.first) as usize);
+    }
+
+    /// Returns the smallest key.
+    pub(super) fn peek(&self) -> Option<Key> {
+        let ((deadline_ns, slot), _) = self.jobs.peek()?;
+        let line = &self.lines[slot as usize];
+        let vertex = line.first + to_u32(line.subtasks.first()?);
+        Some(Key::of_parts(deadline_ns, slot, vertex))
+    }
+
+    pub(super) fn remove(&mut self, key: Key) {
+        let (_, slot) = key.deadline_and_slot();
+        let line = &mut self.lines[slot as usize];
+        line.subtasks.remove((key.vertex() - line.first) as usize);
+        if line.subtasks.is_empty() {
+            self.jobs.remove(slot as usize);
+        }
+    }
+}
