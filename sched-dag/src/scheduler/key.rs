@@ -59,6 +59,15 @@ impl Key {
         Self((first as u128) << 64 | (second as u128) << 32 | vertex as u128)
     }
 
+    /// Reports whether it stands for no key.
+    ///
+    /// Looks at 32 bits only: a processor that has just stored a key in two halves
+    /// waits until both have arrived before it can load it as one.
+    #[inline]
+    pub(super) const fn is_none(&self) -> bool {
+        self.vertex() == u32::MAX
+    }
+
     /// Returns the vertex of the instance.
     #[inline]
     pub(super) const fn vertex(self) -> u32 {

@@ -89,7 +89,7 @@ impl ReadyQueue {
     /// Returns the smallest key.
     #[inline]
     pub(super) fn peek(&self) -> Option<Key> {
-        if self.front != Key::NONE {
+        if !self.front.is_none() {
             return Some(self.front);
         }
         if self.others == 0 {
@@ -101,7 +101,7 @@ impl ReadyQueue {
     /// Puts an instance in line.
     #[inline]
     pub(super) fn insert(&mut self, key: Key) {
-        let is_empty = self.front == Key::NONE && self.others == 0;
+        let is_empty = self.front.is_none() && self.others == 0;
         if is_empty {
             self.front = key;
         } else {
@@ -115,7 +115,7 @@ impl ReadyQueue {
             return;
         }
         let earlier = core::mem::replace(&mut self.front, key);
-        if earlier != Key::NONE {
+        if !earlier.is_none() {
             self.insert_behind(earlier);
         }
     }
@@ -123,7 +123,7 @@ impl ReadyQueue {
     /// Takes the instance with the smallest key out.
     #[inline]
     pub(super) fn pop(&mut self) -> Option<Key> {
-        if self.front != Key::NONE {
+        if !self.front.is_none() {
             return Some(core::mem::replace(&mut self.front, Key::NONE));
         }
         if self.others == 0 {
