@@ -1,53 +1,140 @@
-//! The page `docs/commit-faults.md`, as the tests read it: what a commit says
-//! of each fault is compared with it word for word, on the host and in the
-//! guest, so it cannot go stale.
+//! The page `docs/errors.md`, as the tests read it: what a commit says of each
+//! fault, and the code that has the fault, are compared with it word for word, so it
+//! cannot go stale.
 //!
-//! A fault's section is headed by its name in backquotes; the first indented
-//! line in it is its text.
+//! A fault's *entry* is headed by its name in backquotes. It has a cause, the text
+//! as an indented line, a remedy, and a block of Rust, in this order.
 
 use std::collections::BTreeMap;
 use std::fs;
 
+use crate::guide::blocks;
 use crate::system;
 
-/// Reads the page: the text of each fault by the fault's name.
+/// What the page says of one fault.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// The commit's text.
+    pub text: String,
+    /// The code that has the fault.
+    pub example: String,
+}
+
+/// Reads the page: the entry of each fault by the fault's name.
 ///
 /// # Errors
 ///
-/// In words: the page cannot be read or has no sections, or one has no text.
-pub fn documented_faults() -> Result<BTreeMap<String, String>, String> {
-    let path = system::workspace().join("docs/commit-faults.md");
-    let page = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
-    read(&page)
+/// In words: the page cannot be read or has no entries, or one lacks a part.
+pub fn documented_faults() -> Result<BTreeMap<String, Entry>, String> {
+    read(&page()?)
 }
 
-fn read(page: &str) -> Result<BTreeMap<String, String>, String> {
+/// Reads the page's table of what platforms say; `...` stands for what varies.
+///
+/// # Errors
+///
+/// In words: the page cannot be read.
+pub fn launch_texts() -> Result<Vec<String>, String> {
+    let page = page()?;
+    let table = page.split("\n| platform | text |\n").nth(1).unwrap_or("");
+    let rows = table.lines().skip(1).take_while(|row| row.starts_with('|'));
+    let texts = rows.filter_map(|row| row.trim_end_matches('|').split(" | ").nth(1));
+    Ok(texts.map(|text| text.trim().to_string()).collect())
+}
+
+/// Returns the bodies of a source's functions without arguments, by their names,
+/// without the indentation.
+#[must_use]
+pub fn function_bodies(source: &str) -> BTreeMap<String, String> {
+    let mut bodies = BTreeMap::new();
+    let mut open: Option<(String, String)> = None;
+    for line in source.lines() {
+        match open.as_mut() {
+            None => {
+                let function = line.strip_prefix("pub(super) ").unwrap_or(line);
+                let name = function
+                    .strip_prefix("fn ")
+                    .filter(|rest| rest.ends_with('{'))
+                    .and_then(|rest| rest.split_once("()"));
+                open = name.map(|(name, _)| (name.into(), String::new()));
+            }
+            Some(_) if line == "}" => bodies.extend(open.take()),
+            Some((_, body)) => {
+                *body += line.strip_prefix("    ").unwrap_or(line);
+                body.push('\n');
+            }
+        }
+    }
+    bodies
+}
+
+fn page() -> Result<String, String> {
+    let path = system::workspace().join("docs/errors.md");
+    fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn read(page: &str) -> Result<BTreeMap<String, Entry>, String> {
     let sections = page.split("\n### `").skip(1);
-    let read_one = |section: &str| {
-        let (fault, rest) = section.split_once('`')?;
-        let text = rest.lines().find_map(|line| line.strip_prefix("    "))?;
-        Some((fault.to_string(), text.to_string()))
+    let named = |section: &str| {
+        let (fault, rest) = section.split_once('`').ok_or("a heading without end")?;
+        let rest = rest.split("\n## ").next().unwrap_or(rest);
+        let entry = read_entry(rest).map_err(|lack| format!("`{fault}` lacks its {lack}"))?;
+        Ok((fault.to_string(), entry))
     };
-    let named = |section| read_one(section).ok_or_else(|| format!("no text in `{section}`"));
-    let faults: BTreeMap<String, String> = sections.map(named).collect::<Result<_, _>>()?;
+    let faults: BTreeMap<String, Entry> = sections.map(named).collect::<Result<_, String>>()?;
     if faults.is_empty() {
-        return Err("the page has no section".into());
+        return Err("the page has no entry".into());
     }
     Ok(faults)
 }
 
+/// Reads what stands below an entry's heading, or says which part it lacks.
+fn read_entry(section: &str) -> Result<Entry, &'static str> {
+    let (cause, rest) = section.split_once("\n    ").ok_or("text")?;
+    let (text, rest) = rest.split_once('\n').ok_or("remedy")?;
+    let (remedy, _) = rest.split_once("```rust").ok_or("example")?;
+    if cause.trim().is_empty() {
+        return Err("cause");
+    }
+    if remedy.trim().is_empty() {
+        return Err("remedy");
+    }
+    let example = blocks(section).into_iter().next().ok_or("example")?;
+    Ok(Entry {
+        text: text.into(),
+        example: example.text,
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use super::read;
+    use super::{function_bodies, read};
+
+    const ENTRY: &str = "# Errors\n\n### `cycle`\n\nA circle.\n\n    a -> b; cut it\n\n\
+                         Cut it.\n\n```rust\nlet dag = cycle();\n```\n\n## More\n";
 
     #[test]
-    fn a_section_is_a_name_and_a_text() {
-        let faults = read("# Faults\n\n### `cycle`\n\nWords.\n\n    a -> b; cut it\n").unwrap();
-        assert_eq!(
-            faults.get("cycle").map(String::as_str),
-            Some("a -> b; cut it")
-        );
-        let error = read("\n### `cycle`\n\nWords.\n").unwrap_err();
-        assert!(error.starts_with("no text in `cycle`"), "{error}");
+    fn an_entry_has_a_cause_a_text_a_remedy_and_code() {
+        let faults = read(ENTRY).unwrap();
+        assert_eq!(faults["cycle"].text, "a -> b; cut it");
+        assert_eq!(faults["cycle"].example, "let dag = cycle();\n");
+        for (part, lack) in [
+            ("A circle.\n", "cause"),
+            ("    a -> b; cut it\n", "text"),
+            ("Cut it.\n", "remedy"),
+            ("```rust\nlet dag = cycle();\n```\n", "example"),
+        ] {
+            let error = read(&ENTRY.replace(part, "")).unwrap_err();
+            assert_eq!(error, format!("`cycle` lacks its {lack}"));
+        }
+    }
+
+    #[test]
+    fn bodies_are_those_of_functions_without_arguments() {
+        let source = "pub(super) fn a() -> u8 {\n    if true {\n        1\n    }\n}\n\
+                      fn b(x: u8) {\n    x\n}\n";
+        let bodies = function_bodies(source);
+        assert_eq!(bodies.len(), 1);
+        assert_eq!(bodies["a"], "if true {\n    1\n}\n");
     }
 }

@@ -17,7 +17,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
 use std::rc::Rc;
 use std::sync::{Mutex, PoisonError};
@@ -37,6 +37,8 @@ const LIMIT: Duration = Duration::from_secs(120);
 #[derive(Clone, Debug)]
 pub struct Guest {
     package: String,
+    /// A file to boot instead of what the package is built into.
+    image: Option<PathBuf>,
     qemu: Qemu,
     words: Vec<String>,
     limit: Duration,
@@ -51,6 +53,7 @@ impl Guest {
     pub fn new(package: &str) -> Guest {
         Guest {
             package: package.into(),
+            image: None,
             qemu: Qemu::default(),
             words: Vec::new(),
             limit: LIMIT,
@@ -90,6 +93,13 @@ impl Guest {
     #[must_use]
     pub fn word(mut self, word: &str) -> Guest {
         self.words.push(word.into());
+        self
+    }
+
+    /// Boots this file, which is not built first; the package only names it.
+    #[must_use]
+    pub fn image(mut self, file: &Path) -> Guest {
+        self.image = Some(file.into());
         self
     }
 
@@ -133,7 +143,10 @@ impl Guest {
     #[must_use]
     pub fn boot(&self) -> Outcome {
         let run = || {
-            let image = built(&self.package)?;
+            let image = match &self.image {
+                Some(file) => install::ensure_qemu().map(|()| file.clone())?,
+                None => built(&self.package)?.path,
+            };
             let log = system::new_log(&self.package)?;
             let mut qemu = self.qemu.clone();
             let mode = format!("mode={}", qemu.mode);
@@ -143,7 +156,7 @@ impl Guest {
             let input = talk.input.clone();
             let connect = |pipe| *input.borrow_mut() = pipe;
             let show = |line: &str| talk.hear(line);
-            boot_with_input(&qemu, &image.path, &log, self.limit, connect, show)
+            boot_with_input(&qemu, &image, &log, self.limit, connect, show)
         };
         run().unwrap_or_else(|error: String| panic!("`{}` did not boot: {error}", self.package))
     }

@@ -17,6 +17,7 @@
 //! - [`options`]: command lines by a table;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`guest`]: all that for a test;
+//! - [`fault_page`], [`guide`]: pages of `docs/` that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`dot`]: committed DAGs as a picture;
 //! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
@@ -35,6 +36,7 @@ pub mod dot;
 pub mod elf;
 pub mod fault_page;
 pub mod guest;
+pub mod guide;
 pub mod image;
 pub mod install;
 pub mod json;
@@ -57,3 +59,8 @@ pub mod trace;
 pub use guest::Guest;
 pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
+
+/// The guide's examples, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/guide.md")]
+mod guide_examples {}

@@ -112,17 +112,21 @@ fn write_all(folder: &Path, name: &str) -> Result<(), String> {
 }
 
 fn next_steps(name: &str) -> String {
+    let boot = format!("./scripts/run --app {name}");
+    let test = format!("cargo test -p {name}");
     format!(
         "\
 apps/{name} is there:
-  src/lib.rs              the functions and their DAG: begin here
-  src/main.rs             boots it and reports
-  tests/virtual_time.rs   runs it on the host, in virtual time
+  src/lib.rs             the functions and their DAG: begin here
+  src/main.rs            boots it and reports
+  tests/virtual_time.rs  runs it on the host, in virtual time
 
-./scripts/run --app {name}   boots it in QEMU
-cargo test -p {name}         tests it on the host
-docs/guide.md                goes on from here
-"
+{boot:width$}  boots it in QEMU
+{test:width$}  tests it on the host
+{:width$}  goes on from here
+",
+        "docs/guide.md",
+        width = boot.len()
     )
 }
 

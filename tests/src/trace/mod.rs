@@ -42,9 +42,9 @@ use figures::Figures;
 use model::Run;
 use view::View;
 
-pub use command::check_trace;
+pub use command::{CHECK_TRACE, check_trace};
 pub use read::read;
-pub use viewer::trace;
+pub use viewer::{TRACE, trace};
 
 /// What a run's trace shows.
 #[derive(Clone, Debug, PartialEq, Eq)]

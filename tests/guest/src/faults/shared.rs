@@ -3,7 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fass::{Dag, Raiser, Sample, SubtaskAttributes, Unique, create_dag};
+use fass::{Dag, Latest, Raiser, Sample, SubtaskAttributes, Unique, create_dag};
 
 use super::{PERIOD, named, sound, source};
 
@@ -73,21 +73,17 @@ pub(super) fn state_over_jobs() -> Vec<Dag> {
     vec![dag]
 }
 
-/// A second DAG that samples a topic of the first, if it does.
-pub(super) fn latest(topic: &str, samples: bool) -> Vec<Dag> {
+pub(super) fn latest_unwritten() -> Vec<Dag> {
     let lidar = sound("lidar", "points");
-    let latest = lidar.latest::<u32>(topic);
-    if !samples {
-        return vec![lidar];
-    }
-    let planner = named("planner");
-    planner.relative_deadline(PERIOD);
-    let plan = |_: Option<Sample<'_, u32>>| ();
-    let attributes = SubtaskAttributes::named("plan");
-    planner
-        .using(latest.sample())
-        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+    let pose = lidar.latest::<u32>("pose");
+    let planner = planner(&pose);
     vec![lidar, planner]
+}
+
+pub(super) fn latest_unread() -> Vec<Dag> {
+    let lidar = sound("lidar", "points");
+    let _ = lidar.latest::<u32>("points");
+    vec![lidar]
 }
 
 pub(super) fn latest_type_mismatch() -> Vec<Dag> {
@@ -124,9 +120,9 @@ pub(super) fn latest_of_moved() -> Vec<Dag> {
 }
 
 pub(super) fn latest_not_committed() -> Vec<Dag> {
-    let mut dags = latest("points", true);
-    dags.remove(0);
-    dags
+    let lidar = sound("lidar", "points");
+    let points = lidar.latest::<u32>("points");
+    vec![planner(&points)] // without `lidar`
 }
 
 pub(super) fn signal_not_committed() -> Vec<Dag> {
@@ -138,4 +134,16 @@ pub(super) fn signal_not_committed() -> Vec<Dag> {
     dag.using(alarm.raising())
         .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
     vec![dag]
+}
+
+/// A DAG of one subtask, which samples.
+fn planner(latest: &Latest<u32>) -> Dag {
+    let planner = named("planner");
+    planner.relative_deadline(PERIOD);
+    let plan = |_: Option<Sample<'_, u32>>| ();
+    let attributes = SubtaskAttributes::named("plan");
+    planner
+        .using(latest.sample())
+        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+    planner
 }

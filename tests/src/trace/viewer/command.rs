@@ -8,7 +8,7 @@ use crate::options::{Command, Opt, Parsed, Request, Takes};
 use crate::trace::command::read_file;
 
 /// The table of `trace`.
-static TRACE: Command = Command {
+pub static TRACE: Command = Command {
     invocation: "./scripts/trace",
     about: "Converts the traces of runs for Perfetto's viewer.",
     positional: Some((

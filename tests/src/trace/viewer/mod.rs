@@ -44,7 +44,7 @@ use crate::json::Object;
 use flows::Flows;
 use output::Output;
 
-pub use command::trace;
+pub use command::{TRACE, trace};
 
 /// Returns runs as one text of JSON. Breaches are looked for with `bound_ns`, as
 /// [`check`] does.

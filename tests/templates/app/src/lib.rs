@@ -22,7 +22,7 @@ pub const PERIOD: Duration = Duration::from_millis(10);
 pub fn build(jobs: u64) -> Dag {
     let dag = create_dag();
     dag.name("app-template").jobs(jobs);
-    let mut distance = 100;
+    let mut distance = 100_u32;
     let sense = move || {
         work(800);
         distance -= 1; // a function may keep what it alone needs

@@ -1,0 +1,91 @@
+//! The page `docs/guide.md`, as the tests read it.
+//!
+//! A tutorial that does not work is worse than none, so nothing in it goes
+//! unchecked:
+//!
+//! - its Rust is this crate's doctests (see `lib.rs`), each compiled and run;
+//! - its commands are parsed by the tables of the scripts that they name;
+//! - what it says a new app prints is compared with a boot of one;
+//! - a block of any other kind is refused, as is Rust that would not be tested.
+//!
+//! A *block* is what stands between two fences; its *info* is what the first fence
+//! says of it, such as `rust` or `text output-new-app`.
+
+use std::fs;
+
+use crate::system;
+
+/// A block of a page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// What the opening fence says.
+    pub info: String,
+    /// Its lines, each with its newline.
+    pub text: String,
+}
+
+/// Takes the blocks out of a page.
+#[must_use]
+pub fn blocks(page: &str) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    let mut open: Option<Block> = None;
+    for line in page.lines() {
+        match (line.strip_prefix("```"), open.as_mut()) {
+            (Some(_), Some(_)) => blocks.extend(open.take()),
+            (Some(info), None) => {
+                open = Some(Block {
+                    info: info.into(),
+                    text: String::new(),
+                });
+            }
+            (None, Some(block)) => block.text += &format!("{line}\n"),
+            (None, None) => {}
+        }
+    }
+    // A fence without end would hide the rest of the page.
+    blocks.extend(open);
+    blocks
+}
+
+/// Reads the guide.
+///
+/// # Errors
+///
+/// In words: the page cannot be read.
+pub fn read() -> Result<String, String> {
+    let path = system::workspace().join("docs/guide.md");
+    fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+/// Returns the output that the guide shows under a name.
+///
+/// # Errors
+///
+/// In words: the page cannot be read, or has no such block.
+pub fn documented_output(name: &str) -> Result<String, String> {
+    let info = format!("text output-{name}");
+    let mut blocks = blocks(&read()?).into_iter();
+    let found = blocks.find(|block| block.info == info);
+    found
+        .map(|block| block.text)
+        .ok_or_else(|| format!("docs/guide.md has no block `{info}`"))
+}
+
+/// Replaces each number by `N`: what stays the same when the code becomes faster.
+#[must_use]
+pub fn without_numbers(line: &str) -> String {
+    let mut text = String::new();
+    for character in line.chars() {
+        let in_number = text.ends_with('N');
+        match character {
+            '0'..='9' if in_number => {}
+            '0'..='9' => text.push('N'),
+            '.' if in_number => {}
+            _ => text.push(character),
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests;

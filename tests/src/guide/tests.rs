@@ -1,0 +1,134 @@
+//! The guide holds what it promises; the README's index of pages is complete.
+
+use std::fs;
+
+use super::{Block, blocks, read, without_numbers};
+use crate::new_app::NEW_APP;
+use crate::options::{Command, Request};
+use crate::run::RUN;
+use crate::system::workspace;
+use crate::test::TEST;
+use crate::trace::{CHECK_TRACE, TRACE};
+
+/// The scripts that the guide may name.
+const COMMANDS: [&Command; 5] = [&RUN, &TEST, &NEW_APP, &CHECK_TRACE, &TRACE];
+
+fn guide() -> Vec<Block> {
+    blocks(&read().expect("the page"))
+}
+
+#[test]
+fn every_block_is_of_a_kind_that_is_checked() {
+    let mut examples = 0;
+    for Block { info, text } in guide() {
+        match info.as_str() {
+            // Doctests; `rust,no_run` is for what only the machine can run.
+            "rust" | "rust,no_run" => examples += 1,
+            "console" | "cpp" | "text diagnostic" => {}
+            output if output.starts_with("text output-") => {}
+            other => panic!("a block of the kind `{other}` is checked by nobody:\n{text}"),
+        }
+    }
+    assert!(examples >= 9, "{examples} examples are left");
+    // The line by which the examples become tests.
+    let library = fs::read_to_string(workspace().join("tests/src/lib.rs")).expect("the library");
+    assert!(library.contains("#[doc = include_str!(\"../../docs/guide.md\")]"));
+}
+
+#[test]
+fn every_command_is_one_that_its_script_accepts() {
+    let mut commands = 0;
+    let consoles = guide().into_iter().filter(|block| block.info == "console");
+    for line in consoles.flat_map(|block| {
+        let lines = block.text.lines().map(String::from);
+        lines.collect::<Vec<_>>()
+    }) {
+        let words = line
+            .strip_prefix("$ ")
+            .expect("a console shows commands only");
+        let mut words = words.split(' ').map(String::from);
+        let script = words.next().unwrap_or_default();
+        let command = COMMANDS
+            .iter()
+            .find(|command| command.invocation == script)
+            .unwrap_or_else(|| panic!("`{script}` is no script that the guide may name"));
+        assert!(workspace().join(&script).is_file(), "{script}");
+        let parsed = command.parse(&words.collect::<Vec<_>>());
+        assert!(matches!(parsed, Ok(Request::Work(_))), "{line}: {parsed:?}");
+        commands += 1;
+    }
+    assert!(commands >= 8, "{commands} commands are left");
+}
+
+#[test]
+fn what_it_says_of_the_compiler_is_what_the_compilers_test_expects() {
+    let test = workspace().join("fass/tests/diagnostics.rs");
+    let test = fs::read_to_string(test).expect("the test");
+    let said = guide()
+        .into_iter()
+        .filter(|block| block.info == "text diagnostic");
+    let mut lines = 0;
+    for line in said.flat_map(|block| {
+        let lines = block.text.lines().map(String::from);
+        lines.collect::<Vec<_>>()
+    }) {
+        assert!(test.contains(&line), "no test expects `{line}`");
+        lines += 1;
+    }
+    assert_eq!(lines, 1);
+}
+
+#[test]
+fn the_readme_lists_every_page() {
+    let readme = fs::read_to_string(workspace().join("README.md")).expect("the page");
+    let index = readme.split("\n## More\n").nth(1).expect("the index");
+    let pages = fs::read_dir(workspace().join("docs")).expect("the pages");
+    let mut found = 0;
+    for page in pages.flatten() {
+        let name = page.file_name().to_string_lossy().into_owned();
+        assert!(
+            index.contains(&format!("(docs/{name})")),
+            "the README's list of pages lacks docs/{name}"
+        );
+        found += 1;
+    }
+    assert!(found > 5);
+}
+
+#[test]
+fn every_link_between_pages_leads_somewhere() {
+    let docs = workspace().join("docs");
+    let mut pages = vec![workspace().join("README.md")];
+    let entries = fs::read_dir(&docs).expect("the pages").flatten();
+    let decisions = fs::read_dir(docs.join("decisions"))
+        .expect("the decisions")
+        .flatten();
+    let all = entries.chain(decisions).map(|entry| entry.path());
+    pages.extend(all.filter(|path| path.is_file()));
+    for page in pages {
+        let text = fs::read_to_string(&page).expect("the page");
+        for link in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split(')').next())
+        {
+            let target = link.split('#').next().unwrap_or_default();
+            if target.is_empty() || target.contains("://") || target.contains(' ') {
+                continue;
+            }
+            let path = page.parent().expect("a folder").join(target);
+            assert!(path.exists(), "{}: `{link}` leads nowhere", page.display());
+        }
+    }
+}
+
+#[test]
+fn blocks_are_read_and_numbers_are_left_out() {
+    let page = "# A\n```rust\nlet a = 1;\n```\nwords\n```text x-y\nb\n```\n";
+    let expected = [("rust", "let a = 1;\n"), ("text x-y", "b\n")].map(|(info, text)| Block {
+        info: info.into(),
+        text: text.into(),
+    });
+    assert_eq!(blocks(page), expected);
+    assert_eq!(without_numbers("at most 4.805 ms, 12"), "at most N ms, N");
+}

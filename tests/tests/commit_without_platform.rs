@@ -1,0 +1,30 @@
+//! The one fault that needs a program without a platform, as the page
+//! `docs/errors.md` shows it. The only test of its program, because an installed
+//! platform cannot be removed.
+
+use std::time::Duration;
+
+use fass::{CommitError, SubtaskAttributes, create_dag, finish_create_dags};
+use harness::fault_page::documented_faults;
+
+fn no_platform() -> Result<fass::Commit, CommitError> {
+    // No `VirtualTime::new()` before this.
+    let dag = create_dag();
+    let period = Duration::from_millis(10);
+    let read = SubtaskAttributes::named("read");
+    dag.register_periodic_subtask(|| (1_u32,), vec!["points"], period, read);
+    let store = SubtaskAttributes::named("store");
+    dag.register_sink_subtask(|(_,): (u32,)| (), vec!["points"], period, store);
+    finish_create_dags(&[dag])
+}
+
+#[test]
+fn a_commit_without_platform_is_refused_as_documented() {
+    let error = no_platform().expect_err("there is none");
+    assert_eq!(error.faults()[0].code(), "no_platform");
+    let documented = documented_faults().expect("the page");
+    assert_eq!(
+        Some(&error.to_string()),
+        documented.get("no_platform").map(|entry| &entry.text)
+    );
+}
