@@ -126,6 +126,21 @@ impl Body {
         }
     }
 
+    /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
+    /// platform to which a clock is dear need not read it for the others.
+    ///
+    /// ```
+    /// fn completed(body: &mut fass::Body, raise: &mut dyn FnMut(sched_dag::DagId)) {
+    ///     if body.has_effects() {
+    ///         body.complete(fass::now_ns(), raise);
+    ///     }
+    /// }
+    /// ```
+    #[must_use]
+    pub fn has_effects(&self) -> bool {
+        !self.effects.is_empty()
+    }
+
     /// Drops the inputs of job `job` that have arrived, instead of running it.
     ///
     /// To be called for an instance that will not run, once no predecessor of

@@ -23,7 +23,7 @@ pub(crate) fn run<B: Execute, W: Watch>(
             let body = &mut bodies[vertex.index()];
             body.run(job);
             now_ns += W::STEP_NS;
-            body.complete(now_ns, &mut |dag| signals.push(dag));
+            body.complete(&mut |dag| signals.push(dag));
             if W::STEP_NS > 0 {
                 watch.instant(now_ns);
                 watch.finished(scheduler.instance_of(vertex), CORE);

@@ -42,7 +42,6 @@ mod run;
 mod team;
 mod watch;
 
-pub use execute::Execute;
 pub use pin::{Pinning, processors};
 pub use platform::Native;
 pub use run::{Closure, Recorded, Report, Setting, run, run_recorded, worker};

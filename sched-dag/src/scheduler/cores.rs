@@ -66,6 +66,17 @@ impl Cores {
         self.idle.pop()
     }
 
+    /// Takes a core from the idle ones, which the caller gives an instance or frees.
+    ///
+    /// # Panics
+    ///
+    /// If it is not idle.
+    pub(super) fn take_this(&mut self, core: CoreId) {
+        let place = self.idle.iter().rposition(|&idle| idle == core);
+        let place = place.expect("the core that is to go on has to be idle");
+        self.idle.remove(place);
+    }
+
     /// Gives a core, which is not among the idle ones, an instance.
     #[inline]
     pub(super) fn run(&mut self, core: CoreId, key: Key, may_be_preempted: bool) {

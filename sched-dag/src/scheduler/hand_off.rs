@@ -54,24 +54,72 @@ impl Scheduler {
         vertex: Vertex,
         observer: &mut impl Observer,
     ) -> HandOff {
-        self.now_ns = self.now_ns.max(now_ns);
-        // Otherwise a dispatch is owed from before, or the instance was to move.
-        let is_short = self.fresh == 0 && self.vertices.get(vertex.0).phase == Phase::Running(core);
-        if !is_short {
-            self.finish(self.instance_of(vertex), observer);
+        if !self.ends_shortly(now_ns, core, vertex, observer) {
             return HandOff::Open;
         }
-        self.end(vertex.0, observer);
-        if !self.concerns_one_core() {
-            self.cores.free(core);
-            return HandOff::Open;
-        }
-        self.fresh = 0;
         let Some(key) = self.ready.pop() else {
             self.cores.free(core);
             return HandOff::Idle;
         };
         HandOff::To(Vertex(key.vertex()), self.give(core, key))
+    }
+
+    /// Does the same on behalf of another core: the instance has finished on
+    /// `core`, and what is first in line is for `idle`, which waits for work.
+    ///
+    /// For drivers whose idle cores look after those that compute: the one that has
+    /// the scheduler in its cache goes on. If nothing is in line, both are idle, and
+    /// `idle` stays the first to be given something.
+    ///
+    /// # Panics
+    ///
+    /// As [`hand_off`](Self::hand_off); if `idle` is not idle.
+    #[inline]
+    pub fn hand_over(
+        &mut self,
+        now_ns: u64,
+        core: CoreId,
+        vertex: Vertex,
+        idle: CoreId,
+        observer: &mut impl Observer,
+    ) -> HandOff {
+        if !self.ends_shortly(now_ns, core, vertex, observer) {
+            return HandOff::Open;
+        }
+        self.cores.take_this(idle);
+        self.cores.free(core);
+        let Some(key) = self.ready.pop() else {
+            self.cores.free(idle);
+            return HandOff::Idle;
+        };
+        HandOff::To(Vertex(key.vertex()), self.give(idle, key))
+    }
+
+    /// Ends an instance, and reports whether one core is all there is to it: then
+    /// that core is neither idle nor has it anything else to do yet. Otherwise it is
+    /// idle.
+    #[inline(always)]
+    fn ends_shortly(
+        &mut self,
+        now_ns: u64,
+        core: CoreId,
+        vertex: Vertex,
+        observer: &mut impl Observer,
+    ) -> bool {
+        self.now_ns = self.now_ns.max(now_ns);
+        // Otherwise a dispatch is owed from before, or the instance was to move.
+        let is_short = self.fresh == 0 && self.vertices.get(vertex.0).phase == Phase::Running(core);
+        if !is_short {
+            self.finish(self.instance_of(vertex), observer);
+            return false;
+        }
+        self.end(vertex.0, observer);
+        if !self.concerns_one_core() {
+            self.cores.free(core);
+            return false;
+        }
+        self.fresh = 0;
+        true
     }
 
     /// Reports whether the instant can end with a hand-off.
