@@ -52,16 +52,33 @@ pub fn test(words: &[String]) -> ExitCode {
     libtest::run_all(&plan, &mut tally);
     checks::run_all(&plan, &mut tally);
 
-    print!("{tally}");
+    // A filter without a match ends in the complaint alone: `0 passed, 0 failed`
+    // would look like success.
+    if !tally.is_empty() {
+        print!("{tally}");
+    }
+    match complaint(plan.filter.as_deref(), &tally) {
+        Some(line) => {
+            eprintln!("test: {line}");
+            ExitCode::from(2)
+        }
+        None if tally.failed() > 0 => ExitCode::FAILURE,
+        None => ExitCode::SUCCESS,
+    }
+}
+
+/// Says what is wrong with a filter by which nothing has run.
+fn complaint(filter: Option<&str>, tally: &Tally) -> Option<String> {
+    let filter = filter.filter(|_| !tally.has_run())?;
     if tally.is_empty() {
-        let filter = plan.filter.unwrap_or_default();
-        eprintln!("test: nothing is called `{filter}`; give a part of a test's name");
-        return ExitCode::from(2);
+        return Some(format!(
+            "no test or check has `{filter}` in its name; give a part of a name, as \
+             `./scripts/test --verbose` shows them"
+        ));
     }
-    if tally.failed() > 0 {
-        return ExitCode::FAILURE;
-    }
-    ExitCode::SUCCESS
+    Some(format!(
+        "all that has `{filter}` in its name was skipped, for the reasons above"
+    ))
 }
 
 /// Builds the images before the tests that boot them, so that their limits do
@@ -76,5 +93,29 @@ fn build_images(plan: &Plan, tally: &mut Tally) {
             let built = image::build(&app);
             tally.add(&name, built.map(|_| ()).map_err(|error| error.to_string()));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Tally, complaint};
+
+    #[test]
+    fn a_filter_by_which_nothing_has_run_is_named() {
+        let mut tally = Tally::default();
+        let line = complaint(Some("frobnicate"), &tally).unwrap();
+        assert!(
+            line.starts_with("no test or check has `frobnicate` in its name; "),
+            "{line}"
+        );
+        tally.skip("boot_x", "left out by --quick");
+        let line = complaint(Some("boot"), &tally).unwrap();
+        assert_eq!(
+            line,
+            "all that has `boot` in its name was skipped, for the reasons above"
+        );
+        assert_eq!(complaint(None, &tally), None);
+        tally.fail("a", "b");
+        assert_eq!(complaint(Some("boot"), &tally), None);
     }
 }

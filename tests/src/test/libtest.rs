@@ -48,18 +48,34 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     }
     for binary in binaries {
         let name = binary.name();
-        if binary.boots_guests() && plan.quick {
-            tally.skip(&name, "left out by --quick");
-        } else if binary.boots_guests()
-            && let Err(why) = &plan.boots
-        {
-            tally.skip(&name, why);
-        } else {
-            run_binary(plan, &binary, tally);
+        let skipped = match &plan.boots {
+            _ if !binary.boots_guests() => None,
+            _ if plan.quick => Some("left out by --quick"),
+            Err(why) => Some(why.as_str()),
+            Ok(()) => None,
+        };
+        match skipped {
+            Some(why) if has_matches(plan, &binary) => tally.skip(&name, why),
+            Some(_) => {}
+            None => run_binary(plan, &binary, tally),
         }
     }
     if !plan.quick {
         run_doctests(plan, tally);
+    }
+}
+
+/// Whether a binary that is not run has tests that the filter wants. One that
+/// cannot say so counts as if it had.
+fn has_matches(plan: &Plan, binary: &TestBinary) -> bool {
+    let Some(filter) = &plan.filter else {
+        return true;
+    };
+    let mut command = bound_to_us(&binary.executable);
+    let listed = command.args(["--list", "--format=terse"]).arg(filter);
+    match listed.stdin(Stdio::null()).stderr(Stdio::null()).output() {
+        Ok(output) if output.status.success() => !output.stdout.is_empty(),
+        _ => true,
     }
 }
 

@@ -30,6 +30,7 @@ pub static TEST: Command = Command {
 The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
 the reasons above it.
 
-exit codes: 0 nothing failed; 1 something failed; 2 a refused command line
+exit codes: 0 nothing failed; 1 something failed; 2 a refused command line, or
+a FILTER by which nothing has run
 ",
 };

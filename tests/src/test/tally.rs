@@ -47,10 +47,16 @@ impl Tally {
         self.failures.len()
     }
 
+    /// Returns whether anything passed or failed, rather than being skipped.
+    #[must_use]
+    pub fn has_run(&self) -> bool {
+        self.passed > 0 || !self.failures.is_empty()
+    }
+
     /// Returns whether nothing was counted at all.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.passed == 0 && self.failures.is_empty() && self.skips.is_empty()
+        !self.has_run() && self.skips.is_empty()
     }
 }
 
