@@ -12,7 +12,7 @@
 //! - They take `&mut self` where the figure takes `&self`: each end of an edge
 //!   then has one user at a time by the borrow checker's word, and needs no lock.
 //!
-//! One macro, [`for_each_arity`], counts from 0 to 16 and implements all four
+//! One macro, `for_each_arity`, counts from 0 to 16 and implements all four
 //! traits for each arity. Apps never call these traits; they meet them in the
 //! bounds of [`Dag::register_subtask`](crate::Dag::register_subtask) and in the
 //! compiler's messages, which speak our words. The futures exist only inside a

@@ -91,7 +91,7 @@ impl Dag {
     /// Begins the registration of a subtask that uses something beside its inputs.
     ///
     /// See [`Uses`] for what there is, and [`State`](crate::State),
-    /// [`Latest`](crate::Latest) and [`Signal`](crate::Signal) for examples.
+    /// [`Latest`](crate::Latest) and [`Signal`] for examples.
     ///
     /// # Panics
     ///

@@ -57,7 +57,7 @@
 //! # The parts, in the order of their use
 //!
 //! 1. [`DagSpec`]: what an app states. It may be wrong in every way.
-//! 2. [`verify`]: finds every fault at once, and makes the [`TaskSet`], which
+//! 2. [`verify()`]: finds every fault at once, and makes the [`TaskSet`], which
 //!    has none.
 //! 3. [`analysis`]: bounds on response times, if WCETs are known.
 //! 4. [`Scheduler`]: the rules as a pure state machine. Whoever drives it tells

@@ -10,7 +10,7 @@
 //! that the path's number of subtasks decides: to mix known and invented times
 //! would favour whatever happened to be measured.
 //!
-//! Between DAGs, [`verify`](crate::verify) gives derived priorities deadline
+//! Between DAGs, [`verify`](crate::verify()) gives derived priorities deadline
 //! monotonically: all subtasks of the DAG with the shorter relative deadline
 //! come before all of the other (then the order of the commit), which is the
 //! order that the fixed-priority tests assume. Where some DAGs have priorities

@@ -1,6 +1,6 @@
 //! Analysis at commit: will every job meet its deadline?
 //!
-//! [`answer`] gives each DAG of a commit a *bound*: no job of it ever takes
+//! [`answer()`] gives each DAG of a commit a *bound*: no job of it ever takes
 //! longer from its nominal release to its last finish, whatever the offsets,
 //! with any execution times up to the WCETs. All tests here are *sufficient*:
 //! a DAG without a bound is "not proven", which is not "infeasible". Refusing
@@ -29,7 +29,7 @@
 //!
 //! Each module cites its paper and states its assumptions and the traps that it
 //! avoids. The functions for single tests take [`Task`]s in priority order and
-//! stand for themselves; [`answer`] knows which of them apply.
+//! stand for themselves; [`answer()`] knows which of them apply.
 //!
 //! # Words
 //!

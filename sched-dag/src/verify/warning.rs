@@ -33,7 +33,7 @@ pub enum Warning {
     /// Two DAGs with one name.
     DuplicateDagName { first: DagLabel, second: DagLabel },
     /// The analysis is certain that the DAG cannot keep its deadlines when
-    /// every instance takes its WCET. Not from [`verify`](crate::verify), which
+    /// every instance takes its WCET. Not from [`verify`](crate::verify()), which
     /// does not analyse, but from whoever does.
     CertainMiss {
         dag: DagLabel,

@@ -4,8 +4,8 @@
 //!
 //! - [`rd_gen`]: RD-Gen's YAML, by [`yaml`], with several rates split by [`rates`];
 //! - [`stg`]: task graphs with published makespans, from JSON;
-//! - [`load`]: whichever of them a file is, checked as the commit will check it;
-//! - [`prepare`]: what `./scripts/run --dag FILE` boots;
+//! - [`load()`]: whichever of them a file is, checked as the commit will check it;
+//! - [`prepare()`]: what `./scripts/run --dag FILE` boots;
 //! - [`batch`]: a folder of files, one boot each, in one table.
 //!
 //! Every message about a file begins `FILE:LINE:`.

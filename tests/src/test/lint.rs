@@ -17,6 +17,10 @@ pub(super) const CHECKS: &[Check] = &[
     ("rustdoc has nothing to say", || {
         cargo(&["doc", "--quiet", "--workspace", "--no-deps"], "see above")
     }),
+    ("rustdoc has nothing to say of private items", || {
+        let words = "doc --quiet --workspace --no-deps --document-private-items";
+        cargo(&words.split(' ').collect::<Vec<_>>(), "see above")
+    }),
 ];
 
 /// Runs cargo; whatever it says goes to the terminal only if it fails.

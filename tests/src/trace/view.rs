@@ -12,7 +12,7 @@
 //! event that is not there.
 //!
 //! Events of one instant are in the order of their ring, but nothing says how
-//! those of different rings follow each other; [`history`](super::history)
+//! those of different rings follow each other; [`history`]
 //! deals with that.
 
 use std::collections::{BTreeMap, BTreeSet};

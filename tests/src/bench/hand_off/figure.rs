@@ -79,7 +79,7 @@ impl Figure {
         })
     }
 
-    /// Reads a figure as [`json`](Self::json) writes it.
+    /// Reads a figure as `json` writes it.
     pub(super) fn from_json(value: &Value) -> Option<Figure> {
         let text = |name| value.get(name)?.as_text().map(String::from);
         let number = |name| value.get(name)?.as_u64();

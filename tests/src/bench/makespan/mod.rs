@@ -11,7 +11,7 @@
 //! longer than 2 - 1/m times that (R. L. Graham, SIAM J. Appl. Math. 17, 1969,
 //! doi 10.1137/0117039). Either is a limit: breaking it is a failure.
 //!
-//! - [`measure`]: boots, one a number of cores, with all graphs;
+//! - [`measure()`]: boots, one a number of cores, with all graphs;
 //! - `report`: tables and files of them.
 
 mod measure;
