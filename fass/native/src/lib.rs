@@ -27,7 +27,7 @@
 //! - Nothing is preempted: a host's thread cannot give up a function in its middle.
 //!   Each subtask is non-preemptive.
 //! - The host may take a worker's processor away at any time. Workers that wait poll;
-//!   after two thousand rounds they yield, in case there are fewer processors.
+//!   after some thousand rounds they yield, in case there are fewer processors.
 //! - A panic in a function ends the run with that panic. It does not end one DAG.
 #![forbid(unsafe_code)]
 

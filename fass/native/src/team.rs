@@ -17,6 +17,13 @@
 //!
 //! A post is taken note of exactly once, by whoever has the lock: a server, or the
 //! worker itself, which tries the lock as long as nobody serves.
+//!
+//! # The order of a server's last steps
+//!
+//! It has seen a post, and has something to run. An atomic exchange has to wait until
+//! all stores before it have arrived, also those to lines that another processor reads
+//! right now. So the exchanges come first (the body's lock, the scheduler's), and then
+//! the stores that others wait for: they leave while the body runs.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
@@ -24,7 +31,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use sched_dag::{CoreId, Decision, HandOff, Instance, Scheduler, Vertex};
 
 use crate::execute::Execute;
-use crate::mailbox::{Assignment, Mail, Mailbox};
+use crate::mailbox::{Assignment, Mailbox, Post};
 use crate::relax::poll;
 use crate::watch::Watch;
 
@@ -55,6 +62,8 @@ struct State<W> {
     now_ns: u64,
     /// How many workers have an instance.
     busy: u32,
+    /// By worker, the turn of its latest post that was taken note of.
+    noted: Box<[u32]>,
     /// A copy of the last dispatch, to be carried out.
     decisions: Vec<Decision>,
 }
@@ -72,6 +81,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
                 watch,
                 now_ns: 0,
                 busy: 0,
+                noted: vec![0; cores].into_boxed_slice(),
                 decisions: Vec::with_capacity(2 * cores),
             })),
             is_serving: Pair(AtomicBool::new(false)),
@@ -89,78 +99,120 @@ impl<B: Execute, W: Watch> Team<B, W> {
     /// Works until all jobs have ended. Worker 0 begins.
     pub(crate) fn work(&self, core: CoreId) {
         let _over = OverOnPanic(&self.is_over.0);
+        let mut me = Me {
+            core,
+            posted: None,
+            assigned: 0,
+        };
         let mut next = None;
         if core == CoreId(0)
             && let Some(mut state) = self.try_lock()
         {
-            next = self.proceed(&mut state, core);
+            let own = self.proceed(&mut state, core);
+            next = own.map(|assignment| self.begin(assignment));
         }
-        loop {
-            let Some(Assignment { vertex, job }) = next.take().or_else(|| self.wait(core)) else {
-                return;
-            };
-            let body = &self.bodies[vertex.index()].0;
-            let mut body = body.lock().unwrap_or_else(PoisonError::into_inner);
-            body.run(job);
+        while let Some(mut running) = next.take().or_else(|| self.wait(&mut me)) {
+            running.body.run(running.job);
             let mut has_signals = false;
             let mailbox = &self.mailboxes[core.index()];
-            body.complete(&mut |dag| {
+            running.body.complete(&mut |dag| {
                 has_signals = true;
                 mailbox.signals().push(dag);
             });
-            drop(body);
-            mailbox.post(vertex, has_signals);
+            drop(running.body);
+            me.posted = Some(mailbox.post(running.vertex, has_signals));
+        }
+    }
+
+    /// Takes what an assignment needs.
+    #[inline]
+    fn begin(&self, assignment: Assignment) -> Running<'_, B> {
+        let Assignment { vertex, job } = assignment;
+        let body = self.bodies[vertex.index()].0.lock();
+        Running {
+            vertex,
+            job,
+            body: body.unwrap_or_else(PoisonError::into_inner),
         }
     }
 
     /// Waits for the next instance of this worker, and sees to it that its post is
     /// taken note of; `None` at the end.
     #[inline]
-    fn wait(&self, core: CoreId) -> Option<Assignment> {
-        let mailbox = &self.mailboxes[core.index()];
-        poll(|| match mailbox.read() {
-            Mail::Assigned(assignment) => {
-                mailbox.clear();
-                Some(Some(assignment))
+    fn wait(&self, me: &mut Me) -> Option<Running<'_, B>> {
+        let mailbox = &self.mailboxes[me.core.index()];
+        poll(|| {
+            if let Some(turn) = me.posted
+                && !self.is_serving.0.load(Ordering::Relaxed)
+            {
+                if mailbox.is_hinted(turn) {
+                    me.posted = None;
+                } else if let Some(state) = self.try_lock() {
+                    me.posted = None;
+                    if let Some(own) = self.step(state, me.core, turn) {
+                        return Some(Some(own));
+                    }
+                }
             }
-            Mail::Posted(..) if !self.is_serving.0.load(Ordering::Relaxed) => self
-                .try_lock()
-                .and_then(|state| self.step(state, core).map(Some)),
-            _ => self.is_over.0.load(Ordering::Acquire).then_some(None),
+            if let Some(assignment) = mailbox.assigned_after(&mut me.assigned) {
+                me.posted = None;
+                return Some(Some(self.begin(assignment)));
+            }
+            self.is_over.0.load(Ordering::Acquire).then_some(None)
         })
     }
 
     /// Takes note of the worker's own post, if nobody has done so meanwhile, and then
     /// serves, if it has nothing else to do. Returns what it runs next.
     #[inline]
-    fn step(&self, mut state: MutexGuard<'_, State<W>>, core: CoreId) -> Option<Assignment> {
-        let Mail::Posted(vertex, has_signals) = self.mailboxes[core.index()].read() else {
+    fn step<'a>(
+        &'a self,
+        mut state: MutexGuard<'a, State<W>>,
+        core: CoreId,
+        turn: u32,
+    ) -> Option<Running<'a, B>> {
+        if state.noted[core.index()] == turn {
             return None;
-        };
-        let next = self.take_note(&mut state, core, (core, vertex, has_signals));
-        if next.is_some() || state.busy == 0 {
-            return next;
         }
-        self.serve(&mut state, core)
+        let post = self.mailboxes[core.index()].posted();
+        match self.take_note(&mut state, core, core, post) {
+            Some(own) => Some(self.begin(own)),
+            None if state.busy > 0 => self.serve(state, core),
+            None => None,
+        }
     }
 
     /// Takes note of the others' posts until this worker has something to run, or
     /// nobody else has.
-    fn serve(&self, state: &mut State<W>, core: CoreId) -> Option<Assignment> {
+    fn serve<'a>(
+        &'a self,
+        mut state: MutexGuard<'a, State<W>>,
+        core: CoreId,
+    ) -> Option<Running<'a, B>> {
         self.is_serving.0.store(true, Ordering::Relaxed);
-        let next = poll(|| {
+        for other in (0..).map(CoreId).take(self.mailboxes.len()) {
+            state.scheduler.anticipate(other);
+        }
+        let last = poll(|| {
             for (other, mailbox) in (0..).map(CoreId).zip(&self.mailboxes) {
-                if let Mail::Posted(vertex, has_signals) = mailbox.read() {
-                    let next = self.take_note(state, core, (other, vertex, has_signals));
-                    if next.is_some() || state.busy == 0 {
-                        return Some(next);
-                    }
+                let post = mailbox.posted();
+                if post.turn == state.noted[other.index()] {
+                    continue;
                 }
+                let own = self.take_note(&mut state, core, other, post);
+                if own.is_some() || state.busy == 0 {
+                    return Some(Some((own, mailbox, post.turn)));
+                }
+                mailbox.hint(post.turn);
             }
             self.is_over.0.load(Ordering::Relaxed).then_some(None)
         });
+        let (own, mailbox, turn) = last?;
+        let own = own.map(|own| self.begin(own));
+        drop(state);
+        mailbox.hint(turn);
         self.is_serving.0.store(false, Ordering::Relaxed);
-        next
+        own
     }
 
     /// Takes note that a worker has finished an instance. Returns what `here`, which
@@ -170,10 +222,11 @@ impl<B: Execute, W: Watch> Team<B, W> {
         &self,
         state: &mut State<W>,
         here: CoreId,
-        (core, vertex, has_signals): (CoreId, Vertex, bool),
+        core: CoreId,
+        post: Post,
     ) -> Option<Assignment> {
-        let mailbox = &self.mailboxes[core.index()];
-        mailbox.clear();
+        let vertex = post.vertex;
+        state.noted[core.index()] = post.turn;
         state.busy -= 1;
         if W::STEP_NS > 0 {
             state.now_ns += W::STEP_NS;
@@ -187,11 +240,11 @@ impl<B: Execute, W: Watch> Team<B, W> {
             now_ns,
             ..
         } = state;
-        if has_signals {
+        if post.has_signals {
             let instance = scheduler.instance_of(vertex);
             let mut moment = scheduler.at(*now_ns);
             moment.complete(instance, watch);
-            for dag in mailbox.signals().drain(..) {
+            for dag in self.mailboxes[core.index()].signals().drain(..) {
                 moment.signal(dag, watch);
             }
             return self.proceed(state, here);
@@ -266,6 +319,22 @@ impl<W: Watch> State<W> {
             job: instance.job,
         }
     }
+}
+
+/// What a worker knows.
+struct Me {
+    core: CoreId,
+    /// The turn of its post, if it may be that nobody has taken note of that.
+    posted: Option<u32>,
+    /// The turn of the latest assignment that it has seen.
+    assigned: u32,
+}
+
+/// An instance that a worker runs.
+struct Running<'a, B> {
+    vertex: Vertex,
+    job: u64,
+    body: MutexGuard<'a, B>,
 }
 
 /// Sends all workers home if one panics.

@@ -95,6 +95,19 @@ impl Scheduler {
         HandOff::To(Vertex(key.vertex()), self.give(idle, key))
     }
 
+    /// Fetches into this processor's cache what the completion of the instance on
+    /// `core` will write, and changes nothing. For a driver that waits for that
+    /// completion, and has nothing better to do.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such core.
+    pub fn anticipate(&mut self, core: CoreId) {
+        if let Some(key) = self.cores.running(core) {
+            self.vertices.touch(key.vertex());
+        }
+    }
+
     /// Ends an instance, and reports whether one core is all there is to it: then
     /// that core is neither idle nor has it anything else to do yet. Otherwise it is
     /// idle.

@@ -21,6 +21,7 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use core::hint::black_box;
 use core::ops::Range;
 
 use super::jobs::Job;
@@ -126,6 +127,14 @@ impl Vertices {
 
     pub(super) fn get_mut(&mut self, vertex: u32) -> &mut Vertex {
         &mut self.vertices[vertex as usize]
+    }
+
+    /// Writes what the end of the present instance writes, with no change.
+    pub(super) fn touch(&mut self, vertex: u32) {
+        let vertex = &mut self.vertices[vertex as usize];
+        vertex.phase = black_box(vertex.phase);
+        let counter = &mut self.counters[vertex.counter(vertex.progress)];
+        *counter = black_box(*counter);
     }
 
     /// Ends the instance that a vertex is doing. What thereby may have become

@@ -6,8 +6,11 @@
 //! subtracted once: a stamp encloses half of it at either end.
 
 use std::hint::spin_loop;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{
+    AtomicU64,
+    Ordering::{Acquire, Relaxed, Release},
+};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use hand_off::Shape;
@@ -106,6 +109,7 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
     Ok(vec![
         figure("last return -> sink start", joins),
         figure("source return -> other core's start", starts),
+        Figure::new("", "one cache line, one way", "", 2, transfer()?),
         Figure::new("", "reading the clock", "", 1, clock),
     ])
 }
@@ -136,6 +140,59 @@ fn branch(epoch: Instant, start: &Arc<Stamps>, end: &Arc<Stamps>) -> Closure {
         end.put(job, ended_ns);
     })
 }
+
+/// Returns what it takes to tell another core something: two branches of one job write
+/// to one another's cache line in turn.
+fn transfer() -> Result<Vec<f64>, String> {
+    const EXCHANGES: u64 = 200;
+    const EXCHANGES_F64: f64 = 200.0;
+    const ROUNDS: u64 = 200;
+    let lines = Arc::new([Line(AtomicU64::new(0)), Line(AtomicU64::new(0))]);
+    let samples = Arc::new(Mutex::new(Vec::new()));
+    let side = |own: usize| -> Closure {
+        let (lines, samples) = (Arc::clone(&lines), Arc::clone(&samples));
+        Box::new(move |_| {
+            let (own_line, other_line) = (&lines[own].0, &lines[1 - own].0);
+            for round in 0..ROUNDS {
+                let start = Instant::now();
+                for exchange in 1 + round * EXCHANGES..=(round + 1) * EXCHANGES {
+                    // Side 0 begins; side 1 answers.
+                    if own == 0 {
+                        own_line.store(exchange, Release);
+                    }
+                    while other_line.load(Acquire) < exchange {
+                        spin_loop();
+                    }
+                    if own == 1 {
+                        own_line.store(exchange, Release);
+                    }
+                }
+                if own == 0 {
+                    let one_way = start.elapsed().as_secs_f64() * 1e9 / 2.0 / EXCHANGES_F64;
+                    let mut samples = samples.lock().unwrap_or_else(PoisonError::into_inner);
+                    samples.push(one_way);
+                }
+            }
+        })
+    };
+    let nothing = || -> Closure { Box::new(|_| ()) };
+    let bodies = vec![vec![nothing(), side(0), side(1), nothing()]];
+    let setting = Setting {
+        policy: Policy::StaticPriority,
+        workers: 2,
+    };
+    let task_set = task_set(Shape::ForkJoin(2), 1, setting.policy, setting.workers);
+    native::run(task_set, bodies, setting);
+    let samples = samples.lock().unwrap_or_else(PoisonError::into_inner);
+    if samples.is_empty() {
+        return Err(format!("{WORKLOAD}: no cache line was exchanged"));
+    }
+    Ok(samples.clone())
+}
+
+/// A number in cache lines of its own.
+#[repr(align(128))]
+struct Line(AtomicU64);
 
 /// Returns what reading the clock takes, sorted.
 fn clock(epoch: Instant) -> Vec<f64> {
