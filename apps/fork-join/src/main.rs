@@ -61,7 +61,9 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
     let options = machine.options();
     let most_parallel = MOST_PARALLEL as u64;
     let subtasks = options.numbers("subtasks", 1..=most_parallel, &[2, 4, 6])?;
-    let jobs = options.number("jobs", 0..=1_000_000, 200)?;
+    // Without end only where a person can end it.
+    let least_jobs = u64::from(!machine.has_console());
+    let jobs = options.number("jobs", least_jobs..=1_000_000, 200)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
     let occupation = options.choice(
         "occupy",

@@ -6,7 +6,7 @@
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{Dag, SubtaskAttributes, Untyped, create_dag};
@@ -28,6 +28,8 @@ pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, 
         epoch_ns: AtomicU64::new(u64::MAX),
         jobs: experiment.jobs as u64,
         period_ns: experiment.period_ns,
+        has_keeper: AtomicBool::new(false),
+        latest_seen: AtomicU64::new(0),
         shown: AtomicU64::new(0),
     });
     fass::finish_create_dags(&[workers(machine.cores(), &shared)])?;
@@ -77,6 +79,10 @@ struct Cores {
     epoch_ns: AtomicU64,
     jobs: u64,
     period_ns: u64,
+    /// Whether a worker watches the clock for all that wait.
+    has_keeper: AtomicBool,
+    /// The latest version that a worker had seen when it began to wait.
+    latest_seen: AtomicU64,
     /// The progress that was printed last, in jobs.
     shown: AtomicU64,
 }
@@ -130,10 +136,23 @@ impl Host<Message, Part> for Cores {
         self.event.version()
     }
 
+    /// As in ROS 2's executor one idle worker at a time watches the clock, the others
+    /// wait for a notice. When it leaves, for whatever reason, one of them takes over.
     fn wait(&self, seen: u64, until_ns: u64) {
         self.show_progress(until_ns);
+        self.latest_seen.fetch_max(seen, Ordering::SeqCst);
+        if self.has_keeper.swap(true, Ordering::SeqCst) {
+            self.event.wait(seen, u64::MAX);
+            return;
+        }
         let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
         self.event.wait(seen, until_ns.saturating_add(epoch_ns));
+        self.has_keeper.store(false, Ordering::SeqCst);
+        // Whoever found the place taken had noted before what it has seen. If that is
+        // all that has happened, it sleeps now, and nobody would wake it.
+        if self.latest_seen.load(Ordering::SeqCst) >= self.event.version() {
+            self.event.notify();
+        }
     }
 
     fn notify(&self) {
