@@ -100,6 +100,19 @@ impl Machine {
         self.module
     }
 
+    /// Reports whether a person can talk to the kernel during a run (`console=on`), and
+    /// so end one that would not end by itself.
+    ///
+    /// ```no_run
+    /// fn least_jobs(machine: &kernel::Machine) -> u64 {
+    ///     u64::from(!machine.has_console()) // 0 is without end
+    /// }
+    /// ```
+    #[must_use]
+    pub const fn has_console(&self) -> bool {
+        self.wishes.console.is_some()
+    }
+
     /// Returns the number of cores that run subtasks.
     #[must_use]
     pub fn cores(&self) -> u32 {
