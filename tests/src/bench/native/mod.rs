@@ -180,3 +180,46 @@ fn fail(line: &str) -> ExitCode {
     eprintln!("bench native: {line}");
     ExitCode::FAILURE
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(words: &[&str]) -> Result<Plan, String> {
+        let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+        match TABLE.parse(&words) {
+            Ok(Request::Work(options)) => Plan::read(&options),
+            other => panic!("{other:?} is no work"),
+        }
+    }
+
+    #[test]
+    fn workloads_are_chosen_by_name() {
+        let plan = plan(&["--only", "fork-join-4,chain-64", "--workers", "1"]).expect("right");
+        assert_eq!(plan.graphs, [Graph::Chain, Graph::ForkJoin(4)]);
+        assert!(!plan.with_join);
+    }
+
+    #[test]
+    fn an_unknown_workload_is_refused_with_those_there_are() {
+        let line = plan(&["--only", "chain-65"]).err().expect("refused");
+        assert!(line.contains("`--only chain-65`") && line.contains("chain-64, fork-join-2"));
+    }
+
+    #[test]
+    fn more_workers_than_processors_are_refused() {
+        let most = native::processors().len();
+        if most < 64 {
+            let line = plan(&["--workers", "64"]).err().expect("refused");
+            assert!(line.contains(&format!("{most} processors")), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_short_run_measures_every_graph() {
+        for graph in Graph::ALL {
+            let (figures, _) = throughput::measure(graph, &[1], 3).expect("it runs");
+            assert_eq!(figures.len(), 4, "{graph}");
+        }
+    }
+}
