@@ -94,6 +94,8 @@ pub struct Latest<T> {
 
 /// The use of a [`Latest`]: the function gets an `Option<Sample<T>>`. Made by
 /// [`Latest::sample`].
+///
+/// See [`Latest`].
 pub struct Sampling<T> {
     shared: Rc<SharedLatest<T>>,
 }

@@ -74,6 +74,8 @@ pub struct Signal {
 
 /// The use of a [`Signal`] by a subtask that may raise it: the function gets a
 /// [`Raiser`]. Made by [`Signal::raising`].
+///
+/// See [`Signal`].
 #[derive(Debug)]
 pub struct Raising(Signal);
 
@@ -92,6 +94,8 @@ pub(crate) struct Target {
 
 impl Raiser<'_> {
     /// Raises the signal: it takes effect once, when this instance is complete.
+    ///
+    /// See [`Signal`].
     pub fn raise(&mut self) {
         self.raised.store(true, Ordering::Relaxed);
     }
@@ -175,7 +179,7 @@ impl Dag {
     /// signal starts, but never earlier than `min_inter_arrival` after the job before.
     ///
     /// `output_topics` names one topic for each element of `Ret`. The returned signal
-    /// can be raised by subtasks of all DAGs, or from outside; see [`Signal`].
+    /// can be raised by subtasks of all DAGs, or from outside. See [`Signal`].
     /// Without a limit of [`jobs`](Self::jobs) the DAG keeps no run going: the run
     /// ends when all others have ended.
     #[track_caller]

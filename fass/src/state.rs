@@ -81,11 +81,15 @@ pub struct State<T> {
 
 /// The use of a [`State`] that may change it: the function gets a `&mut T`. Made
 /// by [`State::update`].
+///
+/// See [`State`].
 #[derive(Debug)]
 pub struct Update<T>(State<T>);
 
 /// The use of a [`State`] that only reads it: the function gets a `&T`. Made by
 /// [`State::read`].
+///
+/// See [`State`].
 #[derive(Debug)]
 pub struct Read<T>(State<T>);
 

@@ -80,6 +80,8 @@ pub trait Uses: sealed::Sealed {
 ///
 /// Its methods are those of [`Dag`], for functions that get what they use as their
 /// first argument.
+///
+/// See [`State`](crate::State).
 #[derive(Debug)]
 #[must_use = "register a subtask with it"]
 pub struct Using<'d, U> {

@@ -70,6 +70,10 @@ impl Write for Buffer {
 }
 
 /// Writes text; what one call writes stays together. For [`print!`](crate::print).
+///
+/// ```no_run
+/// kernel::println!("{} jobs", 3); // calls it
+/// ```
 pub fn write(text: fmt::Arguments<'_>) {
     let mut buffer = BUFFER.lock();
     // Only a `Display` that fails of its own accord can fail here; its text up

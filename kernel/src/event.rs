@@ -30,6 +30,20 @@ use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu, this_core};
 
 /// Something that cores wait for.
+///
+/// ```no_run
+/// use kernel::Event;
+///
+/// static NEWS: Event = Event::new();
+///
+/// /// Waits until somebody calls `NEWS.notify()`, at most to a time of `fass::now_ns`.
+/// fn has_news(until_ns: u64) -> bool {
+///     let seen = NEWS.version();
+///     // look for what is wanted; if it is not there:
+///     NEWS.wait(seen, until_ns);
+///     NEWS.version() != seen
+/// }
+/// ```
 #[derive(Debug, Default)]
 pub struct Event {
     version: AtomicU64,
@@ -39,6 +53,8 @@ pub struct Event {
 
 impl Event {
     /// Makes an event that has not happened.
+    ///
+    /// See [`Event`].
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -48,12 +64,16 @@ impl Event {
     }
 
     /// Returns how often the event has happened.
+    ///
+    /// See [`Event`].
     #[must_use]
     pub fn version(&self) -> u64 {
         self.version.load(Ordering::SeqCst)
     }
 
     /// Lets the event happen: whoever waits goes on.
+    ///
+    /// See [`Event`].
     pub fn notify(&self) {
         self.version.fetch_add(1, Ordering::SeqCst);
         for (word, first) in self.waiting.iter().zip((0..).step_by(64)) {
@@ -77,6 +97,8 @@ impl Event {
     /// notifier changes the version before it takes the bits: one of them sees the
     /// other (both orders are sequentially consistent). If it is the notifier, its
     /// interrupt comes after interrupts were disabled here, and so ends the halt.
+    ///
+    /// See [`Event`].
     pub fn wait(&self, seen: u64, until_ns: u64) {
         loop {
             cpu::disable_interrupts();

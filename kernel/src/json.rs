@@ -6,6 +6,22 @@
 use core::fmt::{self, Display, Formatter};
 
 /// Writes the fields of one object.
+///
+/// ```no_run
+/// let line = kernel::json::line("run", |line| {
+///     line.number("jobs", 3_u64)
+///         .flag("proven", true)
+///         .text("dag", "vision")
+///         .object("response_ns", |object| {
+///             object.number("max", 20_u64);
+///         })
+///         .list("cores", [0, 1].iter());
+/// });
+/// assert_eq!(
+///     line.to_string(),
+///     r#"{"kind":"run","jobs":3,"proven":true,"dag":"vision","response_ns":{"max":20},"cores":[0,1]}"#
+/// );
+/// ```
 #[expect(missing_debug_implementations, reason = "a `Formatter` has none")]
 pub struct Object<'a, 'f> {
     out: &'a mut Formatter<'f>,
@@ -15,27 +31,37 @@ pub struct Object<'a, 'f> {
 
 impl Object<'_, '_> {
     /// Writes a field with a whole number.
+    ///
+    /// See [`Object`].
     pub fn number(&mut self, name: &str, value: impl Into<u64>) -> &mut Self {
         let value = value.into();
         self.field(name, |out| Display::fmt(&value, out))
     }
 
     /// Writes a field with a truth value.
+    ///
+    /// See [`Object`].
     pub fn flag(&mut self, name: &str, value: bool) -> &mut Self {
         self.field(name, |out| Display::fmt(&value, out))
     }
 
     /// Writes a field with text.
+    ///
+    /// See [`Object`].
     pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
         self.field(name, |out| quoted(value).fmt(out))
     }
 
     /// Writes a field with an object.
+    ///
+    /// See [`Object`].
     pub fn object(&mut self, name: &str, fields: impl Fn(&mut Object<'_, '_>)) -> &mut Self {
         self.field(name, |out| Fields(&fields).fmt(out))
     }
 
     /// Writes a field with a list of values, each of which is JSON already.
+    ///
+    /// See [`Object`].
     pub fn list(&mut self, name: &str, values: impl Iterator<Item = impl Display>) -> &mut Self {
         self.field(name, |out| {
             out.write_str("[")?;
@@ -80,6 +106,10 @@ impl<F: Fn(&mut Object<'_, '_>)> Display for Fields<F> {
 }
 
 /// Returns text as a JSON string.
+///
+/// ```no_run
+/// assert_eq!(kernel::json::quoted("say \"so\"").to_string(), r#""say \"so\"""#);
+/// ```
 pub fn quoted(value: impl Display) -> impl Display {
     fmt::from_fn(move |out| {
         out.write_str("\"")?;
@@ -104,6 +134,8 @@ impl fmt::Write for Escaped<'_, '_> {
 }
 
 /// Returns a machine line of kind `kind`, without the line's end.
+///
+/// See [`Object`].
 pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
     Fields(move |object: &mut Object<'_, '_>| {
         object.text("kind", kind);
@@ -112,6 +144,12 @@ pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
 }
 
 /// Prints a machine line of kind `kind`.
+///
+/// ```no_run
+/// kernel::json::emit("run", |line| {
+///     line.number("jobs", 3_u64);
+/// });
+/// ```
 pub fn emit(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
     crate::println!("{}", line(kind, fields));
 }

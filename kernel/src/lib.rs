@@ -17,6 +17,10 @@
 //! # fn main() {}
 //! ```
 //!
+//! Examples in this crate's documentation are compiled and not run: it contains the
+//! image's first instruction, with which no program of the host can be linked. An app's
+//! own functions need no kernel and run on the host (`virtual-time`).
+//!
 //! # Principles
 //!
 //! 1. **The scheduler decides, the kernel carries out.** `sched-dag` is told
@@ -71,7 +75,13 @@ pub use machine_handle::{Ending, Machine, Resources};
 pub use memory::heap::KernelHeap;
 pub use run::Run;
 
-/// Returns the timer interrupts that all cores have taken since boot.
+/// Returns the number of timer interrupts that all cores have taken since boot.
+///
+/// ```no_run
+/// let before = kernel::timer_interrupts();
+/// // a run
+/// kernel::println!("{} timer interrupts", kernel::timer_interrupts() - before);
+/// ```
 #[must_use]
 pub fn timer_interrupts() -> u64 {
     worker::timer_interrupts()

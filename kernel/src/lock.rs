@@ -14,11 +14,26 @@ use crate::machine::spinlock::SpinLock;
 /// Data that one core at a time may use.
 ///
 /// Waiting cores get their turn in the order in which they came.
+///
+/// ```no_run
+/// use kernel::Lock;
+///
+/// static SEEN: Lock<u64> = Lock::new(0);
+///
+/// fn saw_one() -> u64 {
+///     SEEN.with(|seen| {
+///         *seen += 1;
+///         *seen
+///     })
+/// }
+/// ```
 #[derive(Debug)]
 pub struct Lock<T>(SpinLock<T>);
 
 impl<T> Lock<T> {
     /// Makes a lock that is free.
+    ///
+    /// See [`Lock`].
     #[must_use]
     pub const fn new(data: T) -> Self {
         Self(SpinLock::new(data))
@@ -27,6 +42,8 @@ impl<T> Lock<T> {
     /// Waits for the data's turn and lends it to `section`.
     ///
     /// A section that takes the same lock again waits forever.
+    ///
+    /// See [`Lock`].
     #[track_caller]
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
         section(&mut self.0.lock())

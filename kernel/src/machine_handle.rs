@@ -23,6 +23,22 @@ use crate::worker;
 use crate::{console, contexts, execution, json, machine, trace};
 
 /// The machine, lent to the app's function for the time of the run.
+///
+/// An app's function gets it; there is no other way to one.
+///
+/// ```no_run
+/// use kernel::{Ending, Machine, println};
+///
+/// fn app(machine: &Machine) -> Result<(), Ending> {
+///     let jobs = machine.options().number("jobs", 1..=100_000, 100)?;
+///     machine.options().finish(&["jobs"])?;
+///     // build DAGs of so many jobs and commit them
+///     let run = machine.run()?;
+///     machine.report_memory();
+///     println!("{} cores, {} allocations", machine.cores(), run.allocations());
+///     Ok(())
+/// }
+/// ```
 #[derive(Debug)]
 pub struct Machine {
     pub(crate) options: Options<'static>,
@@ -38,6 +54,8 @@ pub struct Machine {
 }
 
 /// What of the machine's memory is in use while nothing runs.
+///
+/// See [`Machine::resources`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Resources {
     /// The bytes of the heap that are in use.
@@ -50,6 +68,14 @@ pub struct Resources {
 }
 
 /// Why an app ends other than by success.
+///
+/// ```no_run
+/// use kernel::{Ending, options::UsageError};
+///
+/// let ending = Ending::from(UsageError::new("`jobs=0`: give at least 1"));
+/// assert!(matches!(ending, Ending::Usage(_)));
+/// assert_eq!(ending.to_string(), "`jobs=0`: give at least 1");
+/// ```
 #[derive(Debug)]
 pub enum Ending {
     /// The command line is wrong; QEMU exits with 37.
@@ -87,6 +113,8 @@ impl fmt::Display for Ending {
 
 impl Machine {
     /// Returns the words of the command line that the kernel left to the app.
+    ///
+    /// See [`Options`].
     #[must_use]
     pub const fn options(&self) -> &Options<'static> {
         &self.options
@@ -95,6 +123,12 @@ impl Machine {
     /// Returns the file that the loader left in memory (`qemu -initrd FILE`), if
     /// there is one. It is not copied: memory and the boot's time are the same
     /// whatever its size.
+    ///
+    /// ```no_run
+    /// fn size(machine: &kernel::Machine) -> usize {
+    ///     machine.module().map_or(0, <[u8]>::len)
+    /// }
+    /// ```
     #[must_use]
     pub const fn module(&self) -> Option<&'static [u8]> {
         self.module
@@ -114,6 +148,8 @@ impl Machine {
     }
 
     /// Returns the number of cores that run subtasks.
+    ///
+    /// See [`Machine`].
     #[must_use]
     pub fn cores(&self) -> u32 {
         KERNEL.cores()
@@ -121,6 +157,19 @@ impl Machine {
 
     /// Chooses policy and preemption of the commits to come, instead of what the
     /// command line says.
+    ///
+    /// ```no_run
+    /// use fass::{Policy, Preemption};
+    ///
+    /// fn compare(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    ///     for policy in [Policy::StaticPriority, Policy::Edf] {
+    ///         machine.configure(policy, Preemption::Enabled);
+    ///         // build and commit the DAGs anew
+    ///         machine.run()?;
+    ///     }
+    ///     Ok(())
+    /// }
+    /// ```
     pub fn configure(&self, policy: Policy, preemption: Preemption) {
         KERNEL.set_policy(policy);
         KERNEL.set_preemption(preemption);
@@ -137,6 +186,12 @@ impl Machine {
     /// the model would not. To compare the machine with the model, they have to
     /// be taken together again. The price is that every decision comes `window`
     /// later.
+    ///
+    /// ```no_run
+    /// fn compare_with_model(machine: &kernel::Machine) {
+    ///     machine.set_coincidence(core::time::Duration::from_micros(10));
+    /// }
+    /// ```
     pub fn set_coincidence(&self, window: Duration) {
         KERNEL.set_coincidence_ns(u64::try_from(window.as_nanos()).unwrap_or(u64::MAX));
     }
@@ -152,6 +207,8 @@ impl Machine {
     /// [`Ending::Shutdown`] if a person has ended the run at the console: then each
     /// DAG has ended the jobs that it had in flight and released no more. If that
     /// run broke a rule of the model, it is a failure instead.
+    ///
+    /// See [`Run`].
     pub fn run(&self) -> Result<Run, Ending> {
         /// Time for the cores to get ready between now and the first release.
         const LEAD_NS: u64 = 100_000;
@@ -164,6 +221,13 @@ impl Machine {
     /// # Errors
     ///
     /// As [`run`](Self::run).
+    ///
+    /// ```no_run
+    /// /// Lets the first release be a second from now.
+    /// fn later(machine: &kernel::Machine) -> Result<kernel::Run, kernel::Ending> {
+    ///     machine.run_from(fass::now_ns() + 1_000_000_000)
+    /// }
+    /// ```
     pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
@@ -207,6 +271,22 @@ impl Machine {
     /// # Panics
     ///
     /// If the signal's DAG is not committed.
+    ///
+    /// ```no_run
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// fn answer_keys(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    ///     let dag = create_dag();
+    ///     dag.jobs(10).relative_deadline(Duration::from_millis(5));
+    ///     let least = Duration::from_millis(50);
+    ///     let answer = SubtaskAttributes::named("answer");
+    ///     let key = dag.register_sporadic_subtask(|| (), Vec::new(), least, answer);
+    ///     finish_create_dags(&[dag])?;
+    ///     machine.raise_on_input(&key);
+    ///     machine.run().map(drop)
+    /// }
+    /// ```
     pub fn raise_on_input(&self, signal: &Signal) {
         let target = signal.target();
         assert!(
@@ -218,12 +298,27 @@ impl Machine {
 
     /// Interrupts every core each `period` from now on, beside what scheduling
     /// needs; back to normal if 0. For tests of the kernel's own robustness.
+    ///
+    /// ```no_run
+    /// fn disturb(machine: &kernel::Machine) {
+    ///     machine.set_heartbeat(core::time::Duration::from_micros(50));
+    /// }
+    /// ```
     pub fn set_heartbeat(&self, period: Duration) {
         worker::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
     }
 
     /// Returns what is in use and what is free between two runs: the same after
     /// equal work, unless something leaks.
+    ///
+    /// ```no_run
+    /// fn leaks(machine: &kernel::Machine, work: impl Fn()) -> bool {
+    ///     work();
+    ///     let before = machine.resources();
+    ///     work();
+    ///     machine.resources() != before
+    /// }
+    /// ```
     #[must_use]
     pub fn resources(&self) -> Resources {
         let (contexts, in_stock) = contexts::count();
@@ -238,6 +333,8 @@ impl Machine {
     }
 
     /// Prints how much memory the run has needed, as a `memory` machine line.
+    ///
+    /// See [`Machine`].
     pub fn report_memory(&self) {
         let usage = heap::usage();
         crate::println!(

@@ -13,6 +13,18 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The command line, with a note of which words have been taken.
+///
+/// ```no_run
+/// use kernel::options::Options;
+///
+/// let options = Options::parse("jobs=20 occupy=spin sizes=1,2")?;
+/// assert_eq!(options.number("jobs", 1..=100, 50)?, 20);
+/// assert_eq!(options.number("seed", 0..=9, 1)?, 1); // not given: the default
+/// assert_eq!(options.numbers("sizes", 1..=4, &[1])?, [1, 2]);
+/// assert!(options.choice("occupy", &[("hold", false), ("spin", true)])?);
+/// options.finish(&["jobs", "seed", "sizes", "occupy"])?; // nothing is left over
+/// # Ok::<(), kernel::options::UsageError>(())
+/// ```
 #[derive(Debug)]
 pub struct Options<'a> {
     words: Vec<Word<'a>>,
@@ -26,11 +38,20 @@ struct Word<'a> {
 }
 
 /// A word of the command line is wrong: which one, and what is allowed.
+///
+/// See [`Options::finish`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsageError(String);
 
 impl UsageError {
     /// States what is wrong: the word, and what is allowed.
+    ///
+    /// ```no_run
+    /// use kernel::options::UsageError;
+    ///
+    /// let error = UsageError::new("`rate=3`: only even rates are possible");
+    /// assert!(error.to_string().contains("rate=3"));
+    /// ```
     #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
         Self(message.into())
@@ -51,6 +72,8 @@ impl<'a> Options<'a> {
     /// # Errors
     ///
     /// If a word is not of the form `key=value`, or a key occurs twice.
+    ///
+    /// See [`Options`].
     pub fn parse(line: &'a str) -> Result<Self, UsageError> {
         let mut words = Vec::<Word<'a>>::new();
         for word in line.split_whitespace() {
@@ -70,6 +93,12 @@ impl<'a> Options<'a> {
     }
 
     /// Takes the value of `key` as it is, if the key is given.
+    ///
+    /// ```no_run
+    /// let options = kernel::options::Options::parse("map=town").unwrap();
+    /// assert_eq!(options.text("map"), Some("town"));
+    /// assert_eq!(options.text("seed"), None);
+    /// ```
     pub fn text(&self, key: &str) -> Option<&'a str> {
         let word = self.words.iter().find(|word| word.key == key)?;
         word.taken.set(true);
@@ -81,6 +110,12 @@ impl<'a> Options<'a> {
     /// # Errors
     ///
     /// If the value is not a whole number within `allowed`.
+    ///
+    /// ```no_run
+    /// let options = kernel::options::Options::parse("jobs=0").unwrap();
+    /// let error = options.number("jobs", 1..=100, 50).unwrap_err();
+    /// assert_eq!(error.to_string(), "`jobs=0`: allowed are whole numbers from 1 to 100");
+    /// ```
     pub fn number(
         &self,
         key: &str,
@@ -96,6 +131,8 @@ impl<'a> Options<'a> {
     /// # Errors
     ///
     /// If one of them is not a whole number within `allowed`.
+    ///
+    /// See [`Options`].
     pub fn numbers(
         &self,
         key: &str,
@@ -122,6 +159,8 @@ impl<'a> Options<'a> {
     /// # Panics
     ///
     /// If there are no choices.
+    ///
+    /// See [`Options`].
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<T, UsageError> {
         let Some(value) = self.text(key) else {
             return Ok(choices[0].1);
@@ -141,6 +180,13 @@ impl<'a> Options<'a> {
     /// # Errors
     ///
     /// If one has not: it names the word and the keys that there are.
+    ///
+    /// ```no_run
+    /// let options = kernel::options::Options::parse("sed=3").unwrap();
+    /// let _ = options.number("seed", 0..=9, 1);
+    /// let error = options.finish(&["seed"]).unwrap_err();
+    /// assert!(error.to_string().starts_with("`sed` is no option; there are seed, "));
+    /// ```
     pub fn finish(&self, known: &[&str]) -> Result<(), UsageError> {
         let Some(word) = self.words.iter().find(|word| !word.taken.get()) else {
             return Ok(());

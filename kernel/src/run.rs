@@ -6,6 +6,27 @@ use sched_dag::{DagId, DagStatistics, TaskSet};
 use crate::execution::{Execution, Snapshot};
 
 /// A run that has ended: its model, its times and its counts.
+///
+/// ```no_run
+/// use kernel::report::{Distribution, Ns};
+/// use kernel::{Run, println};
+/// use sched_dag::DagId;
+///
+/// fn report(run: &Run) {
+///     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
+///         let jobs = (0..).zip(run.record().jobs(dag));
+///         let response_times = Distribution::new(jobs.filter_map(|(job, times)| {
+///             Some(run.record().completion_ns(dag, job)? - times.release_ns?)
+///         }));
+///         let misses = run.statistics(dag).misses;
+///         println!("{}: at most {}, {misses} misses", model.name(), Ns(response_times.max()));
+///     }
+///     for violation in run.violations() {
+///         println!("{violation}");
+///     }
+///     println!("{} allocations", run.allocations());
+/// }
+/// ```
 pub struct Run {
     execution: Execution,
     allocations: u64,
@@ -37,6 +58,8 @@ impl Run {
     }
 
     /// Returns the model that was run.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn task_set(&self) -> &TaskSet {
         self.execution.task_set()
@@ -44,6 +67,8 @@ impl Run {
 
     /// Returns the times of all jobs and instances, in nanoseconds from the
     /// instant from which releases count.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn record(&self) -> &Record {
         self.execution.record()
@@ -51,6 +76,13 @@ impl Run {
 
     /// Returns the instant from which releases count, in nanoseconds since the
     /// kernel's entry.
+    ///
+    /// ```no_run
+    /// /// The time of the first release of a DAG without offset, on `fass::now_ns`'s clock.
+    /// fn first_release_ns(run: &kernel::Run) -> u64 {
+    ///     run.epoch_ns()
+    /// }
+    /// ```
     #[must_use]
     pub const fn epoch_ns(&self) -> u64 {
         self.epoch_ns
@@ -61,6 +93,8 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
         self.execution.scheduler().statistics(dag)
@@ -72,12 +106,16 @@ impl Run {
     }
 
     /// Returns every breach of the model's rules.
+    ///
+    /// See [`Run`].
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         sched_dag::record::violations(self.task_set(), self.record())
     }
 
     /// Returns how often anything, kernel or app, allocated memory between the
     /// start of the run and its last completion.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn allocations(&self) -> u64 {
         self.allocations
@@ -85,6 +123,13 @@ impl Run {
 
     /// Returns how often the scheduler's lock was taken between the start of the
     /// run and its last completion, modulo 2^32.
+    ///
+    /// ```no_run
+    /// /// How often the lock was taken for each of `completions` completed instances.
+    /// fn locks_each(run: &kernel::Run, completions: u32) -> u32 {
+    ///     run.lock_acquisitions() / completions
+    /// }
+    /// ```
     #[must_use]
     pub const fn lock_acquisitions(&self) -> u32 {
         self.lock_acquisitions

@@ -8,6 +8,13 @@ use sched_dag::{DagLabel, SubtaskLabel};
 use crate::report::Report;
 
 /// Why a run in virtual time ended early, or could not begin.
+///
+/// ```
+/// use virtual_time::{RunError, VirtualTime};
+///
+/// let machine = VirtualTime::new(); // and nothing is committed
+/// assert!(matches!(machine.try_run(), Err(RunError::NothingToRun)));
+/// ```
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum RunError {

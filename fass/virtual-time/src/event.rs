@@ -6,7 +6,7 @@
 
 use sched_dag::{CoreId, DagId, Instance, JobOutcome};
 
-/// Something that happened at an instant.
+/// Something that happened at an instant. See [`Report`](crate::Report), which has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
     /// When, in nanoseconds since the start of scheduling.
@@ -16,6 +16,13 @@ pub struct Event {
 }
 
 /// What happened.
+///
+/// ```
+/// use virtual_time::{DagId, EventKind};
+///
+/// let event = EventKind::Released { dag: DagId(0), job: 3 };
+/// assert_eq!(event.verb(), "release");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the fields' names are the words of the model")]
 pub enum EventKind {
@@ -58,6 +65,8 @@ pub enum EventKind {
 
 impl EventKind {
     /// Returns a word for the kind of event.
+    ///
+    /// See [`EventKind`].
     #[must_use]
     pub const fn verb(&self) -> &'static str {
         match self {

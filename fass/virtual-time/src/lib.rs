@@ -106,6 +106,8 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If the program has installed another platform.
+    ///
+    /// See [`VirtualTime`].
     #[must_use = "dropping the machine removes it from the thread"]
     #[allow(clippy::new_without_default, reason = "it installs a platform")]
     pub fn new() -> Self {
@@ -115,6 +117,8 @@ impl VirtualTime {
     }
 
     /// Sets the number of cores.
+    ///
+    /// See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn cores(self, cores: u32) -> Self {
         self.machine.cores.set(cores);
@@ -122,6 +126,8 @@ impl VirtualTime {
     }
 
     /// Sets the scheduling policy.
+    ///
+    /// See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn policy(self, policy: Policy) -> Self {
         self.machine.policy.set(policy);
@@ -129,6 +135,13 @@ impl VirtualTime {
     }
 
     /// Sets whether a started instance may lose its core.
+    ///
+    /// ```
+    /// use fass::Preemption;
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new().preemption(Preemption::Disabled);
+    /// ```
     #[must_use = "the machine itself is returned"]
     pub fn preemption(self, preemption: Preemption) -> Self {
         self.machine.preemption.set(preemption);
@@ -138,6 +151,13 @@ impl VirtualTime {
     /// Sets the costs that the commit adds to each WCET before it answers about
     /// deadlines: those of the machine that the DAGs are meant for. The run
     /// itself stays without overheads.
+    ///
+    /// ```
+    /// use fass::Overheads;
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new().overheads(Overheads::default());
+    /// ```
     #[must_use = "the machine itself is returned"]
     pub fn overheads(self, overheads: Overheads) -> Self {
         self.machine.overheads.set(overheads);
@@ -221,6 +241,8 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If [`try_run`](Self::try_run) gives an error, with its message.
+    ///
+    /// See [`VirtualTime`].
     pub fn run(&self) -> Report {
         or_panic(self.try_run())
     }
@@ -232,6 +254,21 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If [`try_run_for`](Self::try_run_for) gives an error, with its message.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new();
+    /// let dag = create_dag(); // without a limit of jobs
+    /// let ms = Duration::from_millis;
+    /// dag.period(ms(10)).relative_deadline(ms(10));
+    /// dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
+    /// finish_create_dags(&[dag]).unwrap();
+    /// assert_eq!(machine.run_for(ms(25)).jobs.len(), 3); // released at 0, 10 and 20 ms
+    /// assert_eq!(machine.run_for(ms(10)).jobs.len(), 4); // and at 30 ms
+    /// ```
     pub fn run_for(&self, duration: Duration) -> Report {
         or_panic(self.try_run_for(duration))
     }

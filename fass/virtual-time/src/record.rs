@@ -3,6 +3,8 @@
 use sched_dag::{CoreId, DagId, Instance, JobOutcome};
 
 /// The times of one instance.
+///
+/// See [`Report`](crate::Report).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstanceRecord {
     /// The instance.
@@ -24,6 +26,8 @@ pub struct InstanceRecord {
 }
 
 /// The times of one job that was released.
+///
+/// See [`Report`](crate::Report).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JobRecord {
     /// The DAG.
@@ -46,6 +50,8 @@ pub struct JobRecord {
 
 impl JobRecord {
     /// Returns the time from the nominal release to the end, if there was one.
+    ///
+    /// See [`Report`](crate::Report).
     #[must_use]
     pub fn response_time_ns(&self) -> Option<u64> {
         self.finish_ns.map(|finish_ns| finish_ns - self.release_ns)
@@ -53,6 +59,8 @@ impl JobRecord {
 }
 
 /// A panic that was contained: it ended its DAG, and the run went on.
+///
+/// See [`contain_panics`](crate::VirtualTime::contain_panics).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PanicRecord {
     /// The instance whose function panicked.

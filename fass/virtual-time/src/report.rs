@@ -11,6 +11,30 @@ use crate::record::{InstanceRecord, JobRecord, PanicRecord};
 use crate::rules;
 
 /// Everything that happened from the commit to the end of a run.
+///
+/// ```
+/// use std::time::Duration;
+/// use fass::{Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let dag = create_dag();
+/// let ms = Duration::from_millis;
+/// dag.name("clock").jobs(2).period(ms(10)).relative_deadline(ms(10));
+/// let tick = move |_job| execute_for(ms(1), Occupation::Hold);
+/// dag.register_untyped_subtask(tick, SubtaskAttributes::named("tick"));
+/// finish_create_dags(&[dag]).unwrap();
+///
+/// let report = machine.run();
+/// let ticks = report.subtask("clock", "tick");
+/// assert_eq!(report.instance(ticks[1].instance), Some(&ticks[1]));
+/// assert_eq!(report.jobs[1].response_time_ns(), Some(1_000_000));
+/// assert_eq!(report.task_set().dags().len(), 1);
+/// assert_eq!(report.record().jobs(ticks[0].instance.dag).len(), 2);
+/// assert!(report.event_lines().contains(&"10000000 start tick[1] core 0".to_string()));
+/// assert_eq!(report.violations(), []);
+/// assert_eq!(report.end_ns, 11_000_000);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Report {
     /// The instances that became ready, in that order.
@@ -37,6 +61,8 @@ impl Report {
     ///
     /// If there is no DAG or no subtask of that name: a test that asks for a
     /// name that does not exist is wrong.
+    ///
+    /// See [`Report`].
     #[must_use]
     pub fn subtask(&self, dag: &str, subtask: &str) -> Vec<InstanceRecord> {
         let (dag, subtask) = self.find(dag, subtask);
@@ -48,12 +74,16 @@ impl Report {
     }
 
     /// Returns the record of one instance, if it became ready.
+    ///
+    /// See [`Report`].
     #[must_use]
     pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
         (self.instances.iter()).find(|record| record.instance == instance)
     }
 
     /// Returns the verified model that ran.
+    ///
+    /// See [`Report`].
     #[must_use]
     pub fn task_set(&self) -> &TaskSet {
         &self.task_set
@@ -65,6 +95,8 @@ impl Report {
     /// # Panics
     ///
     /// If there is no memory for another copy of all times.
+    ///
+    /// See [`Report`].
     #[must_use]
     pub fn record(&self) -> Record {
         rules::record(self).expect("the report's jobs fit into memory")
@@ -79,6 +111,8 @@ impl Report {
     /// # Panics
     ///
     /// If there is no memory for another copy of all times.
+    ///
+    /// See [`Report`].
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         rules::check(self)
@@ -89,6 +123,8 @@ impl Report {
     /// of a DAG and a signal have no job.
     ///
     /// For tests that compare whole sequences in words.
+    ///
+    /// See [`Report`].
     #[must_use]
     pub fn event_lines(&self) -> Vec<String> {
         self.events.iter().map(|event| self.line(event)).collect()

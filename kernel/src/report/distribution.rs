@@ -5,6 +5,15 @@ use alloc::vec::Vec;
 use crate::json::Object;
 
 /// The samples of one quantity, in nanoseconds.
+///
+/// ```no_run
+/// use kernel::report::Distribution;
+///
+/// let latencies = Distribution::new([30, 10, 20, 40]);
+/// assert_eq!((latencies.count(), latencies.min(), latencies.max()), (4, 10, 40));
+/// assert_eq!((latencies.median(), latencies.p99()), (20, 40));
+/// assert_eq!(Distribution::new([]).max(), 0);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Distribution {
     sorted_ns: Vec<u64>,
@@ -12,6 +21,8 @@ pub struct Distribution {
 
 impl Distribution {
     /// Orders the samples.
+    ///
+    /// See [`Distribution`].
     #[must_use]
     pub fn new(samples_ns: impl IntoIterator<Item = u64>) -> Self {
         let mut sorted_ns: Vec<u64> = samples_ns.into_iter().collect();
@@ -20,6 +31,8 @@ impl Distribution {
     }
 
     /// Returns the number of samples.
+    ///
+    /// See [`Distribution`].
     #[must_use]
     pub fn count(&self) -> usize {
         self.sorted_ns.len()
@@ -27,6 +40,13 @@ impl Distribution {
 
     /// Returns the smallest sample that at least `percent` per cent of the
     /// samples do not exceed (nearest rank); 0 without samples.
+    ///
+    /// ```no_run
+    /// use kernel::report::Distribution;
+    ///
+    /// let latencies = Distribution::new(1..=200);
+    /// assert_eq!(latencies.percentile(90), 180);
+    /// ```
     #[must_use]
     pub fn percentile(&self, percent: usize) -> u64 {
         let rank = (self.count() * percent).div_ceil(100).max(1);
@@ -38,30 +58,51 @@ impl Distribution {
     }
 
     /// Returns the smallest sample, or 0.
+    ///
+    /// See [`Distribution`].
     #[must_use]
     pub fn min(&self) -> u64 {
         self.percentile(0)
     }
 
     /// Returns the middle sample, or 0.
+    ///
+    /// See [`Distribution`].
     #[must_use]
     pub fn median(&self) -> u64 {
         self.percentile(50)
     }
 
     /// Returns the sample that 99 per cent do not exceed, or 0.
+    ///
+    /// See [`Distribution`].
     #[must_use]
     pub fn p99(&self) -> u64 {
         self.percentile(99)
     }
 
     /// Returns the largest sample, or 0.
+    ///
+    /// See [`Distribution`].
     #[must_use]
     pub fn max(&self) -> u64 {
         self.percentile(100)
     }
 
     /// Writes the fields `min`, `median`, `p99` and `max` of a machine line.
+    ///
+    /// ```no_run
+    /// use kernel::{json, report::Distribution};
+    ///
+    /// let latencies = Distribution::new([10, 20]);
+    /// let line = json::line("latency", |line| {
+    ///     line.object("ns", |object| latencies.describe(object));
+    /// });
+    /// assert_eq!(
+    ///     line.to_string(),
+    ///     r#"{"kind":"latency","ns":{"min":10,"median":10,"p99":20,"max":20}}"#
+    /// );
+    /// ```
     pub fn describe(&self, object: &mut Object<'_, '_>) {
         object
             .number("min", self.min())

@@ -4,6 +4,12 @@ use core::fmt;
 
 /// Nanoseconds, shown with four digits or so and a unit: `412 ns`, `1.050 us`,
 /// `25.000 ms`, `1.500 s`. Honours the width of the format string.
+///
+/// ```no_run
+/// use kernel::report::Ns;
+///
+/// assert_eq!(Ns(25_000_000).to_string(), "25.000 ms");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ns(pub u64);
 

@@ -1,0 +1,114 @@
+//! Every item of the crates that apps use has an example, or names the item whose
+//! example shows it.
+//!
+//! That there is documentation at all, the compiler demands (`missing_docs`); that
+//! examples compile, and run where the host can run them, rustdoc does.
+
+use std::fs;
+use std::path::PathBuf;
+
+use harness::system::workspace;
+
+/// Files with items that apps use: all of a folder, or these.
+const FOLDERS: [&str; 2] = ["fass/src", "fass/virtual-time/src"];
+const FILES: [&str; 10] = [
+    "kernel/src/lib.rs",
+    "kernel/src/machine_handle.rs",
+    "kernel/src/run.rs",
+    "kernel/src/options.rs",
+    "kernel/src/json.rs",
+    "kernel/src/console.rs",
+    "kernel/src/event.rs",
+    "kernel/src/lock.rs",
+    "kernel/src/report/distribution.rs",
+    "kernel/src/report/time.rs",
+];
+
+/// What is public only within its crate, because its module is not.
+const INTERNAL: [&str; 6] = [
+    "Shared", "Changing", "Looking", "Sampler", "Looked", "Sealed",
+];
+
+/// The words that begin an item that can have an example.
+const ITEMS: [&str; 6] = [
+    "pub fn ",
+    "pub const fn ",
+    "pub struct ",
+    "pub enum ",
+    "pub trait ",
+    "pub unsafe fn ",
+];
+
+fn files() -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = FILES.iter().map(|file| workspace().join(file)).collect();
+    for folder in FOLDERS {
+        let entries = fs::read_dir(workspace().join(folder)).expect("a crate's sources");
+        let paths = entries.flatten().map(|entry| entry.path());
+        files.extend(paths.filter(|path| path.extension().is_some_and(|kind| kind == "rs")));
+    }
+    files
+}
+
+/// Returns the number of items of a source, and the names of those without example.
+fn items(source: &str) -> (usize, Vec<String>) {
+    let (mut found, mut bare) = (0, Vec::new());
+    let mut documentation = String::new();
+    let mut in_attribute = false;
+    for line in source.lines().map(str::trim_start) {
+        if line == "mod tests {" {
+            break;
+        }
+        if line.starts_with("///") {
+            documentation += line;
+            continue;
+        }
+        // Attributes stand between an item and its documentation.
+        in_attribute = match in_attribute {
+            true if line == ")]" => {
+                in_attribute = false;
+                continue;
+            }
+            true => continue,
+            false => line.starts_with("#[") && !line.ends_with(']'),
+        };
+        if line.starts_with("#[") {
+            continue;
+        }
+        let rest = ITEMS.iter().find_map(|item| line.strip_prefix(item));
+        let name = rest.and_then(|rest| {
+            rest.split(|c: char| !c.is_alphanumeric() && c != '_')
+                .next()
+        });
+        if let Some(name) = name.filter(|name| !INTERNAL.contains(name)) {
+            found += 1;
+            if !documentation.contains("```") && !documentation.contains("See [`") {
+                bare.push(name.to_string());
+            }
+        }
+        documentation.clear();
+    }
+    (found, bare)
+}
+
+#[test]
+fn every_item_that_apps_use_has_an_example() {
+    let mut found = 0;
+    let mut bare = Vec::new();
+    for file in files() {
+        let source = fs::read_to_string(&file).expect("a source");
+        let (items, without) = items(&source);
+        found += items;
+        let place = file.strip_prefix(workspace()).unwrap_or(&file).display();
+        bare.extend(without.iter().map(|name| format!("{place}: {name}")));
+    }
+    assert!(found > 150, "only {found} items were found");
+    assert!(bare.is_empty(), "without example: {bare:#?}");
+}
+
+#[test]
+fn an_item_without_example_is_found() {
+    let source = "/// A.\npub struct A;\n\n/// B. See [`A`].\n#[must_use]\npub fn b() {}\n\n\
+                  /// ```\n/// ```\n#[diagnostic::on_unimplemented(\n    message = \"x\",\n)]\n\
+                  pub trait C {}\n\npub fn d() {}\n";
+    assert_eq!(items(source), (4, vec!["A".to_string(), "d".to_string()]));
+}
