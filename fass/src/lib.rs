@@ -135,7 +135,7 @@ pub use sched_dag::analysis::{Overheads, Reason, Test};
 pub use sched_dag::{ConstructionPolicy, Count, OverrunPolicy, Policy, Preemption, Warning};
 pub use signal::{Raiser, Raising, Signal};
 pub use staleness::Staleness;
-pub use state::{Read, State, Update};
+pub use state::{Read, State, StateValue, Update};
 pub use topic::{Ports, Publisher, Subscriber};
 pub use tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use untyped::Untyped;

@@ -37,6 +37,25 @@ use crate::dag::Dag;
 use crate::draft::Draft;
 use crate::uses::{Uses, sealed};
 
+/// What can be a state: any type that several cores may use in turn.
+///
+/// Apps need not implement it; they meet it in [`Dag::state`].
+///
+/// ```
+/// fn is_state<T: fass::StateValue>() {}
+/// is_state::<Vec<f64>>();
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` cannot be a state",
+    label = "is not `Send + Sync + 'static`",
+    note = "subtasks use a state on any core, and readers at the same time: do without `Rc`, `Cell` and borrowed data",
+    note = "what is not shared needs no state: let the one function capture it"
+)]
+pub trait StateValue: Send + Sync + 'static {}
+
+#[diagnostic::do_not_recommend]
+impl<T: Send + Sync + 'static> StateValue for T {}
+
 /// A state that subtasks of one DAG share. Made by [`Dag::state`].
 ///
 /// # Examples
@@ -93,7 +112,7 @@ pub struct Update<T>(State<T>);
 #[derive(Debug)]
 pub struct Read<T>(State<T>);
 
-impl<T: Send + Sync + 'static> State<T> {
+impl<T: StateValue> State<T> {
     /// Returns the use of a subtask that may change the state.
     ///
     /// See [`State`].
@@ -147,7 +166,7 @@ impl Dag {
     /// ```
     #[track_caller]
     #[must_use = "a state that no subtask uses is a fault at commit"]
-    pub fn state<T: Send + Sync + 'static>(&self, name: &str, initial: T) -> State<T> {
+    pub fn state<T: StateValue>(&self, name: &str, initial: T) -> State<T> {
         let mut draft = self.open();
         let position = draft.spec.states.len();
         draft.spec.states.push(StateSpec {
@@ -164,7 +183,7 @@ impl Dag {
 
 impl<T> sealed::Sealed for Update<T> {}
 
-impl<T: Send + Sync + 'static> Uses for Update<T> {
+impl<T: StateValue> Uses for Update<T> {
     type Borrowed<'a> = &'a mut T;
     type Held = Arc<Shared<T>>;
     type Guard<'a> = Changing<'a, T>;
@@ -188,7 +207,7 @@ impl<T: Send + Sync + 'static> Uses for Update<T> {
 
 impl<T> sealed::Sealed for Read<T> {}
 
-impl<T: Send + Sync + 'static> Uses for Read<T> {
+impl<T: StateValue> Uses for Read<T> {
     type Borrowed<'a> = &'a T;
     type Held = Arc<Shared<T>>;
     type Guard<'a> = Looking<'a, T>;

@@ -66,7 +66,80 @@ const CASES: &[Case] = &[
             "one tuple of at most 16 messages",
         ],
     },
+    Case {
+        what: "a receiver that is none",
+        code: "fn receive<T: MulRecv>() {}\nfn main() { receive::<i32>(); }",
+        says: &[
+            "`i32` does not receive a subtask's inputs",
+            "`<Args as VecToSubs>::Subs`",
+        ],
+    },
+    Case {
+        what: "a sender that is none",
+        code: "fn send<T: MulSend>() {}\nfn main() { send::<i32>(); }",
+        says: &[
+            "`i32` does not send a subtask's outputs",
+            "`<Ret as VecToPubs>::Pubs`",
+        ],
+    },
+    Case {
+        what: "a state itself instead of a use of it",
+        code: "fn main() { let dag = create_dag(); let map = dag.state(\"map\", 0_u32); dag.using(map); }",
+        says: &[
+            "`State<u32>` is nothing that a subtask uses",
+            "should be a use, or a tuple of up to 8 uses",
+            "uses are `state.update()`, `state.read()`, `latest.sample()` and `signal.raising()`",
+        ],
+    },
+    Case {
+        what: "a signal itself instead of a use of it",
+        code: "fn main() { let dag = create_dag(); let alarm = dag.sporadic(period()); dag.using(alarm); }",
+        says: &["`Signal` is nothing that a subtask uses"],
+    },
+    Case {
+        what: "a use among what is none",
+        code: "fn main() { let dag = create_dag(); let map = dag.state(\"map\", 0_u32); dag.using((map.read(), 5)); }",
+        says: &["is nothing that a subtask uses"],
+    },
+    Case {
+        what: "a latest value of what cannot travel",
+        code: "fn main() { create_dag().latest::<NotClone>(\"a\"); }",
+        says: &["`NotClone` cannot travel on a topic"],
+    },
+    Case {
+        what: "a state that cannot change threads",
+        code: "use std::rc::Rc;\nfn main() { create_dag().state(\"map\", Rc::new(0)); }",
+        says: &["`Rc<{integer}>` cannot be a state"],
+    },
+    Case {
+        what: "a state that cannot be read by several threads",
+        code: "use std::cell::Cell;\nfn main() { create_dag().state(\"map\", Cell::new(0)); }",
+        says: &["`Cell<{integer}>` cannot be a state"],
+    },
 ];
+
+/// The traits whose sentences are shown, and the sentences, come from the sources:
+/// a new one without a case fails here.
+#[test]
+fn every_sentence_has_a_case() {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let expected: Vec<&str> = CASES.iter().flat_map(|case| case.says).copied().collect();
+    let mut sentences = 0;
+    for entry in fs::read_dir(sources).expect("the sources").flatten() {
+        let source = fs::read_to_string(entry.path()).expect("a source");
+        let attributes = source.split("on_unimplemented(").skip(1);
+        for line in attributes.filter_map(|attribute| attribute.split("message = ").nth(1)) {
+            let message = line.split('"').nth(1).expect("a text");
+            let fixed = message.rsplit('}').next().unwrap_or(message);
+            assert!(
+                expected.iter().any(|said| said.contains(fixed)),
+                "no case expects \"{message}\""
+            );
+            sentences += 1;
+        }
+    }
+    assert!(sentences >= 7, "only {sentences} sentences were found");
+}
 
 #[test]
 fn wrong_shapes_are_refused_in_our_words() {

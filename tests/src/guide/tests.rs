@@ -75,7 +75,7 @@ fn what_it_says_of_the_compiler_is_what_the_compilers_test_expects() {
         assert!(test.contains(&line), "no test expects `{line}`");
         lines += 1;
     }
-    assert_eq!(lines, 1);
+    assert!(lines >= 5, "{lines} lines are left");
 }
 
 #[test]
