@@ -2,7 +2,7 @@
 //!
 //! # The front
 //!
-//! Often an instance that has just become ready is the first in line and starts
+//! Often an instance that has just become ready is the only one in line and starts
 //! at once, on the core that its predecessor has left. So the queue keeps one
 //! instance, the *front*, outside of its ordered rest: such an instance passes
 //! through without being sorted in. The front, if there is one, has the
@@ -109,15 +109,16 @@ impl ReadyQueue {
         }
     }
 
+    /// Puts it in front only before another one there: to see whether it precedes the
+    /// rest would take as long as to put it there.
     fn insert_among_others(&mut self, key: Key) {
-        if self.peek().is_some_and(|first| first < key) {
-            self.insert_behind(key);
-            return;
-        }
-        let earlier = core::mem::replace(&mut self.front, key);
-        if !earlier.is_none() {
-            self.insert_behind(earlier);
-        }
+        let precedes_front = !self.front.is_none() && key < self.front;
+        let behind = match precedes_front {
+            true => core::mem::replace(&mut self.front, key),
+            false => key,
+        };
+        self.others += 1;
+        self.rest.insert(behind);
     }
 
     /// Takes the instance with the smallest key out.
@@ -141,11 +142,6 @@ impl ReadyQueue {
         }
         self.others -= 1;
         self.rest.remove(key);
-    }
-
-    fn insert_behind(&mut self, key: Key) {
-        self.others += 1;
-        self.rest.insert(key);
     }
 }
 
