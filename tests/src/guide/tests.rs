@@ -1,6 +1,7 @@
 //! The guide holds what it promises; the README's index of pages is complete.
 
 use std::fs;
+use std::path::PathBuf;
 
 use super::{Block, blocks, read, without_numbers};
 use crate::new_app::NEW_APP;
@@ -95,23 +96,27 @@ fn the_readme_lists_every_page() {
     assert!(found > 5);
 }
 
+/// Returns the README and all pages of `docs/`, with their texts.
+fn pages() -> Vec<(PathBuf, String)> {
+    let docs = workspace().join("docs");
+    let mut paths = vec![workspace().join("README.md")];
+    for folder in [docs.clone(), docs.join("decisions")] {
+        let entries = fs::read_dir(folder).expect("the pages").flatten();
+        paths.extend(entries.map(|entry| entry.path()));
+    }
+    paths.retain(|path| path.is_file());
+    let read = |path: PathBuf| {
+        let text = fs::read_to_string(&path).expect("the page");
+        (path, text)
+    };
+    paths.into_iter().map(read).collect()
+}
+
 #[test]
 fn every_link_between_pages_leads_somewhere() {
-    let docs = workspace().join("docs");
-    let mut pages = vec![workspace().join("README.md")];
-    let entries = fs::read_dir(&docs).expect("the pages").flatten();
-    let decisions = fs::read_dir(docs.join("decisions"))
-        .expect("the decisions")
-        .flatten();
-    let all = entries.chain(decisions).map(|entry| entry.path());
-    pages.extend(all.filter(|path| path.is_file()));
-    for page in pages {
-        let text = fs::read_to_string(&page).expect("the page");
-        for link in text
-            .split("](")
-            .skip(1)
-            .filter_map(|rest| rest.split(')').next())
-        {
+    for (page, text) in pages() {
+        let links = text.split("](").skip(1);
+        for link in links.filter_map(|rest| rest.split(')').next()) {
             let target = link.split('#').next().unwrap_or_default();
             if target.is_empty() || target.contains("://") || target.contains(' ') {
                 continue;
@@ -120,6 +125,36 @@ fn every_link_between_pages_leads_somewhere() {
             assert!(path.exists(), "{}: `{link}` leads nowhere", page.display());
         }
     }
+}
+
+#[test]
+fn every_file_that_a_page_names_is_there() {
+    const FOLDERS: [&str; 7] = [
+        "sched-dag",
+        "fass",
+        "kernel",
+        "boot",
+        "apps",
+        "tests",
+        "docs",
+    ];
+    // Files that `new-app` makes.
+    const NEW_APPS: [&str; 3] = ["apps/first-steps", "apps/vision", "tests/virtual_time.rs"];
+    let mut named = 0;
+    for (page, text) in pages() {
+        for word in text.split('`').skip(1).step_by(2) {
+            let is_path = word.split_once('/').is_some_and(|(folder, rest)| {
+                FOLDERS.contains(&folder) && !rest.contains([' ', '*', '{', '<'])
+            });
+            let is_of_new_app = NEW_APPS.iter().any(|app| word.starts_with(app));
+            if is_path && !is_of_new_app {
+                let path = workspace().join(word);
+                assert!(path.exists(), "{}: there is no `{word}`", page.display());
+                named += 1;
+            }
+        }
+    }
+    assert!(named > 100, "only {named} files are named");
 }
 
 #[test]
