@@ -29,17 +29,34 @@ pub fn documented_faults() -> Result<BTreeMap<String, Entry>, String> {
     read(&page()?)
 }
 
-/// Reads the page's table of what platforms say; `...` stands for what varies.
+/// Reads the first column of one of the page's tables, which is found by the head of
+/// that column and the columns behind it; `...` stands for what varies.
 ///
 /// # Errors
 ///
-/// In words: the page cannot be read.
-pub fn launch_texts() -> Result<Vec<String>, String> {
+/// In words: the page cannot be read or has no such table.
+pub fn table(head: &str) -> Result<Vec<String>, String> {
     let page = page()?;
-    let table = page.split("\n| platform | text |\n").nth(1).unwrap_or("");
-    let rows = table.lines().skip(1).take_while(|row| row.starts_with('|'));
-    let texts = rows.filter_map(|row| row.trim_end_matches('|').split(" | ").nth(1));
+    let mut parts = page.split(head).skip(1);
+    let rows = parts.next().ok_or_else(|| format!("no table `{head}`"))?;
+    let rows = rows.trim_start().lines().skip(1);
+    let texts = rows
+        .take_while(|row| row.starts_with("| "))
+        .filter_map(|row| row.split('|').nth(1));
     Ok(texts.map(|text| text.trim().to_string()).collect())
+}
+
+/// Whether a text is what a pattern with `...` says.
+#[must_use]
+pub fn is_said_by(text: &str, pattern: &str) -> bool {
+    let mut rest = text;
+    for part in pattern.split("...") {
+        match rest.find(part) {
+            Some(place) => rest = &rest[place + part.len()..],
+            None => return false,
+        }
+    }
+    rest.is_empty()
 }
 
 /// Returns the bodies of a source's functions without arguments, by their names,
@@ -108,7 +125,7 @@ fn read_entry(section: &str) -> Result<Entry, &'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{function_bodies, read};
+    use super::{function_bodies, is_said_by, read};
 
     const ENTRY: &str = "# Errors\n\n### `cycle`\n\nA circle.\n\n    a -> b; cut it\n\n\
                          Cut it.\n\n```rust\nlet dag = cycle();\n```\n\n## More\n";
@@ -136,5 +153,15 @@ mod tests {
         let bodies = function_bodies(source);
         assert_eq!(bodies.len(), 1);
         assert_eq!(bodies["a"], "if true {\n    1\n}\n");
+    }
+
+    #[test]
+    fn a_pattern_says_what_differs_only_at_its_dots() {
+        assert!(is_said_by(
+            "dag `a` is late; hurry",
+            "dag ... is late; hurry"
+        ));
+        assert!(!is_said_by("dag `a` is late; hurry", "dag ... is late"));
+        assert!(!is_said_by("dag `a` is early", "dag ... is late"));
     }
 }

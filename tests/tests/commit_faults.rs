@@ -10,10 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use fass::finish_create_dags;
-use harness::fault_page::{documented_faults, function_bodies, launch_texts};
+use harness::fault_page::{documented_faults, function_bodies, is_said_by, table};
 use harness::system::workspace;
+use sched_dag::analysis::{Reason, TaskError};
 use sched_dag::{
-    CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskSpec, TopicPort, verify,
+    CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskId, SubtaskSpec, TopicPort,
+    verify,
 };
 
 /// The files whose functions the page shows, each named as its fault.
@@ -191,24 +193,105 @@ fn every_text_is_one_line_and_ends_in_a_remedy() {
 
 #[test]
 fn every_reason_of_a_platform_is_listed() {
-    let documented = launch_texts().expect("the page");
-    let mut sources = String::new();
-    for file in [
+    let documented = table("| text | platform |").expect("the page");
+    let sources = sources(&[
         "kernel/src/execution/mod.rs",
         "fass/virtual-time/src/platform.rs",
         "fass/native/src/platform.rs",
-    ] {
-        sources += &fs::read_to_string(workspace().join(file)).expect("the source");
-    }
+    ]);
     let reasons = sources.matches("LaunchError::new(").count();
     assert_eq!(reasons, documented.len(), "{documented:?}");
-    // A text may go on in the next line, behind a backslash.
-    let lines: Vec<&str> = sources.split("\\\n").collect();
-    let joined: String = lines.iter().map(|line| line.trim_start()).collect();
+    all_are_in(&documented, &sources);
+}
+
+#[test]
+fn every_panic_of_a_wrong_program_is_one() {
+    let documented = table("| text | remedy |").expect("the page");
+    assert!(documented.len() >= 5, "{documented:?}");
+    let sources = sources(&[
+        "fass/src/dag.rs",
+        "fass/src/signal.rs",
+        "fass/src/uses.rs",
+        "fass/virtual-time/src/platform.rs",
+    ]);
+    all_are_in(&documented, &sources);
+}
+
+#[test]
+fn every_warning_is_listed() {
+    let documented = table("| warning | cause | remedy |").expect("the page");
+    let source = sources(&["sched-dag/src/verify/warning.rs"]);
+    let codes = source.split("=> \"").skip(1);
+    let codes: Vec<String> = codes
+        .filter_map(|arm| Some(format!("`{}`", arm.split('"').next()?)))
+        .collect();
+    assert_eq!(documented, codes);
+}
+
+#[test]
+fn every_reason_against_a_proof_is_listed() {
+    let documented = table("| text | what to do |").expect("the page");
+    let machine = virtual_time::VirtualTime::new();
+    let dag = fass::create_dag();
+    dag.period(PERIOD).relative_deadline(PERIOD);
+    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
+    let commit = finish_create_dags(&[dag]).expect("the DAG is sound");
+    let unproven = commit.answers()[0].verdict.unproven();
+    let mut texts = vec![unproven.expect("it has no WCET").to_string()];
+    drop(machine);
+
+    let subtask = SubtaskId(0);
+    let reasons = [
+        Reason::LengthBeyondDeadline { length_ns: 5 },
+        Reason::SubtaskBeyondPeriod { subtask },
+        Reason::Overload,
+        Reason::DelayedBy { dag: DagId(1) },
+        Reason::NoBound,
+        Reason::InFlightTooFew { in_flight: 2 },
+        Reason::Limit,
+        Reason::NoCores,
+        Reason::Unknown(TaskError::VolumeOverflow),
+    ];
+    for reason in &reasons {
+        // A new reason does not compile here until it is listed above.
+        match reason {
+            Reason::LengthBeyondDeadline { .. }
+            | Reason::SubtaskBeyondPeriod { .. }
+            | Reason::Overload
+            | Reason::DelayedBy { .. }
+            | Reason::NoBound
+            | Reason::InFlightTooFew { .. }
+            | Reason::Limit
+            | Reason::NoCores
+            | Reason::Unknown(_) => texts.push(reason.to_string()),
+        }
+    }
+    assert_eq!(texts.len(), documented.len());
+    for (text, pattern) in texts.iter().zip(documented) {
+        assert!(is_said_by(text, &pattern), "`{text}` is not `{pattern}`");
+    }
+}
+
+/// Returns sources, with texts that go on in the next line behind a backslash joined.
+fn sources(files: &[&str]) -> String {
+    let mut sources = String::new();
+    for file in files {
+        sources += &fs::read_to_string(workspace().join(file)).expect("a source");
+    }
+    let lines = sources.split("\\\n").enumerate();
+    let joined = lines.map(|(index, line)| match index {
+        0 => line,
+        _ => line.trim_start(),
+    });
+    joined.collect()
+}
+
+/// Checks that each part of documented texts stands in sources.
+fn all_are_in(documented: &[String], sources: &str) {
     for text in documented {
         for part in text.split("...") {
             let part = part.trim();
-            assert!(joined.contains(part), "no platform says `{part}`");
+            assert!(sources.contains(part), "nobody says `{part}`");
         }
     }
 }
