@@ -34,6 +34,8 @@ fn every_block_is_of_a_kind_that_is_checked() {
     // The line by which the examples become tests.
     let library = fs::read_to_string(workspace().join("tests/src/lib.rs")).expect("the library");
     assert!(library.contains("#[doc = include_str!(\"../../docs/guide.md\")]"));
+    let manifest = fs::read_to_string(workspace().join("tests/Cargo.toml")).expect("the manifest");
+    assert!(!manifest.contains("doctest"), "doctests are left out");
 }
 
 #[test]
