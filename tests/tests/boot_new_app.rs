@@ -49,7 +49,9 @@ fn synchronize(from: &Path, to: &Path) {
     for entry in fs::read_dir(from).expect("the workspace").flatten() {
         let name = entry.file_name();
         let (path, copied) = (entry.path(), to.join(&name));
-        if name == "target" || name.to_string_lossy().starts_with('.') {
+        // Somebody may have followed the guide already.
+        let is_theirs = path == workspace().join("apps").join(NAME);
+        if is_theirs || name == "target" || name.to_string_lossy().starts_with('.') {
             continue;
         }
         if path.is_dir() {
