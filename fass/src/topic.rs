@@ -63,13 +63,23 @@ impl<T> Subscriber<T> {
 /// same::<<(i32,) as VecToPubs>::Pubs>(|_| (), |_: Publishers<(Publisher<i32>,)>| ());
 /// ```
 pub struct Publisher<T> {
-    /// One a reading port.
-    writers: Box<[Writer<T>]>,
+    /// That of the last reading port, mostly the only one.
+    last: Option<Writer<T>>,
+    /// Those of the other reading ports.
+    others: Box<[Writer<T>]>,
     /// One a subtask that samples the topic's latest value.
     stages: Box<[Box<dyn Stage<T>>]>,
 }
 
 impl<T: Message> Publisher<T> {
+    fn new(mut writers: Vec<Writer<T>>, stages: Box<[Box<dyn Stage<T>>]>) -> Self {
+        Self {
+            last: writers.pop(),
+            others: writers.into(),
+            stages,
+        }
+    }
+
     /// Hands the value of `job` to every reader: clones for all but the last,
     /// the value itself for the last. What samples the latest value is a reader
     /// whose value is prepared, and shows at the completion.
@@ -81,30 +91,40 @@ impl<T: Message> Publisher<T> {
     /// than the plan says.
     #[inline]
     pub(crate) fn send(&mut self, job: u64, value: T) {
-        let Self { writers, stages } = self;
+        if !self.others.is_empty() || !self.stages.is_empty() {
+            self.share(job, &value);
+        }
+        match &mut self.last {
+            Some(last) => put(last, job, value),
+            None => self.stage_last(job, value),
+        }
+    }
+
+    /// Hands clones to all but the last reader. Apart, so that the usual way to one
+    /// reader is short.
+    #[inline(never)]
+    fn share(&mut self, job: u64, value: &T) {
+        let sampled_last = usize::from(self.last.is_none());
+        let stages = self.stages.iter_mut().rev().skip(sampled_last);
         // The commit refuses several readers of a type that gives `None`.
-        let Some((last, others)) = writers.split_last_mut() else {
-            if let Some((last, others)) = stages.split_last_mut() {
-                for stage in others {
-                    if let Some(clone) = value.for_another_reader() {
-                        stage.stage(job, clone);
-                    }
-                }
-                last.stage(job, value);
-            }
-            return;
-        };
         for stage in stages {
             if let Some(clone) = value.for_another_reader() {
                 stage.stage(job, clone);
             }
         }
-        for writer in others {
+        for writer in &mut self.others {
             if let Some(clone) = value.for_another_reader() {
                 put(writer, job, clone);
             }
         }
-        put(last, job, value);
+    }
+
+    /// Hands the value to the last of those that sample it, where nobody else reads.
+    #[inline(never)]
+    fn stage_last(&mut self, job: u64, value: T) {
+        if let Some(last) = self.stages.last_mut() {
+            last.stage(job, value);
+        }
     }
 }
 
@@ -204,10 +224,8 @@ impl Wiring {
         let from = core::mem::take(&mut self.signals_from[subtask]);
         let readers = to.into_iter().map(|edge| Subscriber(self.reader(edge)));
         let readers = readers.collect();
-        let publisher = Publisher {
-            writers: from.into_iter().map(|edge| self.writer(edge)).collect(),
-            stages: Box::default(),
-        };
+        let writers = from.into_iter().map(|edge| self.writer(edge)).collect();
+        let publisher = Publisher::new(writers, Box::default());
         (readers, publisher)
     }
 
@@ -289,9 +307,7 @@ impl Ports<'_> {
         let edges = self.wiring.edges_of_topic.get(topic).cloned();
         let edges = edges.unwrap_or_default();
         let stages = self.wiring.stages(topic);
-        Publisher {
-            writers: edges.iter().map(|&e| self.wiring.writer(e)).collect(),
-            stages,
-        }
+        let writers = edges.iter().map(|&e| self.wiring.writer(e)).collect();
+        Publisher::new(writers, stages)
     }
 }
