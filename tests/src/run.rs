@@ -114,6 +114,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     };
     image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
     let memory_mib = choose_memory(options, dags)?;
+    seeing::check_dot(options).map_err(Refusal::Usage)?;
     let program = choose_program(options)?;
     let log = Log::choose(options, &app)?;
 
@@ -315,7 +316,9 @@ impl Log {
             return Ok(Log { path, stays: false });
         };
         File::create(named).map_err(|error| {
-            Refusal::Usage(format!("`--{option} {named}`: cannot be written: {error}"))
+            Refusal::Usage(format!(
+                "`--{option} {named}`: cannot be written: {error}; name another file"
+            ))
         })?;
         let path = named.into();
         Ok(Log { path, stays: true })

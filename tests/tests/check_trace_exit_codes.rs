@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use harness::protocol::read_line;
 
@@ -79,7 +79,7 @@ fn a_file_without_a_trace_or_with_a_damaged_one_is_2() {
         assert_eq!(text(&output.stderr), expected);
         assert!(output.stdout.is_empty());
     };
-    let no_trace = "2: the file ends without a trace; boot with `trace=dump`";
+    let no_trace = "2: the file ends without a trace; `./scripts/run --trace FILE` makes one";
     refused("none.log", "hello\nbye\n", no_trace);
     let lines: Vec<&str> = GOOD.lines().collect();
     let no_event = format!(
@@ -125,8 +125,24 @@ fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
     };
     let (code, said) = refused(&[log, "--run", "3"]);
     assert_eq!(code, Some(2));
-    assert!(said.ends_with("has no such run; there are 0\n"), "{said}");
+    assert!(
+        said.ends_with("has no such run; its runs are 0\n"),
+        "{said}"
+    );
     assert_eq!(refused(&[]).0, Some(2));
     assert_eq!(refused(&["/no/such/file"]).0, Some(2));
     assert_eq!(refused(&[log, "-o", "/no/such/folder/file"]).0, Some(1));
+}
+
+#[test]
+fn that_no_one_reads_the_output_is_no_failure() {
+    let log = file("unread.log", GOOD);
+    for subcommand in ["trace", "check-trace"] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.arg(subcommand).arg(&log).stdout(Stdio::piped());
+        let mut child = command.spawn().expect("the tool can be started");
+        drop(child.stdout.take());
+        let status = child.wait().expect("it ends");
+        assert_eq!(status.code(), Some(0), "{subcommand}");
+    }
 }

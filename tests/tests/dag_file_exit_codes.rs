@@ -200,3 +200,13 @@ fn every_format_is_printed_as_ours() {
         assert_eq!(String::from_utf8(output.stdout).expect("UTF-8"), printed);
     }
 }
+
+#[test]
+fn a_drawing_that_cannot_be_written_is_refused_before_anything_boots() {
+    let said = refusal(&["--dot", "/no/such/folder/dags.dot"]);
+    assert!(
+        said.starts_with("run: `--dot /no/such/folder/dags.dot`: cannot be written:"),
+        "{said}"
+    );
+    assert!(said.ends_with("; name another file\n"), "{said}");
+}

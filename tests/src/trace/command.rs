@@ -4,6 +4,7 @@
 //! does not hide behind the breaches of another.
 
 use std::fs;
+use std::io::{Write, stderr, stdout};
 use std::process::ExitCode;
 
 use super::model::Run;
@@ -109,7 +110,7 @@ pub(super) fn read_file(file: &str) -> Result<Vec<Run>, String> {
     let last = text.lines().count();
     match runs.first() {
         None => Err(format!(
-            "{file}:{last}: the file ends without a trace; boot with `trace=dump`"
+            "{file}:{last}: the file ends without a trace; `./scripts/run --trace FILE` makes one"
         )),
         Some(first) if runs.iter().all(|run| run.events.is_empty()) => Err(format!(
             "{file}:{}: no run of the file has an event",
@@ -126,11 +127,12 @@ fn judge(file: &str, run: &Run, options: &Parsed) -> usize {
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
     let findings = check(run, bound_ns);
     let table = report::table(file, run, &findings, bound_ns, shown);
-    if options.is_given("json") {
-        eprint!("{table}");
+    // That no one reads on (`| head`) is no failure.
+    let _ = if options.is_given("json") {
+        stderr().write_all(table.as_bytes())
     } else {
-        print!("{table}");
-    }
-    println!("{}", report::machine_line(file, run, &findings));
+        stdout().write_all(table.as_bytes())
+    };
+    let _ = writeln!(stdout(), "{}", report::machine_line(file, run, &findings));
     findings.breaches.len()
 }

@@ -1,6 +1,7 @@
 //! The subcommand `trace`: from a log to a file for a viewer.
 
 use std::fs;
+use std::io::{Write, stdout};
 use std::process::ExitCode;
 
 use super::convert;
@@ -86,7 +87,7 @@ fn attempt(words: &[String]) -> Result<(), (u8, String)> {
         if runs.is_empty() {
             let there = there.join(", ");
             return Err(refused(format!(
-                "`--run {number}`: {file} has no such run; there are {there}"
+                "`--run {number}`: {file} has no such run; its runs are {there}"
             )));
         }
     }
@@ -96,7 +97,8 @@ fn attempt(words: &[String]) -> Result<(), (u8, String)> {
 
 fn write(text: &str, options: &Parsed) -> Result<(), (u8, String)> {
     let Some(out) = options.text("out") else {
-        print!("{text}");
+        // That no one reads on (`| head`) is no failure.
+        let _ = stdout().write_all(text.as_bytes());
         return Ok(());
     };
     fs::write(out, text).map_err(|error| (1, format!("cannot write {out}: {error}")))
