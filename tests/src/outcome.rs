@@ -110,7 +110,11 @@ impl Outcome {
             reason,
         };
         let Ending::Guest(by_exit) = self.ending else {
-            let mut reason = self.ending.to_string();
+            // QEMU obeys such a signal and ends with the status of a shutdown.
+            let mut reason = match self.complaints.contains("terminating on signal") {
+                true => Ending::Signal.to_string(),
+                false => self.ending.to_string(),
+            };
             if !self.complaints.is_empty() {
                 // Writing into a `String` cannot fail.
                 let _ = write!(reason, "; QEMU says: {}", self.complaints);
@@ -218,6 +222,12 @@ mod tests {
             "no end within 1.5 s, QEMU was killed"
         );
         assert!(reason(Ending::Status(0), SUCCESS).contains("triple fault"));
+        let ended = Outcome {
+            complaints: "terminating on signal 15 from pid 7".into(),
+            ..outcome(Ending::Status(0), SUCCESS)
+        };
+        let reason = ended.judge().unwrap_err().reason;
+        assert!(reason.starts_with("a signal ended QEMU; QEMU says: terminating"));
     }
 
     #[test]
