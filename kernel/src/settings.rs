@@ -7,7 +7,7 @@
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
 //! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
-//! | `trace_events=N` | how many events each core keeps; 0: none | 4096 |
+//! | `trace_events=N` | how many events each core keeps, or up to the next power of two; 0: none | 4096 |
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
