@@ -20,6 +20,8 @@ pub(crate) fn loads_permille(from_ns: u64, to_ns: u64, most: u64) -> impl Iterat
 
 /// Computes one core's load from its events, which are in the order of time.
 fn load_permille(events: impl Iterator<Item = Event>, from_ns: u64, to_ns: u64) -> u64 {
+    // What a ring holds may all have happened since `to_ns` was read.
+    let from_ns = from_ns.min(to_ns);
     let mut busy_ns = 0;
     let mut busy_since_ns = None;
     let mut is_first = true;
@@ -82,5 +84,11 @@ mod tests {
         assert_eq!(load(&[], 100, 200), 0);
         assert_eq!(load(&[(50, What::Start)], 100, 200), 1000);
         assert_eq!(load(&[(50, What::Start)], 100, 100), 0);
+    }
+
+    #[test]
+    fn a_ring_that_begins_after_the_time_has_no_load_in_it() {
+        assert_eq!(load(&[(250, What::Finish)], 250, 200), 0);
+        assert_eq!(load(&[(250, What::Start)], 250, 200), 0);
     }
 }
