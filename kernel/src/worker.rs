@@ -235,9 +235,10 @@ impl Executed {
     }
 
     fn ns(&self) -> u64 {
+        // The clock first: a suspension in between then counts too much in the next
+        // line, which the next look sets right, and not too little, as execution.
+        let elapsed_ns = clock::now_ns().saturating_sub(self.start_ns);
         let suspended_ns = self.context.suspended_ns() - self.suspended_before_ns;
-        clock::now_ns()
-            .saturating_sub(self.start_ns)
-            .saturating_sub(suspended_ns)
+        elapsed_ns.saturating_sub(suspended_ns)
     }
 }

@@ -181,3 +181,13 @@ fn preempted_instances_lose_nothing_in_real_time() {
     preemption(Mode::Threads, 2, "static", 1);
     preemption(Mode::Threads, 4, "edf", 1);
 }
+
+#[test]
+fn an_instance_that_computes_for_a_time_does_so_for_all_of_it() {
+    for mode in [Mode::Deterministic, Mode::Threads] {
+        let outcome = guest("occupation").mode(mode).cores(1).succeed();
+        let line = outcome.transcript.of_kind("occupation").next();
+        let line = line.unwrap_or_else(|| panic!("no occupation line\n{}", outcome.tail()));
+        assert_eq!(line.number_at("too_short"), Some(0), "{}", line.text);
+    }
+}

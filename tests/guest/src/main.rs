@@ -8,6 +8,7 @@ extern crate alloc;
 mod checksum;
 mod endless;
 mod kernel_crimes;
+mod occupation;
 mod preemption;
 mod sharing;
 mod storm;
@@ -20,7 +21,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 13] = [
+const TESTS: [(&str, Test); 14] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -36,6 +37,7 @@ const TESTS: [(&str, Test); 13] = [
         |_| unpunished(kernel_crimes::fault_doubly()),
     ),
     ("preemption", preemption::run),
+    ("occupation", occupation::run),
     ("endless", endless::run),
     ("sharing", sharing::run),
     ("storm", storm::run),

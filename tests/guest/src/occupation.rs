@@ -1,0 +1,72 @@
+//! Whether an instance that occupies its core for a time does so for all of it.
+//!
+//! On one core a long instance is preempted again and again while it computes for a
+//! stated time. What the record leaves of its time, without the times of those that
+//! preempted it, has to be what it asked for. Times differ a little from job to job,
+//! so that the preemptions come at all places of the loop that looks at the clock.
+
+use alloc::vec;
+use core::hint::black_box;
+use core::time::Duration;
+
+use fass::{Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use kernel::{Ending, Machine, json};
+use sched_dag::DagId;
+
+const LONG_NS: u64 = 1_200_000;
+const STEP_NS: u64 = 3_001;
+const JOBS: u64 = 40;
+
+/// Runs both, and counts the jobs whose time was too short.
+pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    machine.options().finish(&["test"])?;
+    let (short, long) = (create_dag(), create_dag());
+    let period = Duration::from_millis(1);
+    short.name("short").jobs(5 * JOBS).relative_deadline(period);
+    let mut job = 0_u64;
+    let interrupt = move || {
+        job += 1;
+        execute_for(Duration::from_micros(500), Occupation::Spin);
+        // Some nanoseconds more or less.
+        (0..job % 64).for_each(|step| {
+            black_box(step);
+        });
+    };
+    let attributes = SubtaskAttributes::named("short").priority(0);
+    short.register_periodic_subtask(interrupt, vec![], period, attributes);
+
+    let period = Duration::from_millis(5);
+    long.name("long").jobs(JOBS).relative_deadline(period);
+    let mut job = 0;
+    let compute = move || {
+        let time = Duration::from_nanos(LONG_NS + job * STEP_NS);
+        job += 1;
+        execute_for(time, Occupation::Spin);
+    };
+    let attributes = SubtaskAttributes::named("long").priority(1);
+    long.register_periodic_subtask(compute, vec![], period, attributes);
+    finish_create_dags(&[short, long])?;
+    let run = machine.run()?;
+
+    let times = |of: DagId| {
+        let instances = run.record().all_instances(run.task_set());
+        let of_dag = instances.filter(move |(instance, _)| instance.dag == of);
+        of_dag
+            .filter_map(|(instance, times)| Some((instance.job, times.start_ns?, times.finish_ns?)))
+    };
+    let mut too_short = 0_u64;
+    for (job, start_ns, finish_ns) in times(DagId(1)) {
+        let others =
+            times(DagId(0)).filter(|(_, start, end)| start_ns < *start && *end < finish_ns);
+        let others_ns: u64 = others.map(|(_, start, end)| end - start).sum();
+        let own_ns = finish_ns - start_ns - others_ns;
+        too_short += u64::from(own_ns < LONG_NS + job * STEP_NS);
+    }
+    json::emit("occupation", |line| {
+        line.number("jobs", JOBS).number("too_short", too_short);
+    });
+    if too_short > 0 {
+        return Err(Ending::Failure("a core was left too early".into()));
+    }
+    Ok(())
+}
