@@ -27,7 +27,7 @@ use crate::options::{Parsed, Request, UsageError};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::Status;
-use crate::qemu::{LEAST_MEMORY_MIB, Machine, Mode, PROGRAM, Qemu};
+use crate::qemu::{Ending, LEAST_MEMORY_MIB, Machine, Mode, PROGRAM, Qemu};
 use crate::system;
 use screen::Screen;
 
@@ -296,7 +296,11 @@ fn conclude(outcome: &Outcome, log: &Log, screen: &Screen) -> ExitCode {
         return ExitCode::from(2);
     }
     eprint!("{}", outcome.tail());
-    eprintln!("run: failed: {}", fault.reason);
+    let remedy = match outcome.ending {
+        Ending::TimedOut(_) => "; `--timeout SECONDS` gives it longer",
+        _ => "",
+    };
+    eprintln!("run: failed: {}{remedy}", fault.reason);
     ExitCode::FAILURE
 }
 

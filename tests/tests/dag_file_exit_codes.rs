@@ -210,3 +210,17 @@ fn a_drawing_that_cannot_be_written_is_refused_before_anything_boots() {
     );
     assert!(said.ends_with("; name another file\n"), "{said}");
 }
+
+#[test]
+fn what_is_for_one_file_is_refused_for_a_folder() {
+    let folder = workspace().join("tests/data/rd-gen");
+    let folder = folder.to_str().expect("a path of UTF-8");
+    for words in [&["--dot", "dags.dot"][..], &["--console"], &["--print-dag"]] {
+        let said = refusal(&[&["--dag", folder], words].concat());
+        let expected = format!(
+            "run: `{}` is for one file; name one with `--dag`\n",
+            words[0]
+        );
+        assert_eq!(said, expected);
+    }
+}

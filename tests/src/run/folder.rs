@@ -11,7 +11,15 @@ use crate::options::Parsed;
 /// Runs all files. A refused or failed one does not keep the others from running;
 /// the exit code is that of the worst.
 pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> {
-    for name in ["print-dag", "graph", "trace", "serial", "gdb"] {
+    for name in [
+        "print-dag",
+        "graph",
+        "trace",
+        "serial",
+        "dot",
+        "console",
+        "gdb",
+    ] {
         if options.is_given(name) {
             let line = format!("`--{name}` is for one file; name one with `--dag`");
             return Err(Refusal::Usage(line));
