@@ -7,6 +7,7 @@ use std::path::Path;
 use super::condition::{Condition, Policy};
 use super::figures::{Figures, METRICS};
 use super::plan::{Plan, Provenance};
+use crate::json::quoted;
 
 /// What has been measured so far, in the order of the plan.
 pub(super) type Measured = Vec<(Condition, Figures)>;
@@ -115,32 +116,4 @@ fn result_json(policy: Policy, subtasks: usize, figures: &Figures) -> String {
     }
     text.push('}');
     text
-}
-
-/// Returns text as a JSON string.
-fn quoted(text: &str) -> String {
-    let mut quoted = String::from("\"");
-    for character in text.chars() {
-        match character {
-            '"' | '\\' => quoted.extend(['\\', character]),
-            control if control < ' ' => {
-                let _ = write!(quoted, "\\u{:04x}", u32::from(control));
-            }
-            other => quoted.push(other),
-        }
-    }
-    quoted.push('"');
-    quoted
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-    use crate::json::{Value, parse};
-
-    #[test]
-    fn quoted_text_is_read_back() {
-        let text = "a \"b\" \\ \n ä";
-        assert_eq!(parse(&quoted(text)), Ok(Value::Text(text.into())));
-    }
 }
