@@ -1,10 +1,9 @@
-//! From the machine's reset to 64-bit Rust, on every processor.
+//! What the machine tells the kernel at its start.
 //!
-//! A loader that speaks PVH (`qemu -kernel` does) jumps to `pvh_entry` in
-//! 32-bit mode. `entry.s` maps the first 4 GiB one to one, enters 64-bit mode
-//! and calls into this crate, which collects what the loader tells in a
-//! [`BootInfo`] and hands over to the image's `kernel_main` for good. Later the
-//! kernel starts the other processors through [`processors`].
+//! A loader that speaks PVH (`qemu -kernel` does) jumps to `pvh_entry` of the crate
+//! `boot-entry` in 32-bit mode, which enters 64-bit mode, has what the loader tells
+//! collected here in a [`BootInfo`] and hands over to the image's `kernel_main` for
+//! good.
 //!
 //! Words: the *image* is the program as linked, the *boot processor* the one
 //! that the firmware started, an *application processor* any other.
@@ -14,19 +13,13 @@
 //! has no guard page. The kernel replaces tables and stack as soon as it can.
 //!
 //! Everything that interprets bytes ([`acpi`], [`pvh`]) works on a borrowed view
-//! of memory and is tested on the host; `unsafe` is in `entry`, `image`,
-//! `physical` and `processors` only.
+//! of memory and is tested on the host; `unsafe` is in `physical` only.
 
 #![cfg_attr(not(test), no_std)]
 
 pub mod acpi;
-#[cfg(not(test))]
-mod entry;
-pub mod image;
 mod list;
 pub mod physical;
-#[cfg(not(test))]
-pub mod processors;
 pub mod pvh;
 
 pub use list::{Full, List};

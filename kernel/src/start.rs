@@ -59,7 +59,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
 /// Returns the first module that the loader left in memory.
 fn module(info: &BootInfo) -> Option<Module> {
     let module = *info.modules.as_slice().first()?;
-    let (map, image) = (info.memory.as_slice(), boot::image::whole());
+    let (map, image) = (info.memory.as_slice(), boot_entry::image::whole());
     assert!(
         memory::lies_in_memory(module, map, &image),
         "the loader's module at {:#x}..{:#x} is not in free memory; give the machine more memory",

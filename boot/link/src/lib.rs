@@ -22,7 +22,7 @@ const ARGUMENTS: [&str; 6] = [
 ];
 
 /// The linker script, beside the boot code that its symbols serve.
-const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../src/image.ld");
+const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../entry/src/image.ld");
 
 /// Tells cargo to link the binaries of the package being built as images.
 ///

@@ -22,13 +22,13 @@ pub(crate) fn arrive() {
 ///
 /// # Safety
 ///
-/// As for [`boot::processors::prepare`].
-pub(crate) unsafe fn start_others(root_table: u64, entry: boot::processors::Entry) -> u32 {
+/// As for [`boot_entry::processors::prepare`].
+pub(crate) unsafe fn start_others(root_table: u64, entry: boot_entry::processors::Entry) -> u32 {
     let others = || this_core::all().iter().skip(1);
     // SAFETY: passed on from the caller.
-    unsafe { boot::processors::prepare(root_table, entry) };
+    unsafe { boot_entry::processors::prepare(root_table, entry) };
     for core in others() {
-        boot::processors::set_stack(core.apic_id(), core.context().stack_top());
+        boot_entry::processors::set_stack(core.apic_id(), core.context().stack_top());
     }
     let expected = u32::try_from(others().count()).unwrap_or(u32::MAX);
     if expected == 0 {
@@ -41,7 +41,7 @@ pub(crate) unsafe fn start_others(root_table: u64, entry: boot::processors::Entr
     for attempt_ns in [200_000, 100_000_000] {
         for core in others() {
             local_apic::start_timer(clock::apic_ticks(LONGEST_JUMP_NS));
-            local_apic::send_startup(core.apic_id(), boot::processors::startup_vector());
+            local_apic::send_startup(core.apic_id(), boot_entry::processors::startup_vector());
         }
         if wait(attempt_ns, expected) {
             break;

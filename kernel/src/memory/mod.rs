@@ -60,7 +60,7 @@ pub(crate) unsafe fn initialize(
     module: Option<Module>,
     device: u64,
 ) -> Result<Layout, OutOfMemory> {
-    let mut frames = Frames::new(map, &[boot::image::whole(), pages_of(module)]);
+    let mut frames = Frames::new(map, &[boot_entry::image::whole(), pages_of(module)]);
     let total_bytes = frames.total_bytes();
     let heap = frames.take_heap().ok_or(OutOfMemory)?;
     let mut new_frame = || take_zeroed(&mut frames);
@@ -118,11 +118,11 @@ fn map_all(
     device: u64,
     new_frame: &mut dyn FnMut() -> Option<u64>,
 ) -> Result<(), OutOfMemory> {
-    let image = boot::image::whole();
+    let image = boot_entry::image::whole();
     let sections = [
-        (boot::image::rodata(), Access::Constant),
-        (boot::image::text(), Access::Code),
-        (boot::image::data(), Access::Data),
+        (boot_entry::image::rodata(), Access::Constant),
+        (boot_entry::image::text(), Access::Code),
+        (boot_entry::image::data(), Access::Data),
     ];
     for (range, access) in sections {
         table.map(range.clone(), range.start, access, new_frame)?;

@@ -12,8 +12,12 @@ use crate::system;
 /// The places, each with its reason; a folder ends in a slash.
 const PLACES: &[(&str, &str)] = &[
     (
-        "boot/src/",
+        "boot/entry/src/",
         "from the reset to Rust, there is nothing safe to stand on",
+    ),
+    (
+        "boot/src/physical.rs",
+        "what the loader left is at addresses, not in references",
     ),
     (
         "kernel/src/machine/",

@@ -1,9 +1,23 @@
-//! The boot processor's first Rust code.
+//! The image's first instructions on every processor, and where its parts lie.
+//!
+//! `entry.s` is what the loader jumps to: it maps the first 4 GiB one to one, enters
+//! 64-bit mode and calls `rust_entry`, which hands over to the image's `kernel_main`
+//! for good. Later the kernel starts the other processors through [`processors`].
+//!
+//! This is a crate of its own, and has nothing else in it, for the sake of host
+//! programs that link the kernel's logic: the code here has fixed addresses, so it
+//! fits into no other program than an image. A linker takes it out of the library
+//! for an image only, which asks for `pvh_entry` (`image.ld`).
+
+#![no_std]
+
+pub mod image;
+pub mod processors;
 
 use core::arch::{asm, global_asm};
 
-use crate::physical::IdentityMap;
-use crate::{BootInfo, processors, pvh};
+use boot::physical::IdentityMap;
+use boot::{BootInfo, pvh};
 
 global_asm!(
     include_str!("entry.s"),
