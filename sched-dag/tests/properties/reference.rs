@@ -3,9 +3,11 @@
 //! Nothing here is clever. At each unit of time every question is asked anew
 //! of the facts so far (what was released, has finished, was cancelled), with
 //! the words of the rules: no counters, no queue, no events, nothing shared with
-//! the crate but the names of the policies.
+//! the crate but the names of the policies and counters.
 
-use sched_dag::{OverrunPolicy, Policy, Preemption};
+mod releases;
+
+use sched_dag::{DagStatistics, Policy, Preemption};
 
 use crate::set::{Dag, Set};
 use crate::{InstanceOutcome, JobOutcome, Outcome};
@@ -23,6 +25,9 @@ struct Reference<'a> {
     set: &'a Set,
     now_ns: u64,
     states: Vec<Vec<State>>,
+    /// The nominal release time of each job; none of a sporadic one whose signal
+    /// has not come.
+    due_ns: Vec<Vec<Option<u64>>>,
     executed_ns: Vec<Vec<Vec<u64>>>,
     outcome: Outcome,
 }
@@ -40,6 +45,7 @@ pub(crate) fn simulate(set: &Set) -> Outcome {
             .iter()
             .map(|dag| vec![State::Ahead; per_job(dag)])
             .collect(),
+        due_ns: set.dags.iter().map(due_times).collect(),
         executed_ns: set
             .dags
             .iter()
@@ -56,14 +62,17 @@ pub(crate) fn simulate(set: &Set) -> Outcome {
                 .iter()
                 .map(|dag| vec![JobOutcome::default(); per_job(dag)])
                 .collect(),
-            dropped: vec![0; set.dags.len()],
+            statistics: vec![DagStatistics::default(); set.dags.len()],
         },
     };
     let mut running: Vec<Place> = Vec::new();
     while !reference.is_over() {
+        reference.note_ready();
         reference.notice_misses();
         reference.end_dags();
         reference.cancel_and_end();
+        reference.pause();
+        reference.take_signals();
         reference.release();
         let selected = reference.select(&running);
         for &(dag, job, subtask) in &running {
@@ -78,23 +87,35 @@ pub(crate) fn simulate(set: &Set) -> Outcome {
         running = selected;
         reference.now_ns += 1;
     }
+    reference.count();
     reference.outcome
+}
+
+/// The grid, or nothing of a sporadic DAG.
+fn due_times(dag: &Dag) -> Vec<Option<u64>> {
+    let due_ns = |job| match dag.signals_ns {
+        Some(_) => None,
+        None => Some(dag.offset_ns + dag.period_ns * job),
+    };
+    (0..dag.jobs).map(due_ns).collect()
 }
 
 impl Reference<'_> {
     fn is_over(&self) -> bool {
-        self.states
-            .iter()
-            .flatten()
-            .all(|&state| state == State::Over)
-    }
-
-    fn release_ns(&self, dag: usize, job: usize) -> u64 {
-        self.set.dags[dag].offset_ns + self.set.dags[dag].period_ns * job as u64
+        self.set.dags.iter().enumerate().all(|(dag, model)| {
+            let jobs = self.states[dag].iter().zip(&self.due_ns[dag]);
+            let mut jobs = jobs.map(|(&state, due_ns)| {
+                state == State::Over || state == State::Ahead && due_ns.is_none()
+            });
+            let signals_ns = model.signals_ns.iter().flatten();
+            let is_last = |&at_ns: &u64| at_ns < self.now_ns;
+            jobs.all(|is_over| is_over) && signals_ns.into_iter().all(is_last)
+        })
     }
 
     fn deadline_ns(&self, dag: usize, job: usize) -> u64 {
-        self.release_ns(dag, job) + self.set.dags[dag].deadline_ns
+        let due_ns = self.due_ns[dag][job];
+        due_ns.expect("it is in flight or waits") + self.set.dags[dag].deadline_ns
     }
 
     /// A job that is not complete at its deadline has missed it.
@@ -105,6 +126,11 @@ impl Reference<'_> {
                     && !self.is_cut(dag, job);
                 if alive && self.now_ns == self.deadline_ns(dag, job) + 1 {
                     self.outcome.jobs[dag][job].missed_ns = Some(self.now_ns);
+                    let statistics = &mut self.outcome.statistics[dag];
+                    statistics.consecutive_misses += 1;
+                    statistics.most_consecutive_misses = statistics
+                        .most_consecutive_misses
+                        .max(statistics.consecutive_misses);
                 }
             }
         }
@@ -123,15 +149,35 @@ impl Reference<'_> {
         job.aborted_ns.is_some() || job.is_cut
     }
 
-    /// Ends DAGs of which an instance has just failed: what is in flight and
+    /// Notes which instances have become ready by what has happened so far: none
+    /// of a job that is cut, and none by a failure, which ends the DAG.
+    fn note_ready(&mut self) {
+        for place in self.all_instances() {
+            let (dag, job, subtask) = place;
+            let is_known = self.outcome.instances[dag][job][subtask].ready_ns.is_some();
+            if is_known || self.is_cut(dag, job) || !self.is_ready(place) {
+                continue;
+            }
+            let fails = |job: usize, subtask: usize| {
+                let instance = &self.outcome.instances[dag][job][subtask];
+                instance.failed_ns == Some(self.now_ns)
+            };
+            let mut edges = self.set.dags[dag].edges.iter();
+            let by_failure = edges.any(|&(from, to)| to == subtask && fails(job, from))
+                || (0..job).any(|before| fails(before, subtask));
+            if !by_failure {
+                self.outcome.instances[dag][job][subtask].ready_ns = Some(self.now_ns);
+            }
+        }
+    }
+
+    /// Ends DAGs of which an instance has just failed, or that are stopped: what is in flight and
     /// not complete is cut, the rest does not happen.
     fn end_dags(&mut self) {
         for dag in 0..self.states.len() {
-            let instances = self.outcome.instances[dag].iter().flatten();
-            if !instances
-                .into_iter()
-                .any(|instance| instance.failed_ns == Some(self.now_ns))
-            {
+            let mut instances = self.outcome.instances[dag].iter().flatten();
+            let has_failed = instances.any(|instance| instance.failed_ns == Some(self.now_ns));
+            if !has_failed && self.set.dags[dag].stop_ns != Some(self.now_ns) {
                 continue;
             }
             for job in 0..self.states[dag].len() {
@@ -141,7 +187,7 @@ impl Reference<'_> {
                 match self.states[dag][job] {
                     State::InFlight if is_complete || self.is_cut(dag, job) => {}
                     State::InFlight => self.outcome.jobs[dag][job].is_cut = true,
-                    State::Waiting => self.outcome.dropped[dag] += 1,
+                    State::Waiting => self.outcome.statistics[dag].dropped += 1,
                     State::Ahead | State::Over => {}
                 }
                 if self.states[dag][job] != State::InFlight {
@@ -186,6 +232,7 @@ impl Reference<'_> {
                 break;
             }
         }
+        self.note_ready();
         for dag in 0..self.states.len() {
             for job in 0..self.states[dag].len() {
                 let subtasks = 0..self.set.dags[dag].subtasks.len();
@@ -196,67 +243,12 @@ impl Reference<'_> {
                 {
                     self.states[dag][job] = State::Over;
                     self.outcome.jobs[dag][job].ended_ns = Some(self.now_ns);
-                }
-            }
-        }
-    }
-
-    fn release(&mut self) {
-        for dag in 0..self.states.len() {
-            self.release_waiting(dag);
-            for job in 0..self.states[dag].len() {
-                if self.states[dag][job] == State::Ahead && self.release_ns(dag, job) == self.now_ns
-                {
-                    self.states[dag][job] = State::Waiting;
-                    self.release_waiting(dag);
-                    if self.states[dag][job] == State::Waiting {
-                        self.overrun(dag, job);
+                    if !self.is_cut(dag, job) && self.outcome.jobs[dag][job].missed_ns.is_none() {
+                        self.outcome.statistics[dag].consecutive_misses = 0;
                     }
                 }
             }
         }
-    }
-
-    fn release_waiting(&mut self, dag: usize) {
-        while let Some(job) = self.first(dag, |state| state == State::Waiting) {
-            let in_flight = usize::try_from(self.set.dags[dag].in_flight).expect("few jobs");
-            let blocked = (0..self.states[dag].len()).any(|other| {
-                self.states[dag][other] == State::InFlight && other + in_flight <= job
-            });
-            if blocked {
-                break;
-            }
-            self.states[dag][job] = State::InFlight;
-            self.outcome.jobs[dag][job].released_ns = Some(self.now_ns);
-        }
-    }
-
-    fn overrun(&mut self, dag: usize, job: usize) {
-        let skip = |reference: &mut Self, job: usize| {
-            reference.states[dag][job] = State::Over;
-            reference.outcome.jobs[dag][job].skipped_ns = Some(reference.now_ns);
-        };
-        match self.set.dags[dag].overrun {
-            OverrunPolicy::Queue => {}
-            OverrunPolicy::Skip => skip(self, job),
-            OverrunPolicy::Abort => {
-                let oldest = (0..self.states[dag].len()).find(|&other| {
-                    self.states[dag][other] == State::InFlight
-                        && self.outcome.jobs[dag][other].aborted_ns.is_none()
-                });
-                if let Some(oldest) = oldest {
-                    self.outcome.jobs[dag][oldest].aborted_ns = Some(self.now_ns);
-                    self.cancel_and_end();
-                } else if let Some(waiting) = self.first(dag, |state| state == State::Waiting) {
-                    skip(self, waiting);
-                }
-                self.release_waiting(dag);
-            }
-        }
-    }
-
-    fn first(&self, dag: usize, is: impl Fn(State) -> bool) -> Option<usize> {
-        self.states[dag].iter().position(|&state| is(state))
     }
 
     /// R5: the instances that execute during the next unit.
@@ -316,5 +308,35 @@ impl Reference<'_> {
             }
         }
         places
+    }
+
+    /// Counts what is to be seen in the jobs and instances.
+    fn count(&mut self) {
+        let Outcome {
+            instances,
+            jobs,
+            statistics,
+        } = &mut self.outcome;
+        for (dag, statistics) in statistics.iter_mut().enumerate() {
+            let due_ns = self.due_ns[dag].iter();
+            for (job, &due_ns) in jobs[dag].iter_mut().zip(due_ns) {
+                let was_due = job.released_ns.is_some() || job.skipped_ns.is_some();
+                job.nominal_ns = due_ns.filter(|_| was_due);
+            }
+            let count = |is: fn(&JobOutcome) -> bool| {
+                let jobs = jobs[dag].iter();
+                jobs.filter(|job| is(job)).count() as u64
+            };
+            let failed = instances[dag].iter().flatten();
+            let failed = failed.filter(|instance| instance.failed_ns.is_some());
+            statistics.faults = failed.count() as u64;
+            statistics.released = count(|job| job.released_ns.is_some());
+            statistics.skips = count(|job| job.skipped_ns.is_some());
+            statistics.aborts = count(|job| job.aborted_ns.is_some());
+            statistics.misses = count(|job| job.missed_ns.is_some());
+            statistics.cut_short = count(|job| job.is_cut);
+            statistics.completed =
+                count(|job| job.ended_ns.is_some() && job.aborted_ns.is_none() && !job.is_cut);
+        }
     }
 }

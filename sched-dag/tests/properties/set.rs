@@ -3,7 +3,7 @@
 use std::fmt;
 
 use sched_dag::{
-    DagSpec, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec,
+    Activation, DagSpec, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec,
 };
 
 use crate::random::Random;
@@ -13,6 +13,8 @@ use crate::random::Random;
 pub(crate) struct Set {
     pub(crate) options: SchedulerOptions,
     pub(crate) dags: Vec<Dag>,
+    /// The seed of what a driver is free to choose.
+    pub(crate) choices: u64,
 }
 
 #[derive(Clone)]
@@ -25,6 +27,12 @@ pub(crate) struct Dag {
     pub(crate) overrun: OverrunPolicy,
     pub(crate) subtasks: Vec<Subtask>,
     pub(crate) edges: Vec<(usize, usize)>,
+    /// When signals come, in order, if it is sporadic.
+    pub(crate) signals_ns: Option<Vec<u64>>,
+    /// When it is paused and when resumed, in order, at different times.
+    pub(crate) pauses_ns: Vec<(u64, u64)>,
+    /// When it is stopped.
+    pub(crate) stop_ns: Option<u64>,
 }
 
 #[derive(Clone)]
@@ -68,7 +76,11 @@ pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
     let dags = (0..random.between(1, 4))
         .map(|_| draw_dag(random, overruns))
         .collect();
-    Set { options, dags }
+    Set {
+        options,
+        dags,
+        choices: random.next(),
+    }
 }
 
 /// Draws a set in which instances fail, of one DAG at least.
@@ -87,6 +99,38 @@ pub(crate) fn draw_failing(random: &mut Random) -> Set {
             random.between(0, 4).saturating_sub(3)
         };
         for _ in 0..faults {
+            let subtask = random.below(dag.subtasks.len());
+            dag.subtasks[subtask].fails_in = Some(random.between(0, dag.jobs - 1));
+        }
+    }
+    set
+}
+
+/// Draws a set with signals, pauses, stops and failures.
+pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
+    let overruns = if random.chance(40) {
+        Overruns::Never
+    } else {
+        Overruns::Often
+    };
+    let mut set = draw(random, overruns);
+    for dag in &mut set.dags {
+        if random.chance(40) {
+            let mut signals_ns: Vec<u64> = (0..random.between(0, 10))
+                .map(|_| random.between(0, 60))
+                .collect();
+            signals_ns.sort_unstable();
+            dag.signals_ns = Some(signals_ns);
+        }
+        let mut time_ns = 0;
+        for _ in 0..random.between(0, 4).saturating_sub(2) {
+            let from_ns = time_ns + random.between(1, 20) - 1;
+            let to_ns = from_ns + random.between(1, 20);
+            dag.pauses_ns.push((from_ns, to_ns));
+            time_ns = to_ns + 1;
+        }
+        dag.stop_ns = random.chance(15).then(|| random.between(0, 50));
+        if random.chance(15) {
             let subtask = random.below(dag.subtasks.len());
             dag.subtasks[subtask].fails_in = Some(random.between(0, dag.jobs - 1));
         }
@@ -135,6 +179,9 @@ fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
         },
         edges: draw_edges(random, subtasks.len()),
         subtasks,
+        signals_ns: None,
+        pauses_ns: Vec::new(),
+        stop_ns: None,
     }
 }
 
@@ -164,6 +211,13 @@ impl Set {
 }
 
 impl Dag {
+    pub(crate) fn is_paused_at(&self, now_ns: u64) -> bool {
+        let pauses = self.pauses_ns.iter();
+        pauses
+            .into_iter()
+            .any(|&(from_ns, to_ns)| (from_ns..to_ns).contains(&now_ns))
+    }
+
     fn spec(&self) -> DagSpec {
         let subtask = |subtask: &Subtask| SubtaskSpec {
             priority: Some(Priority(subtask.priority)),
@@ -171,6 +225,10 @@ impl Dag {
             ..SubtaskSpec::default()
         };
         DagSpec {
+            activation: match self.signals_ns {
+                Some(_) => Activation::Sporadic,
+                None => Activation::default(),
+            },
             period_ns: Some(self.period_ns),
             relative_deadline_ns: Some(self.deadline_ns),
             offset_ns: self.offset_ns,
@@ -235,7 +293,16 @@ impl fmt::Display for Set {
             for (from, to) in &dag.edges {
                 writeln!(f, "edge {from} {to}")?;
             }
+            if let Some(signals_ns) = &dag.signals_ns {
+                writeln!(f, "    signals at {signals_ns:?}")?;
+            }
+            for (from_ns, to_ns) in &dag.pauses_ns {
+                writeln!(f, "    paused at {from_ns}, resumed at {to_ns}")?;
+            }
+            if let Some(stop_ns) = dag.stop_ns {
+                writeln!(f, "    stopped at {stop_ns}")?;
+            }
         }
-        Ok(())
+        writeln!(f, "    choices {}", self.choices)
     }
 }

@@ -49,6 +49,22 @@ fn steps(set: &Set) -> Vec<Set> {
         add(&|set| set.options.cores -= 1);
     }
     for dag in 0..set.dags.len() {
+        for signal in 0..set.dags[dag].signals_ns.as_ref().map_or(0, Vec::len) {
+            add(&|set| {
+                let signals_ns = set.dags[dag].signals_ns.as_mut();
+                signals_ns.expect("it has signals").remove(signal);
+            });
+        }
+        for pause in 0..set.dags[dag].pauses_ns.len() {
+            add(&|set| {
+                set.dags[dag].pauses_ns.remove(pause);
+            });
+        }
+        if set.dags[dag].stop_ns.is_some() {
+            add(&|set| set.dags[dag].stop_ns = None);
+        }
+    }
+    for dag in 0..set.dags.len() {
         lower(&mut add, set.dags[dag].offset_ns, 0, |set, to| {
             set.dags[dag].offset_ns = to
         });

@@ -1,0 +1,257 @@
+//! A set in the real scheduler, by a driver that takes every way that the scheduler
+//! offers.
+//!
+//! It is free to choose, and chooses at random: how an instance's completion is told
+//! (as a moment, by [`Scheduler::hand_off`], or by [`Scheduler::hand_over`] for an
+//! idle core), in which order those of one instant are, whether it calls when nothing
+//! has happened, and whether it anticipates. What comes of it, core numbers apart, has
+//! to be the same; and the core numbers have to be those that the docs state.
+
+use std::collections::HashMap;
+
+use sched_dag::virtual_time::Workload;
+use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Scheduler};
+
+use crate::Outcome;
+use crate::random::Random;
+use crate::record::Record;
+use crate::replay::scheduler;
+use crate::set::Set;
+
+/// Runs a set and returns what happened, or why that contradicts itself.
+pub(crate) fn drive(set: &Set) -> Result<Outcome, String> {
+    let scheduler = scheduler(set)?;
+    let cores = scheduler.options().cores;
+    let mut driver = Driver {
+        set,
+        scheduler,
+        random: Random::new(set.choices),
+        record: Record::new(set),
+        cores: vec![None; cores as usize],
+        idle: (0..cores).rev().map(CoreId).collect(),
+        left_ns: HashMap::new(),
+        now_ns: 0,
+    };
+    driver.instant(0)?;
+    while let Some(next_ns) = driver.next_ns() {
+        if driver.random.chance(10) && driver.now_ns < next_ns {
+            let between_ns = driver.random.between(driver.now_ns, next_ns - 1);
+            driver.instant(between_ns)?;
+        }
+        driver.instant(next_ns)?;
+        driver.compare_cores()?;
+        let event_ns = driver.scheduler.next_event_ns();
+        if event_ns.is_some_and(|event_ns| event_ns <= next_ns) {
+            return Err(format!(
+                "at {next_ns} the instant is over before {event_ns:?}"
+            ));
+        }
+    }
+    driver.record.finish(&driver.scheduler)
+}
+
+struct Driver<'a> {
+    set: &'a Set,
+    scheduler: Scheduler,
+    random: Random,
+    record: Record<'a>,
+    /// What each core executes, and when that ends.
+    cores: Vec<Option<(Instance, u64)>>,
+    /// The idle cores; the last one has to be taken first.
+    idle: Vec<CoreId>,
+    /// What preempted instances have left to execute.
+    left_ns: HashMap<Instance, u64>,
+    now_ns: u64,
+}
+
+impl Driver<'_> {
+    fn next_ns(&self) -> Option<u64> {
+        let ends = self.cores.iter().flatten().map(|&(_, end_ns)| end_ns);
+        let commands = self.set.dags.iter().flat_map(|dag| {
+            let pauses_ns = dag.pauses_ns.iter().flat_map(|&(from, to)| [from, to]);
+            pauses_ns.chain(dag.stop_ns)
+        });
+        let commands = commands.filter(|&at_ns| at_ns > self.now_ns);
+        ends.chain(commands)
+            .chain(self.scheduler.next_event_ns())
+            .chain(self.record.next_signal_ns())
+            .min()
+    }
+
+    fn instant(&mut self, now_ns: u64) -> Result<(), String> {
+        self.now_ns = now_ns;
+        self.record.instant(now_ns);
+        if self.random.chance(20) {
+            let core = self.random.below(self.cores.len());
+            self.scheduler.anticipate(core_id(core));
+        }
+        let mut ended = self.take_ended();
+        let failed: Vec<_> = ended
+            .extract_if(.., |&mut (_, instance)| self.record.fails(instance))
+            .collect();
+        // With a completion before it in the same instant, a dispatch would be owed.
+        let is_quiet = ended.len() == 1
+            && failed.is_empty()
+            && !self.has_commands()
+            && self
+                .record
+                .next_signal_ns()
+                .is_none_or(|at_ns| at_ns > now_ns);
+        let last = if is_quiet { ended.pop() } else { None };
+        for (core, instance) in ended {
+            self.record.finished(instance, core, now_ns);
+            self.idle.push(core);
+            let mut moment = self.scheduler.at(now_ns);
+            moment.complete(instance, &mut self.record);
+        }
+        if let Some((core, instance)) = last
+            && self.complete_last(core, instance)?
+        {
+            return Ok(());
+        }
+        for (core, instance) in failed {
+            self.record.failed(instance, core, now_ns);
+            self.idle.push(core);
+            let mut moment = self.scheduler.at(now_ns);
+            moment.fail(instance, &mut self.record);
+        }
+        self.command();
+        let decisions = self.scheduler.at(now_ns).release_due(&mut self.record);
+        let decisions = decisions.dispatch().to_vec();
+        self.carry_out(&decisions)
+    }
+
+    /// Takes what ends now from its cores, in any order.
+    fn take_ended(&mut self) -> Vec<(CoreId, Instance)> {
+        let mut ended = Vec::new();
+        for (core, place) in (0..).map(CoreId).zip(&mut self.cores) {
+            if let Some((instance, _)) = place.take_if(|(_, end_ns)| *end_ns == self.now_ns) {
+                ended.insert(self.random.below(ended.len() + 1), (core, instance));
+            }
+        }
+        ended
+    }
+
+    /// Tells that the last instance of this instant has finished, in one of the ways
+    /// that there are. Reports whether that was the whole instant.
+    fn complete_last(&mut self, core: CoreId, instance: Instance) -> Result<bool, String> {
+        let (now_ns, record) = (self.now_ns, &mut self.record);
+        record.finished(instance, core, now_ns);
+        let vertex = self.scheduler.vertex(instance);
+        let way = self.random.between(0, 4);
+        if way == 0 {
+            self.scheduler.at(now_ns).complete(instance, record);
+            self.idle.push(core);
+            return Ok(false);
+        }
+        let other = match way {
+            1 => None,
+            _ if self.idle.is_empty() => None,
+            _ => Some(self.random.below(self.idle.len())),
+        };
+        let taker = other.map_or(core, |place| self.idle[place]);
+        let done = if taker == core {
+            self.scheduler.hand_off(now_ns, core, vertex, record)
+        } else {
+            self.scheduler
+                .hand_over(now_ns, core, vertex, taker, record)
+        };
+        self.idle.push(core);
+        if let HandOff::Open = done {
+            return Ok(false);
+        }
+        // The taker is the first to be given something, now or later.
+        self.idle.retain(|&idle| idle != taker);
+        self.idle.push(taker);
+        if let HandOff::To(next, decision) = done {
+            if self.scheduler.vertex(decision.instance()) != next {
+                return Err(format!("{decision:?} is not of {next:?}"));
+            }
+            self.carry_out(&[decision])?;
+        }
+        Ok(true)
+    }
+
+    fn has_commands(&self) -> bool {
+        let now_ns = self.now_ns;
+        self.set.dags.iter().any(|dag| {
+            let mut pauses_ns = dag.pauses_ns.iter();
+            pauses_ns.any(|&(from_ns, to_ns)| from_ns == now_ns || to_ns == now_ns)
+                || dag.stop_ns == Some(now_ns)
+        })
+    }
+
+    /// Stops, pauses, resumes and signals DAGs.
+    fn command(&mut self) {
+        let (now_ns, record) = (self.now_ns, &mut self.record);
+        let mut moment = self.scheduler.at(now_ns);
+        for (id, dag) in (0..).map(DagId).zip(&self.set.dags) {
+            if dag.stop_ns == Some(now_ns) {
+                moment.stop(id, record);
+            }
+            for &(from_ns, to_ns) in &dag.pauses_ns {
+                if from_ns == now_ns {
+                    moment.pause(id, record);
+                }
+                if to_ns == now_ns {
+                    moment.resume(id);
+                }
+            }
+        }
+        while let Some(dag) = record.take_signal(now_ns) {
+            moment.signal(dag, record);
+        }
+    }
+
+    fn carry_out(&mut self, decisions: &[Decision]) -> Result<(), String> {
+        let now_ns = self.now_ns;
+        let mut preempted = None;
+        for &decision in decisions {
+            let (core, instance) = (decision.core(), decision.instance());
+            let place = &mut self.cores[core.index()];
+            if let Decision::Preempt { .. } = decision {
+                let Some((_, end_ns)) = place.take_if(|(running, _)| *running == instance) else {
+                    return Err(format!("at {now_ns} {decision:?} and it does not run"));
+                };
+                self.left_ns.insert(instance, end_ns - now_ns);
+                self.record.preempted(instance, core, now_ns);
+                preempted = Some(core);
+                continue;
+            }
+            let free = preempted.take().or_else(|| self.idle.pop());
+            if free != Some(core) || place.is_some() {
+                return Err(format!(
+                    "at {now_ns} {decision:?} and {free:?} is to be taken"
+                ));
+            }
+            let left_ns = self.left_ns.remove(&instance);
+            let left_ns = match (decision, left_ns) {
+                (Decision::Resume { .. }, Some(left_ns)) => {
+                    self.record.resumed(instance, core, now_ns);
+                    left_ns
+                }
+                (Decision::Start { .. }, None) => {
+                    self.record.started(instance, core, now_ns);
+                    self.record.execute(instance, now_ns)
+                }
+                _ => return Err(format!("at {now_ns} {decision:?}, {left_ns:?} ns are left")),
+            };
+            *place = Some((instance, now_ns + left_ns));
+        }
+        Ok(())
+    }
+
+    fn compare_cores(&self) -> Result<(), String> {
+        for (core, place) in (0..).map(CoreId).zip(&self.cores) {
+            let running = self.scheduler.running(core);
+            if running != place.map(|(instance, _)| instance) {
+                return Err(format!("{core:?} runs {place:?}, not {running:?}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn core_id(index: usize) -> CoreId {
+    CoreId(u32::try_from(index).expect("few cores"))
+}
