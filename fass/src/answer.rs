@@ -54,7 +54,7 @@ use crate::platform::Platform;
 /// ));
 /// assert_eq!(
 ///     answer.to_string(),
-///     "dag `demo` takes at most 5000000 ns, by long paths (He et al. 2022)"
+///     "dag `demo` takes at most 5ms, by long paths (He et al. 2022)"
 /// );
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -265,7 +265,7 @@ impl fmt::Display for Answer {
         let dag = &self.dag;
         match &self.verdict {
             Verdict::Proven { bound, test } => {
-                write!(f, "{dag} takes at most {} ns, by {test}", bound.as_nanos())
+                write!(f, "{dag} takes at most {bound:?}, by {test}")
             }
             Verdict::NotProven(unproven) => {
                 write!(f, "{dag} is not proven to meet its deadlines: {unproven}")

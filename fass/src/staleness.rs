@@ -120,7 +120,7 @@ impl fmt::Display for Staleness {
             "{reader} of {reader_dag} samples topic `{topic}` of {writer_dag}, "
         )?;
         match bound {
-            Some(bound) => write!(f, "less than {} ns old", bound.as_nanos()),
+            Some(bound) => write!(f, "less than {bound:?} old"),
             None => f.write_str("of unknown age"),
         }
     }

@@ -107,7 +107,9 @@ pub(crate) fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         instance,
         &Fault {
             cause: "budget overrun",
-            message: &fmt::from_fn(|f| write!(f, "executed for more than {budget_ns} ns")),
+            message: &fmt::from_fn(|f| {
+                write!(f, "executed for more than its budget of {budget_ns} ns")
+            }),
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: None,
         },

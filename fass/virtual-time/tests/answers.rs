@@ -180,7 +180,7 @@ fn dags_without_all_wcets_say_so() {
         [
             "dag `unknown` is not proven to meet its deadlines: subtask `sink` has no WCET; give \
              every subtask one to have the dag analysed",
-            "dag `urgent` takes at most 2000000 ns, by long paths (He et al. 2022)",
+            "dag `urgent` takes at most 2ms, by long paths (He et al. 2022)",
             "dag `lax` is not proven to meet its deadlines: dag `unknown`, which may delay it, is \
              not proven itself; see to that one first",
         ]

@@ -89,6 +89,9 @@ impl fmt::Display for Exception<'_> {
         if let Some(address) = self.address {
             write!(f, " at address {address:#x}")?;
         }
+        if self.is_stack_overflow() {
+            f.write_str(", a stack overflow")?;
+        }
         let Registers {
             error_code, rsp, ..
         } = self.registers;
@@ -97,6 +100,16 @@ impl fmt::Display for Exception<'_> {
 }
 
 impl Exception<'_> {
+    /// Reports whether the page below the stack was hit: an absent page within one
+    /// page of the stack pointer, as compiled code touches each page on its way down.
+    fn is_stack_overflow(&self) -> bool {
+        const PRESENT: u64 = 1;
+        const PAGE: u64 = 4096;
+        let registers = self.registers;
+        let is_near = |address: u64| address.abs_diff(registers.rsp) <= PAGE;
+        registers.error_code & PRESENT == 0 && self.address.is_some_and(is_near)
+    }
+
     /// Reports whether it is the fault of the code that ran, rather than of the
     /// machine or the kernel: that code had interrupts enabled, as no holder of
     /// a lock and no handler has.
