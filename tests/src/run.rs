@@ -91,7 +91,7 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
         return Ok(ExitCode::SUCCESS);
     }
     let booted = boot_app(&options, dags.as_ref(), true)?;
-    Ok(conclude(&booted.outcome, &booted.log, &booted.screen))
+    Ok(conclude(&booted, dags.as_ref()))
 }
 
 /// Reads the file that `--dag` names, if there is one.
@@ -134,7 +134,8 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     introduce(&screen, &app, &qemu, why);
     let show = |line: &str| {
         if shows {
-            screen.show(line);
+            let translated = dags.and_then(|dags| dags.translate(line));
+            screen.show(translated.as_deref().unwrap_or(line));
         }
     };
     let talk = seeing::relay;
@@ -281,7 +282,12 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say("");
 }
 
-fn conclude(outcome: &Outcome, log: &Log, screen: &Screen) -> ExitCode {
+fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
+    let Booted {
+        outcome,
+        log,
+        screen,
+    } = booted;
     let Err(fault) = outcome.judge() else {
         screen.say(&format!(
             "\nwell ended after {:.1} s",
@@ -291,7 +297,10 @@ fn conclude(outcome: &Outcome, log: &Log, screen: &Screen) -> ExitCode {
         return ExitCode::SUCCESS;
     };
     if fault.status == Status::Usage {
-        eprintln!("run: the guest refused its command line: {}", fault.reason);
+        let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
+        let lines = of_file
+            .unwrap_or_else(|| format!("the guest refused its command line: {}", fault.reason));
+        lines.lines().for_each(|line| eprintln!("run: {line}"));
         log.discard();
         return ExitCode::from(2);
     }

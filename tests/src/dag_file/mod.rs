@@ -8,13 +8,15 @@
 //! - [`prepare()`]: what `./scripts/run --dag FILE` boots;
 //! - [`batch`]: a folder of files, one boot each, in one table.
 //!
-//! Every message about a file begins `FILE:LINE:`.
+//! Every message about a file begins `FILE:LINE:`, with a line of the file that was named,
+//! whatever it became on the way to the guest.
 
 pub mod batch;
 mod load;
 mod prepare;
 pub mod rates;
 pub mod rd_gen;
+mod source_lines;
 pub mod stg;
 pub mod yaml;
 

@@ -8,6 +8,7 @@ use dag_file::time::parse_ns;
 use dag_file::{DagFile, Execution, FileDag, Length, Set};
 
 use super::load::{Import, load};
+use super::source_lines;
 use crate::options::Parsed;
 use crate::system;
 
@@ -34,6 +35,8 @@ fn overheads(cores: u64) -> String {
 /// A file that is ready to be booted.
 #[derive(Debug)]
 pub struct Prepared {
+    /// Its name.
+    pub path: PathBuf,
     /// What it says.
     pub file: DagFile,
     /// Where the boot module lies. It is removed with this value.
@@ -44,6 +47,15 @@ pub struct Prepared {
     pub words: Vec<String>,
     /// A limit that is generous also where a job takes its real time, in seconds.
     pub limit_s: u64,
+}
+
+impl Prepared {
+    /// Returns what the guest says of the file as [`load`] would have said it, one line a
+    /// fault; `None` if it speaks of something else.
+    #[must_use]
+    pub fn translate(&self, said: &str) -> Option<String> {
+        source_lines::translate(said, &self.path, &self.file)
+    }
 }
 
 impl Drop for Prepared {
@@ -75,6 +87,10 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     if options.is_given("jobs") && options.is_given("seconds") {
         let line = "`--jobs` and `--seconds` exclude each other; give one".to_string();
         return Err(refuse(line));
+    }
+    if options.number("jobs") == Some(0) {
+        let line = "`--jobs 0` has no end, which is for fork-join; with `--dag` give at least 1";
+        return Err(refuse(line.into()));
     }
     if let Some(text) = options.text("execution") {
         Execution::parse(text).map_err(|why| refuse(format!("`--execution`: {why}")))?;
@@ -119,6 +135,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     Ok(Some(Prepared {
         memory_mib,
         limit_s: limit_s(&file, length),
+        path: path.into(),
         file,
         module,
         words,

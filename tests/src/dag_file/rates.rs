@@ -22,7 +22,7 @@
 
 use std::collections::BTreeMap;
 
-use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check};
+use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check, quoted};
 use sched_dag::{DagSpec, Policy, SubtaskSpec};
 
 /// A graph in which each subtask may have a timer.
@@ -83,7 +83,7 @@ impl Graph {
 ///
 /// # Errors
 ///
-/// The graph has a cycle.
+/// The graph has a cycle, or a path that is too long for a deadline.
 pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> {
     refuse_cycles(graph, name)?;
     let rates = rates(graph);
@@ -92,27 +92,32 @@ pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> 
     };
     let parts = parts(graph, is_kept);
     let is_one = parts.len() == 1;
-    let mut has_input = vec![false; graph.subtasks.len()];
-    for &(_, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
-        has_input[later] = true;
+    let mut part_of = vec![0; graph.subtasks.len()];
+    for (number, part) in parts.iter().enumerate() {
+        part.iter().for_each(|&subtask| part_of[subtask] = number);
     }
+    let mut has_input = vec![false; graph.subtasks.len()];
+    let mut edges = vec![Vec::new(); parts.len()];
+    for edge in graph.edges.iter().filter(|edge| is_kept(edge)) {
+        has_input[edge.1] = true;
+        edges[part_of[edge.1]].push(*edge);
+    }
+    let ends_ns = earliest_ends_ns(graph, is_kept);
     let named = |part: &[usize]| match part.iter().find(|&&subtask| !has_input[subtask]) {
         Some(&source) if !is_one => format!("{name}-{}", graph.subtasks[source].name),
         _ => name.into(),
     };
     let mut dags: Vec<FileDag> = Vec::new();
-    for part in &parts {
-        let edges = graph.edges.iter().filter(|edge| is_kept(edge));
-        dags.push(dag(graph, part, edges, rates[part[0]], named(part)));
+    for (part, edges) in parts.iter().zip(&edges) {
+        let path_ns = part.iter().map(|&subtask| ends_ns[subtask]).max();
+        let rate = rates[part[0]];
+        let dag = dag(graph, part, edges, rate, named(part), path_ns.unwrap_or(0));
+        dags.push(dag.map_err(|malformed| vec![malformed])?);
     }
     for &(earlier, later, line) in graph.edges.iter().filter(|edge| !is_kept(edge)) {
-        let reader = parts
-            .iter()
-            .position(|part| part.contains(&later))
-            .unwrap_or(0);
         let (from, to) = (&graph.subtasks[earlier].name, &graph.subtasks[later].name);
         let remark = format!("{to} reads the latest value of {from} (line {line}): no precedence");
-        dags[reader].remarks.push(remark);
+        dags[part_of[later]].remarks.push(remark);
     }
     Ok(dags)
 }
@@ -204,14 +209,15 @@ fn parts(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec
     parts
 }
 
-/// Makes a DAG of one part.
-fn dag<'g>(
+/// Makes a DAG of one part, whose longest path takes `path_ns`.
+fn dag(
     graph: &Graph,
     part: &[usize],
-    edges: impl Iterator<Item = &'g (usize, usize, usize)>,
+    edges: &[(usize, usize, usize)],
     (period_ns, offset_ns): Rate,
     name: String,
-) -> FileDag {
+    path_ns: u64,
+) -> Result<FileDag, Malformed> {
     let position = |subtask: usize| part.binary_search(&subtask).ok();
     let subtasks = part.iter().map(|&subtask| &graph.subtasks[subtask]);
     let mut spec = DagSpec {
@@ -243,35 +249,37 @@ fn dag<'g>(
         }
     }
     if spec.relative_deadline_ns.is_none() {
-        let path_ns = longest_path_ns(graph, part, &spec.edges);
-        let periods = path_ns / period_ns.max(1) + 1;
-        spec.relative_deadline_ns = Some(period_ns.saturating_mul(periods));
+        let periods = (path_ns / period_ns.max(1)).checked_add(1);
+        let deadline_ns = periods.and_then(|periods| period_ns.checked_mul(periods));
+        spec.relative_deadline_ns = Some(deadline_ns.ok_or_else(|| Malformed {
+            line: dag.line,
+            reason: format!(
+                "the longest path of dag {} is more than 64 bits of nanoseconds hold, and so is \
+                 its deadline; choose a shorter unit",
+                quoted(&spec.name)
+            ),
+        })?);
         let remark = "no deadline is given: a multiple of the period that fits the longest path";
         dag.remarks.push(remark.into());
     }
     dag.spec = spec;
-    dag
+    Ok(dag)
 }
 
-/// Returns the longest path through a part; `edges` are between its positions.
-fn longest_path_ns(graph: &Graph, part: &[usize], edges: &[(usize, usize)]) -> u64 {
-    let mut after = vec![Vec::new(); part.len()];
-    for &(earlier, later) in edges {
+/// Returns for each subtask the longest path that ends with it, over the kept edges.
+fn earliest_ends_ns(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<u64> {
+    let mut after = vec![Vec::new(); graph.subtasks.len()];
+    for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
         after[earlier].push(later);
     }
-    let mut ends_ns = vec![0_u64; part.len()];
-    let mut longest_ns = 0;
+    let mut ends_ns = vec![0_u64; graph.subtasks.len()];
     for subtask in topological(graph) {
-        let Ok(position) = part.binary_search(&subtask) else {
-            continue;
-        };
-        let end_ns = ends_ns[position].saturating_add(graph.subtasks[subtask].wcet_ns);
-        longest_ns = longest_ns.max(end_ns);
-        for &later in &after[position] {
-            ends_ns[later] = ends_ns[later].max(end_ns);
+        ends_ns[subtask] = ends_ns[subtask].saturating_add(graph.subtasks[subtask].wcet_ns);
+        for &later in &after[subtask] {
+            ends_ns[later] = ends_ns[later].max(ends_ns[subtask]);
         }
     }
-    longest_ns
+    ends_ns
 }
 
 /// Checks the whole graph, timers and all, for cycles alone.

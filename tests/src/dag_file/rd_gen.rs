@@ -91,9 +91,11 @@ fn read_node(node: &Node, unit_ns: u64) -> Result<Subtask, Malformed> {
                 subtask.name = id.into();
             }
             "execution_time" => wcet_ns = Some(time_ns(value, key, unit_ns)?),
-            "period" => subtask.period_ns = Some(time_ns(value, key, unit_ns)?),
+            "period" => subtask.period_ns = Some(positive_ns(value, key, unit_ns)?),
             "offset" => subtask.offset_ns = time_ns(value, key, unit_ns)?,
-            "end_to_end_deadline" => subtask.deadline_ns = Some(time_ns(value, key, unit_ns)?),
+            "end_to_end_deadline" => {
+                subtask.deadline_ns = Some(positive_ns(value, key, unit_ns)?);
+            }
             other => {
                 let known = "id, execution_time, period, offset, end_to_end_deadline";
                 return Err(unknown(value, other, "a node", known));
@@ -191,6 +193,13 @@ fn text<'n>(node: &'n Node, key: &str) -> Result<&'n str, Malformed> {
 fn time_ns(node: &Node, key: &str, unit_ns: u64) -> Result<u64, Malformed> {
     time::scale_ns(text(node, key)?, unit_ns)
         .map_err(|message| malformed(node.line, format!("{key}: {message}")))
+}
+
+fn positive_ns(node: &Node, key: &str, unit_ns: u64) -> Result<u64, Malformed> {
+    match time_ns(node, key, unit_ns)? {
+        0 => Err(malformed(node.line, format!("{key}: it is 0; give more"))),
+        ns => Ok(ns),
+    }
 }
 
 fn expect(node: &Node, key: &str, wanted: &str, why: &str) -> Result<(), Malformed> {

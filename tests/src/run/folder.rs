@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use super::{Refusal, boot_app, conclude, prepare};
 use crate::dag_file::batch;
 use crate::options::Parsed;
+use crate::protocol::Status;
 
 /// Runs all files. A refused or failed one does not keep the others from running;
 /// the exit code is that of the worst.
@@ -34,8 +35,9 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
     for file in &files {
         let place = file.display();
         let one = options.with("dag", &place.to_string()).with("quiet", "yes");
-        let booted = prepare(&one).and_then(|dags| boot_app(&one, dags.as_ref(), false));
-        let booted = match booted {
+        let booted =
+            prepare(&one).and_then(|dags| Ok((boot_app(&one, dags.as_ref(), false)?, dags)));
+        let (booted, dags) = match booted {
             Ok(booted) => booted,
             Err(Refusal::Usage(lines)) => {
                 lines.lines().for_each(|line| eprintln!("run: {line}"));
@@ -48,11 +50,15 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
                 continue;
             }
         };
-        if booted.outcome.judge().is_err() {
-            eprintln!("run: {place}:");
-            failed += 1;
+        match booted.outcome.judge() {
+            Ok(()) => {}
+            Err(fault) if fault.status == Status::Usage => refused += 1,
+            Err(_) => {
+                eprintln!("run: {place}:");
+                failed += 1;
+            }
         }
-        conclude(&booted.outcome, &booted.log, &booted.screen);
+        conclude(&booted, dags.as_ref());
         if shows_lines {
             batch::lines(file, &booted.outcome).for_each(|line| put(&line));
         } else {

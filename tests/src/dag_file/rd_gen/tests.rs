@@ -101,6 +101,18 @@ fn a_refusal_names_line_offender_and_remedy() {
             "line 3: execution_time: `-3` is negative",
         ),
         (
+            "nodes:\n- id: 0\n  execution_time: 3\n  period: 0\n",
+            "line 4: period: it is 0; give more",
+        ),
+        (
+            "nodes:\n- id: 0\n  execution_time: 3\n  end_to_end_deadline: 0.0\n",
+            "line 4: end_to_end_deadline: it is 0",
+        ),
+        (
+            "{node}- id: 1\n  execution_time: 18446744073709\nlinks:\n- source: 0\n  target: 1\n",
+            "line 2: the longest path of dag `x` is more than 64 bits of nanoseconds",
+        ),
+        (
             "nodes:\n- id: 0\n  execution_time: soon\n",
             "line 3: execution_time: `soon` is no time",
         ),
