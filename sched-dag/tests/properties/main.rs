@@ -10,6 +10,7 @@
 //! --test properties`.
 
 mod drive;
+mod pair;
 #[path = "../support/random.rs"]
 mod random;
 mod record;
@@ -104,8 +105,17 @@ fn number(variable: &str, default: u64) -> u64 {
     given.map_or(default, |text| text.parse().expect("a whole number"))
 }
 
-/// Compares `count` sets that `draw` makes.
+/// Compares `count` sets that `draw` makes with the reference.
 fn compare(what: &str, count: u64, draw: fn(&mut Random) -> Set) {
+    look_for(difference, what, count, draw);
+}
+
+fn look_for(
+    difference: fn(&Set) -> Option<String>,
+    what: &str,
+    count: u64,
+    draw: fn(&mut Random) -> Set,
+) {
     let count = number("SCHED_DAG_SETS", count);
     let first_seed = number("SCHED_DAG_SEED", 1);
     println!("{what}: {count} sets from seed {first_seed} on");
@@ -114,7 +124,7 @@ fn compare(what: &str, count: u64, draw: fn(&mut Random) -> Set) {
         if difference(&set).is_some() {
             let smallest = shrink::shrink(set, |set| difference(set).is_some());
             panic!(
-                "{what}: the scheduler differs from the reference\nseed {seed}, shrunk to\n{smallest}\n{}",
+                "{what}: the scheduler is wrong\nseed {seed}, shrunk to\n{smallest}\n{}",
                 difference(&smallest).unwrap_or_default()
             );
         }
@@ -143,4 +153,9 @@ fn ended_dags_leave_the_others_alone() {
 #[test]
 fn signals_pauses_and_stops_are_those_of_the_rules() {
     compare("disturbances", 10_000, set::draw_disturbed);
+}
+
+#[test]
+fn the_short_ways_are_the_long_one() {
+    look_for(pair::difference, "short ways", 10_000, set::draw_disturbed);
 }
