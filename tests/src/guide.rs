@@ -1,11 +1,11 @@
-//! The page `docs/guide.md`, as the tests read it.
+//! The tutorials, `docs/guide.md` and `docs/from-ros-2.md`, as the tests read them.
 //!
-//! A tutorial that does not work is worse than none, so nothing in it goes
+//! A tutorial that does not work is worse than none, so nothing in them goes
 //! unchecked:
 //!
-//! - its Rust is this crate's doctests (see `lib.rs`), each compiled and run;
-//! - its commands are parsed by the tables of the scripts that they name;
-//! - what it says a new app prints is compared with a boot of one;
+//! - their Rust is this crate's doctests (see `lib.rs`), each compiled and run;
+//! - their commands are parsed by the tables of the scripts that they name;
+//! - what the guide says a new app prints is compared with a boot of one;
 //! - a block of any other kind is refused, as is Rust that would not be tested.
 //!
 //! A *block* is what stands between two fences; its *info* is what the first fence
@@ -47,21 +47,27 @@ pub fn blocks(page: &str) -> Vec<Block> {
     blocks
 }
 
-/// Reads the guide.
+/// The tutorials.
+pub const PAGES: [&str; 2] = ["docs/guide.md", "docs/from-ros-2.md"];
+
+/// Reads the tutorials, one behind the other.
 ///
 /// # Errors
 ///
-/// In words: the page cannot be read.
+/// In words: a page cannot be read.
 pub fn read() -> Result<String, String> {
-    let path = system::workspace().join("docs/guide.md");
-    fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
+    let page = |name: &&str| {
+        let path = system::workspace().join(name);
+        fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
+    };
+    PAGES.iter().map(page).collect()
 }
 
 /// Returns the output that the guide shows under a name.
 ///
 /// # Errors
 ///
-/// In words: the page cannot be read, or has no such block.
+/// In words: a page cannot be read, or none has such a block.
 pub fn documented_output(name: &str) -> Result<String, String> {
     let info = format!("text output-{name}");
     let mut blocks = blocks(&read()?).into_iter();

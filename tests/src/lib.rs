@@ -64,3 +64,8 @@ pub use qemu::{Machine, Mode};
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/guide.md")]
 mod guide_examples {}
+
+/// As above, of the page for those who have a ROS 2 graph.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/from-ros-2.md")]
+mod ros_examples {}

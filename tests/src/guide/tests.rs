@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::{Block, blocks, read, without_numbers};
+use super::{Block, PAGES, blocks, read, without_numbers};
 use crate::new_app::NEW_APP;
 use crate::options::{Command, Request};
 use crate::run::RUN;
@@ -31,9 +31,11 @@ fn every_block_is_of_a_kind_that_is_checked() {
         }
     }
     assert!(examples >= 9, "{examples} examples are left");
-    // The line by which the examples become tests.
+    // The lines by which the examples become tests.
     let library = fs::read_to_string(workspace().join("tests/src/lib.rs")).expect("the library");
-    assert!(library.contains("#[doc = include_str!(\"../../docs/guide.md\")]"));
+    for page in PAGES {
+        assert!(library.contains(&format!("#[doc = include_str!(\"../../{page}\")]")));
+    }
     let manifest = fs::read_to_string(workspace().join("tests/Cargo.toml")).expect("the manifest");
     assert!(!manifest.contains("doctest"), "doctests are left out");
 }
