@@ -9,7 +9,8 @@
 //! The reader is strict: a line that begins with `{` and is damaged, or lacks
 //! a member that its kind must have ([`KINDS`]), is a fault with its line
 //! number. Kinds that are not listed pass, so that an app may add its own;
-//! `docs/serial-protocol.md` describes the listed ones for people.
+//! `docs/serial-protocol.md` and the pages that it names describe the listed ones for
+//! people.
 
 mod kinds;
 
@@ -257,8 +258,12 @@ ok
     }
 
     #[test]
-    fn the_document_describes_every_kind_and_member() {
-        let document = include_str!("../../docs/serial-protocol.md");
+    fn the_documents_describe_every_kind_and_member() {
+        let document = concat!(
+            include_str!("../../docs/serial-protocol.md"),
+            include_str!("../../docs/app-lines.md"),
+            include_str!("../../docs/trace-format.md"),
+        );
         for (kind, members) in KINDS {
             let heading = format!("\n### `{kind}`");
             let section = document.split(&heading).nth(1);

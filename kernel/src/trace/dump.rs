@@ -1,4 +1,4 @@
-//! The trace as machine lines; `docs/serial-protocol.md` has the format.
+//! The trace as machine lines; `docs/trace-format.md` has the format.
 
 use core::fmt;
 

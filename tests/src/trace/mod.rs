@@ -1,7 +1,7 @@
 //! The trace checker: what happened in a run, held against the model's rules.
 //!
 //! A guest that is booted with `trace=dump` prints the trace of each run on its
-//! serial port, as `docs/serial-protocol.md` says. From that alone, and sharing
+//! serial port, as `docs/trace-format.md` says. From that alone, and sharing
 //! nothing with the scheduler but the numbers of things, [`check`] replays the
 //! run and finds every breach of
 //!

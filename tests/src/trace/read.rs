@@ -2,7 +2,7 @@
 //!
 //! The log is a serial log or any file of JSON lines; lines of other kinds and
 //! lines for people are passed over, also within a run. A trace that is not as
-//! `docs/serial-protocol.md` says is [`Malformed`] with its line, so that a
+//! `docs/trace-format.md` says is [`Malformed`] with its line, so that a
 //! damaged log is never taken for a good run or for a breach.
 
 use std::collections::BTreeMap;
