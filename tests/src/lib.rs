@@ -14,7 +14,7 @@
 //! - [`elf`], [`image`], [`places`], [`tiny`]: what is booted;
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
-//! - [`options`]: command lines by a table;
+//! - [`options`]: command lines by a table; [`output`]: printing without a panic;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`guest`]: all that for a test;
 //! - [`fault_page`], [`guide`]: pages of `docs/` that tests hold to their word;
@@ -28,6 +28,10 @@
 //! no `unsafe`.
 
 #![forbid(unsafe_code)]
+
+// First, for its macros are in force in the modules after it.
+#[macro_use]
+pub mod output;
 
 pub mod bench;
 pub mod child;

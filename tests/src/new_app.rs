@@ -18,7 +18,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use crate::options::Request;
 use crate::system;
 
 pub use name::check;
@@ -51,33 +50,21 @@ pub enum NewAppError {
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn new_app(words: &[String]) -> ExitCode {
-    let options = match NEW_APP.parse(words) {
-        Ok(Request::Work(options)) => options,
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => return refuse(&error.0),
+    let options = match NEW_APP.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
     let Some(name) = options.positional() else {
-        return refuse("which name? give one, such as `./scripts/new-app brake-assist`");
+        return NEW_APP.refuse("which name? give one, such as `./scripts/new-app brake-assist`");
     };
     match create(system::workspace(), name) {
         Ok(_) => {
             print!("{}", next_steps(name));
             ExitCode::SUCCESS
         }
-        Err(NewAppError::Name(line)) => refuse(&line),
-        Err(NewAppError::Files(line)) => {
-            eprintln!("new-app: {line}");
-            ExitCode::FAILURE
-        }
+        Err(NewAppError::Name(line)) => NEW_APP.refuse(&line),
+        Err(NewAppError::Files(line)) => NEW_APP.fail(&line),
     }
-}
-
-fn refuse(line: &str) -> ExitCode {
-    eprintln!("new-app: {line}");
-    ExitCode::from(2)
 }
 
 /// Writes a new app into a workspace, and returns its folder.

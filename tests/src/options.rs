@@ -10,11 +10,14 @@
 //! and nothing is done before the whole line is understood.
 
 mod help;
+mod menu;
+mod read;
 mod suggest;
 
 use std::collections::BTreeMap;
 use std::fmt;
 
+pub use menu::{Choice, Menu};
 pub use suggest::nearest;
 
 /// A subcommand of the tool.

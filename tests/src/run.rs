@@ -15,7 +15,6 @@ mod status;
 mod table;
 
 use std::fs::{self, File};
-use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -23,7 +22,7 @@ use std::time::Duration;
 use crate::dag_file::{self, Prepared};
 use crate::image;
 use crate::install;
-use crate::options::{Parsed, Request, UsageError};
+use crate::options::Parsed;
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::Status;
@@ -41,38 +40,21 @@ enum Refusal {
     Failure(String),
 }
 
-impl From<UsageError> for Refusal {
-    fn from(error: UsageError) -> Self {
-        Refusal::Usage(error.0)
-    }
-}
-
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn run(words: &[String]) -> ExitCode {
-    match attempt(words) {
+    let options = match RUN.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    match attempt(&options) {
         Ok(code) => code,
-        Err(Refusal::Usage(lines)) => {
-            for line in lines.lines() {
-                eprintln!("run: {line}");
-            }
-            ExitCode::from(2)
-        }
-        Err(Refusal::Failure(line)) => {
-            eprintln!("run: {line}");
-            ExitCode::FAILURE
-        }
+        Err(Refusal::Usage(lines)) => RUN.refuse(&lines),
+        Err(Refusal::Failure(line)) => RUN.fail(&line),
     }
 }
 
-fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
-    let options = match RUN.parse(words)? {
-        Request::Work(options) => options,
-        Request::Help(text) => {
-            print!("{text}");
-            return Ok(ExitCode::SUCCESS);
-        }
-    };
+fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     if options.is_given("json") && options.is_given("plain") {
         let line = "`--json` and `--plain` exclude each other; give one";
         return Err(Refusal::Usage(line.into()));
@@ -81,16 +63,15 @@ fn attempt(words: &[String]) -> Result<ExitCode, Refusal> {
         let line = "`--trace` and `--serial` both name the serial log; give one";
         return Err(Refusal::Usage(line.into()));
     }
-    if let Some(folder) = dag_file::batch::folder(&options) {
-        return folder::run(&options, &folder);
+    if let Some(folder) = dag_file::batch::folder(options) {
+        return folder::run(options, &folder);
     }
-    let dags = prepare(&options)?;
+    let dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
-        // That no one reads on (`| head`) is no failure.
-        let _ = write!(stdout(), "{}", dags.file);
+        print!("{}", dags.file);
         return Ok(ExitCode::SUCCESS);
     }
-    let booted = boot_app(&options, dags.as_ref(), true)?;
+    let booted = boot_app(options, dags.as_ref(), true)?;
     Ok(conclude(&booted, dags.as_ref()))
 }
 
@@ -300,17 +281,15 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
         let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
         let lines = of_file
             .unwrap_or_else(|| format!("the guest refused its command line: {}", fault.reason));
-        lines.lines().for_each(|line| eprintln!("run: {line}"));
         log.discard();
-        return ExitCode::from(2);
+        return RUN.refuse(&lines);
     }
     eprint!("{}", outcome.tail());
     let remedy = match outcome.ending {
         Ending::TimedOut(_) => "; `--timeout SECONDS` gives it longer",
         _ => "",
     };
-    eprintln!("run: failed: {}{remedy}", fault.reason);
-    ExitCode::FAILURE
+    RUN.fail(&format!("failed: {}{remedy}", fault.reason))
 }
 
 /// Where the serial log goes, and whether it stays.

@@ -21,7 +21,6 @@ use std::process::ExitCode;
 
 use crate::image;
 use crate::install;
-use crate::options::Request;
 use libtest::Plan;
 
 pub use table::TEST;
@@ -30,16 +29,9 @@ pub use tally::Tally;
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn test(words: &[String]) -> ExitCode {
-    let options = match TEST.parse(words) {
-        Ok(Request::Work(options)) => options,
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => {
-            eprintln!("test: {error}");
-            return ExitCode::from(2);
-        }
+    let options = match TEST.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
     let plan = Plan {
         filter: options.positional().map(String::from),
@@ -58,10 +50,7 @@ pub fn test(words: &[String]) -> ExitCode {
         print!("{tally}");
     }
     match complaint(plan.filter.as_deref(), &tally) {
-        Some(line) => {
-            eprintln!("test: {line}");
-            ExitCode::from(2)
-        }
+        Some(line) => TEST.refuse(&line),
         None if tally.failed() > 0 => ExitCode::FAILURE,
         None => ExitCode::SUCCESS,
     }

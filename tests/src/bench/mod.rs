@@ -21,48 +21,74 @@ pub mod scheduler;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-const USAGE: &str = "usage: bench WHAT [options]
+use crate::install;
+use crate::options::{Choice, Command, Menu, Parsed};
 
-WHAT is one of:
-  scheduler      the commit of a large DAG, and the cost of a dispatched instance:
-                 prints a table and a JSON object for each figure
-  hand-off       the way from a completion to its successor's first instruction, in
-                 instructions and in time; see bench hand-off --help
-  join-latency   the paper's evaluation: boots each condition, writes samples,
-                 figures, plots and a report; see bench join-latency --help
-  makespan       task graphs with published optimal makespans, on the machine; see
-                 bench makespan --help
-  native         the scheduler on this host's own processors, in nanoseconds a hop, a job,
-                 an instance; see bench native --help
-
-Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.
-";
+static BENCH: Menu = Menu {
+    invocation: "./scripts/bench",
+    word: "WHAT",
+    about: "Measures one part of the project.",
+    choices: &[
+        Choice {
+            name: "scheduler",
+            about: "the commit of a large DAG, and the cost of a dispatched instance",
+            work: scheduler::run,
+        },
+        Choice {
+            name: "hand-off",
+            about: "from a completion to its successor's first instruction",
+            work: hand_off::run,
+        },
+        Choice {
+            name: "join-latency",
+            about: "the paper's evaluation: samples, figures, plots and a report",
+            work: join_latency::run,
+        },
+        Choice {
+            name: "makespan",
+            about: "task graphs with published optimal makespans, on the machine",
+            work: makespan::run,
+        },
+        Choice {
+            name: "native",
+            about: "the scheduler on this host's own processors, in nanoseconds",
+            work: native::run,
+        },
+    ],
+    notes: "\nExit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
+};
 
 /// Runs the subcommand.
 #[must_use]
 pub fn bench(words: &[String]) -> ExitCode {
-    match words.split_first().map(|(what, rest)| (&**what, rest)) {
-        Some(("hand-off", rest)) => return hand_off::run(rest),
-        Some(("join-latency", rest)) => return join_latency::run(rest),
-        Some(("makespan", rest)) => return makespan::run(rest),
-        Some(("native", rest)) => return native::run(rest),
-        _ => {}
-    }
-    if words.iter().any(|word| word == "--help" || word == "-h") {
-        print!("{USAGE}");
-        return ExitCode::SUCCESS;
-    }
-    match words {
-        [] => refuse("measure what?"),
-        [what] if what == "scheduler" => scheduler::run(),
-        [what] => refuse(&format!("nothing to measure is called `{what}`")),
-        [_, unexpected, ..] => refuse(&format!("`{unexpected}` is one word too many")),
-    }
+    BENCH.run(words)
 }
 
-fn refuse(reason: &str) -> ExitCode {
-    eprint!("bench: {reason}\n{USAGE}");
-    ExitCode::from(2)
+/// Runs a measurement that boots guests: `measure` gets what `plan` makes of the options,
+/// and says whether all limits hold.
+fn on_machine<Plan>(
+    table: &Command,
+    words: &[String],
+    plan: impl Fn(&Parsed) -> Result<Plan, String>,
+    measure: impl Fn(&Plan) -> Result<bool, String>,
+) -> ExitCode {
+    let options = match table.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    // Settling the mode may need QEMU.
+    if let Err(line) = install::ensure_qemu() {
+        return table.fail(&line);
+    }
+    let plan = match plan(&options) {
+        Ok(plan) => plan,
+        Err(line) => return table.refuse(&line),
+    };
+    match measure(&plan) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(line) => table.fail(&line),
+    }
 }
 
 /// Returns how long `work` takes.

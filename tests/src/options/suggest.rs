@@ -1,7 +1,8 @@
 //! The nearest match to a mistyped name.
 //!
-//! *Distance* is Levenshtein's: the fewest insertions, deletions and
-//! replacements of one character that turn one word into the other.
+//! *Distance* is Damerau's (10.1145/363958.363994): the fewest insertions, deletions and
+//! replacements of one character, and swaps of two neighbours, that turn one word into
+//! the other, no place being changed twice.
 
 /// Returns the allowed name nearest to `word`, if one is near enough to be
 /// what was meant: at most a third of its length away, but at least 1.
@@ -13,19 +14,22 @@ pub fn nearest<'n>(word: &str, allowed: &[&'n str]) -> Option<&'n str> {
 }
 
 fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    // `row[j]`: the distance between the part of `a` read so far and `b[..j]`.
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, left) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, right) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(left != *right);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    // `rows[i][j]`: the distance between `a[..i]` and `b[..j]`.
+    let mut rows = vec![(0..=b.len()).collect::<Vec<usize>>()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut least = replaced.min(row[j - 1] + 1).min(rows[i - 1][j] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                least = least.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(least);
         }
+        rows.push(row);
     }
-    row[b.len()]
+    rows[a.len()][b.len()]
 }
 
 #[cfg(test)]
@@ -38,13 +42,16 @@ mod tests {
         assert_eq!(distance("abc", ""), 3);
         assert_eq!(distance("kitten", "sitting"), 3);
         assert_eq!(distance("cores", "cores"), 0);
+        assert_eq!(distance("coers", "cores"), 1);
+        assert_eq!(distance("tset", "test"), 1);
     }
 
     #[test]
     fn suggests_only_what_is_near() {
         let allowed = ["cores", "jobs", "seed"];
         assert_eq!(nearest("core", &allowed), Some("cores"));
-        assert_eq!(nearest("sede", &["seed"]), None);
+        assert_eq!(nearest("sede", &["seed"]), Some("seed"));
+        assert_eq!(nearest("dees", &["seed"]), None);
         assert_eq!(nearest("job", &allowed), Some("jobs"));
         assert_eq!(nearest("frobnicate", &allowed), None);
         assert_eq!(nearest("x", &[]), None);

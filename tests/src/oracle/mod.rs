@@ -15,99 +15,88 @@ pub mod bounds;
 pub mod in_kernel;
 pub mod schedules;
 pub mod synchronizer;
+mod table;
 
 use std::process::ExitCode;
 
 use replay::lines::Malformed;
 
+use crate::options::{Choice, Command, Menu};
+
 /// One kind of reference file: how to read its cases and how to check one.
 struct Kind<Case> {
+    table: &'static Command,
     parse: fn(&str) -> Result<Vec<Case>, Malformed>,
     name: fn(&Case) -> &str,
     check: fn(&Case) -> Result<(), String>,
 }
 
-const USAGE: &str = "usage: oracle KIND FILE...
-
-Compares reference cases with what this project computes. KIND is one of:
-  bounds        lengths, widths, response-time bounds and verdicts
-  schedules     starts, finishes, preemptions, response times and misses
-                With --in-kernel on the bare machine; see schedules --in-kernel --help
-  synchronizer  sets that ExactTime and ApproximateTime emit, and what they drop
-
-Prints the first difference of each failing case, then `N passed, M failed`.
-Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
-";
+static ORACLE: Menu = Menu {
+    invocation: "./scripts/oracle",
+    word: "KIND",
+    about: "Compares reference cases with what this project computes.",
+    choices: &[
+        Choice {
+            name: "bounds",
+            about: "lengths, widths, response-time bounds and verdicts",
+            work: |words| {
+                let kind = Kind {
+                    table: &table::BOUNDS,
+                    parse: bounds::parse,
+                    name: |case| &case.name,
+                    check: bounds::check,
+                };
+                run_files(&kind, words)
+            },
+        },
+        Choice {
+            name: "schedules",
+            about: "starts, finishes, preemptions, response times and misses",
+            work: |words| {
+                if words.iter().any(|word| word == "--in-kernel") {
+                    return in_kernel::command(words);
+                }
+                let kind = Kind {
+                    table: &table::SCHEDULES,
+                    parse: schedules::parse,
+                    name: |case| &case.name,
+                    check: schedules::check,
+                };
+                run_files(&kind, words)
+            },
+        },
+        Choice {
+            name: "synchronizer",
+            about: "sets that ExactTime and ApproximateTime emit, and what they drop",
+            work: |words| {
+                let kind = Kind {
+                    table: &table::SYNCHRONIZER,
+                    parse: synchronizer::parse,
+                    name: |case| &case.name,
+                    check: synchronizer::check,
+                };
+                run_files(&kind, words)
+            },
+        },
+    ],
+    notes: table::NOTES,
+};
 
 /// Runs the subcommand.
 #[must_use]
 pub fn oracle(words: &[String]) -> ExitCode {
-    let on_machine = words.iter().any(|word| word == "--in-kernel");
-    if !on_machine && words.iter().any(|word| word == "--help" || word == "-h") {
-        print!("{USAGE}");
-        return ExitCode::SUCCESS;
-    }
-    let Some((kind, files)) = words.split_first() else {
-        return refuse("which kind of reference file?");
+    ORACLE.run(words)
+}
+
+fn run_files<Case>(kind: &Kind<Case>, words: &[String]) -> ExitCode {
+    let options = match kind.table.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
-    if kind == "schedules" && files.iter().any(|word| word == "--in-kernel") {
-        return in_kernel::command(files);
-    }
-    match kind.as_str() {
-        "bounds" => run_files(
-            &Kind {
-                parse: bounds::parse,
-                name: |case: &bounds::Case| &case.name,
-                check: bounds::check,
-            },
-            files,
-        ),
-        "schedules" => run_files(
-            &Kind {
-                parse: schedules::parse,
-                name: |case: &schedules::Case| &case.name,
-                check: schedules::check,
-            },
-            files,
-        ),
-        "synchronizer" => run_files(
-            &Kind {
-                parse: synchronizer::parse,
-                name: |case: &synchronizer::Case| &case.name,
-                check: synchronizer::check,
-            },
-            files,
-        ),
-        _ => refuse(&format!("no kind of reference file `{kind}`")),
-    }
-}
-
-fn refuse(reason: &str) -> ExitCode {
-    eprint!("oracle: {reason}\n{USAGE}");
-    ExitCode::from(2)
-}
-
-fn run_files<Case>(kind: &Kind<Case>, files: &[String]) -> ExitCode {
-    if files.is_empty() {
-        return refuse("which files? name at least one reference file");
-    }
-    let mut cases = Vec::new();
-    for file in files {
-        let text = match std::fs::read_to_string(file) {
-            Ok(text) => text,
-            Err(error) => {
-                eprintln!("oracle: cannot read {file}: {error}");
-                return ExitCode::from(2);
-            }
-        };
-        match (kind.parse)(&text) {
-            Ok(parsed) => cases.extend(parsed),
-            Err(Malformed { line, reason }) => {
-                eprintln!("oracle: {file}:{line}: {reason}");
-                return ExitCode::from(2);
-            }
-        }
-    }
+    let cases = match read(options.positionals(), kind.parse) {
+        Ok(cases) => cases,
+        Err(line) => return kind.table.refuse(&line),
+    };
     let mut failed = 0_usize;
     for case in &cases {
         if let Err(difference) = (kind.check)(case) {
@@ -117,4 +106,23 @@ fn run_files<Case>(kind: &Kind<Case>, files: &[String]) -> ExitCode {
     }
     println!("{} passed, {failed} failed", cases.len() - failed);
     ExitCode::from(u8::from(failed > 0))
+}
+
+/// Reads the cases of all files, of which there must be one.
+fn read<Case>(
+    files: &[String],
+    parse: impl Fn(&str) -> Result<Vec<Case>, Malformed>,
+) -> Result<Vec<Case>, String> {
+    if files.is_empty() {
+        return Err("which files? name at least one reference file".into());
+    }
+    let mut cases = Vec::new();
+    for file in files {
+        let text = std::fs::read_to_string(file)
+            .map_err(|error| format!("cannot read {file}: {error}"))?;
+        let parsed = parse(&text)
+            .map_err(|Malformed { line, reason }| format!("{file}:{line}: {reason}"))?;
+        cases.extend(parsed);
+    }
+    Ok(cases)
 }

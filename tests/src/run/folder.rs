@@ -1,6 +1,5 @@
 //! `run --dag FOLDER`: each DAG file of a folder, one boot each, in one table.
 
-use std::io::{Write, stdout};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -29,7 +28,7 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
     let files = batch::files(folder).map_err(Refusal::Usage)?;
     let shows_lines = options.is_given("json");
     if !shows_lines {
-        put(&batch::heading());
+        println!("{}", batch::heading());
     }
     let (mut refused, mut failed) = (0, 0);
     for file in &files {
@@ -60,26 +59,19 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
         }
         conclude(&booted, dags.as_ref());
         if shows_lines {
-            batch::lines(file, &booted.outcome).for_each(|line| put(&line));
+            batch::lines(file, &booted.outcome).for_each(|line| println!("{line}"));
         } else {
             let cores = options.number("cores").unwrap_or(1);
-            put(batch::rows(file, cores, &booted.outcome).trim_end());
+            print!("{}", batch::rows(file, cores, &booted.outcome));
         }
     }
     if !shows_lines {
         let count = files.len();
-        put(&format!(
-            "{count} files: {refused} refused, {failed} failed"
-        ));
+        println!("{count} files: {refused} refused, {failed} failed");
     }
     Ok(match (refused, failed) {
         (0, 0) => ExitCode::SUCCESS,
         (0, _) => ExitCode::FAILURE,
         _ => ExitCode::from(2),
     })
-}
-
-/// Writes lines. That no one reads them (`| head`) must not end the runs.
-fn put(lines: &str) {
-    let _ = writeln!(stdout(), "{lines}");
 }

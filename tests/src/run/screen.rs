@@ -7,7 +7,7 @@
 //! take its place on a terminal. A fault at an address gets a line of our own that
 //! names the function.
 
-use std::io::{IsTerminal, Write, stderr, stdout};
+use std::io::{IsTerminal, stderr};
 use std::path::Path;
 
 use crate::options::Parsed;
@@ -57,9 +57,9 @@ impl Screen {
             return;
         }
         if self.people {
-            put(&mut stdout(), line);
+            println!("{line}");
         } else {
-            put(&mut stderr(), line);
+            eprintln!("{line}");
         }
     }
 
@@ -87,7 +87,7 @@ impl Screen {
         };
         if wanted {
             self.end();
-            put(&mut stdout(), line);
+            println!("{line}");
         }
         if let Some(place) = self.places.explain(line) {
             self.end();
@@ -98,13 +98,13 @@ impl Screen {
     /// Wipes the progress line away.
     pub(super) fn end(&mut self) {
         if std::mem::take(&mut self.bar_is_shown) {
-            let _ = write!(stderr(), "\r\x1b[K");
+            eprint!("\r\x1b[K");
         }
     }
 
     fn show_status(&mut self, line: &MachineLine) {
         if let Some(text) = self.status.text(line).filter(|_| !self.quiet) {
-            let _ = write!(stderr(), "\r\x1b[K{text}");
+            eprint!("\r\x1b[K{text}");
             self.bar_is_shown = true;
         }
     }
@@ -126,16 +126,11 @@ impl Screen {
             let filled: String = (0..BAR)
                 .map(|i| if i < part_of(BAR) { '#' } else { '.' })
                 .collect();
-            let _ = write!(stderr(), "\r\x1b[K[{filled}] {done} of {total} jobs");
+            eprint!("\r\x1b[K[{filled}] {done} of {total} jobs");
             self.bar_is_shown = true;
         } else if part_of(10) != self.tenths_shown {
             self.tenths_shown = part_of(10);
-            put(&mut stderr(), &format!("progress: {done} of {total} jobs"));
+            eprintln!("progress: {done} of {total} jobs");
         }
     }
-}
-
-/// Writes a line. That no one reads it (`| head`) must not end the run.
-fn put(stream: &mut impl Write, line: &str) {
-    let _ = writeln!(stream, "{line}");
 }

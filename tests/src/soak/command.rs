@@ -7,7 +7,7 @@ use super::figures::Figures;
 use super::plan::{Length, Part, Plan, usual_bound_ns};
 use super::progress::Progress;
 use super::{Report, run};
-use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::options::{Command, Opt, Parsed, Takes};
 use crate::qemu::{MOST_CORES, Mode};
 
 /// The most that a load may be, in percent.
@@ -165,17 +165,13 @@ exit codes: 0 no round failed; 1 some did; 2 a refused command line
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn soak(words: &[String]) -> ExitCode {
-    let options = match SOAK.parse(words) {
-        Ok(Request::Work(options)) => options,
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => return refuse(&error.to_string()),
+    let options = match SOAK.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
     let plan = match plan(&options) {
         Ok(plan) => plan,
-        Err(reason) => return refuse(&reason),
+        Err(reason) => return SOAK.refuse(&reason),
     };
     println!(
         "{} rounds of {} ms on {} cores, seed {}, mode {}",
@@ -190,16 +186,8 @@ pub fn soak(words: &[String]) -> ExitCode {
     progress.end();
     match report {
         Ok(report) => conclude(&report),
-        Err(reason) => {
-            eprintln!("soak: {reason}");
-            ExitCode::FAILURE
-        }
+        Err(reason) => SOAK.fail(&reason),
     }
-}
-
-fn refuse(reason: &str) -> ExitCode {
-    eprintln!("soak: {reason}");
-    ExitCode::from(2)
 }
 
 /// Makes the plan that the options ask for.
@@ -275,6 +263,7 @@ fn conclude(report: &Report) -> ExitCode {
 mod tests {
     use super::super::plan::{OVERRUNS, POLICIES};
     use super::*;
+    use crate::options::Request;
 
     fn plan_of(line: &str) -> Result<Plan, String> {
         let words: Vec<String> = line.split_whitespace().map(String::from).collect();

@@ -4,12 +4,11 @@
 //! does not hide behind the breaches of another.
 
 use std::fs;
-use std::io::{Write, stderr, stdout};
 use std::process::ExitCode;
 
 use super::model::Run;
 use super::{check, read, report};
-use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::options::{Command, Opt, Parsed, Takes};
 
 /// The table of `check-trace`.
 pub static CHECK_TRACE: Command = Command {
@@ -71,22 +70,18 @@ well-formed trace with events
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn check_trace(words: &[String]) -> ExitCode {
-    let options = match CHECK_TRACE.parse(words) {
-        Ok(Request::Work(options)) => options,
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => return refuse(&error.0),
+    let options = match CHECK_TRACE.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
     if options.positionals().is_empty() {
-        return refuse("which files? name at least one serial log with a trace");
+        return CHECK_TRACE.refuse("which files? name at least one serial log with a trace");
     }
     let mut runs = Vec::new();
     for file in options.positionals() {
         match read_file(file) {
             Ok(found) => runs.extend(found.into_iter().map(|run| (file.as_str(), run))),
-            Err(line) => return refuse(&line),
+            Err(line) => return CHECK_TRACE.refuse(&line),
         }
     }
     let breaches: usize = runs
@@ -94,11 +89,6 @@ pub fn check_trace(words: &[String]) -> ExitCode {
         .map(|(file, run)| judge(file, run, &options))
         .sum();
     ExitCode::from(u8::from(breaches > 0))
-}
-
-fn refuse(line: &str) -> ExitCode {
-    eprintln!("check-trace: {line}");
-    ExitCode::from(2)
 }
 
 /// Reads a file's runs, of which at least one must have events.
@@ -127,12 +117,11 @@ fn judge(file: &str, run: &Run, options: &Parsed) -> usize {
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
     let findings = check(run, bound_ns);
     let table = report::table(file, run, &findings, bound_ns, shown);
-    // That no one reads on (`| head`) is no failure.
-    let _ = if options.is_given("json") {
-        stderr().write_all(table.as_bytes())
+    if options.is_given("json") {
+        eprint!("{table}");
     } else {
-        stdout().write_all(table.as_bytes())
-    };
-    let _ = writeln!(stdout(), "{}", report::machine_line(file, run, &findings));
+        print!("{table}");
+    }
+    println!("{}", report::machine_line(file, run, &findings));
     findings.breaches.len()
 }

@@ -26,6 +26,7 @@ use std::time::Duration;
 use figure::Figure;
 use plan::{Boot, Plan};
 
+use super::on_machine;
 use crate::options::Request;
 use crate::outcome::boot;
 use crate::qemu::Mode;
@@ -36,36 +37,7 @@ const LIMIT: Duration = Duration::from_secs(300);
 
 /// Runs `bench hand-off` with the words after its name.
 pub(super) fn run(words: &[String]) -> ExitCode {
-    let plan = match table::TABLE.parse(words) {
-        Ok(Request::Work(options)) => {
-            // Settling the mode may need QEMU.
-            if let Err(error) = install::ensure_qemu() {
-                eprintln!("bench hand-off: {error}");
-                return ExitCode::FAILURE;
-            }
-            Plan::new(&options)
-        }
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => Err(error.to_string()),
-    };
-    let plan = match plan {
-        Ok(plan) => plan,
-        Err(line) => {
-            eprintln!("bench hand-off: {line}");
-            return ExitCode::from(2);
-        }
-    };
-    match measure_all(&plan) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(line) => {
-            eprintln!("bench hand-off: {line}");
-            ExitCode::FAILURE
-        }
-    }
+    on_machine(&table::TABLE, words, Plan::new, measure_all)
 }
 
 /// Measures as `--compare` does, and prints the table.

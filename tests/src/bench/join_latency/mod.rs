@@ -35,42 +35,16 @@ use join_latency::Samples;
 use plan::{Plan, Provenance};
 use progress::Progress;
 
-use crate::options::Request;
+use super::on_machine;
 use crate::outcome::boot;
 use crate::qemu::Mode;
-use crate::{image, install, system};
+use crate::{image, system};
 
 /// Runs `bench join-latency` with the words after its name.
 pub(super) fn run(words: &[String]) -> ExitCode {
-    let plan = match table::TABLE.parse(words) {
-        Ok(Request::Work(options)) => {
-            // Settling the mode may need QEMU.
-            if let Err(error) = install::ensure_qemu() {
-                eprintln!("bench join-latency: {error}");
-                return ExitCode::FAILURE;
-            }
-            Plan::new(&options)
-        }
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => Err(error.to_string()),
-    };
-    let plan = match plan {
-        Ok(plan) => plan,
-        Err(line) => {
-            eprintln!("bench join-latency: {line}");
-            return ExitCode::from(2);
-        }
-    };
-    match measure_all(&plan) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(line) => {
-            eprintln!("bench join-latency: {line}");
-            ExitCode::FAILURE
-        }
-    }
+    on_machine(&table::TABLE, words, Plan::new, |plan| {
+        measure_all(plan).map(|()| true)
+    })
 }
 
 /// Measures what is not there yet, and writes all results.

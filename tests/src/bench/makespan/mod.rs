@@ -24,7 +24,7 @@ use std::process::ExitCode;
 pub use measure::{Makespan, measure};
 
 use crate::dag_file::stg::{TaskGraph, read_graphs};
-use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::options::{Command, Opt, Parsed, Takes};
 use crate::qemu::MOST_CORES;
 use crate::system;
 
@@ -78,40 +78,29 @@ Graham's bound; 2 the command line or the file is refused.
 
 /// Runs `bench makespan` with the words after its name.
 pub(super) fn run(words: &[String]) -> ExitCode {
-    let refuse = |line: &str| {
-        eprintln!("bench makespan: {line}");
-        ExitCode::from(2)
-    };
-    let options = match TABLE.parse(words) {
-        Ok(Request::Work(options)) => options,
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => return refuse(&error.to_string()),
+    let options = match TABLE.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
     let cores: Vec<u64> = (options.text("cores").unwrap_or_default().split(','))
         .filter_map(|number| number.parse().ok())
         .collect();
     let graphs = match graphs(&options, &cores) {
         Ok(graphs) => graphs,
-        Err(line) => return refuse(&line),
+        Err(line) => return TABLE.refuse(&line),
     };
     // A place that cannot be written is found before the work, not after.
     let out = options.text("out").map(PathBuf::from);
     if let Some(out) = &out
         && let Err(error) = fs::write(out, "")
     {
-        return refuse(&format!("`--out {}`: {error}", out.display()));
+        return TABLE.refuse(&format!("`--out {}`: {error}", out.display()));
     }
     let mut all = Vec::new();
     for cores in cores {
         match measure(&graphs, cores) {
             Ok(makespans) => all.extend(makespans),
-            Err(line) => {
-                eprintln!("bench makespan: {line}");
-                return ExitCode::FAILURE;
-            }
+            Err(line) => return TABLE.fail(&line),
         }
     }
     print!("{}", report::table(&all));
@@ -123,15 +112,14 @@ pub(super) fn run(words: &[String]) -> ExitCode {
             report::csv(&all)
         };
         if let Err(error) = fs::write(out, text) {
-            eprintln!("bench makespan: `--out {}`: {error}", out.display());
-            return ExitCode::FAILURE;
+            return TABLE.fail(&format!("`--out {}`: {error}", out.display()));
         }
     }
     let broken: Vec<String> = all.iter().filter_map(Makespan::complaint).collect();
-    broken
-        .iter()
-        .for_each(|line| eprintln!("bench makespan: {line}"));
-    ExitCode::from(u8::from(!broken.is_empty()))
+    if broken.is_empty() {
+        return ExitCode::SUCCESS;
+    }
+    TABLE.fail(&broken.join("\n"))
 }
 
 /// Reads the graphs that are wanted, with an optimum for each number of cores.

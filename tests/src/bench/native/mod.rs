@@ -24,7 +24,7 @@ use std::process::ExitCode;
 use figure::Figure;
 use workload::Graph;
 
-use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::options::{Command, Opt, Parsed, Takes};
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench native",
@@ -84,21 +84,13 @@ const JOIN: &str = "join";
 
 /// Runs `bench native` with the words after its name.
 pub(super) fn run(words: &[String]) -> ExitCode {
-    let refuse = |line: &str| {
-        eprintln!("bench native: {line}");
-        ExitCode::from(2)
-    };
-    let options = match TABLE.parse(words) {
-        Ok(Request::Work(options)) => options,
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => return refuse(&error.to_string()),
+    let options = match TABLE.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
     match Plan::read(&options) {
         Ok(plan) => measure(&plan),
-        Err(line) => refuse(&line),
+        Err(line) => TABLE.refuse(&line),
     }
 }
 
@@ -157,13 +149,13 @@ fn measure(plan: &Plan) -> ExitCode {
                 figures.extend(of_graph);
                 pinned &= all_pinned;
             }
-            Err(line) => return fail(&line),
+            Err(line) => return TABLE.fail(&line),
         }
     }
     if plan.with_join {
         match join::measure(plan.jobs) {
             Ok(of_join) => figures.extend(of_join),
-            Err(line) => return fail(&line),
+            Err(line) => return TABLE.fail(&line),
         }
     }
     print!("{}", Figure::table(&figures));
@@ -176,14 +168,10 @@ fn measure(plan: &Plan) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn fail(line: &str) -> ExitCode {
-    eprintln!("bench native: {line}");
-    ExitCode::FAILURE
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::Request;
 
     fn plan(words: &[&str]) -> Result<Plan, String> {
         let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();

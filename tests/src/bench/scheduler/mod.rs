@@ -10,11 +10,28 @@ mod dispatch;
 
 use std::process::ExitCode;
 
+use crate::options::Command;
+
 /// How many depth-first walks a commit may cost.
 const MOST_WALKS: f64 = 20.0;
 
+static TABLE: Command = Command {
+    invocation: "./scripts/bench scheduler",
+    about: "Measures the commit of a large DAG, and the cost of a dispatched instance.",
+    positional: None,
+    options: &[],
+    notes: "\
+Prints a table and a JSON object for each figure.
+
+Exit code: 0 all limits hold; 1 one does not; 2 the command line is refused.
+",
+};
+
 /// Measures, prints, and judges.
-pub(super) fn run() -> ExitCode {
+pub(super) fn run(words: &[String]) -> ExitCode {
+    if let Err(code) = TABLE.read(words) {
+        return code;
+    }
     let commits = commit::measure();
     println!(
         "commit of {} subtasks and {} edges",

@@ -6,15 +6,14 @@ use replay::Case;
 use replay::lines::Malformed;
 
 use super::{Deviation, Judged, Settings, run};
-use crate::options::{Command, Opt, Parsed, Request, Takes};
-use crate::oracle::schedules;
+use crate::options::{Command, Opt, Parsed, Takes};
+use crate::oracle::{read, schedules};
 use crate::qemu::{MOST_CORES, Machine, Mode};
 
-/// The table of the command. The files are taken out before it is consulted.
 static IN_KERNEL: Command = Command {
-    invocation: "./scripts/oracle schedules --in-kernel FILE...",
+    invocation: "./scripts/oracle schedules --in-kernel",
     about: "Runs reference schedules on the bare machine in QEMU and compares.",
-    positional: None,
+    positional: Some(("FILE...", "Reference schedules, as in tests/oracle.")),
     options: &[
         Opt {
             name: "in-kernel",
@@ -102,68 +101,33 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 
 /// Runs the command with the words after `schedules`.
 pub(in crate::oracle) fn command(words: &[String]) -> ExitCode {
-    let (options, files) = take_files(words);
-    let refuse = |reason: &str| {
-        eprintln!("oracle: {reason}");
-        ExitCode::from(2)
-    };
-    let options = match IN_KERNEL.parse(&options) {
-        Ok(Request::Work(options)) => options,
-        Ok(Request::Help(text)) => {
-            print!("{text}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => return refuse(&error.to_string()),
+    let options = match IN_KERNEL.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
     };
     let settings = settings(&options);
     let most_us = settings.unit_us / 4;
     if settings.window_us > most_us || settings.guard_us > most_us {
-        return refuse(&format!(
+        return IN_KERNEL.refuse(&format!(
             "the window and the guard may be a quarter of a unit at most, here {most_us} us"
         ));
     }
-    let (mut cases, mut texts) = match read(&files) {
-        Ok(read) => read,
-        Err(reason) => return refuse(&reason),
+    let mut cases = match read(options.positionals(), with_texts) {
+        Ok(cases) => cases,
+        Err(reason) => return IN_KERNEL.refuse(&reason),
     };
     let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
     let all = cases.len();
-    let mut keeps = cases.iter().map(|case| u64::from(case.cores) <= most_cores);
-    let keeps: Vec<bool> = keeps.by_ref().collect();
-    let mut keep = keeps.iter();
-    cases.retain(|_| keep.next().copied().unwrap_or(false));
-    let mut keep = keeps.iter();
-    texts.retain(|_| keep.next().copied().unwrap_or(false));
+    cases.retain(|(case, _)| u64::from(case.cores) <= most_cores);
     if cases.len() < all {
         let left_out = all - cases.len();
         println!("{left_out} cases for more than {most_cores} cores are left out");
     }
+    let (cases, texts): (Vec<Case>, Vec<String>) = cases.into_iter().unzip();
     match run(&cases, &texts, &settings) {
         Ok(judged) => ExitCode::from(u8::from(report(&judged, &settings) > 0)),
-        Err(reason) => {
-            eprintln!("oracle: {reason}");
-            ExitCode::FAILURE
-        }
+        Err(reason) => IN_KERNEL.fail(&reason),
     }
-}
-
-/// Parts the words that name files from the options and their values.
-fn take_files(words: &[String]) -> (Vec<String>, Vec<String>) {
-    let takes_value = |word: &str| {
-        let known = IN_KERNEL.options.iter().filter(|option| {
-            !matches!(option.takes, Takes::Nothing) && word.strip_prefix("--") == Some(option.name)
-        });
-        known.count() > 0
-    };
-    let (mut options, mut files) = (Vec::new(), Vec::new());
-    let mut is_value = false;
-    for word in words {
-        let is_option = is_value || word.starts_with('-');
-        is_value = !is_value && takes_value(word);
-        let list = if is_option { &mut options } else { &mut files };
-        list.push(word.clone());
-    }
-    (options, files)
 }
 
 fn settings(options: &Parsed) -> Settings {
@@ -181,21 +145,10 @@ fn settings(options: &Parsed) -> Settings {
     }
 }
 
-/// Reads the cases of all files, each also as text.
-fn read(files: &[String]) -> Result<(Vec<Case>, Vec<String>), String> {
-    if files.is_empty() {
-        return Err("which files? name at least one file of reference schedules".into());
-    }
-    let (mut cases, mut texts) = (Vec::new(), Vec::new());
-    for file in files {
-        let text = std::fs::read_to_string(file)
-            .map_err(|error| format!("cannot read {file}: {error}"))?;
-        let parsed = schedules::parse(&text)
-            .map_err(|Malformed { line, reason }| format!("{file}:{line}: {reason}"))?;
-        cases.extend(parsed);
-        texts.extend(texts_of_cases(&text));
-    }
-    Ok((cases, texts))
+/// Reads the cases of a file, each also as text.
+fn with_texts(text: &str) -> Result<Vec<(Case, String)>, Malformed> {
+    let cases = schedules::parse(text)?;
+    Ok(cases.into_iter().zip(texts_of_cases(text)).collect())
 }
 
 /// Takes a well-formed file apart, one text a case.

@@ -1,11 +1,10 @@
 //! The subcommand `trace`: from a log to a file for a viewer.
 
 use std::fs;
-use std::io::{Write, stdout};
 use std::process::ExitCode;
 
 use super::convert;
-use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::options::{Command, Opt, Parsed, Takes};
 use crate::trace::command::read_file;
 
 /// The table of `trace`.
@@ -58,48 +57,39 @@ line, or a file without a well-formed trace with events
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn trace(words: &[String]) -> ExitCode {
-    match attempt(words) {
+    let options = match TRACE.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    let text = match draw(&options) {
+        Ok(text) => text,
+        Err(line) => return TRACE.refuse(&line),
+    };
+    let Some(out) = options.text("out") else {
+        print!("{text}");
+        return ExitCode::SUCCESS;
+    };
+    match fs::write(out, text) {
         Ok(()) => ExitCode::SUCCESS,
-        Err((code, line)) => {
-            eprintln!("trace: {line}");
-            ExitCode::from(code)
-        }
+        Err(error) => TRACE.fail(&format!("cannot write {out}: {error}")),
     }
 }
 
-fn attempt(words: &[String]) -> Result<(), (u8, String)> {
-    let refused = |line: String| (2, line);
-    let options = match TRACE.parse(words).map_err(|error| refused(error.0))? {
-        Request::Work(options) => options,
-        Request::Help(text) => {
-            print!("{text}");
-            return Ok(());
-        }
-    };
+/// Converts the runs that the options ask for.
+fn draw(options: &Parsed) -> Result<String, String> {
     let question = "which file? name a serial log with a trace";
-    let file = options
-        .positional()
-        .ok_or_else(|| refused(question.into()))?;
-    let mut runs = read_file(file).map_err(refused)?;
+    let file = options.positional().ok_or(question)?;
+    let mut runs = read_file(file)?;
     if let Some(number) = options.number("run") {
         let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
         runs.retain(|run| run.number == number);
         if runs.is_empty() {
             let there = there.join(", ");
-            return Err(refused(format!(
+            return Err(format!(
                 "`--run {number}`: {file} has no such run; its runs are {there}"
-            )));
+            ));
         }
     }
     let bound_ns = options.number("bound-us").unwrap_or(0).saturating_mul(1000);
-    write(&convert(&runs, bound_ns), &options)
-}
-
-fn write(text: &str, options: &Parsed) -> Result<(), (u8, String)> {
-    let Some(out) = options.text("out") else {
-        // That no one reads on (`| head`) is no failure.
-        let _ = stdout().write_all(text.as_bytes());
-        return Ok(());
-    };
-    fs::write(out, text).map_err(|error| (1, format!("cannot write {out}: {error}")))
+    Ok(convert(&runs, bound_ns))
 }

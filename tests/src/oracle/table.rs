@@ -1,0 +1,45 @@
+//! What `oracle KIND` accepts.
+
+use crate::options::{Command, Opt, Takes};
+
+/// What all kinds have in common, for the help texts.
+pub(super) const NOTES: &str = "
+Prints the first difference of each failing case, then `N passed, M failed`.
+
+Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
+";
+
+const FILES: Option<(&str, &str)> = Some(("FILE...", "Reference files, as in tests/oracle."));
+
+pub(super) static BOUNDS: Command = Command {
+    invocation: "./scripts/oracle bounds",
+    about: "Compares lengths, widths, response-time bounds and verdicts with those of the \
+            analysis at commit.",
+    positional: FILES,
+    options: &[],
+    notes: NOTES,
+};
+
+pub(super) static SCHEDULES: Command = Command {
+    invocation: "./scripts/oracle schedules",
+    about: "Compares starts, finishes, preemptions, response times and misses with those of \
+            the scheduler in virtual time.",
+    positional: FILES,
+    options: &[Opt {
+        name: "in-kernel",
+        short: None,
+        takes: Takes::Nothing,
+        default: "",
+        help: "On the bare machine; with options of its own, see schedules --in-kernel --help.",
+    }],
+    notes: NOTES,
+};
+
+pub(super) static SYNCHRONIZER: Command = Command {
+    invocation: "./scripts/oracle synchronizer",
+    about: "Compares the sets that ExactTime and ApproximateTime emit, and what they drop, \
+            with those of the publish/subscribe baseline.",
+    positional: FILES,
+    options: &[],
+    notes: NOTES,
+};

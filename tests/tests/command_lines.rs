@@ -1,0 +1,133 @@
+//! What holds for every command of the tool alike: how it refuses what it does not know,
+//! and that it does not mind who reads.
+
+use std::io;
+use std::process::{Command, Output, Stdio};
+
+use harness::system::workspace;
+
+/// Every command, by the words that name it.
+const COMMANDS: [&str; 17] = [
+    "run",
+    "test",
+    "new-app",
+    "check-trace",
+    "trace",
+    "soak",
+    "bench",
+    "bench scheduler",
+    "bench hand-off",
+    "bench join-latency",
+    "bench makespan",
+    "bench native",
+    "oracle",
+    "oracle bounds",
+    "oracle schedules",
+    "oracle schedules --in-kernel",
+    "oracle synchronizer",
+];
+
+fn tool(words: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    command.args(words.split(' ')).stdin(Stdio::null());
+    command
+}
+
+fn output(words: &str) -> Output {
+    tool(words).output().expect("the tool can be started")
+}
+
+/// Runs the tool with the other ends of both its outputs closed; returns its exit code.
+fn code_without_readers(words: &str) -> Option<i32> {
+    let closed = || {
+        let (reader, writer) = io::pipe().expect("a pipe");
+        drop(reader);
+        writer
+    };
+    let mut command = tool(words);
+    command.stdout(closed()).stderr(closed());
+    let status = command.status().expect("the tool can be started");
+    status.code()
+}
+
+#[test]
+fn an_unknown_option_is_named_and_2() {
+    for name in COMMANDS {
+        let output = output(&format!("{name} --frobnicate"));
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
+        assert_eq!(output.stdout, b"", "{name}");
+        let words = format!("{name}: unknown option `--frobnicate`; ");
+        assert!(said.starts_with(&words), "{said}");
+        assert!(said.trim_end().ends_with("--help"), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+#[test]
+fn the_nearest_option_or_word_is_suggested() {
+    for (words, said) in [
+        (
+            "run --coers 3",
+            "run: unknown option `--coers`; did you mean `--cores`?\n",
+        ),
+        (
+            "oracle schedules --in-kernal",
+            "oracle schedules: unknown option `--in-kernal`; did you mean `--in-kernel`?\n",
+        ),
+        (
+            "bench hand-of",
+            "bench: unknown WHAT `hand-of`; did you mean `hand-off`?\n",
+        ),
+        (
+            "oracle bound",
+            "oracle: unknown KIND `bound`; did you mean `bounds`?\n",
+        ),
+        (
+            "tset",
+            "harness: unknown SUBCOMMAND `tset`; did you mean `test`?\n",
+        ),
+    ] {
+        let output = output(words);
+        let found = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{found}");
+        assert_eq!(found, said);
+    }
+}
+
+#[test]
+fn every_command_explains_itself() {
+    for name in COMMANDS {
+        let output = output(&format!("{name} --help"));
+        let said = String::from_utf8(output.stdout).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(0), "{name}");
+        let usage = format!("usage: ./scripts/{name} ");
+        assert!(said.contains(&usage), "{name}: {said}");
+        let mut words = name.split(' ');
+        let script = words.next().unwrap_or_default();
+        assert!(workspace().join("scripts").join(script).is_file(), "{name}");
+    }
+}
+
+#[test]
+fn that_no_one_reads_is_no_failure() {
+    for name in COMMANDS {
+        assert_eq!(
+            code_without_readers(&format!("{name} --help")),
+            Some(0),
+            "{name}"
+        );
+        assert_eq!(
+            code_without_readers(&format!("{name} --frobnicate")),
+            Some(2),
+            "{name}"
+        );
+    }
+    let data = workspace().join("tests");
+    let cases = data.join("oracle/synchronizer.txt");
+    let words = format!("oracle synchronizer {}", cases.display());
+    assert_eq!(code_without_readers(&words), Some(0));
+    let file = data.join("data/rd-gen/gnp_01.yaml");
+    let words = format!("run --print-dag --dag {}", file.display());
+    assert_eq!(code_without_readers(&words), Some(0));
+}
