@@ -13,7 +13,7 @@
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
-use sched_dag::{CommitOptions, ConstructionPolicy, DagId, DagLabel};
+use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
 use sched_dag::{Policy, Verified, Warning};
 
 use crate::answer::{Answer, Answers};
@@ -71,6 +71,9 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
 /// Does as [`finish_create_dags`] for other shapes of graph: with several
 /// sources or sinks, or of several parts. Nothing else changes.
 ///
+/// A topic has one writer whatever `construction` says: an input is one value a job,
+/// and which of two it were would depend on the schedule.
+///
 /// All sources of a job become ready at its release; a job is complete when all
 /// its sinks are.
 ///
@@ -101,6 +104,10 @@ pub fn finish_create_dags_with(
     dags: &[Dag],
     construction: ConstructionPolicy,
 ) -> Result<Commit, CommitError> {
+    let construction = ConstructionPolicy {
+        writers: Count::One,
+        ..construction
+    };
     let with = |policy, cores| CommitOptions::new(policy, cores).with_construction(construction);
     let Some(platform) = platform::installed() else {
         // What else is wrong does not depend on the platform, except for the

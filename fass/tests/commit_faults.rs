@@ -7,7 +7,8 @@ use core::time::Duration;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::slice;
 
-use fass::{CommitError, Dag, Fault, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::{CommitError, ConstructionPolicy, Count, Dag, Fault, SubtaskAttributes};
+use fass::{create_dag, finish_create_dags, finish_create_dags_with};
 
 const PERIOD: Duration = Duration::from_millis(10);
 
@@ -31,6 +32,23 @@ fn faultless(name: &str) -> Dag {
     dag.register_periodic_subtask(|| (1,), vec![name], PERIOD, named("source"));
     dag.register_sink_subtask(|_: (i32,)| (), vec![name], PERIOD, named("sink"));
     dag
+}
+
+#[test]
+fn a_topic_of_values_has_one_writer_under_any_construction_policy() {
+    support::install();
+    let dag = create_dag();
+    dag.register_periodic_subtask(|| (1,), vec!["a"], PERIOD, named("source"));
+    for name in ["near", "far"] {
+        dag.register_subtask(|(a,): (i32,)| (a,), vec!["a"], vec!["b"], named(name));
+    }
+    dag.register_sink_subtask(|_: (i32,)| (), vec!["b"], PERIOD, named("sink"));
+    let construction = ConstructionPolicy {
+        writers: Count::Several,
+        ..ConstructionPolicy::paper()
+    };
+    let error = finish_create_dags_with(&[dag], construction).expect_err("two writers");
+    assert_eq!(codes(&error), ["several_writers"]);
 }
 
 #[test]
