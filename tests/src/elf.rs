@@ -1,4 +1,5 @@
-//! As much of ELF as it takes to weigh an image and to find its symbols.
+//! As much of ELF as it takes to weigh an image, to find its symbols, and to tell it
+//! from a program for the host.
 //!
 //! *Stripped size* is what `strip` would leave: the file's headers, every
 //! byte that is loaded or a note, and a section table of the sections left
@@ -11,6 +12,10 @@ const SECTION_HEADER_BYTES: u64 = 64;
 const PROGRAM_HEADER_BYTES: u64 = 56;
 const SHF_ALLOC: u64 = 2;
 const SHF_EXECINSTR: u64 = 4;
+const PT_NOTE: u64 = 4;
+
+/// Xen's number for the note that holds the 32-bit entry address.
+const XEN_ELFNOTE_PHYS32_ENTRY: u64 = 18;
 
 /// The type of the section that holds all symbols.
 pub(crate) const SHT_SYMTAB: u64 = 2;
@@ -38,6 +43,36 @@ pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
         kept += u64::from(flags & SHF_ALLOC != 0);
     }
     Ok(end + kept * (SECTION_HEADER_BYTES + NAME_BYTES))
+}
+
+/// Makes sure that QEMU's `-kernel` can enter a file: a 64-bit ELF file with Xen's note
+/// of the 32-bit entry address ("x86/HVM direct boot ABI", `docs/misc/pvh.pandoc` of Xen).
+///
+/// # Errors
+///
+/// In words: it is none, it has no such note, or a table points outside it.
+pub fn check_bootable(file: &[u8]) -> Result<(), String> {
+    check(file)?;
+    for segment in table(file, 32, 56, PROGRAM_HEADER_BYTES)? {
+        if number(file, segment, 4)? != PT_NOTE {
+            continue;
+        }
+        let mut note = number(file, segment + 8, 8)?;
+        let end = note.saturating_add(number(file, segment + 32, 8)?);
+        // A note: the lengths of name and content, its type, and both, padded.
+        while note < end {
+            let name = number(file, note, 4)?;
+            let content = number(file, note + 4, 4)?;
+            let kind = number(file, note + 8, 4)?;
+            if (name, kind) == (4, XEN_ELFNOTE_PHYS32_ENTRY)
+                && number(file, note + 12, 4)? == u64::from(u32::from_le_bytes(*b"Xen\0"))
+            {
+                return Ok(());
+            }
+            note += 12 + name.next_multiple_of(4) + content.next_multiple_of(4);
+        }
+    }
+    Err("it has no PVH note, by which QEMU would enter it".into())
 }
 
 /// A section of the file.
@@ -134,7 +169,7 @@ fn count(length: usize) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::stripped_bytes;
+    use super::{check_bootable, stripped_bytes};
     use crate::tiny::{TinyEnd, tiny_image};
 
     #[test]
@@ -152,5 +187,21 @@ mod tests {
         assert!(stripped_bytes(b"#!/bin/sh").is_err());
         let image = tiny_image("hello", TinyEnd::Never);
         assert!(stripped_bytes(&image[..100]).is_err());
+    }
+
+    #[test]
+    fn an_image_is_told_from_other_files() {
+        let mut image = tiny_image("hello", TinyEnd::Never);
+        assert_eq!(check_bootable(&image), Ok(()));
+        let note = image
+            .windows(4)
+            .position(|bytes| bytes == b"Xen\0")
+            .unwrap();
+        image[note] = b'x';
+        assert!(check_bootable(&image).unwrap_err().contains("PVH note"));
+        assert!(check_bootable(&image[..100]).is_err());
+        let ours = std::fs::read(std::env::current_exe().unwrap()).unwrap();
+        assert!(check_bootable(&ours).unwrap_err().contains("PVH note"));
+        assert!(check_bootable(b"#!/bin/sh").is_err());
     }
 }

@@ -89,6 +89,24 @@ pub fn check_app(name: &str) -> Result<(), ImageError> {
     )))
 }
 
+/// Makes sure that a file is an image.
+///
+/// # Errors
+///
+/// One line that says why not, and which files are.
+pub fn check_file(path: &Path) -> Result<(), String> {
+    let bytes = fs::read(path).map_err(|error| format!("cannot be read: {error}"));
+    let is_one = bytes.and_then(|bytes| {
+        elf::check_bootable(&bytes).map_err(|what| format!("is no image: {what}"))
+    });
+    is_one.map_err(|why| {
+        format!(
+            "{why}; name what `cargo build --release -p APP` leaves in target/release, or \
+             give --app instead"
+        )
+    })
+}
+
 /// Builds the image of a package. Cargo's progress and errors go to standard
 /// error as they come.
 ///

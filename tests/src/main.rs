@@ -56,7 +56,7 @@ static TOOL: Menu = Menu {
             work: harness::soak::soak,
         },
     ],
-    notes: "",
+    notes: "Exit codes: 0 all is well, 1 a failure, 2 a refused command line.\n",
 };
 
 fn main() -> ExitCode {

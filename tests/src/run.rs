@@ -96,6 +96,10 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
     let memory_mib = choose_memory(options, dags)?;
     seeing::check_dot(options).map_err(Refusal::Usage)?;
+    if let Some(path) = options.text("image") {
+        let checked = image::check_file(Path::new(path));
+        checked.map_err(|why| Refusal::Usage(format!("`--image {path}`: {why}")))?;
+    }
     let program = choose_program(options)?;
     let log = Log::choose(options, &app)?;
 
@@ -166,13 +170,6 @@ fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
     if let Some(named) = options.text("qemu") {
         return system::find_program(named)
             .ok_or_else(|| Refusal::Usage(format!("`--qemu {named}`: there is no such program")));
-    }
-    if let Some(path) = options.text("image")
-        && !Path::new(path).is_file()
-    {
-        return Err(Refusal::Usage(format!(
-            "`--image {path}`: there is no such file"
-        )));
     }
     install::ensure_qemu().map_err(Refusal::Failure)?;
     Ok(PROGRAM.into())

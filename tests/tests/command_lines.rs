@@ -1,7 +1,9 @@
 //! What holds for every command of the tool alike: how it refuses what it does not know,
 //! and that it does not mind who reads.
 
+use std::fs;
 use std::io;
+use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
 use harness::system::workspace;
@@ -92,6 +94,32 @@ fn the_nearest_option_or_word_is_suggested() {
         let found = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(2), "{found}");
         assert_eq!(found, said);
+    }
+}
+
+#[test]
+fn what_is_no_image_is_2_before_anything_boots() {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let text = folder.join("image.txt");
+    fs::write(&text, "no image").expect("the test's folder takes a file");
+    let tool = PathBuf::from(env!("CARGO_BIN_EXE_harness"));
+    for (path, why) in [
+        (
+            &text,
+            "is no image: not a 64-bit little-endian ELF file; name what `cargo",
+        ),
+        (
+            &tool,
+            "is no image: it has no PVH note, by which QEMU would enter it; name",
+        ),
+        (&folder, "cannot be read: "),
+        (&folder.join("none"), "cannot be read: "),
+    ] {
+        let output = output(&format!("run --image {}", path.display()));
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        let words = format!("run: `--image {}`: {why}", path.display());
+        assert!(said.starts_with(&words), "{said}  not: {words}");
     }
 }
 

@@ -55,7 +55,7 @@ static BENCH: Menu = Menu {
             work: native::run,
         },
     ],
-    notes: "\nExit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
+    notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
 };
 
 /// Runs the subcommand.

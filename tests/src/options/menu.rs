@@ -83,7 +83,7 @@ impl Menu {
             .map(|choice| format!("  {:14}{}\n", choice.name, choice.about))
             .collect();
         format!(
-            "{}\n\nusage: {} {} [options]; each {} explains itself by --help\n\n{lines}{}",
+            "{}\n\nusage: {} {} [options]; each {} explains itself by --help\n\n{lines}\n{}",
             self.about, self.invocation, self.word, self.word, self.notes
         )
     }
@@ -110,7 +110,7 @@ mod tests {
                 work: |_| ExitCode::SUCCESS,
             },
         ],
-        notes: "",
+        notes: "Hot.\n",
     };
 
     #[test]
@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(
             MENU.help(),
             "Cooks.\n\nusage: ./scripts/cook DISH [options]; each DISH explains itself by --help\
-             \n\n  soup          hot\n  salad         cold\n"
+             \n\n  soup          hot\n  salad         cold\n\nHot.\n"
         );
     }
 }

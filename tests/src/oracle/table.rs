@@ -3,7 +3,7 @@
 use crate::options::{Command, Opt, Takes};
 
 /// What all kinds have in common, for the help texts.
-pub(super) const NOTES: &str = "
+pub(super) const NOTES: &str = "\
 Prints the first difference of each failing case, then `N passed, M failed`.
 
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
