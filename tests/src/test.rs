@@ -11,6 +11,7 @@
 
 mod checks;
 mod crates;
+mod disk;
 mod libtest;
 mod lint;
 mod table;
@@ -33,6 +34,9 @@ pub fn test(words: &[String]) -> ExitCode {
         Ok(options) => options,
         Err(code) => return code,
     };
+    if let Err(line) = disk::check() {
+        return TEST.fail(&line);
+    }
     let plan = Plan {
         filter: options.positional().map(String::from),
         quick: options.is_given("quick"),
