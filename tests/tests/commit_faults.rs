@@ -159,6 +159,11 @@ fn every_kind_of_fault_has_an_entry() {
         codes.extend(found.into_iter().map(String::from));
     }
     assert_eq!(documented, codes);
+    let page = fs::read_to_string(workspace().join("docs/errors.md")).expect("the page");
+    for code in codes {
+        let link = format!("[`{code}`](#{code})");
+        assert!(page.contains(&link), "the page's index lacks `{code}`");
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@
 //! place of these; `docs/guide.md` explains each step.
 
 #![no_std]
+#![forbid(unsafe_code)]
 
 extern crate alloc;
 
