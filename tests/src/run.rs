@@ -281,9 +281,16 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
         log.discard();
         return RUN.refuse(&lines);
     }
-    eprint!("{}", outcome.tail());
+    match outcome.transcript.verdict() {
+        // The screen has shown all that it said.
+        Ok(_) => eprintln!("the serial log is {}", outcome.log.display()),
+        Err(_) => eprint!("{}", outcome.tail()),
+    }
     let remedy = match outcome.ending {
-        Ending::TimedOut(_) => "; `--timeout SECONDS` gives it longer",
+        Ending::TimedOut(_) => {
+            "; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
+             if it has a WCET or a budget"
+        }
         _ => "",
     };
     RUN.fail(&format!("failed: {}{remedy}", fault.reason))
