@@ -16,6 +16,7 @@ mod suggest;
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::RangeInclusive;
 
 pub use menu::{Choice, Menu};
 pub use suggest::nearest;
@@ -74,6 +75,22 @@ pub enum Takes {
     OneOf(&'static [&'static str]),
     /// Any text; the word stands for it in the help text.
     Text(&'static str),
+}
+
+impl Takes {
+    /// Takes a number of a range.
+    #[must_use]
+    pub const fn number(range: RangeInclusive<u64>) -> Takes {
+        let (least, most) = (*range.start(), *range.end());
+        Takes::Number { least, most }
+    }
+
+    /// Takes numbers of a range with commas between.
+    #[must_use]
+    pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
+        let (least, most) = (*range.start(), *range.end());
+        Takes::Numbers { least, most }
+    }
 }
 
 /// A command line that was understood.
@@ -207,6 +224,32 @@ impl Command {
 }
 
 impl Opt {
+    /// Describes an option without short form and default.
+    #[must_use]
+    pub const fn new(name: &'static str, takes: Takes, help: &'static str) -> Opt {
+        Opt {
+            name,
+            short: None,
+            takes,
+            default: "",
+            help,
+        }
+    }
+
+    /// Adds a short form, without its dash.
+    #[must_use]
+    pub const fn short(mut self, short: char) -> Opt {
+        self.short = Some(short);
+        self
+    }
+
+    /// Adds the value when the option is not given.
+    #[must_use]
+    pub const fn or(mut self, default: &'static str) -> Opt {
+        self.default = default;
+        self
+    }
+
     /// Checks a value against what the option takes.
     fn check(&self, value: &str) -> Result<(), UsageError> {
         let valid = match self.takes {

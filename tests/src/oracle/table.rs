@@ -25,13 +25,11 @@ pub(super) static SCHEDULES: Command = Command {
     about: "Compares starts, finishes, preemptions, response times and misses with those of \
             the scheduler in virtual time.",
     positional: FILES,
-    options: &[Opt {
-        name: "in-kernel",
-        short: None,
-        takes: Takes::Nothing,
-        default: "",
-        help: "On the bare machine; with options of its own, see schedules --in-kernel --help.",
-    }],
+    options: &[Opt::new(
+        "in-kernel",
+        Takes::Nothing,
+        "On the bare machine; with options of its own, see schedules --in-kernel --help.",
+    )],
     notes: NOTES,
 };
 

@@ -26,244 +26,168 @@ pub static RUN: Command = Command {
     about: "Builds an app, boots it on the bare machine in QEMU, and judges the run.",
     positional: None,
     options: &[
-        Opt {
-            name: "app",
-            short: None,
-            takes: Takes::Text("NAME"),
-            default: "fork-join",
-            help: "The app to run: a package under apps/.",
-        },
-        Opt {
-            name: "cores",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: MOST_CORES,
-            },
-            default: "8",
-            help: "Processors of the guest.",
-        },
-        Opt {
-            name: "jobs",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 1_000_000,
-            },
-            default: "",
-            help: "Jobs that each DAG releases; the default is 200 for fork-join, 50 for --dag; \
-                   0, for fork-join: no end, which is for --console.",
-        },
-        Opt {
-            name: "seed",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: u64::MAX,
-            },
-            default: "",
-            help: "Seed of the app's random draws; the app's default is 1.",
-        },
-        Opt {
-            name: "policy",
-            short: None,
-            takes: Takes::OneOf(&["static", "edf"]),
-            default: "",
-            help: "Static priorities (the kernel's default), or earliest deadline first.",
-        },
-        Opt {
-            name: "preemption",
-            short: None,
-            takes: Takes::OneOf(&["on", "off"]),
-            default: "",
-            help: "Whether a started instance may lose its core (the kernel's default: on).",
-        },
-        Opt {
-            name: "subtasks",
-            short: None,
-            takes: Takes::Numbers {
-                least: 1,
-                most: MOST_SUBTASKS,
-            },
-            default: "",
-            help: "fork-join: parallel subtasks, one run each; the app's default is 2,4,6.",
-        },
-        Opt {
-            name: "occupy",
-            short: None,
-            takes: Takes::OneOf(&["hold", "spin"]),
-            default: "",
-            help: "fork-join, --dag: how a subtask executes: it holds its core while the \
-                   processor halts (the app's default), or it spins.",
-        },
-        Opt {
-            name: "dag",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "Run the DAGs of a file, see docs/dag-file.md: our text format, RD-Gen's .yaml, \
-                   or task graphs in .json; of a folder, each of its files, in one table.",
-        },
-        Opt {
-            name: "print-dag",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "--dag: print the file in our text format; run nothing.",
-        },
-        Opt {
-            name: "graph",
-            short: None,
-            takes: Takes::Text("NAME"),
-            default: "",
-            help: "--dag: the one graph to take of a set of task graphs; else each is run.",
-        },
-        Opt {
-            name: "unit",
-            short: None,
-            takes: Takes::Text("TIME"),
-            default: "",
-            help: "--dag: what 1 stands for where a format has no units; 1ms.",
-        },
-        Opt {
-            name: "execution",
-            short: None,
-            takes: Takes::Text("MODEL"),
-            default: "",
-            help: "--dag: execution times: wcet (the default), uniform:0.2..1 (drawn, fractions of \
-                   the WCET), or samples (drawn from the file's).",
-        },
-        Opt {
-            name: "seconds",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 1_000_000,
-            },
-            default: "",
-            help: "--dag: each DAG releases the jobs of so many seconds, instead of --jobs.",
-        },
-        Opt {
-            name: "strict-deadlines",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "--dag: a deadline miss makes the run a failure.",
-        },
-        Opt {
-            name: "memory",
-            short: None,
-            takes: Takes::Number {
-                least: LEAST_MEMORY_MIB,
-                most: 65_536,
-            },
-            default: "32",
-            help: "The guest's memory in MiB; more than 24 cores take more than 16, and more than \
-                   48 get more than the default.",
-        },
-        Opt {
-            name: "mode",
-            short: None,
-            takes: Takes::OneOf(Mode::NAMES),
-            default: "",
-            help: "What time means, see below; kvm where it works, else deterministic.",
-        },
-        Opt {
-            name: "machine",
-            short: None,
-            takes: Takes::OneOf(Machine::NAMES),
-            default: "microvm",
-            help: "The board that QEMU imitates.",
-        },
-        Opt {
-            name: "timeout",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 86_400,
-            },
-            default: "",
-            help: "Seconds of wall time until the guest is killed; 120 and one a job.",
-        },
-        Opt {
-            name: "serial",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "Keep the serial log in this file.",
-        },
-        Opt {
-            name: "trace",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "Keep the serial log in this file, with the trace of each run, which is not \
-                   shown; ./scripts/check-trace FILE judges it.",
-        },
-        Opt {
-            name: "dot",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "Write the committed DAGs to this file, for Graphviz: `dot -Tsvg FILE`.",
-        },
-        Opt {
-            name: "console",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Talk to the kernel while it runs: type `help`. Real time unless --mode says \
-                   otherwise, no timeout unless --timeout does, no machine lines unless --json.",
-        },
-        Opt {
-            name: "append",
-            short: None,
-            takes: Takes::Text("WORDS"),
-            default: "",
-            help: "More words for the guest's command line.",
-        },
-        Opt {
-            name: "json",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Only machine lines on standard output, the rest on standard error.",
-        },
-        Opt {
-            name: "plain",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "No machine lines on standard output.",
-        },
-        Opt {
-            name: "quiet",
-            short: Some('q'),
-            takes: Takes::Nothing,
-            default: "",
-            help: "Only what the guest prints: no introduction, no progress.",
-        },
-        Opt {
-            name: "gdb",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Wait for a debugger on TCP port 1234; no timeout.",
-        },
-        Opt {
-            name: "image",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "Boot this image; build nothing.",
-        },
-        Opt {
-            name: "qemu",
-            short: None,
-            takes: Takes::Text("PROGRAM"),
-            default: "",
-            help: "Use this QEMU; install nothing.",
-        },
+        Opt::new(
+            "app",
+            Takes::Text("NAME"),
+            "The app to run: a package under apps/.",
+        )
+        .or("fork-join"),
+        Opt::new(
+            "cores",
+            Takes::number(1..=MOST_CORES),
+            "Processors of the guest.",
+        )
+        .or("8"),
+        Opt::new(
+            "jobs",
+            Takes::number(0..=1_000_000),
+            "Jobs that each DAG releases; the default is 200 for fork-join, 50 for --dag; \
+             0, for fork-join: no end, which is for --console.",
+        ),
+        Opt::new(
+            "seed",
+            Takes::number(0..=u64::MAX),
+            "Seed of the app's random draws; the app's default is 1.",
+        ),
+        Opt::new(
+            "policy",
+            Takes::OneOf(&["static", "edf"]),
+            "Static priorities (the kernel's default), or earliest deadline first.",
+        ),
+        Opt::new(
+            "preemption",
+            Takes::OneOf(&["on", "off"]),
+            "Whether a started instance may lose its core (the kernel's default: on).",
+        ),
+        Opt::new(
+            "subtasks",
+            Takes::numbers(1..=MOST_SUBTASKS),
+            "fork-join: parallel subtasks, one run each; the app's default is 2,4,6.",
+        ),
+        Opt::new(
+            "occupy",
+            Takes::OneOf(&["hold", "spin"]),
+            "fork-join, --dag: how a subtask executes: it holds its core while the \
+             processor halts (the app's default), or it spins.",
+        ),
+        Opt::new(
+            "dag",
+            Takes::Text("FILE"),
+            "Run the DAGs of a file, see docs/dag-file.md: our text format, RD-Gen's .yaml, \
+             or task graphs in .json; of a folder, each of its files, in one table.",
+        ),
+        Opt::new(
+            "print-dag",
+            Takes::Nothing,
+            "--dag: print the file in our text format; run nothing.",
+        ),
+        Opt::new(
+            "graph",
+            Takes::Text("NAME"),
+            "--dag: the one graph to take of a set of task graphs; else each is run.",
+        ),
+        Opt::new(
+            "unit",
+            Takes::Text("TIME"),
+            "--dag: what 1 stands for where a format has no units; 1ms.",
+        ),
+        Opt::new(
+            "execution",
+            Takes::Text("MODEL"),
+            "--dag: execution times: wcet (the default), uniform:0.2..1 (drawn, fractions of \
+             the WCET), or samples (drawn from the file's).",
+        ),
+        Opt::new(
+            "seconds",
+            Takes::number(1..=1_000_000),
+            "--dag: each DAG releases the jobs of so many seconds, instead of --jobs.",
+        ),
+        Opt::new(
+            "strict-deadlines",
+            Takes::Nothing,
+            "--dag: a deadline miss makes the run a failure.",
+        ),
+        Opt::new(
+            "memory",
+            Takes::number(LEAST_MEMORY_MIB..=65_536),
+            "The guest's memory in MiB; more than 24 cores take more than 16, and more than \
+             48 get more than the default.",
+        )
+        .or("32"),
+        Opt::new(
+            "mode",
+            Takes::OneOf(Mode::NAMES),
+            "What time means, see below; kvm where it works, else deterministic.",
+        ),
+        Opt::new(
+            "machine",
+            Takes::OneOf(Machine::NAMES),
+            "The board that QEMU imitates.",
+        )
+        .or("microvm"),
+        Opt::new(
+            "timeout",
+            Takes::number(1..=86_400),
+            "Seconds of wall time until the guest is killed; 120 and one a job.",
+        ),
+        Opt::new(
+            "serial",
+            Takes::Text("FILE"),
+            "Keep the serial log in this file.",
+        ),
+        Opt::new(
+            "trace",
+            Takes::Text("FILE"),
+            "Keep the serial log in this file, with the trace of each run, which is not \
+             shown; ./scripts/check-trace FILE judges it.",
+        ),
+        Opt::new(
+            "dot",
+            Takes::Text("FILE"),
+            "Write the committed DAGs to this file, for Graphviz: `dot -Tsvg FILE`.",
+        ),
+        Opt::new(
+            "console",
+            Takes::Nothing,
+            "Talk to the kernel while it runs: type `help`. Real time unless --mode says \
+             otherwise, no timeout unless --timeout does, no machine lines unless --json.",
+        ),
+        Opt::new(
+            "append",
+            Takes::Text("WORDS"),
+            "More words for the guest's command line.",
+        ),
+        Opt::new(
+            "json",
+            Takes::Nothing,
+            "Only machine lines on standard output, the rest on standard error.",
+        ),
+        Opt::new(
+            "plain",
+            Takes::Nothing,
+            "No machine lines on standard output.",
+        ),
+        Opt::new(
+            "quiet",
+            Takes::Nothing,
+            "Only what the guest prints: no introduction, no progress.",
+        )
+        .short('q'),
+        Opt::new(
+            "gdb",
+            Takes::Nothing,
+            "Wait for a debugger on TCP port 1234; no timeout.",
+        ),
+        Opt::new(
+            "image",
+            Takes::Text("FILE"),
+            "Boot this image; build nothing.",
+        ),
+        Opt::new(
+            "qemu",
+            Takes::Text("PROGRAM"),
+            "Use this QEMU; install nothing.",
+        ),
     ],
     notes: "\
 modes:

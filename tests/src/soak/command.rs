@@ -19,136 +19,87 @@ static SOAK: Command = Command {
     about: "Runs random DAG sets on the bare machine for a long time, and checks everything.",
     positional: None,
     options: &[
-        Opt {
-            name: "short",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Seconds instead of minutes, of the same kinds.",
-        },
-        Opt {
-            name: "cores",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: MOST_CORES,
-            },
-            default: "4",
-            help: "Processors of the guest.",
-        },
-        Opt {
-            name: "load",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: MOST_LOAD,
-            },
-            default: "90",
-            help: "The load, in percent of all cores.",
-        },
-        Opt {
-            name: "overload",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: MOST_LOAD,
-            },
-            default: "130",
-            help: "The load of the overload, in percent of all cores.",
-        },
-        Opt {
-            name: "seconds",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 86_400,
-            },
-            default: "600",
-            help: "Guest time at the load, half of it under each policy.",
-        },
-        Opt {
-            name: "overload-seconds",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 86_400,
-            },
-            default: "60",
-            help: "Guest time in overload with each overrun policy, likewise.",
-        },
-        Opt {
-            name: "round-ms",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 10_000,
-            },
-            default: "5000",
-            help: "Guest time in which a round, that is one set of DAGs, releases jobs.",
-        },
-        Opt {
-            name: "seed",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: u64::MAX,
-            },
-            default: "1",
-            help: "Seed of the sets and the execution times.",
-        },
-        Opt {
-            name: "mode",
-            short: None,
-            takes: Takes::OneOf(Mode::NAMES),
-            default: "deterministic",
-            help: "What time means; see ./scripts/run --help.",
-        },
-        Opt {
-            name: "only",
-            short: None,
-            takes: Takes::Text("PART"),
-            default: "",
-            help: "Only this part, by the table's name, such as edf-130-skip.",
-        },
-        Opt {
-            name: "first",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 1_000_000,
-            },
-            default: "0",
-            help: "The first round of each part.",
-        },
-        Opt {
-            name: "rounds",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 1_000_000,
-            },
-            default: "",
-            help: "The rounds of each part, instead of a time.",
-        },
-        Opt {
-            name: "bound-us",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 1_000_000_000,
-            },
-            default: "",
-            help: "Microseconds for which an instance may wait for what it is owed; 50, and where \
-                   time is real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).",
-        },
-        Opt {
-            name: "side-by-side",
-            short: None,
-            takes: Takes::Number { least: 1, most: 64 },
-            default: "",
-            help: "Guests that run at once; as many as the host has processors, and one where \
-                   time is real.",
-        },
+        Opt::new(
+            "short",
+            Takes::Nothing,
+            "Seconds instead of minutes, of the same kinds.",
+        ),
+        Opt::new(
+            "cores",
+            Takes::number(1..=MOST_CORES),
+            "Processors of the guest.",
+        )
+        .or("4"),
+        Opt::new(
+            "load",
+            Takes::number(1..=MOST_LOAD),
+            "The load, in percent of all cores.",
+        )
+        .or("90"),
+        Opt::new(
+            "overload",
+            Takes::number(1..=MOST_LOAD),
+            "The load of the overload, in percent of all cores.",
+        )
+        .or("130"),
+        Opt::new(
+            "seconds",
+            Takes::number(1..=86_400),
+            "Guest time at the load, half of it under each policy.",
+        )
+        .or("600"),
+        Opt::new(
+            "overload-seconds",
+            Takes::number(0..=86_400),
+            "Guest time in overload with each overrun policy, likewise.",
+        )
+        .or("60"),
+        Opt::new(
+            "round-ms",
+            Takes::number(1..=10_000),
+            "Guest time in which a round, that is one set of DAGs, releases jobs.",
+        )
+        .or("5000"),
+        Opt::new(
+            "seed",
+            Takes::number(0..=u64::MAX),
+            "Seed of the sets and the execution times.",
+        )
+        .or("1"),
+        Opt::new(
+            "mode",
+            Takes::OneOf(Mode::NAMES),
+            "What time means; see ./scripts/run --help.",
+        )
+        .or("deterministic"),
+        Opt::new(
+            "only",
+            Takes::Text("PART"),
+            "Only this part, by the table's name, such as edf-130-skip.",
+        ),
+        Opt::new(
+            "first",
+            Takes::number(0..=1_000_000),
+            "The first round of each part.",
+        )
+        .or("0"),
+        Opt::new(
+            "rounds",
+            Takes::number(1..=1_000_000),
+            "The rounds of each part, instead of a time.",
+        ),
+        Opt::new(
+            "bound-us",
+            Takes::number(0..=1_000_000_000),
+            "Microseconds for which an instance may wait for what it is owed; 50, and where \
+             time is real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).",
+        ),
+        Opt::new(
+            "side-by-side",
+            Takes::number(1..=64),
+            "Guests that run at once; as many as the host has processors, and one where \
+             time is real.",
+        ),
     ],
     notes: "\
 A round draws a random set of 3 to 8 DAGs of 3 to 12 subtasks, whose execution

@@ -11,20 +11,17 @@ pub static TEST: Command = Command {
         "Run only tests and checks whose name contains this.",
     )),
     options: &[
-        Opt {
-            name: "quick",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Only what runs on the host: no guests, no images, no lints.",
-        },
-        Opt {
-            name: "verbose",
-            short: Some('v'),
-            takes: Takes::Nothing,
-            default: "",
-            help: "Show every test by name, not only those that fail.",
-        },
+        Opt::new(
+            "quick",
+            Takes::Nothing,
+            "Only what runs on the host: no guests, no images, no lints.",
+        ),
+        Opt::new(
+            "verbose",
+            Takes::Nothing,
+            "Show every test by name, not only those that fail.",
+        )
+        .short('v'),
     ],
     notes: "\
 The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with

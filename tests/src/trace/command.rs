@@ -20,34 +20,24 @@ pub static CHECK_TRACE: Command = Command {
          `./scripts/run --trace FILE` makes one.",
     )),
     options: &[
-        Opt {
-            name: "bound-us",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 1_000_000_000,
-            },
-            default: "1000",
-            help: "Microseconds for which an instance may wait for what it is owed, because a \
-                   decision takes effect after an interrupt.",
-        },
-        Opt {
-            name: "show",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: u64::MAX,
-            },
-            default: "20",
-            help: "Breaches of a run to be shown; all are counted.",
-        },
-        Opt {
-            name: "json",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Only the machine lines on standard output, the rest on standard error.",
-        },
+        Opt::new(
+            "bound-us",
+            Takes::number(0..=1_000_000_000),
+            "Microseconds for which an instance may wait for what it is owed, because a \
+             decision takes effect after an interrupt.",
+        )
+        .or("1000"),
+        Opt::new(
+            "show",
+            Takes::number(0..=u64::MAX),
+            "Breaches of a run to be shown; all are counted.",
+        )
+        .or("20"),
+        Opt::new(
+            "json",
+            Takes::Nothing,
+            "Only the machine lines on standard output, the rest on standard error.",
+        ),
     ],
     notes: "\
 rules:

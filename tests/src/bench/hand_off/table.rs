@@ -9,115 +9,74 @@ pub(super) static TABLE: Command = Command {
     about: "Measures on the machine the way from a completion to its successor's first instruction.",
     positional: None,
     options: &[
-        Opt {
-            name: "mode",
-            short: None,
-            takes: Takes::OneOf(&["both", "deterministic", "threads", "kvm"]),
-            default: "both",
-            help: "What is counted: instructions (deterministic), time (kvm, threads), or both.",
-        },
-        Opt {
-            name: "compare",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Compare the instructions with the baseline; one that grew is a failure.",
-        },
-        Opt {
-            name: "save-baseline",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Write the instructions into the baseline.",
-        },
-        Opt {
-            name: "baseline",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "The baseline; tests/baselines/hand-off.json if not given.",
-        },
-        Opt {
-            name: "jobs",
-            short: None,
-            takes: Takes::Number {
-                least: 2,
-                most: 10_000,
-            },
-            default: "200",
-            help: "Jobs of each workload.",
-        },
-        Opt {
-            name: "chain",
-            short: None,
-            takes: Takes::Numbers {
-                least: 2,
-                most: 10_000,
-            },
-            default: "64",
-            help: "Subtasks of the chains.",
-        },
-        Opt {
-            name: "branches",
-            short: None,
-            takes: Takes::Numbers { least: 1, most: 16 },
-            default: "2,4,6,16",
-            help: "Parallel subtasks N of the fork-joins.",
-        },
-        Opt {
-            name: "layered",
-            short: None,
-            takes: Takes::Numbers {
-                least: 3,
-                most: 10_000,
-            },
-            default: "1000",
-            help: "Subtasks of the layered random graphs.",
-        },
-        Opt {
-            name: "seed",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: u64::MAX,
-            },
-            default: "1",
-            help: "Seed of the layered random graphs.",
-        },
-        Opt {
-            name: "scale",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Instead, count what the workloads cost on more cores and with more subtasks.",
-        },
-        Opt {
-            name: "cores",
-            short: None,
-            takes: Takes::Numbers {
-                least: 1,
-                most: MOST_CORES,
-            },
-            default: "1,2,4,8,16,32,64",
-            help: "With --scale: the numbers of cores.",
-        },
-        Opt {
-            name: "subtasks",
-            short: None,
-            takes: Takes::Numbers {
-                least: 3,
-                most: 10_000,
-            },
-            default: "10,100,1000,10000",
-            help: "With --scale: the numbers of subtasks of a layered random graph.",
-        },
-        Opt {
-            name: "append",
-            short: None,
-            takes: Takes::Text("WORDS"),
-            default: "",
-            help: "More words for the guest's command line, such as trace_events=0.",
-        },
+        Opt::new(
+            "mode",
+            Takes::OneOf(&["both", "deterministic", "threads", "kvm"]),
+            "What is counted: instructions (deterministic), time (kvm, threads), or both.",
+        )
+        .or("both"),
+        Opt::new(
+            "compare",
+            Takes::Nothing,
+            "Compare the instructions with the baseline; one that grew is a failure.",
+        ),
+        Opt::new(
+            "save-baseline",
+            Takes::Nothing,
+            "Write the instructions into the baseline.",
+        ),
+        Opt::new(
+            "baseline",
+            Takes::Text("FILE"),
+            "The baseline; tests/baselines/hand-off.json if not given.",
+        ),
+        Opt::new("jobs", Takes::number(2..=10_000), "Jobs of each workload.").or("200"),
+        Opt::new(
+            "chain",
+            Takes::numbers(2..=10_000),
+            "Subtasks of the chains.",
+        )
+        .or("64"),
+        Opt::new(
+            "branches",
+            Takes::numbers(1..=16),
+            "Parallel subtasks N of the fork-joins.",
+        )
+        .or("2,4,6,16"),
+        Opt::new(
+            "layered",
+            Takes::numbers(3..=10_000),
+            "Subtasks of the layered random graphs.",
+        )
+        .or("1000"),
+        Opt::new(
+            "seed",
+            Takes::number(0..=u64::MAX),
+            "Seed of the layered random graphs.",
+        )
+        .or("1"),
+        Opt::new(
+            "scale",
+            Takes::Nothing,
+            "Instead, count what the workloads cost on more cores and with more subtasks.",
+        ),
+        Opt::new(
+            "cores",
+            Takes::numbers(1..=MOST_CORES),
+            "With --scale: the numbers of cores.",
+        )
+        .or("1,2,4,8,16,32,64"),
+        Opt::new(
+            "subtasks",
+            Takes::numbers(3..=10_000),
+            "With --scale: the numbers of subtasks of a layered random graph.",
+        )
+        .or("10,100,1000,10000"),
+        Opt::new(
+            "append",
+            Takes::Text("WORDS"),
+            "More words for the guest's command line, such as trace_events=0.",
+        ),
     ],
     notes: "What each row means stands in docs/performance.md.
 

@@ -34,37 +34,27 @@ static TABLE: Command = Command {
             published optima.",
     positional: None,
     options: &[
-        Opt {
-            name: "file",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "The set of task graphs; tests/data/stg50.json.",
-        },
-        Opt {
-            name: "cores",
-            short: None,
-            takes: Takes::Numbers {
-                least: 1,
-                most: MOST_CORES,
-            },
-            default: "2,4,8,16",
-            help: "The numbers of cores; the file must have optima for them.",
-        },
-        Opt {
-            name: "graphs",
-            short: None,
-            takes: Takes::Text("NAMES"),
-            default: "",
-            help: "The graphs, with commas between; all of the file.",
-        },
-        Opt {
-            name: "out",
-            short: None,
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "Write the figures, too: as CSV, or as JSON Lines if the name ends in .json.",
-        },
+        Opt::new(
+            "file",
+            Takes::Text("FILE"),
+            "The set of task graphs; tests/data/stg50.json.",
+        ),
+        Opt::new(
+            "cores",
+            Takes::numbers(1..=MOST_CORES),
+            "The numbers of cores; the file must have optima for them.",
+        )
+        .or("2,4,8,16"),
+        Opt::new(
+            "graphs",
+            Takes::Text("NAMES"),
+            "The graphs, with commas between; all of the file.",
+        ),
+        Opt::new(
+            "out",
+            Takes::Text("FILE"),
+            "Write the figures, too: as CSV, or as JSON Lines if the name ends in .json.",
+        ),
     ],
     notes: "\
 Deterministic mode; execution ends on whole units of time, as in the model of the

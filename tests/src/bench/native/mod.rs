@@ -31,41 +31,30 @@ static TABLE: Command = Command {
     about: "Measures the scheduler on this host's own processors, with empty bodies.",
     positional: None,
     options: &[
-        Opt {
-            name: "workers",
-            short: None,
-            takes: Takes::Numbers { least: 1, most: 64 },
-            default: "1,2",
-            help: "The numbers of workers, each a thread with a processor of its own.",
-        },
-        Opt {
-            name: "rounds",
-            short: None,
-            takes: Takes::Number {
-                least: 10,
-                most: 100_000,
-            },
-            default: "300",
-            help: "How many rounds of about 20,000 instances each figure has.",
-        },
-        Opt {
-            name: "jobs",
-            short: None,
-            takes: Takes::Number {
-                least: 100,
-                most: 10_000_000,
-            },
-            default: "20000",
-            help: "The jobs whose joins across cores are measured.",
-        },
-        Opt {
-            name: "only",
-            short: None,
-            takes: Takes::Text("NAMES"),
-            default: "",
-            help: "The workloads, with commas between: chain-64, fork-join-2, fork-join-4, \
-                   fork-join-6, layered-1000, join; all.",
-        },
+        Opt::new(
+            "workers",
+            Takes::numbers(1..=64),
+            "The numbers of workers, each a thread with a processor of its own.",
+        )
+        .or("1,2"),
+        Opt::new(
+            "rounds",
+            Takes::number(10..=100_000),
+            "How many rounds of about 20,000 instances each figure has.",
+        )
+        .or("300"),
+        Opt::new(
+            "jobs",
+            Takes::number(100..=10_000_000),
+            "The jobs whose joins across cores are measured.",
+        )
+        .or("20000"),
+        Opt::new(
+            "only",
+            Takes::Text("NAMES"),
+            "The workloads, with commas between: chain-64, fork-join-2, fork-join-4, \
+             fork-join-6, layered-1000, join; all.",
+        ),
     ],
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under

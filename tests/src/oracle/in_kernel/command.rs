@@ -15,74 +15,51 @@ static IN_KERNEL: Command = Command {
     about: "Runs reference schedules on the bare machine in QEMU and compares.",
     positional: Some(("FILE...", "Reference schedules, as in tests/oracle.")),
     options: &[
-        Opt {
-            name: "in-kernel",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "On the machine, not in virtual time on the host.",
-        },
-        Opt {
-            name: "cores-up-to",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: MOST_CORES,
-            },
-            default: "64",
-            help: "Leave out the cases for more cores.",
-        },
-        Opt {
-            name: "unit-us",
-            short: None,
-            takes: Takes::Number {
-                least: 100,
-                most: 10_000_000,
-            },
-            default: "10000",
-            help: "The length of a unit of time in microseconds.",
-        },
-        Opt {
-            name: "window-us",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 2_500_000,
-            },
-            default: "",
-            help: "Events less than this apart count as one instant; a 100th of a unit.",
-        },
-        Opt {
-            name: "guard-us",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 2_500_000,
-            },
-            default: "",
-            help: "How much before a unit's end execution in it ends; a 500th of a unit.",
-        },
-        Opt {
-            name: "tolerance",
-            short: None,
-            takes: Takes::Number { least: 1, most: 49 },
-            default: "2",
-            help: "How far starts and finishes may be from the reference, in percent of a unit.",
-        },
-        Opt {
-            name: "mode",
-            short: None,
-            takes: Takes::OneOf(Mode::NAMES),
-            default: "deterministic",
-            help: "What time means; see ./scripts/run --help.",
-        },
-        Opt {
-            name: "machine",
-            short: None,
-            takes: Takes::OneOf(Machine::NAMES),
-            default: "microvm",
-            help: "The board that QEMU imitates.",
-        },
+        Opt::new(
+            "in-kernel",
+            Takes::Nothing,
+            "On the machine, not in virtual time on the host.",
+        ),
+        Opt::new(
+            "cores-up-to",
+            Takes::number(1..=MOST_CORES),
+            "Leave out the cases for more cores.",
+        )
+        .or("64"),
+        Opt::new(
+            "unit-us",
+            Takes::number(100..=10_000_000),
+            "The length of a unit of time in microseconds.",
+        )
+        .or("10000"),
+        Opt::new(
+            "window-us",
+            Takes::number(0..=2_500_000),
+            "Events less than this apart count as one instant; a 100th of a unit.",
+        ),
+        Opt::new(
+            "guard-us",
+            Takes::number(0..=2_500_000),
+            "How much before a unit's end execution in it ends; a 500th of a unit.",
+        ),
+        Opt::new(
+            "tolerance",
+            Takes::number(1..=49),
+            "How far starts and finishes may be from the reference, in percent of a unit.",
+        )
+        .or("2"),
+        Opt::new(
+            "mode",
+            Takes::OneOf(Mode::NAMES),
+            "What time means; see ./scripts/run --help.",
+        )
+        .or("deterministic"),
+        Opt::new(
+            "machine",
+            Takes::OneOf(Machine::NAMES),
+            "The board that QEMU imitates.",
+        )
+        .or("microvm"),
     ],
     notes: "\
 Each case runs with its number of cores, its policy, and preemption as it says.

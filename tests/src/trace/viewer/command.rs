@@ -17,33 +17,23 @@ pub static TRACE: Command = Command {
          `./scripts/run --trace FILE` makes one.",
     )),
     options: &[
-        Opt {
-            name: "out",
-            short: Some('o'),
-            takes: Takes::Text("FILE"),
-            default: "",
-            help: "Write to this file; else to standard output.",
-        },
-        Opt {
-            name: "run",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: u64::MAX,
-            },
-            default: "",
-            help: "Only the run of this number; else all of them, side by side from time 0.",
-        },
-        Opt {
-            name: "bound-us",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: 1_000_000_000,
-            },
-            default: "1000",
-            help: "As for ./scripts/check-trace, whose breaches are shown as markers.",
-        },
+        Opt::new(
+            "out",
+            Takes::Text("FILE"),
+            "Write to this file; else to standard output.",
+        )
+        .short('o'),
+        Opt::new(
+            "run",
+            Takes::number(0..=u64::MAX),
+            "Only the run of this number; else all of them, side by side from time 0.",
+        ),
+        Opt::new(
+            "bound-us",
+            Takes::number(0..=1_000_000_000),
+            "As for ./scripts/check-trace, whose breaches are shown as markers.",
+        )
+        .or("1000"),
     ],
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
