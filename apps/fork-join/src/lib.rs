@@ -14,6 +14,7 @@
 
 extern crate alloc;
 
+mod arity;
 mod draw;
 mod sink;
 

@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use fass::{Dag, SubtaskAttributes};
 
-use crate::{BUDGET, RELATIVE_DEADLINE, WCET_OF_ENDS};
+use crate::{BUDGET, RELATIVE_DEADLINE, WCET_OF_ENDS, each_arity};
 
 /// How many joins the sink has seen.
 #[derive(Clone, Debug, Default)]
@@ -42,23 +42,6 @@ impl Joins {
     }
 }
 
-/// Registers the sink for one of the given numbers of arguments.
-macro_rules! register_for {
-    ($dag:ident, $parallel:ident, $topics:ident, $joins:ident, $attributes:ident;
-     $($number:literal: $($part:ident)+;)+) => {
-        match $parallel {
-            $($number => $dag.register_sink_subtask(
-                move |($($part,)+): ($(register_for!(@u64 $part),)+)| $joins.join(&[$($part),+]),
-                $topics,
-                RELATIVE_DEADLINE,
-                $attributes,
-            ),)+
-            _ => panic!("a fork-join DAG has 1 to 16 parallel subtasks, not {}", $parallel),
-        }
-    };
-    (@u64 $part:ident) => { u64 };
-}
-
 pub(crate) fn register(dag: &Dag, parallel: usize, joins: &Joins) {
     let names: Vec<String> = (0..parallel)
         .map(|branch| format!("part-{branch}"))
@@ -68,22 +51,19 @@ pub(crate) fn register(dag: &Dag, parallel: usize, joins: &Joins) {
     let attributes = SubtaskAttributes::named("sink")
         .wcet(WCET_OF_ENDS)
         .budget(BUDGET);
-    register_for! { dag, parallel, topics, joins, attributes;
-        1: a;
-        2: a b;
-        3: a b c;
-        4: a b c d;
-        5: a b c d e;
-        6: a b c d e f;
-        7: a b c d e f g;
-        8: a b c d e f g h;
-        9: a b c d e f g h i;
-        10: a b c d e f g h i j;
-        11: a b c d e f g h i j k;
-        12: a b c d e f g h i j k l;
-        13: a b c d e f g h i j k l m;
-        14: a b c d e f g h i j k l m n;
-        15: a b c d e f g h i j k l m n o;
-        16: a b c d e f g h i j k l m n o p;
+    macro_rules! register_for {
+        ($($number:literal: $($part:ident)+;)+) => {
+            match parallel {
+                $($number => dag.register_sink_subtask(
+                    move |($($part,)+): ($(register_for!(@u64 $part),)+)| joins.join(&[$($part),+]),
+                    topics,
+                    RELATIVE_DEADLINE,
+                    attributes,
+                ),)+
+                _ => panic!("a fork-join DAG has 1 to 16 parallel subtasks, not {parallel}"),
+            }
+        };
+        (@u64 $part:ident) => { u64 };
     }
+    each_arity!(register_for);
 }

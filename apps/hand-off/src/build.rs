@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, VecToSubs, create_dag};
+use fork_join::each_arity;
 
 use crate::shape::Shape;
 use crate::stamps::{Pen, Stamps};
@@ -101,24 +102,7 @@ impl Builder<'_> {
             };
             (@u64 $part:ident) => { u64 };
         }
-        join! {
-            1: a;
-            2: a b;
-            3: a b c;
-            4: a b c d;
-            5: a b c d e;
-            6: a b c d e f;
-            7: a b c d e f g;
-            8: a b c d e f g h;
-            9: a b c d e f g h i;
-            10: a b c d e f g h i j;
-            11: a b c d e f g h i j k;
-            12: a b c d e f g h i j k l;
-            13: a b c d e f g h i j k l m;
-            14: a b c d e f g h i j k l m n;
-            15: a b c d e f g h i j k l m n o;
-            16: a b c d e f g h i j k l m n o p;
-        }
+        each_arity!(join);
     }
 
     fn at_run_time(&mut self) {

@@ -91,6 +91,30 @@ impl<'a> Lines<'a> {
     }
 }
 
+/// Reads a file of records that each begin a case; `read` reads one from there on.
+///
+/// # Errors
+///
+/// [`Malformed`] for another record, for what `read` finds, and for a file without a case.
+pub fn cases<'a, Case>(
+    text: &'a str,
+    read: impl Fn(&Line<'a>, &mut Lines<'a>) -> Result<Case, Malformed>,
+) -> Result<Vec<Case>, Malformed> {
+    let mut lines = Lines::new(text);
+    let mut cases = Vec::new();
+    while let Some(line) = lines.next_line() {
+        if line.kind != "case" {
+            let found = quoted(line.kind);
+            return Err(line.malformed(format!("expected a `case` record, found {found}")));
+        }
+        cases.push(read(&line, &mut lines)?);
+    }
+    if cases.is_empty() {
+        return Err(lines.ended("a `case` record"));
+    }
+    Ok(cases)
+}
+
 impl Line<'_> {
     /// Returns an error on this line.
     #[must_use]

@@ -14,7 +14,7 @@ use sched_dag::{
 };
 
 use crate::case::{Case, CaseDag, InstanceTimes, JobTimes};
-use crate::lines::{Line, Lines, Malformed, quoted};
+use crate::lines::{Line, Lines, Malformed, cases, quoted};
 
 /// Reads all cases of a file.
 ///
@@ -23,21 +23,7 @@ use crate::lines::{Line, Lines, Malformed, quoted};
 /// [`Malformed`] for the first record that is not as described above, and for
 /// DAGs that cannot be committed.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
-    let mut lines = Lines::new(text);
-    let mut cases = Vec::new();
-    while let Some(line) = lines.next_line() {
-        if line.kind != "case" {
-            return Err(line.malformed(format!(
-                "expected a `case` record, found {}",
-                quoted(line.kind)
-            )));
-        }
-        cases.push(parse_case(&line, &mut lines)?);
-    }
-    if cases.is_empty() {
-        return Err(lines.ended("a `case` record"));
-    }
-    Ok(cases)
+    cases(text, parse_case)
 }
 
 fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {

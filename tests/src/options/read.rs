@@ -36,6 +36,16 @@ impl Command {
         ExitCode::FAILURE
     }
 
+    /// Returns the options of a command line that is right, for tests.
+    #[cfg(test)]
+    pub(crate) fn right(&self, line: &str) -> Parsed {
+        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
+        match self.parse(&words) {
+            Ok(Request::Work(options)) => options,
+            other => panic!("`{line}` gave {other:?}"),
+        }
+    }
+
     fn complain(&self, lines: &str) {
         let name = self.invocation.trim_start_matches("./scripts/");
         lines.lines().for_each(|line| eprintln!("{name}: {line}"));

@@ -26,10 +26,7 @@ fn request(line: &str) -> Result<Request, String> {
 }
 
 fn parsed(line: &str) -> Parsed {
-    match request(line) {
-        Ok(Request::Work(parsed)) => parsed,
-        other => panic!("`{line}` gave {other:?}"),
-    }
+    COMMAND.right(line)
 }
 
 fn refusal(line: &str) -> String {

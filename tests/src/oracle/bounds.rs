@@ -24,7 +24,7 @@ use sched_dag::analysis::{
     melani_fp, melani_fp_width, np_safe_fp, pipelined_fp_reference, width,
 };
 
-use replay::lines::{Line, Lines, Malformed};
+use replay::lines::{Line, Lines, Malformed, cases};
 
 /// One task set with the values expected of it.
 #[derive(Debug)]
@@ -67,18 +67,7 @@ const QUANTITIES: [&str; 10] = [
 ///
 /// [`Malformed`] for the first record that is not as described above.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
-    let mut lines = Lines::new(text);
-    let mut cases = Vec::new();
-    while let Some(line) = lines.next_line() {
-        if line.kind != "case" {
-            return Err(line.malformed(format!("expected a `case` record, found `{}`", line.kind)));
-        }
-        cases.push(parse_case(&line, &mut lines)?);
-    }
-    if cases.is_empty() {
-        return Err(lines.ended("a `case` record"));
-    }
-    Ok(cases)
+    cases(text, parse_case)
 }
 
 /// Computes and compares each quantity of a case.

@@ -214,14 +214,9 @@ fn conclude(report: &Report) -> ExitCode {
 mod tests {
     use super::super::plan::{OVERRUNS, POLICIES};
     use super::*;
-    use crate::options::Request;
 
     fn plan_of(line: &str) -> Result<Plan, String> {
-        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
-        match SOAK.parse(&words) {
-            Ok(Request::Work(options)) => plan(&options),
-            other => panic!("{other:?}"),
-        }
+        plan(&SOAK.right(line))
     }
 
     #[test]

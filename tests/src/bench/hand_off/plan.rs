@@ -178,14 +178,9 @@ impl Boot {
 mod tests {
     use super::Plan;
     use crate::bench::hand_off::table::TABLE;
-    use crate::options::Request;
 
     fn plan(line: &str) -> Result<Plan, String> {
-        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
-        match TABLE.parse(&words) {
-            Ok(Request::Work(options)) => Plan::new(&options),
-            other => panic!("`{line}`: {other:?}"),
-        }
+        Plan::new(&TABLE.right(line))
     }
 
     #[test]

@@ -160,26 +160,21 @@ fn measure(plan: &Plan) -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::Request;
 
-    fn plan(words: &[&str]) -> Result<Plan, String> {
-        let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
-        match TABLE.parse(&words) {
-            Ok(Request::Work(options)) => Plan::read(&options),
-            other => panic!("{other:?} is no work"),
-        }
+    fn plan(line: &str) -> Result<Plan, String> {
+        Plan::read(&TABLE.right(line))
     }
 
     #[test]
     fn workloads_are_chosen_by_name() {
-        let plan = plan(&["--only", "fork-join-4,chain-64", "--workers", "1"]).expect("right");
+        let plan = plan("--only fork-join-4,chain-64 --workers 1").expect("right");
         assert_eq!(plan.graphs, [Graph::Chain, Graph::ForkJoin(4)]);
         assert!(!plan.with_join);
     }
 
     #[test]
     fn an_unknown_workload_is_refused_with_those_there_are() {
-        let line = plan(&["--only", "chain-65"]).err().expect("refused");
+        let line = plan("--only chain-65").err().expect("refused");
         assert!(line.contains("`--only chain-65`") && line.contains("chain-64, fork-join-2"));
     }
 
@@ -187,7 +182,7 @@ mod tests {
     fn more_workers_than_processors_are_refused() {
         let most = native::processors().len();
         if most < 64 {
-            let line = plan(&["--workers", "64"]).err().expect("refused");
+            let line = plan("--workers 64").err().expect("refused");
             assert!(line.contains(&format!("{most} processors")), "{line}");
         }
     }

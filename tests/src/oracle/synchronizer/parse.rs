@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 use pub_sub::{AgePenalty, Parameters};
 
 use super::{Arrival, Case, Departures, Policy};
-use ::replay::lines::{Line, Lines, Malformed};
+use ::replay::lines::{Line, Lines, Malformed, cases};
 
 /// Reserved storage grows with the topics whatever the arrivals are, so a number
 /// that no trace can need is refused before it is reserved.
@@ -19,18 +19,7 @@ const MOST_TOPICS: usize = 1024;
 ///
 /// [`Malformed`] for the first record that is not as described above.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
-    let mut lines = Lines::new(text);
-    let mut cases = Vec::new();
-    while let Some(line) = lines.next_line() {
-        if line.kind != "case" {
-            return Err(line.malformed(format!("expected a `case` record, found `{}`", line.kind)));
-        }
-        cases.push(parse_case(&line, &mut lines)?);
-    }
-    if cases.is_empty() {
-        return Err(lines.ended("a `case` record"));
-    }
-    Ok(cases)
+    cases(text, parse_case)
 }
 
 /// A policy before it is known how many arrivals there are.

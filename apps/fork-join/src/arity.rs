@@ -1,0 +1,31 @@
+//! One row for each number of values that a join can have.
+//!
+//! The inputs of a subtask are a tuple, and the number of its elements is part of its
+//! type. Who chooses that number at run time has to write each of them once; this table
+//! writes them for all.
+
+/// Calls a macro with the rows `1: a;`, `2: a b;` and so on to 16: a number and as many
+/// names.
+#[macro_export]
+macro_rules! each_arity {
+    ($rows:ident) => {
+        $rows! {
+            1: a;
+            2: a b;
+            3: a b c;
+            4: a b c d;
+            5: a b c d e;
+            6: a b c d e f;
+            7: a b c d e f g;
+            8: a b c d e f g h;
+            9: a b c d e f g h i;
+            10: a b c d e f g h i j;
+            11: a b c d e f g h i j k;
+            12: a b c d e f g h i j k l;
+            13: a b c d e f g h i j k l m;
+            14: a b c d e f g h i j k l m n;
+            15: a b c d e f g h i j k l m n o;
+            16: a b c d e f g h i j k l m n o p;
+        }
+    };
+}
