@@ -56,3 +56,13 @@ fn bytes_release_a_dag() {
     assert_eq!(number(&outcome, "answers_to_bytes"), 2);
     assert_eq!(number(&outcome, "violations"), 0);
 }
+
+#[test]
+fn what_comes_before_time_0_releases_nothing_yet() {
+    let typed = [("\"kind\":\"listening\"", "a")];
+    let guest = sharing("static").word("input=yes").word("later_ms=100");
+    let outcome = guest.typing(&typed).succeed();
+    assert_eq!(number(&outcome, "answers_to_bytes"), 1);
+    assert_eq!(number(&outcome, "violations"), 0);
+    assert_eq!(outcome.transcript.of_kind("fault").count(), 0);
+}

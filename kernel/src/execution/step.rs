@@ -144,7 +144,10 @@ impl Execution {
             Event::Signalled(dag) => moment.signal(dag, &mut watcher),
             Event::Control(control) => control.apply(&mut moment, &mut watcher),
         }
-        let due_ns = *dispatch_due_ns.get_or_insert(now_ns.saturating_add(KERNEL.coincidence_ns()));
+        // What happens before time 0 releases nothing yet.
+        let waits_until_ns = now_ns.saturating_add(KERNEL.coincidence_ns());
+        let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
+        let due_ns = *dispatch_due_ns.get_or_insert(waits_until_ns.max(epoch_ns));
         if now_ns < due_ns {
             self.may_hand_off = false;
             return self.announce();

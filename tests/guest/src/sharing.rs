@@ -4,8 +4,9 @@
 //! gives, and offers what they make as a latest value. Two readers of other rates
 //! sample it, on other cores as it comes, and check that what they get is whole,
 //! complete, and never older than what they had. One of them raises the signal of
-//! `answers` each time, far more often than that may run. With `input=yes` a DAG of
-//! two jobs waits for bytes from the serial port, too.
+//! `answers` each time, far more often than that may run. With `input=yes` a DAG
+//! waits for two bytes from the serial port, too. With `later_ms=N` the releases
+//! count from N milliseconds later, and nothing may begin before.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -21,6 +22,12 @@ use sched_dag::DagId;
 
 const ANSWERS_APART: Duration = Duration::from_millis(20);
 
+/// When the releases count from.
+static EPOCH_NS: AtomicU64 = AtomicU64::new(0);
+
+/// Time for the cores to get ready.
+const LEAD_NS: u64 = 100_000;
+
 /// A value that cannot be half written without showing it.
 #[derive(Clone)]
 struct Whole([u64; 16]);
@@ -28,7 +35,8 @@ struct Whole([u64; 16]);
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let with_input = options.choice("input", &[("no", false), ("yes", true)])?;
-    options.finish(&["test", "input"])?;
+    let later_ms = options.number("later_ms", 0..=10_000, 0)?;
+    options.finish(&["test", "input", "later_ms"])?;
     let (writer, latest) = writer();
     let (answers, signal) = answers("answers");
     let counters = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
@@ -39,7 +47,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         reader("seldom", 7, 90, &latest, Some(&signal), &counters[1]),
     ];
     let button = with_input.then(|| {
-        let (dag, button) = answers_to_bytes();
+        // Of two bytes before time 0 one is kept.
+        let (dag, button) = answers_to_bytes(if later_ms == 0 { 2 } else { 1 });
         dags.push(dag);
         button
     });
@@ -47,11 +56,18 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     if let Some(button) = &button {
         machine.raise_on_input(button);
         json::emit("listening", |_| {});
+        // Time for the host to type, so that the byte is there before the epoch.
+        let typed_ns = fass::now_ns() + later_ms * 1_000_000;
+        while fass::now_ns() < typed_ns {
+            core::hint::spin_loop();
+        }
     }
     for staleness in commit.staleness() {
         kernel::println!("{staleness}");
     }
-    let run = machine.run()?;
+    let epoch_ns = fass::now_ns() + LEAD_NS + later_ms * 1_000_000;
+    EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
+    let run = machine.run_from(epoch_ns)?;
     let apart_ns = u64::try_from(ANSWERS_APART.as_nanos()).unwrap_or(u64::MAX);
     let of_answers = *run.statistics(DagId(0));
     let of_input = button.map(|_| run.statistics(DagId(4)).completed);
@@ -87,7 +103,12 @@ fn writer() -> (Dag, Latest<Whole>) {
     let period = ms(5);
     dag.name("writer").jobs(120).relative_deadline(period);
     let count = dag.state("count", 0_u64);
-    dag.register_periodic_subtask(|| (1_u64,), vec!["tick"], period, taking("source", 100));
+    let source = || {
+        let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
+        assert!(fass::now_ns() >= epoch_ns, "released before the epoch");
+        (1_u64,)
+    };
+    dag.register_periodic_subtask(source, vec!["tick"], period, taking("source", 100));
     dag.using(count.update()).register_subtask(
         |count: &mut u64, (tick,): (u64,)| {
             hold(400);
@@ -172,9 +193,9 @@ fn answers(name: &str) -> (Dag, Signal) {
     (dag, signal)
 }
 
-fn answers_to_bytes() -> (Dag, Signal) {
+fn answers_to_bytes(jobs: u64) -> (Dag, Signal) {
     let dag = create_dag();
-    dag.name("input").jobs(2).relative_deadline(ms(5));
+    dag.name("input").jobs(jobs).relative_deadline(ms(5));
     let attributes = taking("byte", 500);
     let button = dag.register_sporadic_subtask(|| hold(100), vec![], ms(1), attributes);
     (dag, button)
