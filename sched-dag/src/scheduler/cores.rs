@@ -25,15 +25,13 @@ pub(super) struct Cores {
 
 #[derive(Clone, Copy, Debug)]
 struct Occupation {
-    /// The key of what runs, or ran last.
+    /// The key of what runs, if anything does.
     key: Key,
-    is_idle: bool,
     may_be_preempted: bool,
 }
 
 const IDLE: Occupation = Occupation {
     key: Key::NONE,
-    is_idle: true,
     may_be_preempted: false,
 };
 
@@ -52,8 +50,8 @@ impl Cores {
     }
 
     pub(super) fn running(&self, core: CoreId) -> Option<Key> {
-        let occupation = self.occupations[core.index()];
-        (!occupation.is_idle).then_some(occupation.key)
+        let key = self.occupations[core.index()].key;
+        (!key.is_none()).then_some(key)
     }
 
     /// Reports whether any core is idle.
@@ -82,7 +80,6 @@ impl Cores {
     pub(super) fn run(&mut self, core: CoreId, key: Key, may_be_preempted: bool) {
         self.occupations[core.index()] = Occupation {
             key,
-            is_idle: false,
             may_be_preempted,
         };
     }

@@ -138,8 +138,9 @@ impl Scheduler {
     /// Reports whether the instant can end with a hand-off.
     #[inline]
     fn concerns_one_core(&self) -> bool {
-        let is_due = (self.timers.peek()).is_some_and(|(event_ns, _)| event_ns <= self.now_ns);
-        let concerns_others = self.fresh > 1 && self.cores.count() > 1;
-        !is_due && !concerns_others
+        if self.fresh > 1 && self.cores.count() > 1 {
+            return false;
+        }
+        (self.timers.peek()).is_none_or(|(event_ns, _)| event_ns > self.now_ns)
     }
 }

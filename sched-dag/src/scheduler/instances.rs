@@ -5,6 +5,8 @@
 //! are released at that instant (R3), so such a job ends by the same rules as
 //! any other, only without running.
 
+use alloc::vec::Vec;
+
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
@@ -126,13 +128,12 @@ impl Scheduler {
         let job = jobs.job_mut(sequence);
         job.unfinished -= 1;
         let is_last = job.unfinished == 0;
-        for place in Vertices::successors(&ended) {
-            let next = vertices.successor(place);
-            if let Some(successor) = vertices.arrive(next, sequence) {
-                if is_cut {
-                    observer.cancelled(successor.instance(job));
-                    ending.push(next);
-                } else {
+        if is_cut {
+            cancel_successors(&ended, vertices, job, ending, observer);
+        } else {
+            for place in Vertices::successors(&ended) {
+                let next = vertices.successor(place);
+                if let Some(successor) = vertices.arrive(next, sequence) {
                     line_up(next, successor, job, ready, observer);
                     *fresh += 1;
                 }
@@ -204,6 +205,24 @@ impl Scheduler {
         {
             Some(event_ns) => self.timers.set(dag.index(), event_ns),
             None => self.timers.remove(dag.index()),
+        }
+    }
+}
+
+/// Cancels what becomes ready by the end of an instance of a job that was cut.
+#[cold]
+fn cancel_successors(
+    ended: &Vertex,
+    vertices: &mut Vertices,
+    job: &Job,
+    ending: &mut Vec<u32>,
+    observer: &mut impl Observer,
+) {
+    for place in Vertices::successors(ended) {
+        let next = vertices.successor(place);
+        if let Some(successor) = vertices.arrive(next, ended.progress) {
+            observer.cancelled(successor.instance(job));
+            ending.push(next);
         }
     }
 }

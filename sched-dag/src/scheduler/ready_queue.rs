@@ -12,7 +12,8 @@
 //!
 //! Under static priority the order of all instances that can ever wait together
 //! is mostly known at commit: then each subtask has a *rank*, and the rest is a
-//! set of bits, which costs the same however many wait. That holds unless two
+//! set of bits, which costs the same however many wait; up to 64 subtasks are bits of
+//! one word, which is at hand without any call. That holds unless two
 //! subtasks of one DAG share a priority and jobs of that DAG overlap, because
 //! then the job comes before the subtask. In that case the rest is a heap. Under
 //! EDF it is a heap of jobs.
@@ -42,8 +43,16 @@ pub(super) struct ReadyQueue {
     rest: Rest,
 }
 
+/// Its numbers are its own, so that telling the first one apart takes one comparison.
 #[derive(Debug)]
+#[repr(u8)]
 enum Rest {
+    /// For keys that are ranks up to 63.
+    Word {
+        ranks: u64,
+        /// The key of each rank.
+        keys: Box<[Key]>,
+    },
     /// For keys that are ranks.
     Ranked {
         ranks: BitSet,
@@ -111,6 +120,7 @@ impl ReadyQueue {
 
     /// Puts it in front only before another one there: to see whether it precedes the
     /// rest would take as long as to put it there.
+    #[inline]
     fn insert_among_others(&mut self, key: Key) {
         let precedes_front = !self.front.is_none() && key < self.front;
         let behind = match precedes_front {
@@ -131,7 +141,7 @@ impl ReadyQueue {
             return None;
         }
         self.others -= 1;
-        self.rest.pop()
+        Some(self.rest.pop())
     }
 
     /// Takes an instance out, which waits.
@@ -148,14 +158,25 @@ impl ReadyQueue {
 impl Rest {
     fn peek(&self) -> Option<Key> {
         match self {
+            Self::Word { ranks, keys } => keys.get(ranks.trailing_zeros() as usize).copied(),
             Self::Ranked { ranks, keys } => ranks.first().map(|rank| keys[rank]),
             Self::ByDeadline(jobs) => jobs.peek(),
             Self::Keyed(heap) => heap.peek().map(|(key, _)| key),
         }
     }
 
+    #[inline]
     fn insert(&mut self, key: Key) {
         match self {
+            Self::Word { ranks, .. } => *ranks |= 1 << key.rank(),
+            _ => self.insert_beyond_a_word(key),
+        }
+    }
+
+    #[inline(never)]
+    fn insert_beyond_a_word(&mut self, key: Key) {
+        match self {
+            Self::Word { .. } => {}
             Self::Ranked { ranks, .. } => ranks.insert(key.rank()),
             Self::ByDeadline(jobs) => jobs.insert(key),
             Self::Keyed(heap) => heap.set(key.vertex() as usize, key),
@@ -164,26 +185,38 @@ impl Rest {
 
     fn remove(&mut self, key: Key) {
         match self {
+            Self::Word { ranks, .. } => *ranks &= !(1 << key.rank()),
             Self::Ranked { ranks, .. } => ranks.remove(key.rank()),
             Self::ByDeadline(jobs) => jobs.remove(key),
             Self::Keyed(heap) => heap.remove(key.vertex() as usize),
         }
     }
 
-    fn pop(&mut self) -> Option<Key> {
+    /// Takes the instance with the smallest key out, of which there is one.
+    #[inline]
+    fn pop(&mut self) -> Key {
         match self {
-            Self::Ranked { ranks, keys } => {
-                let rank = ranks.first()?;
-                ranks.remove(rank);
-                Some(keys[rank])
+            Self::Word { ranks, keys } => {
+                let first = ranks.trailing_zeros() as usize;
+                *ranks &= ranks.wrapping_sub(1);
+                keys[first]
             }
-            Self::ByDeadline(jobs) => {
-                let key = jobs.peek()?;
-                jobs.remove(key);
-                Some(key)
-            }
-            Self::Keyed(heap) => heap.pop().map(|(key, _)| key),
+            _ => self.pop_beyond_a_word(),
         }
+    }
+
+    #[inline(never)]
+    fn pop_beyond_a_word(&mut self) -> Key {
+        let first = match self {
+            Self::Word { .. } => None,
+            Self::Ranked { ranks, keys } => ranks.first().map(|rank| {
+                ranks.remove(rank);
+                keys[rank]
+            }),
+            Self::ByDeadline(jobs) => jobs.peek().inspect(|&key| jobs.remove(key)),
+            Self::Keyed(heap) => heap.pop().map(|(key, _)| key),
+        };
+        first.expect("as many are in line as were counted")
     }
 }
 
@@ -220,11 +253,15 @@ fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
 /// Makes the rest for vertices in the order of their ranks.
 fn ranked(order: &[u32]) -> Rest {
     let keys = (0u64..).zip(order);
-    Rest::Ranked {
-        ranks: BitSet::new(order.len()),
-        keys: keys
-            .map(|(rank, &vertex)| Key::of_parts(rank << 32, 0, vertex))
-            .collect(),
+    let keys = keys
+        .map(|(rank, &vertex)| Key::of_parts(rank << 32, 0, vertex))
+        .collect();
+    match order.len() {
+        0..=64 => Rest::Word { ranks: 0, keys },
+        count => Rest::Ranked {
+            ranks: BitSet::new(count),
+            keys,
+        },
     }
 }
 
@@ -236,19 +273,23 @@ mod tests {
         Key::of_parts(u64::from(number) << 32, 0, number)
     }
 
-    fn queues() -> [ReadyQueue; 2] {
-        let order: Vec<u32> = (0..100).collect();
-        [
-            ReadyQueue::of(Order::Rank, ranked(&order)),
-            ReadyQueue::of(Order::Job, Rest::Keyed(IndexedHeap::new(100))),
-        ]
+    /// One of each kind that needs no task set, with room for so many.
+    fn queues() -> [(ReadyQueue, u32); 4] {
+        let ranked = |count| (ReadyQueue::of(Order::Rank, ranked(&order(count))), count);
+        let keyed = Rest::Keyed(IndexedHeap::new(100));
+        let keyed = (ReadyQueue::of(Order::Job, keyed), 100);
+        [ranked(63), ranked(64), ranked(100), keyed]
+    }
+
+    fn order(count: u32) -> Vec<u32> {
+        (0..count).collect()
     }
 
     #[test]
     fn pops_ascending_however_inserts_pops_and_removals_mix() {
-        for mut queue in queues() {
-            for number in 0..100u32 {
-                queue.insert(key((number * 37) % 100));
+        for (mut queue, count) in queues() {
+            for number in 0..count {
+                queue.insert(key((number * 37) % count));
                 if number % 3 == 0 {
                     let first = queue.peek();
                     let popped = queue.pop().expect("one waits");
@@ -256,11 +297,12 @@ mod tests {
                     queue.insert(popped);
                 }
             }
-            for vertex in (0..100).step_by(4) {
+            for vertex in (0..count).step_by(4) {
                 queue.remove(key(vertex));
             }
+            let left = order(count).into_iter().filter(|vertex| vertex % 4 != 0);
             let popped: Vec<_> = core::iter::from_fn(|| queue.pop()).collect();
-            assert_eq!(popped.len(), 75);
+            assert_eq!(popped.len(), left.count());
             assert!(popped.iter().all(|&popped| popped == key(popped.vertex())));
             assert!(popped.is_sorted());
         }
@@ -268,7 +310,7 @@ mod tests {
 
     #[test]
     fn the_front_may_be_removed() {
-        for mut queue in queues() {
+        for (mut queue, _) in queues() {
             queue.insert(key(7));
             queue.insert(key(3));
             queue.remove(key(3));
