@@ -72,7 +72,9 @@ const EMPTY_SLOT: u64 = 0;
 /// If `slots` is 0.
 pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
     assert!(slots > 0, "an edge needs at least one slot");
-    let slots: Arc<[Slot<T>]> = (0..slots).map(|_| Slot::empty()).collect();
+    let slots: Arc<[Slot<T>]> = (0..slots.next_power_of_two())
+        .map(|_| Slot::empty())
+        .collect();
     let writer = Writer {
         slots: Arc::clone(&slots),
         next: 0,
@@ -169,7 +171,7 @@ fn search<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'
 
 /// Returns the slot after one, round the ring.
 fn after<T>(slots: &[Slot<T>], slot: usize) -> usize {
-    if slot + 1 == slots.len() { 0 } else { slot + 1 }
+    (slot + 1) & (slots.len() - 1)
 }
 
 impl<T> Slot<T> {

@@ -19,8 +19,9 @@
 //! [`Body`](crate::Body).
 
 use alloc::vec::Vec;
-use core::future::{poll_fn, ready};
-use core::task::Poll;
+use core::future::ready;
+use core::pin::Pin;
+use core::task::{Context, Poll};
 
 use crate::gate::{Gate, Grant};
 use crate::message::{Message, MessageType};
@@ -222,6 +223,19 @@ pub struct Publishers<Ends> {
     ends: Ends,
 }
 
+/// The future that waits at the gate. It is `core::future::PollFn` but for being
+/// compiled into whoever polls it, also where that is compiled for size.
+struct AtTheGate<F>(F);
+
+impl<T, F: FnMut() -> Poll<T> + Unpin> Future for AtTheGate<F> {
+    type Output = T;
+
+    #[inline(always)]
+    fn poll(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<T> {
+        (self.0)()
+    }
+}
+
 /// Implements the four traits for one arity.
 macro_rules! implement_arity {
     ($(($Item:ident $item:ident $end:ident))*) => {
@@ -237,7 +251,7 @@ macro_rules! implement_arity {
 
                 #[inline]
                 fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send {
-                    poll_fn(move |_| {
+                    AtTheGate(move || {
                         let ($($end,)*) = &mut self.ends;
                         match self.gate.pass() {
                             Some(Grant::Run(job)) => Poll::Ready(($($end.recv(job),)*)),
