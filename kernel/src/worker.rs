@@ -2,7 +2,9 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use crate::execution::{self, Assignment, Work};
+use alloc::boxed::Box;
+
+use crate::execution::{self, Runner, Work};
 use crate::machine::context::{Context, Parked};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
@@ -30,7 +32,7 @@ pub(crate) fn work() -> Parked {
     let mut work = execution::find_work();
     loop {
         work = match work {
-            Work::Run(assignment) => run(assignment),
+            Work::Run(runner) => run(runner),
             Work::Continue(context) => return context,
             Work::Rest => {
                 rest(this_core::get());
@@ -41,12 +43,12 @@ pub(crate) fn work() -> Parked {
 }
 
 /// Calls a subtask's function, with interrupts enabled meanwhile.
-fn run(mut assignment: Assignment) -> Work {
+fn run(mut runner: Box<Runner>) -> Work {
     cpu::enable_interrupts();
-    assignment.run();
+    runner.run();
     cpu::disable_enabled_interrupts();
     let finish_ns = clock::now_ns();
-    execution::complete(assignment, finish_ns)
+    execution::complete(runner, finish_ns)
 }
 
 /// Lets the cores other than core 0 watch for work instead of halting when they

@@ -1,39 +1,57 @@
 //! What the execution keeps beside the scheduler: the bodies with their places,
-//! the record, and tables of what is fixed for a run.
+//! the record, and where each DAG's vertices begin.
 
 use alloc::boxed::Box;
+use alloc::vec::Vec;
 
 use fass::Body;
 use sched_dag::record::Record;
-use sched_dag::{Instance, TaskSet, Vertex};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
 
 use super::placement::Placement;
+use super::runner::Runner;
 use crate::machine::context::Parked;
 use crate::platform::KERNEL;
 
 /// All of it, for as long as a run goes on.
 pub(super) struct Books {
     pub(super) record: Record,
-    /// Bodies are boxed, so that moving one is moving a pointer.
-    pub(super) placement: Placement<Box<Body>, Parked>,
+    pub(super) placement: Placement<Box<Runner>, Parked>,
     /// Each DAG's first vertex.
     first_vertices: Box<[u32]>,
-    /// The budget of each vertex, `u64::MAX` if it has none.
-    budgets_ns: Box<[u64]>,
 }
 
 impl Books {
     pub(super) fn new(
         task_set: &TaskSet,
         record: Record,
-        bodies: impl Iterator<Item = Body>,
+        bodies: Vec<Vec<Body>>,
         cores: usize,
     ) -> Self {
+        let mut first_vertices = Vec::with_capacity(bodies.len());
+        let mut runners = Vec::new();
+        for (dag, bodies) in (0..).map(DagId).zip(bodies) {
+            // The verification has seen to it that subtasks can be counted so.
+            let vertex = |count| u32::try_from(count).unwrap_or(u32::MAX);
+            first_vertices.push(vertex(runners.len()));
+            for (subtask, body) in (0..).map(SubtaskId).zip(bodies) {
+                let first_instance = Instance {
+                    dag,
+                    job: 0,
+                    subtask,
+                };
+                runners.push(Box::new(Runner::new(
+                    body,
+                    Vertex(vertex(runners.len())),
+                    first_instance,
+                    budget_ns(task_set, first_instance),
+                )));
+            }
+        }
         Self {
             record,
-            placement: Placement::new(bodies.map(Box::new), cores),
-            first_vertices: first_vertices(task_set),
-            budgets_ns: budgets_ns(task_set),
+            placement: Placement::new(runners.into_iter(), cores),
+            first_vertices: first_vertices.into(),
         }
     }
 
@@ -41,35 +59,14 @@ impl Books {
     pub(super) fn vertex(&self, instance: Instance) -> Vertex {
         Vertex(self.first_vertices[instance.dag.index()] + instance.subtask.0)
     }
-
-    /// Returns how long an instance of a subtask may execute for, `u64::MAX` if for
-    /// ever.
-    #[inline]
-    pub(super) fn budget_ns(&self, vertex: Vertex) -> u64 {
-        self.budgets_ns[vertex.index()]
-    }
 }
 
-/// Returns each DAG's first vertex.
-fn first_vertices(task_set: &TaskSet) -> Box<[u32]> {
-    let mut next = 0;
-    let first = task_set.dags().iter().map(|dag| {
-        let first = next;
-        // The verification has seen to it that subtasks can be counted so.
-        next += u32::try_from(dag.subtasks().len()).unwrap_or(u32::MAX);
-        first
-    });
-    first.collect()
-}
-
-/// Returns the budget of each vertex.
-fn budgets_ns(task_set: &TaskSet) -> Box<[u64]> {
-    let subtasks = task_set.dags().iter().flat_map(|dag| dag.subtasks());
-    let budgets_ns = subtasks.map(|subtask| {
-        subtask
-            .budget_ns()
-            .or_else(|| KERNEL.budget_of_wcet(subtask.wcet_ns()?))
-            .unwrap_or(u64::MAX)
-    });
-    budgets_ns.collect()
+/// Returns how long an instance of a subtask may execute for, `u64::MAX` if for
+/// ever.
+pub(super) fn budget_ns(task_set: &TaskSet, instance: Instance) -> u64 {
+    let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
+    subtask
+        .budget_ns()
+        .or_else(|| KERNEL.budget_of_wcet(subtask.wcet_ns()?))
+        .unwrap_or(u64::MAX)
 }

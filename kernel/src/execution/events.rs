@@ -7,26 +7,32 @@
 
 use core::sync::atomic::Ordering;
 
+use alloc::boxed::Box;
+
 use sched_dag::CoreId;
 
 use super::core_set::CoreSet;
+use super::runner::Runner;
 use super::status::note_running;
 use super::step::Ended;
-use super::{Assignment, EPOCH_NS, EXECUTION, Event, NEXT_EVENT_NS, Work};
+use super::{EPOCH_NS, EXECUTION, Event, NEXT_EVENT_NS, Work};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, this_core};
-use crate::trace::{self, Recorder, What};
+use crate::trace::{Recorder, Subject, What};
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
 pub(crate) fn find_work() -> Work {
     let core = this_core::get();
     let mut place = EXECUTION.lock_uninterrupted();
-    let execution = place.as_mut();
-    let work = execution.map_or(Work::Rest, |execution| execution.find_work(core));
+    let Some(execution) = place.as_mut() else {
+        return Work::Rest;
+    };
+    let recorder = execution.recorders.of(CoreId(core.index));
+    let work = execution.find_work(core);
     drop(place);
-    begin(core, trace::recorder(CoreId(core.index)), work)
+    begin(core, recorder, work)
 }
 
 /// Stamps the start of what this core begins. Start and finish are stamped with
@@ -34,21 +40,32 @@ pub(crate) fn find_work() -> Work {
 /// it says.
 #[inline]
 fn begin(core: &Core, recorder: Recorder, mut work: Work) -> Work {
-    if let Work::Run(assignment) = &mut work {
+    if let Work::Run(runner) = &mut work {
         let now_ns = clock::now_ns();
-        let budget_end_ns = now_ns.saturating_add(assignment.budget_ns);
+        let budget_end_ns = match runner.budget_ns {
+            u64::MAX => u64::MAX,
+            budget_ns => {
+                let end_ns = now_ns.saturating_add(budget_ns);
+                timer::set_no_later(core, Alarm::Budget, end_ns);
+                end_ns
+            }
+        };
         core.context().set_budget_end(budget_end_ns);
-        timer::set_no_later(Alarm::Budget, budget_end_ns);
-        assignment.start_ns = since_epoch(now_ns);
-        let here = CoreId(core.index);
-        recorder.instance(What::Start, assignment.start_ns, here, assignment.instance);
+        runner.start_ns = instance_time_ns(now_ns);
+        recorder.own(What::Start, runner.start_ns, runner.subject());
     }
     work
 }
 
-/// Converts a time on the clock to the run's time.
+/// Converts a time on the clock to the run's time; one before time 0 becomes that.
 pub(crate) fn since_epoch(time_ns: u64) -> u64 {
     time_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
+}
+
+/// Does the same for when something happened to an instance: none before time 0.
+#[inline]
+pub(super) fn instance_time_ns(time_ns: u64) -> u64 {
+    time_ns.wrapping_sub(EPOCH_NS.load(Ordering::Relaxed))
 }
 
 /// Returns the core that executes this. Interrupts are disabled.
@@ -58,19 +75,19 @@ pub(super) fn here() -> CoreId {
 
 /// Reports that this core has run its instance, and finds what it is to do
 /// next. Interrupts are disabled.
-pub(crate) fn complete(mut finished: Assignment, finish_ns: u64) -> Work {
+pub(crate) fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     let core = this_core::get();
     let here = CoreId(core.index);
-    let recorder = trace::recorder(here);
     let mut place = EXECUTION.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return Work::Rest;
     };
-    let Assignment {
-        instance, vertex, ..
-    } = finished;
-    execution.signals.take(&mut finished.body, finish_ns);
-    let finished_ns = since_epoch(finish_ns);
+    let recorder = execution.recorders.of(here);
+    let vertex = finished.vertex;
+    if finished.body.has_effects() {
+        execution.signals.take(&mut finished.body, finish_ns);
+    }
+    let finished_ns = instance_time_ns(finish_ns);
     execution.note_finish(recorder, here, finished, finished_ns);
     let mut woken = None;
     if execution.may_hand_off && execution.signals.are_none() {
@@ -84,6 +101,7 @@ pub(crate) fn complete(mut finished: Assignment, finish_ns: u64) -> Work {
             Ended::Quiet => {}
         }
     } else {
+        let instance = execution.scheduler.instance_of(vertex);
         woken = Some(execution.step(finish_ns, Event::Completed(instance)));
     }
     let work = execution.find_work(core);
@@ -109,7 +127,8 @@ pub(crate) fn fail(now_ns: u64) {
     // Not when the interrupt came: a step may have left events since then.
     let ended_ns = since_epoch(clock::now_ns());
     let here = CoreId(core.index);
-    trace::recorder(here).instance(What::Ended, ended_ns, here, instance);
+    let recorder = execution.recorders.of(here);
+    recorder.own(What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
     if let Some(record) = execution.books.record.instance_mut(instance) {
         record.failed_ns = Some(since_epoch(now_ns));

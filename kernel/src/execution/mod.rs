@@ -12,6 +12,7 @@ mod control;
 mod core_set;
 mod events;
 mod placement;
+mod runner;
 mod signals;
 mod status;
 mod step;
@@ -23,46 +24,29 @@ use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
 
-use fass::{Body, LaunchError, Plan};
+use fass::{LaunchError, Plan};
 use sched_dag::record::Record;
-use sched_dag::{DagId, Instance, Scheduler, SchedulerOptions, TaskSet, Vertex};
+use sched_dag::{DagId, Instance, Scheduler, SchedulerOptions, TaskSet};
 
+use crate::contexts;
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
 use crate::platform::KERNEL;
-use crate::{contexts, trace};
+use crate::trace::{self, Recorders};
 use books::Books;
 pub(crate) use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
 pub(crate) use events::{arm_next_event, complete, fail, find_work, interrupt, since_epoch};
+pub(crate) use runner::Runner;
 use signals::Signals;
 pub(crate) use signals::raise;
 pub(crate) use status::{
     budget_ns, is_finished, jobs_ended, lock_acquisitions, names, next_event_ns, running, try_names,
 };
 
-/// An instance that a core runs, with what it takes.
-pub(crate) struct Assignment {
-    instance: Instance,
-    vertex: Vertex,
-    /// The time that it may execute for, `u64::MAX` if for ever.
-    budget_ns: u64,
-    /// When it started, on the run's time.
-    start_ns: u64,
-    /// Moves between the table and the core, so it is but a pointer.
-    body: Box<Body>,
-}
-
-impl Assignment {
-    /// Calls the subtask's function for this instance.
-    pub(crate) fn run(&mut self) {
-        self.body.run(self.instance.job);
-    }
-}
-
 /// What a core is to do next.
 pub(crate) enum Work {
-    /// Call the subtask's function for this instance.
-    Run(Assignment),
+    /// Call the subtask's function for the instance.
+    Run(Box<Runner>),
     /// Go on with this context.
     Continue(Parked),
     /// Nothing.
@@ -96,6 +80,8 @@ pub(crate) struct Execution {
     /// waits.
     may_hand_off: bool,
     signals: Signals,
+    /// Where each core's events go.
+    recorders: Recorders,
 }
 
 static EXECUTION: SpinLock<Option<Execution>> = SpinLock::new(None);
@@ -132,14 +118,14 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         ))
     })?;
     let signals = Signals::new(&plan);
-    let bodies = plan.bodies.into_iter().flatten();
     let execution = Execution {
-        books: Books::new(&plan.task_set, record, bodies, cores),
+        books: Books::new(&plan.task_set, record, plan.bodies, cores),
         scheduler: Scheduler::new(Arc::new(plan.task_set), options),
         background: None,
         dispatch_due_ns: None,
         may_hand_off: KERNEL.coincidence_ns() == 0,
         signals,
+        recorders: trace::recorders(),
     };
     *EXECUTION.lock() = Some(execution);
     Ok(())

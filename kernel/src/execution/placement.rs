@@ -51,11 +51,26 @@ pub(super) struct Placement<Body, Parked> {
     seats: Box<[Seat]>,
 }
 
-/// What one core has, and what it should have.
-#[derive(Clone, Copy, Debug, Default)]
+/// What one core has, and what it should have: [`NOTHING`], or a vertex.
+///
+/// Not options, which would be two words each: a seat changes twice with each
+/// instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Seat {
-    current: Option<Vertex>,
-    target: Option<Vertex>,
+    current: Vertex,
+    target: Vertex,
+}
+
+/// Stands where there is no vertex; so many subtasks do not fit into memory.
+const NOTHING: Vertex = Vertex(u32::MAX);
+
+const EMPTY_SEAT: Seat = Seat {
+    current: NOTHING,
+    target: NOTHING,
+};
+
+fn some(vertex: Vertex) -> Option<Vertex> {
+    (vertex != NOTHING).then_some(vertex)
 }
 
 impl<Body, Parked> Placement<Body, Parked> {
@@ -63,27 +78,30 @@ impl<Body, Parked> Placement<Body, Parked> {
     pub(super) fn new(bodies: impl Iterator<Item = Body>, cores: usize) -> Self {
         Self {
             places: bodies.map(Place::Resting).collect(),
-            seats: alloc::vec![Seat::default(); cores].into_boxed_slice(),
+            seats: alloc::vec![EMPTY_SEAT; cores].into_boxed_slice(),
         }
     }
 
     /// Takes note of what the scheduler wants a core to run.
     pub(super) fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
-        self.seats[core.index()].target = target;
+        self.seats[core.index()].target = target.unwrap_or(NOTHING);
     }
 
     /// Takes note that core `core` has finished its current instance.
     #[inline]
     pub(super) fn finish(&mut self, core: usize, vertex: Vertex, body: Body) {
-        self.seats[core].current = None;
-        *self.place(vertex) = Place::Resting(body);
+        self.seats[core].current = NOTHING;
+        let running = core::mem::replace(self.place(vertex), Place::Resting(body));
+        debug_assert!(matches!(running, Place::Running));
+        // It holds nothing, which the compiler need not find out each time.
+        core::mem::forget(running);
         self.forget_target(core, vertex);
     }
 
     /// Takes note that core `core`'s current instance was ended, and returns its
     /// vertex. Its body stays on the stack of a context that is never resumed.
     pub(super) fn lose(&mut self, core: usize) -> Option<Vertex> {
-        let vertex = self.seats[core].current.take()?;
+        let vertex = self.detach(core)?;
         *self.place(vertex) = Place::Lost;
         self.forget_target(core, vertex);
         Some(vertex)
@@ -91,33 +109,33 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// The scheduler knows that the instance has ended: nobody is to run it.
     fn forget_target(&mut self, core: usize, vertex: Vertex) {
-        let wants_it = |seat: &Seat| seat.target == Some(vertex);
+        let wants_it = |seat: &Seat| seat.target == vertex;
         // Nearly always the core that ran it; another one if it was about to move.
         let seat = match wants_it(&self.seats[core]) {
             true => Some(&mut self.seats[core]),
             false => self.seats.iter_mut().find(|seat| wants_it(seat)),
         };
         if let Some(seat) = seat {
-            seat.target = None;
+            seat.target = NOTHING;
         }
     }
 
     /// Reports whether core `core` has an instance that it should give up.
     pub(super) fn must_suspend(&self, core: usize) -> bool {
         let Seat { current, target } = self.seats[core];
-        current.is_some() && current != target
+        current != NOTHING && current != target
     }
 
     /// Reports whether core `core` has nothing and should have something.
     pub(super) fn is_wanted(&self, core: usize) -> bool {
         let Seat { current, target } = self.seats[core];
-        current.is_none() && target.is_some()
+        current == NOTHING && target != NOTHING
     }
 
     /// Takes core `core`'s current instance away from it, if it has one. To be
     /// followed by [`suspend`](Self::suspend), as soon as its context is known.
     pub(super) fn detach(&mut self, core: usize) -> Option<Vertex> {
-        self.seats[core].current.take()
+        some(core::mem::replace(&mut self.seats[core].current, NOTHING))
     }
 
     /// Takes note that `context` holds a detached instance. Returns the core
@@ -125,17 +143,17 @@ impl<Body, Parked> Placement<Body, Parked> {
     pub(super) fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
         *self.place(vertex) = Place::Suspended(context);
         let mut seats = (0..).map(CoreId).zip(&self.seats);
-        seats.find_map(|(core, seat)| (seat.target == Some(vertex)).then_some(core))
+        seats.find_map(|(core, seat)| (seat.target == vertex).then_some(core))
     }
 
     /// Gives core `core`, which has no current instance, what it should have, if
     /// that is suspended.
     pub(super) fn take_suspended(&mut self, core: usize) -> Option<Parked> {
-        let vertex = self.seats[core].target?;
+        let vertex = some(self.seats[core].target)?;
         let place = self.place(vertex);
         match core::mem::replace(place, Place::Running) {
             Place::Suspended(context) => {
-                self.seats[core].current = Some(vertex);
+                self.seats[core].current = vertex;
                 Some(context)
             }
             other => {
@@ -147,7 +165,7 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// Gives core `core`, which has no current instance, what it should have.
     pub(super) fn next(&mut self, core: usize) -> Next<Body, Parked> {
-        let Some(vertex) = self.seats[core].target else {
+        let Some(vertex) = some(self.seats[core].target) else {
             return Next::Nothing;
         };
         let place = self.place(vertex);
@@ -161,7 +179,7 @@ impl<Body, Parked> Placement<Body, Parked> {
                 return Next::Nothing;
             }
         };
-        self.seats[core].current = Some(vertex);
+        self.seats[core].current = vertex;
         next
     }
 
@@ -173,8 +191,8 @@ impl<Body, Parked> Placement<Body, Parked> {
         match core::mem::replace(place, Place::Running) {
             Place::Resting(body) => {
                 self.seats[core.index()] = Seat {
-                    current: Some(vertex),
-                    target: Some(vertex),
+                    current: vertex,
+                    target: vertex,
                 };
                 Some(body)
             }
@@ -187,7 +205,7 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// Returns the vertex of core `core`'s current instance.
     pub(super) fn current(&self, core: usize) -> Option<Vertex> {
-        self.seats[core].current
+        some(self.seats[core].current)
     }
 
     /// Returns the body of a subtask of which no instance has started.

@@ -14,7 +14,6 @@ use super::watcher::Watcher;
 use super::{EXECUTION, Event, Execution, status};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu, this_core};
-use crate::trace;
 
 /// The signals of a run that are on their way to its scheduler.
 pub(super) struct Signals {
@@ -35,7 +34,9 @@ impl Signals {
         }
     }
 
-    /// Lets what the body has prepared happen, and takes its signals.
+    /// Lets what the body has prepared happen, and takes its signals. Apart, as most
+    /// bodies never have any.
+    #[inline(never)]
     pub(super) fn take(&mut self, body: &mut Body, completed_ns: u64) {
         body.complete(completed_ns, &mut |dag| self.keep(dag));
     }
@@ -67,13 +68,13 @@ impl Execution {
             scheduler,
             books,
             signals,
+            recorders,
             ..
         } = self;
         let here = here();
         let mut watcher = Watcher {
             books,
-            recorder: trace::recorder(here),
-            here,
+            recorder: recorders.of(here),
             has_job_news: false,
         };
         signals.has_begun = true;

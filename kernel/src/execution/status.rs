@@ -4,10 +4,11 @@ use core::sync::atomic::Ordering;
 
 use alloc::string::String;
 
-use sched_dag::{DagId, Instance, SubtaskId};
+use sched_dag::Instance;
 
-use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS};
+use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS, books};
 use crate::machine::this_core::Core;
+use crate::trace::Subject;
 
 /// Reports whether all jobs of the run have ended.
 pub(crate) fn is_finished() -> bool {
@@ -59,31 +60,23 @@ pub(crate) fn names(instance: Instance) -> (String, String) {
 
 /// Returns the instance that a core runs, without the lock.
 pub(crate) fn running(core: &Core) -> Option<Instance> {
-    let [dag, job, subtask] = core
+    let [ids, job] = core
         .running
         .each_ref()
         .map(|field| field.load(Ordering::Relaxed));
-    Some(Instance {
-        dag: DagId(u32::try_from(dag).ok()?),
-        job,
-        subtask: SubtaskId(u32::try_from(subtask).ok()?),
-    })
+    Subject { ids, job }.instance()
 }
 
 /// Notes which instance a core runs, for [`running`].
-pub(super) fn note_running(core: &Core, instance: Option<Instance>) {
-    core.note_running(instance.map_or([u64::MAX; 3], |instance| {
-        [
-            u64::from(instance.dag.0),
-            instance.job,
-            u64::from(instance.subtask.0),
-        ]
-    }));
+pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
+    let Subject { ids, job } = subject.unwrap_or(Subject::NONE);
+    core.note_running([ids, job]);
 }
+
 /// Returns how long an instance may execute for, `u64::MAX` if for ever.
 pub(crate) fn budget_ns(instance: Instance) -> u64 {
     let place = EXECUTION.lock();
     place.as_ref().map_or(u64::MAX, |execution| {
-        execution.books.budget_ns(execution.books.vertex(instance))
+        books::budget_ns(execution.task_set(), instance)
     })
 }

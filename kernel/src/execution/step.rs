@@ -4,28 +4,28 @@ use core::sync::atomic::Ordering;
 
 use alloc::boxed::Box;
 
-use fass::Body;
 use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
 
 use super::core_set::CoreSet;
 use super::events::{arm_next_event, here, since_epoch};
 use super::placement::Next;
+use super::runner::Runner;
 use super::status::{is_finished, note_running};
 use super::watcher::Watcher;
-use super::{Assignment, EPOCH_NS, Event, Execution, FINISHED, NEXT_EVENT_NS, Work};
+use super::{EPOCH_NS, Event, Execution, FINISHED, NEXT_EVENT_NS, Work};
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, this_core};
 use crate::platform::KERNEL;
-use crate::trace::{self, Recorder, What};
+use crate::trace::{Recorder, Subject, What};
 use crate::worker;
 
 /// What comes of [`Execution::hand_off`].
 pub(super) enum Ended {
     /// The core has its next instance, and nothing else is to do.
-    HandedOff(Assignment),
+    HandedOff(Box<Runner>),
     /// The scheduler's step is not over.
     Open,
     /// When the next event is due may have changed; then the core may have a
@@ -42,18 +42,17 @@ impl Execution {
         &mut self,
         recorder: Recorder,
         here: CoreId,
-        finished: Assignment,
+        finished: Box<Runner>,
         finish_ns: u64,
     ) {
-        let Assignment {
-            instance,
+        let Runner {
             vertex,
+            instance,
             start_ns,
-            body,
             ..
-        } = finished;
-        recorder.instance(What::Finish, finish_ns, here, instance);
-        self.books.placement.finish(here.index(), vertex, body);
+        } = *finished;
+        recorder.own(What::Finish, finish_ns, finished.subject());
+        self.books.placement.finish(here.index(), vertex, finished);
         if let Some(record) = self.books.record.instance_mut(instance) {
             record.start_ns = Some(start_ns);
             record.finish_ns = Some(finish_ns);
@@ -79,7 +78,6 @@ impl Execution {
         let mut watcher = Watcher {
             books,
             recorder,
-            here,
             has_job_news: false,
         };
         let done = scheduler.hand_off(finish_ns, here, finished, &mut watcher);
@@ -87,10 +85,10 @@ impl Execution {
         match done {
             HandOff::Open => return Ended::Open,
             HandOff::To(vertex, decision) => {
-                if !has_job_news && let Some(body) = books.placement.start(here, vertex) {
-                    let instance = decision.instance();
-                    note_running(core, Some(instance));
-                    return Ended::HandedOff(self.assignment(instance, vertex, body));
+                if !has_job_news && let Some(mut runner) = books.placement.start(here, vertex) {
+                    runner.instance.job = decision.instance().job;
+                    note_running(core, Some(runner.subject()));
+                    return Ended::HandedOff(runner);
                 }
                 books.placement.set_target(here, Some(vertex));
             }
@@ -103,22 +101,11 @@ impl Execution {
         }
     }
 
-    #[inline]
-    fn assignment(&self, instance: Instance, vertex: Vertex, body: Box<Body>) -> Assignment {
-        Assignment {
-            instance,
-            vertex,
-            budget_ns: self.books.budget_ns(vertex),
-            start_ns: 0,
-            body,
-        }
-    }
-
     /// Makes one step of the scheduler and returns which other cores have to
     /// look at what they should run.
     pub(super) fn step(&mut self, now_ns: u64, event: Event) -> CoreSet {
         let here = here();
-        let recorder = trace::recorder(here);
+        let recorder = self.recorders.of(here);
         let Self {
             scheduler,
             books,
@@ -130,7 +117,6 @@ impl Execution {
         let mut watcher = Watcher {
             books,
             recorder,
-            here,
             has_job_news: false,
         };
         let mut moment = scheduler.at(since_epoch(now_ns));
@@ -169,7 +155,7 @@ impl Execution {
                 books.placement.set_target(core, Some(vertex));
                 if preempted == Some(core) {
                     let time_ns = since_epoch(clock::now_ns());
-                    recorder.instance(What::Request, time_ns, core, instance);
+                    recorder.for_core(core, What::Request, time_ns, Subject::of(instance));
                 }
             }
             if core != here {
@@ -209,14 +195,14 @@ impl Execution {
     pub(super) fn find_work(&mut self, core: &Core) -> Work {
         let here = core.index as usize;
         match self.books.placement.next(here) {
-            Next::Start(vertex, body) => {
-                let instance = self.scheduler.instance_of(vertex);
-                note_running(core, Some(instance));
-                Work::Run(self.assignment(instance, vertex, body))
+            Next::Start(vertex, mut runner) => {
+                runner.instance.job = self.scheduler.instance_of(vertex).job;
+                note_running(core, Some(runner.subject()));
+                Work::Run(runner)
             }
             Next::Continue(context) => {
-                self.note_resumed(&context, clock::now_ns());
-                note_running(core, self.current(here));
+                self.note_resumed(core, &context, clock::now_ns());
+                note_running(core, self.current(here).map(Subject::of));
                 Work::Continue(context)
             }
             // Only core 0 has a background, and only while it does other work.
@@ -249,17 +235,17 @@ impl Execution {
             // Not when the interrupt came: its step has left events since then.
             let time_ns = since_epoch(clock::now_ns());
             let instance = self.scheduler.instance_of(vertex);
-            let here = CoreId(core.index);
-            trace::recorder(here).instance(What::Suspend, time_ns, here, instance);
+            let recorder = self.recorders.of(CoreId(core.index));
+            recorder.own(What::Suspend, time_ns, Subject::of(instance));
         }
         let next = match self.books.placement.take_suspended(here) {
             Some(context) => {
-                self.note_resumed(&context, now_ns);
+                self.note_resumed(core, &context, now_ns);
                 context
             }
             None => worker::new_context(),
         };
-        note_running(core, self.current(here));
+        note_running(core, self.current(here).map(Subject::of));
         let last = interrupted.exchange(next);
         match suspended {
             Some(vertex) => {
@@ -275,13 +261,14 @@ impl Execution {
     }
 
     /// Notes that this core's current instance continues in `context`.
-    fn note_resumed(&self, context: &Parked, now_ns: u64) {
+    fn note_resumed(&self, core: &Core, context: &Parked, now_ns: u64) {
         context.note_resumed(now_ns);
-        timer::set_no_later(Alarm::Budget, context.budget_end_ns());
-        let here = here();
+        timer::set_no_later(core, Alarm::Budget, context.budget_end_ns());
+        let here = CoreId(core.index);
         if let Some(instance) = self.current(here.index()) {
             let time_ns = since_epoch(clock::now_ns());
-            trace::recorder(here).instance(What::Resume, time_ns, here, instance);
+            let recorder = self.recorders.of(here);
+            recorder.own(What::Resume, time_ns, Subject::of(instance));
         }
     }
 }

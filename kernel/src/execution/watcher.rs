@@ -2,20 +2,19 @@
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer};
+use sched_dag::{DagId, Instance, JobOutcome, Observer};
 
 use super::JOBS_ENDED;
 use super::books::Books;
-use super::events::since_epoch;
+use super::events::{instance_time_ns, since_epoch};
 use crate::machine::clock;
-use crate::trace::{Recorder, What};
+use crate::trace::{Recorder, Subject, What};
 
 /// Writes what the scheduler reports into the record, with the clock's time at
 /// that very moment: so a join's latency includes the wait for the lock.
 pub(super) struct Watcher<'a> {
     pub(super) books: &'a mut Books,
     pub(super) recorder: Recorder,
-    pub(super) here: CoreId,
     /// Whether anything has happened to a job as a whole.
     pub(super) has_job_news: bool,
 }
@@ -32,7 +31,7 @@ impl Observer for Watcher<'_> {
         self.has_job_news = true;
         let now_ns = self.now_ns();
         self.recorder
-            .job(What::Released, now_ns, self.here, dag, job);
+            .own(What::Released, now_ns, Subject::of_job(dag, job));
         if let Some(record) = self.books.record.job_mut(dag, job) {
             record.release_ns = Some(release_ns);
             record.released_ns = Some(now_ns);
@@ -42,20 +41,20 @@ impl Observer for Watcher<'_> {
     fn queued(&mut self, dag: DagId, job: u64, _: u64) {
         self.has_job_news = true;
         self.recorder
-            .job(What::Queued, self.now_ns(), self.here, dag, job);
+            .own(What::Queued, self.now_ns(), Subject::of_job(dag, job));
     }
 
     fn skipped(&mut self, dag: DagId, job: u64, _: u64) {
         self.has_job_news = true;
         self.recorder
-            .job(What::Skipped, self.now_ns(), self.here, dag, job);
+            .own(What::Skipped, self.now_ns(), Subject::of_job(dag, job));
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {
         self.has_job_news = true;
         let now_ns = self.now_ns();
         self.recorder
-            .job(What::Aborted, now_ns, self.here, dag, job);
+            .own(What::Aborted, now_ns, Subject::of_job(dag, job));
         if let Some(record) = self.books.record.job_mut(dag, job) {
             record.cut_ns = Some(now_ns);
         }
@@ -64,7 +63,8 @@ impl Observer for Watcher<'_> {
     fn deadline_missed(&mut self, dag: DagId, job: u64, _: u64) {
         self.has_job_news = true;
         let now_ns = self.now_ns();
-        self.recorder.job(What::Missed, now_ns, self.here, dag, job);
+        self.recorder
+            .own(What::Missed, now_ns, Subject::of_job(dag, job));
         if let Some(record) = self.books.record.job_mut(dag, job) {
             record.missed_ns = Some(now_ns);
         }
@@ -76,14 +76,15 @@ impl Observer for Watcher<'_> {
             Some(_) => What::Signalled,
             None => What::Dropped,
         };
-        self.recorder.job(what, self.now_ns(), self.here, dag, job);
+        self.recorder
+            .own(what, self.now_ns(), Subject::of_job(dag, job));
     }
 
     #[inline]
     fn ready(&mut self, instance: Instance) {
-        let now_ns = self.now_ns();
+        let now_ns = instance_time_ns(clock::now_ns());
         self.recorder
-            .instance(What::Ready, now_ns, self.here, instance);
+            .own(What::Ready, now_ns, Subject::of(instance));
         if let Some(record) = self.books.record.instance_mut(instance) {
             record.ready_ns = Some(now_ns);
         }
@@ -91,10 +92,10 @@ impl Observer for Watcher<'_> {
 
     fn cancelled(&mut self, instance: Instance) {
         self.recorder
-            .instance(What::Cancelled, self.now_ns(), self.here, instance);
+            .own(What::Cancelled, self.now_ns(), Subject::of(instance));
         let vertex = self.books.vertex(instance);
-        if let Some(body) = self.books.placement.resting(vertex) {
-            body.discard(instance.job);
+        if let Some(runner) = self.books.placement.resting(vertex) {
+            runner.body.discard(instance.job);
         }
     }
 
@@ -102,7 +103,7 @@ impl Observer for Watcher<'_> {
         self.has_job_news = true;
         let now_ns = self.now_ns();
         self.recorder
-            .job(What::Completed, now_ns, self.here, dag, job);
+            .own(What::Completed, now_ns, Subject::of_job(dag, job));
         if let Some(record) = self.books.record.job_mut(dag, job) {
             record.ended_ns = Some(now_ns);
             record.outcome = Some(outcome);

@@ -54,7 +54,7 @@ pub(crate) struct Core {
     pub(crate) heartbeat_ns: AtomicU64,
     interrupts_off: Meter,
     /// What runs here, in the words of whoever sets it; for reports of panics.
-    pub(crate) running: [AtomicU64; 3],
+    pub(crate) running: [AtomicU64; 2],
 }
 
 /// Where `interrupt.s` finds the handler stack.
@@ -81,7 +81,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         timer_interrupts: AtomicU64::new(0),
         heartbeat_ns: AtomicU64::new(0),
         interrupts_off: Meter::new(),
-        running: [const { AtomicU64::new(u64::MAX) }; 3],
+        running: [const { AtomicU64::new(u64::MAX) }; 2],
     });
     // A second call would come from a second boot, which there is not.
     let _ = CORES.set(cores.collect());
@@ -246,8 +246,8 @@ impl Core {
         !self.spare.load(Ordering::Relaxed).is_null()
     }
 
-    /// Notes what runs here, as three numbers.
-    pub(crate) fn note_running(&self, fields: [u64; 3]) {
+    /// Notes what runs here, as two numbers.
+    pub(crate) fn note_running(&self, fields: [u64; 2]) {
         for (place, field) in self.running.iter().zip(fields) {
             place.store(field, Ordering::Relaxed);
         }

@@ -74,15 +74,15 @@ pub(crate) fn latest(most: usize) -> impl fmt::Display {
                     time_ns,
                     what,
                     core,
-                    dag,
-                    job,
-                    subtask,
+                    subject,
                 } = event;
-                let (word, core, dag) = (WORDS[what as usize], core.0, dag.0);
+                let (word, core) = (WORDS[what as usize], core.0);
+                let (dag, job) = (subject.dag().0, subject.job);
                 write!(
                     f,
                     "  {time_ns:>12} ns  core {core} {word} dag {dag} job {job}"
                 )?;
+                let subtask = subject.subtask();
                 subtask.map_or(Ok(()), |subtask| write!(f, " subtask {}", subtask.0))?;
                 writeln!(f)
             })
@@ -95,13 +95,12 @@ fn as_json(event: Event) -> impl fmt::Display {
             time_ns,
             what,
             core,
-            dag,
-            job,
-            subtask,
+            subject,
         } = event;
-        let word = WORDS[what as usize];
-        write!(f, "[{time_ns},\"{word}\",{},{},{job},", core.0, dag.0)?;
-        match subtask {
+        let (word, core) = (WORDS[what as usize], core.0);
+        let (dag, job) = (subject.dag().0, subject.job);
+        write!(f, "[{time_ns},\"{word}\",{core},{dag},{job},")?;
+        match subject.subtask() {
             Some(SubtaskId(subtask)) => write!(f, "{subtask}]"),
             None => f.write_str("-1]"),
         }

@@ -46,6 +46,7 @@ fn load_permille(events: impl Iterator<Item = Event>, from_ns: u64, to_ns: u64) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trace::Subject;
     use sched_dag::{CoreId, DagId};
 
     fn load(events: &[(u64, What)], from_ns: u64, to_ns: u64) -> u64 {
@@ -53,9 +54,7 @@ mod tests {
             time_ns,
             what,
             core: CoreId(0),
-            dag: DagId(0),
-            job: 0,
-            subtask: None,
+            subject: Subject::of_job(DagId(0), 0),
         });
         load_permille(events, from_ns, to_ns)
     }

@@ -11,15 +11,17 @@
 mod dump;
 mod load;
 mod ring;
+mod subject;
 
 use alloc::boxed::Box;
 
-use sched_dag::{CoreId, DagId, Instance, SubtaskId};
+use sched_dag::CoreId;
 
 use crate::machine::once::Once;
 pub(crate) use dump::{dump, latest};
 pub(crate) use load::loads_permille;
 use ring::Ring;
+pub(crate) use subject::Subject;
 
 /// What has happened. The words of the machine lines are the names in lower case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,10 +87,7 @@ pub(crate) struct Event {
     pub(crate) time_ns: u64,
     pub(crate) what: What,
     pub(crate) core: CoreId,
-    pub(crate) dag: DagId,
-    pub(crate) job: u64,
-    /// `None` for what happens to a whole job.
-    pub(crate) subtask: Option<SubtaskId>,
+    pub(crate) subject: Subject,
 }
 
 static RINGS: Once<Box<[Ring]>> = Once::new();
@@ -96,57 +95,56 @@ static RINGS: Once<Box<[Ring]>> = Once::new();
 /// Makes a ring of `events` events, or up to the next power of two, for each core.
 /// With 0 nothing is recorded.
 pub(crate) fn create(cores: usize, events: usize) {
-    let new_ring = || Ring::new(events.checked_next_power_of_two().unwrap_or(events));
-    // A second call would come from a second boot, which there is not.
-    let _ = match events {
-        0 => RINGS.set((0..cores).map(|_| Ring::new(0)).collect()),
-        _ => RINGS.set((0..cores).map(|_| new_ring()).collect()),
+    let capacity = match events {
+        0 => 0,
+        _ => events.checked_next_power_of_two().unwrap_or(events),
     };
+    let rings = (0..).map(CoreId).take(cores);
+    // A second call would come from a second boot, which there is not.
+    let _ = RINGS.set(rings.map(|core| Ring::new(core, capacity)).collect());
 }
+
+/// Where the events of all cores go.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Recorders(&'static [Ring]);
 
 /// Where one core's events go, looked up once for several of them. For as long as
 /// its holder stays on the core, with interrupts disabled.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Recorder(Option<&'static Ring>);
+pub(crate) struct Recorder(&'static Ring);
 
-/// Returns where the events of core `here` go, which executes this.
-#[inline]
-pub(crate) fn recorder(here: CoreId) -> Recorder {
-    Recorder(all_rings().get(here.index()))
+/// Returns where the events of all cores go, once they have rings.
+pub(crate) fn recorders() -> Recorders {
+    Recorders(all_rings())
+}
+
+impl Recorders {
+    /// Returns where the events of core `here` go, which executes this.
+    ///
+    /// # Panics
+    ///
+    /// If the cores have no rings yet.
+    #[inline]
+    pub(crate) fn of(self, here: CoreId) -> Recorder {
+        Recorder(&self.0[here.index()])
+    }
 }
 
 impl Recorder {
-    /// Records that something happened to an instance, to or for core `core`.
+    /// Records that something happened on this core.
     #[inline]
-    pub(crate) fn instance(self, what: What, time_ns: u64, core: CoreId, instance: Instance) {
-        let Instance { dag, job, subtask } = instance;
-        self.record(&Event {
+    pub(crate) fn own(self, what: What, time_ns: u64, subject: Subject) {
+        self.0.push_own(what, time_ns, subject);
+    }
+
+    /// Records that something happened that is for core `core`.
+    pub(crate) fn for_core(self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
+        self.0.push(&Event {
             time_ns,
             what,
             core,
-            dag,
-            job,
-            subtask: Some(subtask),
+            subject,
         });
-    }
-
-    /// Records that something happened to a job.
-    pub(crate) fn job(self, what: What, time_ns: u64, core: CoreId, dag: DagId, job: u64) {
-        self.record(&Event {
-            time_ns,
-            what,
-            core,
-            dag,
-            job,
-            subtask: None,
-        });
-    }
-
-    #[inline]
-    fn record(self, event: &Event) {
-        if let Some(ring) = self.0 {
-            ring.push(event);
-        }
     }
 }
 

@@ -4,9 +4,9 @@ use core::sync::atomic::{AtomicU64, Ordering, fence};
 
 use alloc::boxed::Box;
 
-use sched_dag::{CoreId, DagId, SubtaskId};
+use sched_dag::CoreId;
 
-use super::{Event, What};
+use super::{Event, Subject, What};
 
 /// One event: time, job, DAG and subtask, core and what happened.
 type Words = [AtomicU64; 4];
@@ -19,13 +19,12 @@ pub(super) struct Ring {
     events: Box<[Words]>,
     /// How many events were ever written since the last [`clear`](Self::clear).
     written: AtomicU64,
-    /// [`NOT_KEPT`] while recording is off, else 0.
-    not_kept: AtomicU64,
+    /// What an event on its core has in its last word, besides what happened:
+    /// the core, and [`NOT_KEPT`] while recording is off.
+    own: AtomicU64,
     /// The number of the first event that was not forgotten.
     first: AtomicU64,
 }
-
-const NO_SUBTASK: u64 = 0xffff_ffff;
 
 /// Stands where the number of a [`What`] does, and is none.
 const NOT_KEPT: u64 = 0xff;
@@ -51,33 +50,47 @@ const WHATS: [What; 16] = [
 ];
 
 impl Ring {
-    /// Makes a ring with room for `capacity` events, a power of two or 0.
-    pub(super) fn new(capacity: usize) -> Self {
+    /// Makes the ring of a core, with room for `capacity` events, a power of two or 0.
+    pub(super) fn new(core: CoreId, capacity: usize) -> Self {
         debug_assert!(capacity == 0 || capacity.is_power_of_two());
         let empty = || [const { AtomicU64::new(0) }; 4];
         Self {
             events: (0..capacity).map(|_| empty()).collect(),
             written: AtomicU64::new(0),
-            not_kept: AtomicU64::new(0),
+            own: AtomicU64::new(last_word(core)),
             first: AtomicU64::new(0),
         }
     }
 
-    /// Writes an event; while recording is off, counts it only.
+    /// Writes an event on the ring's core; while recording is off, counts it only.
     #[inline]
+    pub(super) fn push_own(&self, what: What, time_ns: u64, subject: Subject) {
+        let own = self.own.load(Ordering::Relaxed);
+        self.write([time_ns, subject.job, subject.ids, own | what as u64]);
+    }
+
+    /// Writes an event that may be for another core.
     pub(super) fn push(&self, event: &Event) {
+        let Event {
+            time_ns,
+            what,
+            core,
+            subject,
+        } = *event;
+        let not_kept = self.own.load(Ordering::Relaxed) & NOT_KEPT;
+        let last = last_word(core) | not_kept | what as u64;
+        self.write([time_ns, subject.job, subject.ids, last]);
+    }
+
+    #[inline]
+    fn write(&self, event: [u64; 4]) {
         let written = self.written.load(Ordering::Relaxed);
         let Some(words) = self.events.get(self.index(written)) else {
             return;
         };
-        let subtask = event
-            .subtask
-            .map_or(NO_SUBTASK, |subtask| u64::from(subtask.0));
-        words[0].store(event.time_ns, Ordering::Relaxed);
-        words[1].store(event.job, Ordering::Relaxed);
-        words[2].store(u64::from(event.dag.0) << 32 | subtask, Ordering::Relaxed);
-        let what = event.what as u64 | self.not_kept.load(Ordering::Relaxed);
-        words[3].store(u64::from(event.core.0) << 8 | what, Ordering::Relaxed);
+        for (word, value) in words.iter().zip(event) {
+            word.store(value, Ordering::Relaxed);
+        }
         self.written.store(written + 1, Ordering::Release);
     }
 
@@ -91,18 +104,18 @@ impl Ring {
     /// as lost. May be called while events are written.
     pub(super) fn record_events(&self, on: bool) {
         if !on {
-            self.not_kept.store(NOT_KEPT, Ordering::Relaxed);
+            self.own.fetch_or(NOT_KEPT, Ordering::Relaxed);
         }
         let written = self.written.load(Ordering::Acquire);
         self.first.store(written, Ordering::Release);
         if on {
-            self.not_kept.store(0, Ordering::Release);
+            self.own.fetch_and(!NOT_KEPT, Ordering::Release);
         }
     }
 
     /// Reports whether events are recorded.
     pub(super) fn is_on(&self) -> bool {
-        self.not_kept.load(Ordering::Relaxed) == 0
+        self.own.load(Ordering::Relaxed) & NOT_KEPT == 0
     }
 
     /// Reports whether an event has room.
@@ -152,17 +165,12 @@ impl Ring {
 
     fn read(&self, number: u64) -> Option<Event> {
         let words = self.events.get(self.index(number))?;
-        let [time_ns, job, ids, rest] = words.each_ref().map(|word| word.load(Ordering::Relaxed));
-        let [dag, subtask] = [ids >> 32, ids & 0xffff_ffff].map(|id| u32::try_from(id).ok());
+        let [time_ns, job, ids, last] = words.each_ref().map(|word| word.load(Ordering::Relaxed));
         Some(Event {
             time_ns,
-            what: *WHATS.get(usize::try_from(rest & 0xff).ok()?)?,
-            core: CoreId(u32::try_from(rest >> 8).ok()?),
-            dag: DagId(dag?),
-            job,
-            subtask: subtask
-                .filter(|id| u64::from(*id) != NO_SUBTASK)
-                .map(SubtaskId),
+            what: *WHATS.get(usize::try_from(last & 0xff).ok()?)?,
+            core: CoreId(u32::try_from(last >> 8).ok()?),
+            subject: Subject { ids, job },
         })
     }
 
@@ -178,24 +186,51 @@ impl Ring {
     }
 }
 
+/// Returns an event's last word without what happened.
+fn last_word(core: CoreId) -> u64 {
+    u64::from(core.0) << 8
+}
+
 #[cfg(test)]
 mod tests {
+    use sched_dag::{DagId, Instance, SubtaskId};
+
     use super::*;
 
     fn event(time_ns: u64, what: What, subtask: Option<u32>) -> Event {
+        let (dag, job) = (DagId(2), time_ns + 1);
+        let of = |subtask| {
+            Subject::of(Instance {
+                dag,
+                job,
+                subtask: SubtaskId(subtask),
+            })
+        };
         Event {
             time_ns,
             what,
             core: CoreId(3),
-            dag: DagId(2),
-            job: time_ns + 1,
-            subtask: subtask.map(SubtaskId),
+            subject: subtask.map_or(Subject::of_job(dag, job), of),
+        }
+    }
+
+    #[test]
+    fn an_event_on_the_own_core_is_like_any_other() {
+        let [own, any] = [(); 2].map(|()| Ring::new(CoreId(3), 2));
+        for is_on in [true, false, true] {
+            let event = event(4, What::Finish, Some(7));
+            own.record_events(is_on);
+            any.record_events(is_on);
+            own.push_own(event.what, event.time_ns, event.subject);
+            any.push(&event);
+            assert!(own.iter().eq(any.iter()));
+            assert_eq!(own.iter().count(), usize::from(is_on));
         }
     }
 
     #[test]
     fn keeps_the_latest_events_and_counts_the_lost_ones() {
-        let ring = Ring::new(4);
+        let ring = Ring::new(CoreId(3), 4);
         assert_eq!(ring.iter().count(), 0);
         let events: Vec<_> = (0..6)
             .map(|time| event(time, What::Ready, Some(7)))
@@ -209,14 +244,14 @@ mod tests {
 
     #[test]
     fn reads_back_every_kind_of_event() {
-        let ring = Ring::new(WHATS.len().next_power_of_two());
+        let ring = Ring::new(CoreId(3), WHATS.len().next_power_of_two());
         for (number, what) in (0..).zip(WHATS) {
             assert_eq!(what as u64, number, "{what:?} stands at its number");
             ring.push(&event(number, what, (number % 2 == 0).then_some(9)));
         }
         let read: Vec<_> = ring
             .iter()
-            .map(|event| (event.what, event.subtask))
+            .map(|event| (event.what, event.subject.subtask()))
             .collect();
         let expected = (0..)
             .zip(WHATS)
@@ -226,7 +261,7 @@ mod tests {
 
     #[test]
     fn what_is_forgotten_or_not_kept_counts_as_lost() {
-        let ring = Ring::new(4);
+        let ring = Ring::new(CoreId(3), 4);
         ring.push(&event(0, What::Ready, None));
         ring.push(&event(1, What::Ready, None));
         ring.record_events(false);
@@ -245,7 +280,7 @@ mod tests {
 
     #[test]
     fn whoever_reads_meanwhile_leaves_out_what_may_be_overwritten() {
-        let ring = Ring::new(4);
+        let ring = Ring::new(CoreId(3), 4);
         (0..4).for_each(|time| ring.push(&event(time, What::Ready, None)));
         let times: Vec<_> = ring.iter_meanwhile(9).map(|event| event.time_ns).collect();
         assert_eq!(times, [1, 2, 3]);
@@ -259,7 +294,7 @@ mod tests {
 
     #[test]
     fn a_ring_without_room_takes_nothing() {
-        let ring = Ring::new(0);
+        let ring = Ring::new(CoreId(3), 0);
         ring.push(&event(1, What::Start, None));
         assert_eq!(ring.iter().count(), 0);
     }
