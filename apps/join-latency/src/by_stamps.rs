@@ -95,11 +95,13 @@ impl Cores {
             .store(fass::now_ns() + LEAD_NS, Ordering::Relaxed);
     }
 
-    /// Waits for time 0, before which the graph's time stands still.
+    /// Waits for time 0, before which the graph's time stands still. One worker has an
+    /// alarm, as in any wait: which of two cores comes first whose timers end at one
+    /// time depends on the host, also in `deterministic` mode.
     fn wait_for_epoch(&self) {
         let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
         while fass::now_ns() < epoch_ns {
-            self.event.wait(self.event.version(), epoch_ns);
+            self.wait(self.version(), 0);
         }
     }
 
