@@ -19,18 +19,32 @@
 //! the counter right before it halts ([`count_before_halt`]), which makes QEMU count
 //! what it has executed so far, so that no more than a few instructions are at stake.
 //!
+//! The jump does more than move the clock. It tells every core's emulation to leave its
+//! next turn (`qemu_timer_notify_cb`, `rr_kick_vcpu_thread`). As a rule all cores have
+//! been passed by then, and QEMU goes on with the first. But if the main loop is so
+//! early that the halted cores behind the last one are still being passed
+//! (`rr_cpu_thread_fn`), it goes on right there, and other cores than usual have that
+//! mark left when the timer's core gets its turn. The mark matters if another timer ends
+//! in the next few microseconds: QEMU then looks for due timers before a marked core's
+//! turn, but within an unmarked one's, which has no instruction left for it and is lost
+//! (`icount_prepare_for_run`). So the order of turns would depend on the host. A core
+//! whose timer has fired therefore passes its turn once, by a `pause`; when it is its
+//! turn again all cores have been passed, and no mark is left ([`settle`]).
+//!
 //! All this is off unless [`enable`] is called, and of no use where an instruction
-//! does not take a nanosecond. It guarantees nothing where a timer's interrupt
-//! waits for its turn because other cores compute; but then not all cores have
-//! halted, and the clock has not jumped.
+//! does not take a nanosecond. Where a timer's interrupt waits for its turn because
+//! other cores compute, not all cores had halted, and the clock has not jumped: nothing
+//! is done then. What it cannot hide: of two cores whose timers end at the same time, or
+//! within some 100 ns, the one is first with which QEMU goes on, and that is the host's
+//! choice in the rare cases above. So no several cores should wait for one time.
 
 use core::arch::asm;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::{clock, cpu};
 
-/// How long after its time a timer's interrupt goes on. From there to [`settle`] it
-/// is some 70 instructions, from [`count_before_halt`] to the halt less than 10.
+/// How long after its time a timer's interrupt goes on. Until [`settle`] has read the
+/// clock again it is some 90 instructions, from [`count_before_halt`] to the halt less than 10.
 const GRACE_NS: u64 = 128;
 
 static IS_ENABLED: AtomicBool = AtomicBool::new(false);
@@ -41,12 +55,19 @@ pub(crate) fn enable() {
 }
 
 /// Returns [`GRACE_NS`] after `at_ns`, the time for which this core's timer was
-/// armed; at once if that is past, or if the timer is early.
+/// armed; at once if that is past, or if the timer is early. Lets all other cores have
+/// a turn before.
 #[inline]
 pub(super) fn settle(at_ns: u64) {
-    if IS_ENABLED.load(Ordering::Relaxed)
-        && let Some(late_ns) = clock::now_ns().checked_sub(at_ns)
-    {
+    if !IS_ENABLED.load(Ordering::Relaxed) {
+        return;
+    }
+    let Some(late_ns) = clock::now_ns().checked_sub(at_ns) else {
+        return;
+    };
+    if late_ns < GRACE_NS {
+        cpu::relax();
+        let late_ns = clock::now_ns() - at_ns;
         execute_nops(GRACE_NS.saturating_sub(late_ns));
     }
 }
