@@ -307,6 +307,19 @@ fn cores_beyond_a_word_of_bits_take_over() {
 }
 
 #[test]
+fn a_dispatch_that_is_owed_leaves_the_instant_open() {
+    // Two run, two are in line; an instant without dispatch has made core 1 idle.
+    let spec = dag(100, 100, 1, &[0, 1, 2, 3], &[]);
+    let owing = || {
+        let mut scheduler = scheduler(std::slice::from_ref(&spec), TWO_CORES);
+        let _ = dispatch(&mut scheduler, 0);
+        scheduler.at(5).complete(instance(0, 0, 1), &mut ());
+        scheduler
+    };
+    finish(5, instance(0, 0, 0), owing, Next::Open, "");
+}
+
+#[test]
 #[should_panic(expected = "has to be idle")]
 fn a_busy_core_cannot_take_over() {
     let specs = [chain(100, 100, 1), dag(100, 100, 1, &[5], &[])];

@@ -191,6 +191,26 @@ fn a_signal_at_the_instant_of_the_kept_ones_release_is_dropped() {
 }
 
 #[test]
+fn a_signal_after_the_kept_ones_release_counts_even_if_the_driver_comes_late() {
+    let spec = DagSpec {
+        activation: Activation::Sporadic,
+        offset_ns: 5,
+        ..dag(10, 10, 5, &[0], &[])
+    };
+    let mut scheduler = scheduler(&[spec], PREEMPTIVE);
+    let mut log = Log::default();
+    scheduler.at(0).signal(DAG, &mut log);
+    // Job 0 was due at 5.
+    scheduler.at(9).signal(DAG, &mut log);
+    let expected = [
+        "signalled 0 Some(5)",
+        "released 0 of 5",
+        "signalled 1 Some(15)",
+    ];
+    assert_eq!(log.0, expected);
+}
+
+#[test]
 fn numbers_go_on_over_many_skipped_jobs() {
     // One job runs while thousands are skipped; slots are counted by sequence.
     let spec = overrunning(

@@ -202,6 +202,15 @@ fn p4_releases_go_on_upon_the_old_grid() {
 }
 
 #[test]
+fn p4_a_driver_that_comes_late_releases_nothing_of_the_pause() {
+    let mut bench = Bench::new(spec(5, OverrunPolicy::Queue));
+    assert_eq!(bench.pause(0), "skipped 0");
+    // Jobs 1 and 2 were due at 100 and 200, while it was paused.
+    assert_eq!(bench.resume(250), "skipped 1, skipped 2");
+    assert_eq!(bench.time(300), "released 3");
+}
+
+#[test]
 fn p5_a_paused_dag_comes_to_its_limit() {
     let mut bench = Bench::new(spec(3, OverrunPolicy::Queue));
     bench.time(0);

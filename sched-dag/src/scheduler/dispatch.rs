@@ -17,7 +17,7 @@
 
 use super::key::Key;
 use super::vertices::Phase;
-use super::{Decision, Scheduler};
+use super::{Decision, OWED, Scheduler};
 use crate::ids::CoreId;
 
 impl Scheduler {
@@ -31,7 +31,7 @@ impl Scheduler {
             let decision = self.give(core, key);
             self.decisions.push(decision);
         }
-        if core::mem::take(&mut self.fresh) == 0 {
+        if core::mem::take(&mut self.fresh) & !OWED == 0 {
             return;
         }
         while let Some(ready) = self.ready.peek()

@@ -21,7 +21,7 @@
 //! exactly one instance finishes; so its tests compare both with one reference.
 
 use super::vertices::Phase;
-use super::{Decision, Observer, Scheduler};
+use super::{Decision, OWED, Observer, Scheduler};
 use crate::ids::{CoreId, Vertex};
 
 /// What comes of a completion by [`Scheduler::hand_off`].
@@ -129,6 +129,7 @@ impl Scheduler {
         self.end(vertex.0, observer);
         if !self.concerns_one_core() {
             self.cores.free(core);
+            self.fresh |= OWED;
             return false;
         }
         self.fresh = 0;

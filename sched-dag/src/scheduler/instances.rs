@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
-use super::{JobOutcome, Observer, Scheduler};
+use super::{JobOutcome, OWED, Observer, Scheduler};
 use crate::ids::{DagId, Instance};
 
 impl Scheduler {
@@ -31,7 +31,10 @@ impl Scheduler {
             && vertex.progress < jobs.next
             && jobs.job(vertex.progress).number == instance.job;
         match vertex.phase {
-            Phase::Running(core) if in_flight => self.cores.free(core),
+            Phase::Running(core) if in_flight => {
+                self.cores.free(core);
+                self.fresh |= OWED;
+            }
             Phase::Preempted if in_flight => {
                 let key = self.ready.key(number, vertex, jobs.job(vertex.progress));
                 self.ready.remove(key);

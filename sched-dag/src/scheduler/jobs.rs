@@ -152,6 +152,11 @@ impl Jobs {
         self.next_due_ns
     }
 
+    /// Reports whether a job was due before `now_ns` and nobody has dealt with it.
+    pub(super) fn is_overdue(&self, now_ns: u64) -> bool {
+        self.next_due_ns.is_some_and(|due_ns| due_ns < now_ns)
+    }
+
     pub(super) fn waiting(&self) -> u64 {
         self.next_due - self.first_waiting
     }

@@ -98,7 +98,8 @@ pub struct Scheduler {
     vertices: Vertices,
     /// The ready instances that do not run.
     ready: ReadyQueue,
-    /// How many instances have become ready since the last dispatch.
+    /// How many instances have become ready since the last dispatch, and [`OWED`] if
+    /// a core has become idle since then that the next instance in line may need.
     fresh: u32,
     cores: Cores,
     /// When something happens to each DAG without a completion.
@@ -109,6 +110,9 @@ pub struct Scheduler {
     decisions: Vec<Decision>,
 }
 
+/// Stands beside a count of instances: a dispatch is owed.
+const OWED: u32 = 1 << 31;
+
 /// The state of one DAG.
 #[derive(Debug)]
 struct DagState {
@@ -117,6 +121,8 @@ struct DagState {
     jobs: Jobs,
     statistics: DagStatistics,
     is_paused: bool,
+    /// When the latest pause has ended; what was due before is skipped.
+    resumed_ns: u64,
 }
 
 impl Scheduler {
@@ -151,6 +157,7 @@ impl Scheduler {
                     jobs: Jobs::new(dag, first_slot),
                     statistics: DagStatistics::default(),
                     is_paused: false,
+                    resumed_ns: 0,
                 }
             })
             .collect();

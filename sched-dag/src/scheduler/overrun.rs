@@ -67,7 +67,8 @@ impl Scheduler {
         release_ns: u64,
         observer: &mut impl Observer,
     ) {
-        if self.is_paused(dag) {
+        // A driver that comes late may learn of a job of the pause after it.
+        if self.is_paused(dag) || release_ns < self.dags[dag.index()].resumed_ns {
             self.skip_oldest_waiting(dag, observer);
             return;
         }

@@ -61,6 +61,9 @@ impl Scheduler {
 
     /// Ends the pause of a DAG (P4).
     pub(super) fn resume(&mut self, dag: DagId) {
-        self.dags[dag.index()].is_paused = false;
+        let state = &mut self.dags[dag.index()];
+        if core::mem::take(&mut state.is_paused) {
+            state.resumed_ns = self.now_ns;
+        }
     }
 }

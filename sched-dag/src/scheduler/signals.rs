@@ -31,12 +31,16 @@ use crate::scheduler::Observer;
 impl Scheduler {
     /// Takes a signal to a sporadic DAG.
     pub(super) fn signal(&mut self, dag: DagId, observer: &mut impl Observer) {
-        let model = self.task_set.dag(dag);
         assert!(
-            model.is_sporadic(),
+            self.task_set.dag(dag).is_sporadic(),
             "a signal to dag {}, which is periodic; signal sporadic dags only",
             dag.0
         );
+        // A driver that comes late: what was due before this signal is not kept any more.
+        if self.dags[dag.index()].jobs.is_overdue(self.now_ns) {
+            self.serve(dag, observer);
+        }
+        let model = self.task_set.dag(dag);
         let state = &mut self.dags[dag.index()];
         let job = state.jobs.signal_job();
         let release_ns = state.jobs.signal(model, self.now_ns);

@@ -89,9 +89,7 @@ impl Driver<'_> {
         let failed: Vec<_> = ended
             .extract_if(.., |&mut (_, instance)| self.record.fails(instance))
             .collect();
-        // With a completion before it in the same instant, a dispatch would be owed.
-        let is_quiet = ended.len() == 1
-            && failed.is_empty()
+        let is_quiet = failed.is_empty()
             && !self.has_commands()
             && self
                 .record

@@ -49,7 +49,15 @@ fn walk(set: &Set) -> Result<(), String> {
         let running: Vec<_> = short.running().collect();
         let kind = random.between(0, 99);
         if kind < 60 && !running.is_empty() {
-            let (core, instance) = running[random.below(running.len())];
+            let place = random.below(running.len());
+            let (core, instance) = running[place];
+            if random.chance(20) && running.len() > 1 {
+                // An instant that is not over: a dispatch is owed.
+                let (_, before) = running[(place + 1) % running.len()];
+                for side in [&mut short, &mut long] {
+                    side.scheduler.at(now_ns).complete(before, &mut side.log);
+                }
+            }
             short.complete_shortly(now_ns, core, instance, &mut random);
             long.complete(now_ns, instance);
         } else if kind < 70 && !preempted.is_empty() {
