@@ -98,8 +98,8 @@ fn lost_inputs_make_a_condition_worthless() {
 
 /// Long runs, and several boots, since what the host does to a boot is rare: without
 /// `kernel/src/machine/counted_time.rs` one boot in ten is another, one in four where
-/// the host is busy. One of some 150 differed with it, for two reasons that are
-/// gone now (docs/evaluation.md). Too few boots have been seen since to claim that none
+/// the host is busy. One of some 150 differed with it, probably for one of two
+/// reasons that were found and are gone now (docs/evaluation.md). Too few boots have been seen since to claim that none
 /// is left, so one of four is let pass.
 #[test]
 fn long_runs_print_the_same_bytes() {
