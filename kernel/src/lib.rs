@@ -49,10 +49,12 @@ mod background;
 pub mod console;
 mod containment;
 mod contexts;
+mod ending;
 #[doc(hidden)]
 pub mod entry;
 mod event;
 mod execution;
+mod fault_verdict;
 mod graph;
 pub mod json;
 mod lock;
@@ -69,9 +71,10 @@ mod start;
 mod trace;
 mod worker;
 
+pub use ending::Ending;
 pub use event::Event;
 pub use lock::Lock;
-pub use machine_handle::{Ending, Machine, Resources};
+pub use machine_handle::{Machine, Resources};
 pub use memory::heap::KernelHeap;
 pub use run::Run;
 

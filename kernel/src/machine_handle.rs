@@ -6,16 +6,17 @@ use core::panic::Location;
 use core::time::Duration;
 
 use alloc::format;
-use alloc::string::String;
 
-use fass::{CommitError, Platform, Policy, Preemption, Signal};
+use fass::{Platform, Policy, Preemption, Signal};
 use sched_dag::DagId;
 
 use crate::background::{Background, Wishes};
 use crate::console::session;
+use crate::ending::Ending;
+use crate::fault_verdict::FaultVerdict;
 use crate::machine::interrupts_off;
 use crate::memory::heap;
-use crate::options::{Options, UsageError};
+use crate::options::Options;
 use crate::platform::KERNEL;
 use crate::report::Ns;
 use crate::run::Run;
@@ -51,6 +52,8 @@ pub struct Machine {
     pub(crate) input: Cell<Option<(u64, DagId)>>,
     /// How many runs have ended.
     pub(crate) runs: Cell<u64>,
+    /// Whether faults in them make the app fail.
+    pub(crate) fault_verdict: FaultVerdict,
 }
 
 /// What of the machine's memory is in use while nothing runs.
@@ -65,50 +68,6 @@ pub struct Resources {
     pub contexts: usize,
     /// How many of these can be taken: while nothing runs, all.
     pub contexts_free: usize,
-}
-
-/// Why an app ends other than by success.
-///
-/// ```no_run
-/// use kernel::{Ending, options::UsageError};
-///
-/// let ending = Ending::from(UsageError::new("`jobs=0`: give at least 1"));
-/// assert!(matches!(ending, Ending::Usage(_)));
-/// assert_eq!(ending.to_string(), "`jobs=0`: give at least 1");
-/// ```
-#[derive(Debug)]
-pub enum Ending {
-    /// The command line is wrong; QEMU exits with 37.
-    Usage(UsageError),
-    /// The DAGs could not be committed; QEMU exits with 35.
-    Commit(CommitError),
-    /// Something else went wrong, in words; QEMU exits with 35.
-    Failure(String),
-    /// A person has ended the run at the console; QEMU exits with 33.
-    Shutdown,
-}
-
-impl From<UsageError> for Ending {
-    fn from(error: UsageError) -> Self {
-        Self::Usage(error)
-    }
-}
-
-impl From<CommitError> for Ending {
-    fn from(error: CommitError) -> Self {
-        Self::Commit(error)
-    }
-}
-
-impl fmt::Display for Ending {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Usage(error) => error.fmt(f),
-            Self::Commit(error) => error.fmt(f),
-            Self::Failure(message) => f.write_str(message),
-            Self::Shutdown => f.write_str("shut down at the console"),
-        }
-    }
 }
 
 impl Machine {
@@ -196,10 +155,30 @@ impl Machine {
         KERNEL.set_coincidence_ns(u64::try_from(window.as_nanos()).unwrap_or(u64::MAX));
     }
 
+    /// Leaves it to the app to judge faults. Unless it says so, at any time before its
+    /// function returns, a fault that ended a DAG in any of its runs makes it fail.
+    ///
+    /// ```no_run
+    /// fn may_lose_a_camera(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    ///     machine.accept_faults();
+    ///     let run = machine.run()?;
+    ///     let cameras = [sched_dag::DagId(0), sched_dag::DagId(1)];
+    ///     let lost = cameras.map(|dag| run.statistics(dag).faults > 0);
+    ///     match lost {
+    ///         [true, true] => Err(kernel::Ending::Failure("both cameras are lost".into())),
+    ///         _ => Ok(()),
+    ///     }
+    /// }
+    /// ```
+    pub fn accept_faults(&self) {
+        self.fault_verdict.accept();
+    }
+
     /// Runs the committed DAGs until each has ended all its jobs.
     ///
     /// The calling core takes part. Progress is printed in machine lines of
-    /// kind `progress`, by an idle core.
+    /// kind `progress`, by an idle core. A fault ends its DAG, and makes the app
+    /// fail (see [`accept_faults`](Self::accept_faults)).
     ///
     /// # Errors
     ///
@@ -249,6 +228,8 @@ impl Machine {
         }
         let ended = execution::end().ok_or_else(nothing)?;
         let run = Run::new(ended, allocations, locks, epoch_ns);
+        let faults = |dag| run.statistics(dag).faults;
+        self.fault_verdict.note(run.task_set(), faults);
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }

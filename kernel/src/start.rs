@@ -7,9 +7,11 @@ use boot::acpi::{self, Platform};
 use boot::physical::IdentityMap;
 use boot::{BootInfo, Module};
 
+use crate::ending::Ending;
+use crate::fault_verdict::FaultVerdict;
 use crate::machine::this_core::{self, Stacks};
 use crate::machine::{clock, cpu, exit, interrupt, legacy, local_apic, processors, serial};
-use crate::machine_handle::{Ending, Machine};
+use crate::machine_handle::Machine;
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
 use crate::platform::KERNEL;
@@ -177,14 +179,17 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
     let options = Options::parse(line)?;
     let settings = settings::apply(&options)?;
     trace::create(this_core::all().len(), settings.events);
-    app(&Machine {
+    let machine = Machine {
         options,
         module: module_bytes(info),
         dumps_trace: settings.dump,
         wishes: settings.wishes,
         input: Cell::new(None),
         runs: Cell::new(0),
-    })
+        fault_verdict: FaultVerdict::default(),
+    };
+    let result = app(&machine);
+    machine.fault_verdict.judge(result)
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.

@@ -67,6 +67,18 @@ fn faults_of_a_subtask_end_its_dag_alone() {
 }
 
 #[test]
+fn a_fault_that_the_app_does_not_look_at_is_a_failure() {
+    let outcome = guest("unnoticed").end_in(Status::Failure);
+    assert_eq!(outcome.transcript.of_kind("fault").count(), 1);
+    let verdict = outcome.transcript.verdict().expect("checked before");
+    assert!(
+        verdict.reason.starts_with("a fault ended dag `careless`"),
+        "{}",
+        verdict.reason
+    );
+}
+
+#[test]
 fn a_processor_exception_ends_in_failure_and_is_named() {
     for test in [
         "null_write",

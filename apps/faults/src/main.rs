@@ -39,6 +39,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         PERIOD.as_millis()
     );
     println!("the doomed one is at fault in its job {FATAL_JOB}.");
+    machine.accept_faults(); // here they are what is wanted
     let mut counts = [0; 3];
     for (name, crime) in CRIMES {
         if only.is_none_or(|only| only == name) {

@@ -12,6 +12,7 @@ mod occupation;
 mod preemption;
 mod sharing;
 mod storm;
+mod unnoticed;
 
 use faults::crimes::{CRIMES, Unpunished};
 use kernel::{Ending, Machine, json};
@@ -21,7 +22,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 14] = [
+const TESTS: [(&str, Test); 15] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -41,6 +42,7 @@ const TESTS: [(&str, Test); 14] = [
     ("endless", endless::run),
     ("sharing", sharing::run),
     ("storm", storm::run),
+    ("unnoticed", unnoticed::run),
 ];
 
 fn main(machine: &Machine) -> Result<(), Ending> {
