@@ -139,9 +139,7 @@ impl Scheduler {
     /// Reports whether the instant can end with a hand-off.
     #[inline]
     fn concerns_one_core(&self) -> bool {
-        if self.fresh > 1 && self.cores.count() > 1 {
-            return false;
-        }
-        (self.timers.peek()).is_none_or(|(event_ns, _)| event_ns > self.now_ns)
+        let concerns_others = self.fresh > 1 && self.cores.count() > 1;
+        !concerns_others && self.now_ns < self.quiet_until_ns
     }
 }

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
-use super::{JobOutcome, OWED, Observer, Scheduler};
+use super::{JobOutcome, OWED, Observer, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 
 impl Scheduler {
@@ -209,6 +209,7 @@ impl Scheduler {
             Some(event_ns) => self.timers.set(dag.index(), event_ns),
             None => self.timers.remove(dag.index()),
         }
+        self.quiet_until_ns = earliest_ns(&self.timers);
     }
 }
 

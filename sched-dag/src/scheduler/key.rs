@@ -46,12 +46,16 @@ impl Key {
     pub(super) fn new(order: Order, number: u32, vertex: &Vertex, job: &Job) -> Self {
         match order {
             Order::Rank => Self::of_parts(u64::from(vertex.rank) << 32, 0, number),
-            Order::Job => {
-                let [high, low] = halves(vertex.progress);
-                Self::of_parts(u64::from(vertex.rank) << 32 | u64::from(high), low, number)
-            }
+            Order::Job => Self::by_job(number, vertex),
             Order::Deadline => Self::of_parts(job.deadline_ns, job.slot, number),
         }
+    }
+
+    /// Apart, as it is rare, and its shifts would be made for every key.
+    #[inline(never)]
+    fn by_job(number: u32, vertex: &Vertex) -> Self {
+        let [high, low] = halves(vertex.progress);
+        Self::of_parts(u64::from(vertex.rank) << 32 | u64::from(high), low, number)
     }
 
     #[inline]

@@ -104,6 +104,9 @@ pub struct Scheduler {
     cores: Cores,
     /// When something happens to each DAG without a completion.
     timers: IndexedHeap<u64>,
+    /// The least of these times, at hand for each completion; `u64::MAX` also if there
+    /// is none.
+    quiet_until_ns: u64,
     /// Vertices whose instances were cancelled and whose successors do not know
     /// yet.
     ending: Vec<u32>,
@@ -176,6 +179,7 @@ impl Scheduler {
             fresh: 0,
             vertices,
             cores: Cores::new(options.cores),
+            quiet_until_ns: earliest_ns(&timers),
             timers,
             ending: Vec::with_capacity(longest),
             // A dispatch names a core at most twice: to preempt and to start.
@@ -304,4 +308,9 @@ impl Scheduler {
         let vertex = self.vertices.get(vertex.0);
         vertex.instance(self.dags[vertex.dag.index()].jobs.job(vertex.progress))
     }
+}
+
+/// Returns the least time, `u64::MAX` if there is none.
+fn earliest_ns(timers: &IndexedHeap<u64>) -> u64 {
+    timers.peek().map_or(u64::MAX, |(event_ns, _)| event_ns)
 }
