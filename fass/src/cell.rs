@@ -17,14 +17,15 @@
 //! 1 and 3 can be in flight together.)
 //!
 //! A slot holds a value and one atomic word, its *turn*: 0 while the slot is
-//! empty, `k + 1` while it holds the value of job k. One soundness argument
-//! covers the ring, and the `SAFETY` comments below cite it by its name:
+//! empty, `2k + 1` (modulo 2^64) while it holds the value of job k, which is never 0.
+//! (It is the same for job k + 2^63, to which no run gets in 292 years.) One soundness
+//! argument covers the ring, and the `SAFETY` comments below cite it by its name:
 //!
 //! > **Turn invariant.** While a slot's turn is 0, only the ring's writer may
 //! > touch the slot's value, and the value is uninitialised. While it is not 0,
 //! > only the ring's reader may touch the value, and the value is initialised.
 //! > Only the side whose turn it is changes the turn: the writer from 0 to
-//! > `k + 1` once the value is written, the reader back to 0 once the value is
+//! > `2k + 1` once the value is written, the reader back to 0 once the value is
 //! > moved out. The change is a `Release` store and the other side's look at
 //! > it an `Acquire` load, so all that one side did to the value
 //! > happens before all that the other does.
@@ -65,7 +66,14 @@ use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 /// The turn of a slot that holds no value.
 const EMPTY_SLOT: u64 = 0;
 
-/// Makes the ring of one edge with `slots` slots and returns its two ends.
+/// Returns the turn of a slot that holds the value of a job.
+#[inline]
+const fn turn_of(job: u64) -> u64 {
+    job << 1 | 1
+}
+
+/// Makes the ring of one edge with at least `slots` slots and returns its two ends.
+/// They are a power of two, so that going round takes no comparison.
 ///
 /// # Panics
 ///
@@ -85,25 +93,22 @@ pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
 /// The writing end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Writer<T> {
     slots: Arc<[Slot<T>]>,
-    /// The slot to look at first.
+    /// The slot to look at first, counted on and on.
     next: usize,
 }
 
 /// The reading end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Reader<T> {
     slots: Arc<[Slot<T>]>,
-    /// The slot to look at first.
+    /// The slot to look at first, counted on and on.
     next: usize,
 }
 
 impl<T> Writer<T> {
     /// Puts the value of `job` into a free slot, or gives the value back if all
-    /// are taken (or `job` is `u64::MAX`, which has no turn).
+    /// are taken.
     #[inline]
     pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
-        let Some(turn) = job.checked_add(1) else {
-            return Err(value);
-        };
         let Some(slot) = find(&self.slots, &mut self.next, EMPTY_SLOT) else {
             return Err(value);
         };
@@ -111,7 +116,7 @@ impl<T> Writer<T> {
         // SAFETY: by the turn invariant an empty slot is the writer's alone,
         // and `&mut self` makes us the only thread that acts as the writer.
         unsafe { place.write(value) };
-        slot.turn.store(turn, Ordering::Release);
+        slot.turn.store(turn_of(job), Ordering::Release);
         Ok(())
     }
 }
@@ -121,7 +126,7 @@ impl<T> Reader<T> {
     /// holds that very job's value.
     #[inline]
     pub(crate) fn take(&mut self, job: u64) -> Option<T> {
-        let slot = find(&self.slots, &mut self.next, job.checked_add(1)?)?;
+        let slot = find(&self.slots, &mut self.next, turn_of(job))?;
         let place = slot.value.get().cast::<T>();
         // SAFETY: by the turn invariant a slot with a turn other than 0 is
         // initialised and the reader's alone, and `&mut self` makes us the only
@@ -144,24 +149,24 @@ struct Slot<T> {
 // shared, which is why `T: Send` is enough.
 unsafe impl<T: Send> Sync for Slot<T> {}
 
-/// Finds a slot with the given turn, from slot `next` on and round the ring
-/// once, and moves `next` behind it. Its look at the turn is an `Acquire`.
+/// Finds a slot with the given turn, from slot `next` on and round the ring once,
+/// and moves `next` behind it. Its look at the turn is an `Acquire`.
 #[inline]
 fn find<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
-    let slot = slots.get(*next)?;
+    let slot = at(slots, *next)?;
     // Nearly always it is the first one.
     if slot.turn.load(Ordering::Acquire) != turn {
         return search(slots, next, turn);
     }
-    *next = after(slots, *next);
+    *next = next.wrapping_add(1);
     Some(slot)
 }
 
 #[cold]
 fn search<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
     for _ in 0..slots.len() {
-        let slot = &slots[*next];
-        *next = after(slots, *next);
+        let slot = at(slots, *next)?;
+        *next = next.wrapping_add(1);
         if slot.turn.load(Ordering::Acquire) == turn {
             return Some(slot);
         }
@@ -169,9 +174,10 @@ fn search<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'
     None
 }
 
-/// Returns the slot after one, round the ring.
-fn after<T>(slots: &[Slot<T>], slot: usize) -> usize {
-    (slot + 1) & (slots.len() - 1)
+/// Returns the slot that a count gets to, round and round the ring.
+#[inline]
+fn at<T>(slots: &[Slot<T>], count: usize) -> Option<&Slot<T>> {
+    slots.get(count & slots.len().wrapping_sub(1))
 }
 
 impl<T> Slot<T> {
