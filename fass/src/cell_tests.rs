@@ -82,7 +82,7 @@ fn jobs_may_be_written_and_read_out_of_order() {
 }
 
 #[test]
-fn the_last_job_number_has_no_turn() {
+fn the_last_job_numbers_have_turns() {
     let (mut writer, mut reader) = ring(1);
     assert_eq!(writer.put(u64::MAX, 7), Ok(()));
     assert_eq!(reader.take(0), None);

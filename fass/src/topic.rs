@@ -63,19 +63,20 @@ impl<T> Subscriber<T> {
 /// same::<<(i32,) as VecToPubs>::Pubs>(|_| (), |_: Publishers<(Publisher<i32>,)>| ());
 /// ```
 pub struct Publisher<T> {
-    /// That of the last reading port, mostly the only one.
-    last: Option<Writer<T>>,
-    /// Those of the other reading ports.
-    others: Box<[Writer<T>]>,
+    /// That of the one reading port, where nobody else reads the topic.
+    only: Option<Writer<T>>,
+    /// Those of all reading ports otherwise.
+    several: Box<[Writer<T>]>,
     /// One a subtask that samples the topic's latest value.
     stages: Box<[Box<dyn Stage<T>>]>,
 }
 
 impl<T: Message> Publisher<T> {
     fn new(mut writers: Vec<Writer<T>>, stages: Box<[Box<dyn Stage<T>>]>) -> Self {
+        let is_one = writers.len() == 1 && stages.is_empty();
         Self {
-            last: writers.pop(),
-            others: writers.into(),
+            only: if is_one { writers.pop() } else { None },
+            several: writers.into(),
             stages,
         }
     }
@@ -91,38 +92,32 @@ impl<T: Message> Publisher<T> {
     /// than the plan says.
     #[inline]
     pub(crate) fn send(&mut self, job: u64, value: T) {
-        if !self.others.is_empty() || !self.stages.is_empty() {
-            self.share(job, &value);
-        }
-        match &mut self.last {
-            Some(last) => put(last, job, value),
-            None => self.stage_last(job, value),
+        match &mut self.only {
+            Some(only) => put(only, job, value),
+            None => self.share(job, value),
         }
     }
 
-    /// Hands clones to all but the last reader. Apart, so that the usual way to one
-    /// reader is short.
+    /// Does so for any number of readers. Apart, so that the usual way to one reader
+    /// is short.
     #[inline(never)]
-    fn share(&mut self, job: u64, value: &T) {
-        let sampled_last = usize::from(self.last.is_none());
-        let stages = self.stages.iter_mut().rev().skip(sampled_last);
+    fn share(&mut self, job: u64, value: T) {
         // The commit refuses several readers of a type that gives `None`.
-        for stage in stages {
+        let stage = |stage: &mut Box<dyn Stage<T>>, value: &T| {
             if let Some(clone) = value.for_another_reader() {
                 stage.stage(job, clone);
             }
-        }
-        for writer in &mut self.others {
-            if let Some(clone) = value.for_another_reader() {
-                put(writer, job, clone);
+        };
+        if let Some((last, others)) = self.several.split_last_mut() {
+            (self.stages.iter_mut()).for_each(|sampled| stage(sampled, &value));
+            for writer in others {
+                if let Some(clone) = value.for_another_reader() {
+                    put(writer, job, clone);
+                }
             }
-        }
-    }
-
-    /// Hands the value to the last of those that sample it, where nobody else reads.
-    #[inline(never)]
-    fn stage_last(&mut self, job: u64, value: T) {
-        if let Some(last) = self.stages.last_mut() {
+            put(last, job, value);
+        } else if let Some((last, others)) = self.stages.split_last_mut() {
+            (others.iter_mut()).for_each(|sampled| stage(sampled, &value));
             last.stage(job, value);
         }
     }
