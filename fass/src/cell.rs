@@ -327,6 +327,7 @@ impl<T: Copy> SetOnce<T> {
     }
 
     /// Returns the value, or `None` while none is set.
+    #[inline]
     pub(crate) fn get(&self) -> Option<T> {
         if self.state.load(Ordering::Acquire) != SET {
             return None;

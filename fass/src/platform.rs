@@ -217,6 +217,7 @@ pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> 
 }
 
 /// Returns the installed platform, if there is one.
+#[inline]
 pub(crate) fn installed() -> Option<&'static dyn Platform> {
     PLATFORM.get()
 }
@@ -233,6 +234,7 @@ pub(crate) fn installed() -> Option<&'static dyn Platform> {
 /// let machine = virtual_time::VirtualTime::new();
 /// assert_eq!(fass::now_ns(), 0);
 /// ```
+#[inline]
 #[must_use]
 pub fn now_ns() -> u64 {
     expect_installed().now_ns()
@@ -280,12 +282,15 @@ pub fn execute_for(duration: Duration, how: Occupation) {
     expect_installed().execute_for(duration, how);
 }
 
-#[track_caller]
+#[inline]
 pub(crate) fn expect_installed() -> &'static dyn Platform {
     match installed() {
         Some(platform) => platform,
-        None => panic!(
-            "no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`"
-        ),
+        None => missing(),
     }
+}
+
+#[cold]
+fn missing() -> ! {
+    panic!("no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`")
 }
