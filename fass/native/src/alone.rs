@@ -3,6 +3,7 @@
 use sched_dag::{CoreId, HandOff, Scheduler, Vertex};
 
 use crate::execute::Execute;
+use crate::reports::Reports;
 use crate::watch::Watch;
 
 const CORE: CoreId = CoreId(0);
@@ -10,55 +11,54 @@ const CORE: CoreId = CoreId(0);
 /// Runs all jobs to their ends.
 pub(crate) fn run<B: Execute, W: Watch>(
     scheduler: &mut Scheduler,
-    bodies: &mut [B],
-    watch: &mut W,
+    reports: &mut Reports<W, &mut [B]>,
 ) {
     let mut signals = Vec::with_capacity(scheduler.task_set().dags().len());
     let mut now_ns = 0;
     while let Some(event_ns) = scheduler.next_event_ns() {
         now_ns = event_ns.max(now_ns);
-        watch.instant(now_ns);
-        let mut next = end_instant(scheduler, now_ns, watch);
+        reports.watch.instant(now_ns);
+        let mut next = end_instant(scheduler, now_ns, reports);
         while let Some((vertex, job)) = next {
-            let body = &mut bodies[vertex.index()];
+            let body = &mut reports.bodies[vertex.index()];
             body.run(job);
             now_ns += W::STEP_NS;
             body.complete(&mut |dag| signals.push(dag));
             if W::STEP_NS > 0 {
-                watch.instant(now_ns);
-                watch.finished(scheduler.instance_of(vertex), CORE);
+                reports.watch.instant(now_ns);
+                reports.watch.finished(scheduler.instance_of(vertex), CORE);
             }
             if !signals.is_empty() {
                 let instance = scheduler.instance_of(vertex);
                 let mut moment = scheduler.at(now_ns);
-                moment.complete(instance, watch);
+                moment.complete(instance, reports);
                 for dag in signals.drain(..) {
-                    moment.signal(dag, watch);
+                    moment.signal(dag, reports);
                 }
-                next = end_instant(scheduler, now_ns, watch);
+                next = end_instant(scheduler, now_ns, reports);
                 continue;
             }
-            next = match scheduler.hand_off(now_ns, CORE, vertex, watch) {
+            next = match scheduler.hand_off(now_ns, CORE, vertex, reports) {
                 HandOff::To(vertex, decision) => {
-                    watch.started(decision.instance(), CORE);
+                    reports.watch.started(decision.instance(), CORE);
                     Some((vertex, decision.instance().job))
                 }
                 HandOff::Idle => None,
-                HandOff::Open => end_instant(scheduler, now_ns, watch),
+                HandOff::Open => end_instant(scheduler, now_ns, reports),
             };
         }
     }
 }
 
 /// Releases, dispatches, and returns what the core shall run.
-fn end_instant(
+fn end_instant<B: Execute, W: Watch>(
     scheduler: &mut Scheduler,
     now_ns: u64,
-    watch: &mut impl Watch,
+    reports: &mut Reports<W, &mut [B]>,
 ) -> Option<(Vertex, u64)> {
-    let decisions = scheduler.at(now_ns).release_due(watch).dispatch();
+    let decisions = scheduler.at(now_ns).release_due(reports).dispatch();
     // Without preemption one core gets at most one instance.
     let instance = decisions.first()?.instance();
-    watch.started(instance, CORE);
+    reports.watch.started(instance, CORE);
     Some((scheduler.vertex(instance), instance.job))
 }

@@ -13,6 +13,11 @@ pub(crate) trait Execute: Send {
     fn complete(&mut self, raise: &mut dyn FnMut(DagId)) {
         let _ = raise;
     }
+
+    /// Drops what has arrived for a job that it will not run. Mostly there is nothing.
+    fn discard(&mut self, job: u64) {
+        let _ = job;
+    }
 }
 
 impl<F: FnMut(u64) + Send + ?Sized> Execute for Box<F> {
@@ -34,5 +39,9 @@ impl Execute for Body {
         if self.has_effects() {
             Self::complete(self, fass::now_ns(), raise);
         }
+    }
+
+    fn discard(&mut self, job: u64) {
+        Self::discard(self, job);
     }
 }

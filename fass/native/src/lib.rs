@@ -11,8 +11,11 @@
 //! The scheduler's clock is *not* the host's. It stands still while anything runs,
 //! and jumps to the next release when nothing does: jobs follow one another back to
 //! back, whatever their periods, and no clock is read on the way from a completion
-//! to its successor. So no deadline is ever missed. [`fass::now_ns`] is the host's
-//! clock, for functions that measure.
+//! to its successor. So no deadline is missed, and no job waits, is skipped or aborted.
+//! [`fass::now_ns`] is the host's clock, for functions that measure.
+//!
+//! In a run that is *recorded* the scheduler's clock goes on, by 1 ns at each
+//! completion: there jobs can be late, and overruns happen as their policies say.
 //!
 //! # What is guaranteed
 //!
@@ -20,6 +23,8 @@
 //!   the scheduler's clock. [`Native::run_recorded`] writes a run down and checks it.
 //! - What a function has written is visible to the functions of its successors,
 //!   whichever worker runs them.
+//! - Signals and latest values take effect with the completion that leaves them, before
+//!   the scheduler hears of it; what was sent to cancelled instances is dropped.
 //! - After the start nothing is allocated but by the functions themselves.
 //!
 //! # What is not
@@ -28,7 +33,9 @@
 //!   Each subtask is non-preemptive.
 //! - The host may take a worker's processor away at any time. Workers that wait poll;
 //!   after some thousand rounds they yield, in case there are fewer processors.
-//! - A panic in a function ends the run with that panic. It does not end one DAG.
+//! - A panic in a function ends the run with that panic. It does not end one DAG, and
+//!   nothing else does: no DAG is stopped or paused.
+//! - Signals come from subtasks only, not from outside.
 #![forbid(unsafe_code)]
 
 mod alone;
@@ -38,6 +45,7 @@ mod pin;
 mod platform;
 mod recorder;
 mod relax;
+mod reports;
 mod run;
 mod team;
 mod watch;

@@ -104,7 +104,8 @@ impl Native {
     ///
     /// # Panics
     ///
-    /// As [`run`](Self::run); if the record does not fit into memory.
+    /// As [`run`](Self::run); if the record does not fit into memory; if a sporadic DAG
+    /// has no limit of jobs.
     pub fn run_recorded(self) -> Recorded {
         let (plan, setting) = self.take();
         run_bodies_recorded(plan.task_set, plan.bodies, setting)

@@ -14,6 +14,7 @@ use crate::execute::Execute;
 use crate::pin::{Pinning, pin, processors};
 use crate::recorder::Recorder;
 use crate::relax::poll;
+use crate::reports::Reports;
 use crate::watch::Watch;
 use crate::{alone, team};
 
@@ -65,8 +66,8 @@ pub fn worker() -> Option<u32> {
 ///
 /// # Panics
 ///
-/// If a function panics; if there are no workers; if a DAG has no limit of jobs; if the
-/// number of functions is not that of the subtasks.
+/// If a function panics; if there are no workers; if a periodic DAG has no limit of
+/// jobs; if the number of functions is not that of the subtasks.
 ///
 /// # Examples
 ///
@@ -96,11 +97,13 @@ pub fn run(task_set: TaskSet, bodies: Vec<Vec<Closure>>, setting: Setting) -> Re
 /// Runs as [`run`] does, writes everything down, and checks it.
 ///
 /// The scheduler's clock moves on by 1 ns at each completion, so that no two are at
-/// the same instant. Choose periods with more nanoseconds than a job has subtasks.
+/// the same instant. A period with fewer nanoseconds than its jobs have subtasks is
+/// thus an overload: jobs are late, and wait, are skipped or aborted.
 ///
 /// # Panics
 ///
-/// As [`run`]; if the record does not fit into memory.
+/// As [`run`]; if the record does not fit into memory; if a sporadic DAG has no limit
+/// of jobs.
 pub fn run_recorded(task_set: TaskSet, bodies: Vec<Vec<Closure>>, setting: Setting) -> Recorded {
     run_bodies_recorded(task_set, bodies, setting)
 }
@@ -118,6 +121,14 @@ pub(crate) fn run_bodies_recorded<B: Execute>(
     bodies: Vec<Vec<B>>,
     setting: Setting,
 ) -> Recorded {
+    let mut dags = task_set.dags().iter();
+    if let Some(endless) = dags.find(|dag| dag.jobs().is_none()) {
+        // What is left out of the record would keep its core from others, unseen.
+        panic!(
+            "dag `{}` has no limit of jobs and cannot be recorded; give it one, or use `run`",
+            endless.name()
+        );
+    }
     let task_set = Arc::new(task_set);
     let recorder = Recorder::new(&task_set);
     let (report, recorder) = run_watched(&task_set, bodies, setting, recorder);
@@ -153,13 +164,15 @@ fn run_watched<B: Execute, W: Watch>(
     let mut scheduler = Scheduler::new(Arc::clone(task_set), options(setting));
     let start = Start::new(setting.workers);
     if setting.workers == 1 {
+        let mut reports = Reports::new(task_set, watch, &mut bodies[..]);
         thread::scope(|scope| {
             let worker = scope.spawn(|| {
                 start.ready(0);
-                alone::run(&mut scheduler, &mut bodies, &mut watch);
+                alone::run(&mut scheduler, &mut reports);
             });
             join(worker);
         });
+        watch = reports.watch;
     } else {
         let team = team::Team::new(scheduler, bodies, watch);
         thread::scope(|scope| {

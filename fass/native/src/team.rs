@@ -26,20 +26,20 @@
 //! the stores that others wait for: they leave while the body runs.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use sched_dag::{CoreId, Decision, HandOff, Instance, Scheduler, Vertex};
 
 use crate::execute::Execute;
 use crate::mailbox::{Assignment, Mailbox, Post};
 use crate::relax::poll;
+use crate::reports::{Line, Reports, Shared};
 use crate::watch::Watch;
 
 /// What all workers share.
 pub(crate) struct Team<B, W> {
-    state: Pair<Mutex<State<W>>>,
-    /// By vertex. Only who was assigned a vertex locks its body, so nobody ever waits.
-    bodies: Box<[Line<Mutex<B>>]>,
+    state: Pair<Mutex<State<B, W>>>,
+    bodies: Shared<B>,
     mailboxes: Box<[Mailbox]>,
     /// Whether whoever has the lock looks into mailboxes.
     is_serving: Pair<AtomicBool>,
@@ -47,18 +47,14 @@ pub(crate) struct Team<B, W> {
     is_over: Pair<AtomicBool>,
 }
 
-/// A value in a cache line of its own.
-#[repr(align(64))]
-struct Line<T>(T);
-
 /// A value in two cache lines of its own, since processors fetch them in pairs.
 #[repr(align(128))]
 struct Pair<T>(T);
 
 /// What is under the lock.
-struct State<W> {
+struct State<B, W> {
     scheduler: Scheduler,
-    watch: W,
+    reports: Reports<W, Shared<B>>,
     now_ns: u64,
     /// How many workers have an instance.
     busy: u32,
@@ -73,17 +69,18 @@ impl<B: Execute, W: Watch> Team<B, W> {
         let cores = scheduler.options().cores as usize;
         let dags = scheduler.task_set().dags().len();
         let bodies = bodies.into_iter().map(|body| Line(Mutex::new(body)));
+        let bodies: Shared<B> = bodies.collect();
         Self {
-            bodies: bodies.collect(),
             mailboxes: (0..cores).map(|_| Mailbox::new(dags)).collect(),
             state: Pair(Mutex::new(State {
+                reports: Reports::new(scheduler.task_set(), watch, Arc::clone(&bodies)),
                 scheduler,
-                watch,
                 now_ns: 0,
                 busy: 0,
                 noted: vec![0; cores].into_boxed_slice(),
                 decisions: Vec::with_capacity(2 * cores),
             })),
+            bodies,
             is_serving: Pair(AtomicBool::new(false)),
             is_over: Pair(AtomicBool::new(false)),
         }
@@ -93,7 +90,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
     pub(crate) fn into_parts(self) -> (Scheduler, W) {
         let state = self.state.0.into_inner();
         let state = state.unwrap_or_else(PoisonError::into_inner);
-        (state.scheduler, state.watch)
+        (state.scheduler, state.reports.watch)
     }
 
     /// Works until all jobs have ended. Worker 0 begins.
@@ -167,7 +164,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
     #[inline]
     fn step<'a>(
         &'a self,
-        mut state: MutexGuard<'a, State<W>>,
+        mut state: MutexGuard<'a, State<B, W>>,
         core: CoreId,
         turn: u32,
     ) -> Option<Running<'a, B>> {
@@ -186,7 +183,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
     /// nobody else has.
     fn serve<'a>(
         &'a self,
-        mut state: MutexGuard<'a, State<W>>,
+        mut state: MutexGuard<'a, State<B, W>>,
         core: CoreId,
     ) -> Option<Running<'a, B>> {
         self.is_serving.0.store(true, Ordering::Relaxed);
@@ -220,7 +217,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
     #[inline]
     fn take_note(
         &self,
-        state: &mut State<W>,
+        state: &mut State<B, W>,
         here: CoreId,
         core: CoreId,
         post: Post,
@@ -230,29 +227,29 @@ impl<B: Execute, W: Watch> Team<B, W> {
         state.busy -= 1;
         if W::STEP_NS > 0 {
             state.now_ns += W::STEP_NS;
-            state.watch.instant(state.now_ns);
+            state.reports.watch.instant(state.now_ns);
             let instance = state.scheduler.instance_of(vertex);
-            state.watch.finished(instance, core);
+            state.reports.watch.finished(instance, core);
         }
         let State {
             scheduler,
-            watch,
+            reports,
             now_ns,
             ..
         } = state;
         if post.has_signals {
             let instance = scheduler.instance_of(vertex);
             let mut moment = scheduler.at(*now_ns);
-            moment.complete(instance, watch);
+            moment.complete(instance, reports);
             for dag in self.mailboxes[core.index()].signals().drain(..) {
-                moment.signal(dag, watch);
+                moment.signal(dag, reports);
             }
             return self.proceed(state, here);
         }
         let done = if core == here {
-            scheduler.hand_off(*now_ns, core, vertex, watch)
+            scheduler.hand_off(*now_ns, core, vertex, reports)
         } else {
-            scheduler.hand_over(*now_ns, core, vertex, here, watch)
+            scheduler.hand_over(*now_ns, core, vertex, here, reports)
         };
         match done {
             HandOff::To(_, decision) => Some(state.assign(decision.instance(), here)),
@@ -263,10 +260,10 @@ impl<B: Execute, W: Watch> Team<B, W> {
 
     /// Ends the instant; goes on to the next release if nothing runs and nothing
     /// starts. Returns what `here` runs next.
-    fn proceed(&self, state: &mut State<W>, here: CoreId) -> Option<Assignment> {
+    fn proceed(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
         loop {
             let moment = state.scheduler.at(state.now_ns);
-            let decisions = moment.release_due(&mut state.watch).dispatch();
+            let decisions = moment.release_due(&mut state.reports).dispatch();
             state.decisions.clear();
             state.decisions.extend_from_slice(decisions);
             if !state.decisions.is_empty() {
@@ -280,11 +277,11 @@ impl<B: Execute, W: Watch> Team<B, W> {
                 return None;
             };
             state.now_ns = event_ns.max(state.now_ns);
-            state.watch.instant(state.now_ns);
+            state.reports.watch.instant(state.now_ns);
         }
     }
 
-    fn carry_out(&self, state: &mut State<W>, here: CoreId) -> Option<Assignment> {
+    fn carry_out(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
         let mut own = None;
         for index in 0..state.decisions.len() {
             let decision = state.decisions[index];
@@ -299,7 +296,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
     }
 
     #[inline]
-    fn try_lock(&self) -> Option<MutexGuard<'_, State<W>>> {
+    fn try_lock(&self) -> Option<MutexGuard<'_, State<B, W>>> {
         match self.state.0.try_lock() {
             Ok(guard) => Some(guard),
             // Whoever panicked in there has set `is_over`; the run ends with its panic.
@@ -309,11 +306,11 @@ impl<B: Execute, W: Watch> Team<B, W> {
     }
 }
 
-impl<W: Watch> State<W> {
+impl<B, W: Watch> State<B, W> {
     #[inline]
     fn assign(&mut self, instance: Instance, core: CoreId) -> Assignment {
         self.busy += 1;
-        self.watch.started(instance, core);
+        self.reports.watch.started(instance, core);
         Assignment {
             vertex: self.scheduler.vertex(instance),
             job: instance.job,

@@ -1,0 +1,183 @@
+//! What instances leave outside their DAGs: signals and latest values, on threads.
+//!
+//! Both take effect when the instance is complete, neither earlier nor later: so a
+//! sporadic DAG that a signal releases finds the value of the very job that raised it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use fass::{
+    Dag, Latest, Policy, Raiser, Sample, Signal, SubtaskAttributes, create_dag, finish_create_dags,
+};
+use native::{Native, Report};
+
+const JOBS: u64 = 500;
+const PERIOD: Duration = Duration::from_micros(10);
+const SHORTER: Duration = Duration::from_micros(3);
+
+fn named(name: &str) -> SubtaskAttributes {
+    SubtaskAttributes::named(name)
+}
+
+/// Runs what `commit` commits in all settings, at full speed and written down.
+fn in_all_settings(commit: impl Fn() -> Box<dyn Fn(&Report)>) {
+    for policy in [Policy::StaticPriority, Policy::Edf] {
+        for workers in 1..=3 {
+            let machine = Native::new().workers(workers).policy(policy);
+            let judge = commit();
+            judge(&machine.run());
+            let machine = Native::new().workers(workers).policy(policy);
+            let judge = commit();
+            let recorded = machine.run_recorded();
+            assert_eq!(recorded.violations, [], "{policy:?}, {workers} workers");
+            judge(&recorded.report);
+        }
+    }
+}
+
+/// A sporadic DAG of two subtasks that counts its runs and samples what has raised it.
+fn answering(name: &str, latest: &Latest<u64>, runs: &Arc<AtomicU64>) -> (Dag, Signal) {
+    let dag = create_dag();
+    dag.name(name).jobs(JOBS).relative_deadline(SHORTER);
+    let signal = dag.register_sporadic_subtask(|| (7u64,), vec![name], SHORTER, named("wake"));
+    let runs = Arc::clone(runs);
+    dag.using(latest.sample()).register_sink_subtask(
+        move |sample: Option<Sample<'_, u64>>, (own,): (u64,)| {
+            let job = runs.fetch_add(1, Relaxed);
+            let sample = sample.expect("it shows at the completion that raised the signal");
+            assert_eq!((*sample.value, sample.job, own), (job, job, 7));
+            assert!(sample.completed_ns <= fass::now_ns());
+        },
+        vec![name],
+        SHORTER,
+        named("answer"),
+    );
+    (dag, signal)
+}
+
+#[test]
+fn signals_and_latest_values_take_effect_at_the_same_completion() {
+    in_all_settings(|| {
+        let asks = create_dag();
+        asks.name("asks").jobs(JOBS);
+        let latest = asks.latest("count");
+        let runs: [Arc<AtomicU64>; 2] = Default::default();
+        let (one, to_one) = answering("one", &latest, &runs[0]);
+        let (other, to_other) = answering("other", &latest, &runs[1]);
+        asks.register_periodic_subtask(|| (1u64,), vec!["tick"], PERIOD, named("clock"));
+        let mut count = 0u64;
+        asks.using((to_one.raising(), to_other.raising()))
+            .register_subtask(
+                move |(mut one, mut other): (Raiser<'_>, Raiser<'_>), (tick,): (u64,)| {
+                    one.raise();
+                    other.raise();
+                    count += tick;
+                    (count - 1,)
+                },
+                vec!["tick"],
+                vec!["count"],
+                named("ask"),
+            );
+        asks.register_sink_subtask(|_: (u64,)| (), vec!["count"], PERIOD, named("end"));
+        finish_create_dags(&[one, other, asks]).expect("the dags are right");
+        Box::new(move |report| {
+            for of_dag in &report.statistics {
+                assert_eq!((of_dag.completed, of_dag.misses), (JOBS, 0));
+            }
+            assert!(report.statistics[..2].iter().all(|of| of.signals == JOBS));
+            assert!(runs.iter().all(|runs| runs.load(Relaxed) == JOBS));
+        })
+    });
+}
+
+#[test]
+fn a_signal_too_soon_is_dropped_and_an_instance_that_raises_none_has_none() {
+    in_all_settings(|| {
+        let answers = create_dag();
+        answers.name("answers").jobs(JOBS).relative_deadline(PERIOD);
+        let signal = answers.register_sporadic_subtask(|| (), vec![], 2 * PERIOD, named("answer"));
+        let asks = create_dag();
+        asks.name("asks").jobs(JOBS).relative_deadline(PERIOD);
+        let mut job = 0;
+        asks.using(signal.raising()).register_periodic_subtask(
+            move |mut signal: Raiser<'_>| {
+                if job % 10 < 4 {
+                    signal.raise();
+                }
+                job += 1;
+            },
+            vec![],
+            PERIOD,
+            named("ask"),
+        );
+        finish_create_dags(&[answers, asks]).expect("the dags are right");
+        Box::new(|report| {
+            let answers = &report.statistics[0];
+            // Of four in a row, one finds another that is still kept.
+            assert_eq!(answers.signals, JOBS / 10 * 4);
+            assert_eq!(answers.dropped_signals, JOBS / 10);
+            assert_eq!(answers.completed, JOBS / 10 * 3);
+            assert_eq!(report.statistics[1].completed, JOBS);
+        })
+    });
+}
+
+#[test]
+fn a_chain_of_signals_reaches_its_end() {
+    in_all_settings(|| {
+        let dags: Vec<Dag> = (0..4).map(|_| create_dag()).collect();
+        let signals: Vec<Signal> = dags[1..].iter().map(|dag| dag.sporadic(SHORTER)).collect();
+        dags[0].period(PERIOD);
+        for (stage, dag) in dags.iter().enumerate() {
+            dag.name(&format!("stage {stage}")).jobs(JOBS);
+            dag.relative_deadline(SHORTER);
+            if let Some(next) = signals.get(stage) {
+                dag.using(next.raising()).register_untyped_subtask(
+                    |mut next: Raiser<'_>, _job| next.raise(),
+                    named("stage"),
+                );
+            } else {
+                let _ = dag.register_untyped_subtask(|_job| (), named("stage"));
+            }
+        }
+        finish_create_dags(&dags).expect("the dags are right");
+        Box::new(|report| {
+            assert!(report.statistics.iter().all(|of| of.completed == JOBS));
+        })
+    });
+}
+
+/// A sporadic DAG without a limit, whose jobs are more urgent than what raises them.
+fn without_a_limit() -> Native {
+    let machine = Native::new().policy(Policy::Edf);
+    let answers = create_dag();
+    answers.name("answers").relative_deadline(SHORTER);
+    let signal = answers.register_sporadic_subtask(|| (), vec![], SHORTER, named("answer"));
+    let asks = create_dag();
+    asks.name("asks").jobs(JOBS);
+    asks.using(signal.raising()).register_periodic_subtask(
+        |mut signal: Raiser<'_>| {
+            signal.raise();
+            (1u64,)
+        },
+        vec!["tick"],
+        PERIOD,
+        named("ask"),
+    );
+    asks.register_sink_subtask(|_: (u64,)| (), vec!["tick"], PERIOD, named("end"));
+    finish_create_dags(&[answers, asks]).expect("the dags are right");
+    machine
+}
+
+#[test]
+fn a_sporadic_dag_without_a_limit_keeps_no_run_going() {
+    let report = without_a_limit().run();
+    assert_eq!(report.statistics[0].completed, JOBS);
+}
+
+#[test]
+#[should_panic(expected = "dag `answers` has no limit of jobs and cannot be recorded")]
+fn a_sporadic_dag_without_a_limit_is_not_recorded() {
+    without_a_limit().run_recorded();
+}
