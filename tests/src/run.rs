@@ -25,7 +25,7 @@ use crate::install;
 use crate::options::Parsed;
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
-use crate::protocol::Status;
+use crate::protocol::{Status, Transcript};
 use crate::qemu::{Ending, LEAST_MEMORY_MIB, Machine, Mode, PROGRAM, Qemu};
 use crate::system;
 use screen::Screen;
@@ -287,13 +287,26 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
         Err(_) => eprint!("{}", outcome.tail()),
     }
     let remedy = match outcome.ending {
-        Ending::TimedOut(_) => {
-            "; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
-             if it has a WCET or a budget"
-        }
-        _ => "",
+        Ending::TimedOut(_) => format!(
+            "{}; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
+             if it has a WCET or a budget",
+            stalled(&outcome.transcript)
+        ),
+        _ => String::new(),
     };
     RUN.fail(&format!("failed: {}{remedy}", fault.reason))
+}
+
+/// Names whom the guest has found to run when nothing went on, if it has.
+fn stalled(transcript: &Transcript) -> String {
+    let named = transcript.of_kind("stalled").filter_map(|line| {
+        let (subtask, dag) = (line.text_at("subtask_name")?, line.text_at("dag_name")?);
+        let seconds = line.number_at("still_ns")? / 1_000_000_000;
+        Some(format!(
+            "; subtask `{subtask}` of dag `{dag}` ran for {seconds} s of its time while no job ended"
+        ))
+    });
+    named.collect()
 }
 
 /// Where the serial log goes, and whether it stays.

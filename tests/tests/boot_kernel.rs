@@ -79,6 +79,23 @@ fn a_fault_that_the_app_does_not_look_at_is_a_failure() {
 }
 
 #[test]
+fn a_run_that_comes_to_a_standstill_names_who_runs() {
+    for cores in [1, 4] {
+        let outcome = guest("stalled").cores(cores).succeed();
+        let stalled: Vec<_> = outcome.transcript.of_kind("stalled").collect();
+        let [line] = stalled[..] else {
+            panic!("not one line of kind `stalled`\n{}", outcome.tail());
+        };
+        assert_eq!(line.text_at("dag_name"), Some("endless"), "{}", line.text);
+        assert_eq!(line.text_at("subtask_name"), Some("holds"), "{}", line.text);
+        assert_eq!(line.number_at("job"), Some(0), "{}", line.text);
+        let still_ns = line.number_at("still_ns").unwrap_or(0);
+        assert!((2_000_000_000..4_000_000_000).contains(&still_ns));
+        assert_eq!(outcome.transcript.of_kind("fault").count(), 1);
+    }
+}
+
+#[test]
 fn a_processor_exception_ends_in_failure_and_is_named() {
     for test in [
         "null_write",

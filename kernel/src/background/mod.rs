@@ -7,10 +7,12 @@
 //! Under overload that may be for ever, and then a person wants most to see what
 //! goes on, and to stop it. So if the background has not come to run for
 //! [`STARVED_NS`], core 0's heartbeat does a *slice* of the status and the console
-//! instead: one line, a few microseconds.
+//! instead: one line, a few microseconds. The heartbeat is also what notices that a run
+//! has stalled ([`stall`]).
 
 mod listener;
 mod progress;
+mod stall;
 mod status;
 
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -79,8 +81,10 @@ impl Sliced {
     }
 }
 
-/// Does a slice in core 0's heartbeat, if the background does not come to it.
+/// Does in core 0's heartbeat what is its own, and a slice if the background does not
+/// come to it.
 pub(crate) fn beat(now_ns: u64) {
+    stall::beat(now_ns);
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
     }
@@ -118,6 +122,7 @@ impl Background {
             };
             RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }
+        stall::begin();
         Self {
             heartbeat_before_ns: period_ns.map(worker::set_own_heartbeat),
             progress: Progress::new(total),
@@ -145,6 +150,7 @@ impl Background {
         if let Some(before_ns) = self.heartbeat_before_ns {
             worker::set_own_heartbeat(before_ns);
         }
+        stall::end();
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;

@@ -11,6 +11,7 @@ mod kernel_crimes;
 mod occupation;
 mod preemption;
 mod sharing;
+mod stalled;
 mod storm;
 mod unnoticed;
 
@@ -22,7 +23,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 15] = [
+const TESTS: [(&str, Test); 16] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -41,6 +42,7 @@ const TESTS: [(&str, Test); 15] = [
     ("occupation", occupation::run),
     ("endless", endless::run),
     ("sharing", sharing::run),
+    ("stalled", stalled::run),
     ("storm", storm::run),
     ("unnoticed", unnoticed::run),
 ];

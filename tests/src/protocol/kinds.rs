@@ -22,6 +22,18 @@ pub const KINDS: &[(&str, &[&str])] = &[
         "status",
         &["time_ns", "done", "total", "misses", "load_permille"],
     ),
+    (
+        "stalled",
+        &[
+            "dag",
+            "dag_name",
+            "subtask",
+            "subtask_name",
+            "job",
+            "cpu",
+            "still_ns",
+        ],
+    ),
     ("console", &["command", "accepted"]),
     (
         "dag_status",
