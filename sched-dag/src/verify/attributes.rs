@@ -109,15 +109,17 @@ fn check_counts(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
 fn check_times(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
+    // Who registers subtasks states both with them.
+    let has_subtasks = !spec.subtasks.is_empty();
     match spec.period_ns {
-        None => findings.fault(dag, Fault::MissingPeriod { dag: label() }),
+        None if has_subtasks => findings.fault(dag, Fault::MissingPeriod { dag: label() }),
         Some(0) => findings.fault(dag, Fault::ZeroPeriod { dag: label() }),
-        Some(_) => {}
+        _ => {}
     }
     match spec.relative_deadline_ns {
-        None => findings.fault(dag, Fault::MissingDeadline { dag: label() }),
+        None if has_subtasks => findings.fault(dag, Fault::MissingDeadline { dag: label() }),
         Some(0) => findings.fault(dag, Fault::ZeroDeadline { dag: label() }),
-        Some(_) => {}
+        _ => {}
     }
     if deadline_of(spec, 0).is_none() {
         let time = Time::FirstDeadline;

@@ -1,6 +1,6 @@
 //! Faults of the graph as a whole: cycles, sources, sinks, connection.
 
-use sched_dag::{CommitOptions, ConstructionPolicy, Policy, SubtaskSpec, verify};
+use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, verify};
 
 use crate::{assert_fault, assert_faults, dag, drive, options, port, subtask};
 
@@ -33,13 +33,13 @@ fn no_dags_no_cores_no_subtasks() {
         no_cores.to_string(),
         "the commit is for 0 cores; give the scheduler at least 1"
     );
-    assert_faults(
-        &[dag("", vec![])],
-        &[(
-            "no_subtasks",
-            "dag 0 has no subtask; register one or drop the dag",
-        )],
-    );
+    let no_subtasks = [(
+        "no_subtasks",
+        "dag 0 has no subtask; register one or drop the dag",
+    )];
+    assert_faults(&[dag("", vec![])], &no_subtasks);
+    // Neither what subtasks would have stated is missed.
+    assert_faults(&[DagSpec::default()], &no_subtasks);
 }
 
 #[test]
