@@ -1,54 +1,13 @@
 //! The experiment on threads, a hundred times as fast: the joins are what the policy
 //! makes of the publications that really happened.
 
+#[path = "../../pub-sub/tests/support/threads.rs"]
+mod threads;
+
 use std::num::NonZeroUsize;
-use std::sync::{Condvar, Mutex};
 use std::thread;
-use std::time::{Duration, Instant};
 
-use join_latency::{Experiment, Matching, Message, Part, Samples};
-use pub_sub::executor::{Host, work};
-use pub_sub::graph::Graph;
-
-struct Threads {
-    graph: Mutex<Graph<Message, Part>>,
-    version: Mutex<u64>,
-    changed: Condvar,
-    start: Instant,
-}
-
-impl Host<Message, Part> for Threads {
-    fn now_ns(&self) -> u64 {
-        self.start
-            .elapsed()
-            .as_nanos()
-            .try_into()
-            .expect("a short test")
-    }
-
-    fn with_graph<R>(&self, section: impl FnOnce(&mut Graph<Message, Part>) -> R) -> R {
-        section(&mut self.graph.lock().expect("no holder panics"))
-    }
-
-    fn version(&self) -> u64 {
-        *self.version.lock().expect("no holder panics")
-    }
-
-    fn wait(&self, seen: u64, until_ns: u64) {
-        let limit = Duration::from_nanos(until_ns.saturating_sub(self.now_ns()));
-        let limit = limit.min(Duration::from_secs(1));
-        let version = self.version.lock().expect("no holder panics");
-        drop(
-            self.changed
-                .wait_timeout_while(version, limit, |version| *version == seen),
-        );
-    }
-
-    fn notify(&self) {
-        *self.version.lock().expect("no holder panics") += 1;
-        self.changed.notify_all();
-    }
-}
+use join_latency::{Experiment, Matching, Samples};
 
 const JOBS: usize = 100;
 const PARALLEL: usize = 3;
@@ -65,18 +24,7 @@ fn run(matching: Matching, depth: usize) -> Samples {
         period_ns: 250_000,
         execute: |time| thread::sleep(time / 100),
     };
-    let host = Threads {
-        graph: Mutex::new(experiment.graph()),
-        version: Mutex::new(0),
-        changed: Condvar::new(),
-        start: Instant::now(),
-    };
-    thread::scope(|scope| {
-        for _ in 0..PARALLEL + 2 {
-            scope.spawn(|| work(&host));
-        }
-    });
-    experiment.samples(host.graph.into_inner().expect("no holder panics"))
+    experiment.samples(threads::run(experiment.graph(), PARALLEL + 2))
 }
 
 #[test]

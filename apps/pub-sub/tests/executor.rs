@@ -1,65 +1,14 @@
 //! Workers on threads: what is published is handled, in order, and never twice at a
 //! time within a group.
 
+#[path = "support/threads.rs"]
+mod threads;
+
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Condvar, Mutex};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use pub_sub::executor::{Host, work};
 use pub_sub::graph::{Call, Callbacks, Context, Graph, TopicId};
-
-/// A graph shared by threads.
-struct Threads<C> {
-    graph: Mutex<Graph<u64, C>>,
-    version: Mutex<u64>,
-    changed: Condvar,
-    start: Instant,
-}
-
-impl<C: Send> Threads<C> {
-    fn new(graph: Graph<u64, C>) -> Self {
-        Self {
-            graph: Mutex::new(graph),
-            version: Mutex::new(0),
-            changed: Condvar::new(),
-            start: Instant::now(),
-        }
-    }
-}
-
-impl<C: Send> Host<u64, C> for Threads<C> {
-    fn now_ns(&self) -> u64 {
-        self.start
-            .elapsed()
-            .as_nanos()
-            .try_into()
-            .expect("a short test")
-    }
-
-    fn with_graph<R>(&self, section: impl FnOnce(&mut Graph<u64, C>) -> R) -> R {
-        section(&mut self.graph.lock().expect("no holder panics"))
-    }
-
-    fn version(&self) -> u64 {
-        *self.version.lock().expect("no holder panics")
-    }
-
-    fn wait(&self, seen: u64, until_ns: u64) {
-        let limit = Duration::from_nanos(until_ns.saturating_sub(self.now_ns()));
-        let version = self.version.lock().expect("no holder panics");
-        let limit = limit.min(Duration::from_secs(1));
-        drop(
-            self.changed
-                .wait_timeout_while(version, limit, |version| *version == seen),
-        );
-    }
-
-    fn notify(&self) {
-        *self.version.lock().expect("no holder panics") += 1;
-        self.changed.notify_all();
-    }
-}
 
 /// A source, relays that pass on what they get in the middle of their callback, and a
 /// collector of all relays' topics.
@@ -139,13 +88,7 @@ fn several_workers_handle_everything_once_and_in_order() {
     for output in &outputs {
         graph.subscribe(collector, *output, 1000);
     }
-    let host = Threads::new(graph);
-    thread::scope(|scope| {
-        for _ in 0..RELAYS + 2 {
-            scope.spawn(|| work(&host));
-        }
-    });
-    let graph = host.graph.into_inner().unwrap();
+    let graph = threads::run(graph, RELAYS + 2);
     assert_eq!(graph.dropped(), 0);
     let parts: Vec<Part> = graph.into_callbacks().collect();
     assert_eq!(parts.len(), RELAYS + 2, "all were given back");

@@ -1,7 +1,8 @@
 //! What must hold of any trace, on random ones. A failing test's last line of output
 //! is the seed that repeats it.
 
-mod support;
+#[path = "../../../sched-dag/tests/support/random.rs"]
+mod random;
 
 use std::collections::HashSet;
 use std::num::NonZeroUsize;
@@ -9,7 +10,7 @@ use std::num::NonZeroUsize;
 use pub_sub::{
     AgePenalty, ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer,
 };
-use support::Random;
+use random::Random;
 
 const SEEDS: u64 = 300;
 
@@ -55,15 +56,10 @@ fn for_each_seed(mut property: impl FnMut(&mut Random)) {
     }
 }
 
-/// Returns a number below a limit that is not 0.
-fn below(random: &mut Random, limit: usize) -> usize {
-    usize::try_from(random.next() % limit as u64).expect("below the limit")
-}
-
 /// Stamps that are about periodic, and repeat and go backwards.
 fn wild_trace(random: &mut Random, topics: usize) -> Trace {
     let stamps = (0..200).map(|arrival| {
-        let topic = below(random, topics);
+        let topic = random.below(topics);
         (topic, arrival / topics as u64 + random.between(0, 12))
     });
     stamps.collect()
@@ -73,7 +69,7 @@ fn wild_trace(random: &mut Random, topics: usize) -> Trace {
 fn ordered_trace(random: &mut Random, topics: usize, gaps_ns: &[u64], arrivals: u64) -> Trace {
     let mut last_ns = vec![0; topics];
     let stamps = (0..arrivals).map(|_| {
-        let topic = below(random, topics);
+        let topic = random.below(topics);
         last_ns[topic] += gaps_ns[topic] + random.between(1, 20);
         (topic, last_ns[topic])
     });
@@ -96,7 +92,7 @@ fn random_synchronizer(
     let factor = random.between(4, 12);
     let mut parameters = parameters(topics, queue_size)
         .age_penalty(AgePenalty::from_factor(factor, 2).expect("in range"))
-        .lower_bound_ns(below(random, topics), random.between(0, 5));
+        .lower_bound_ns(random.below(topics), random.between(0, 5));
     if random.between(0, 1) == 0 {
         parameters = parameters.max_interval_ns(random.between(0, 10));
     }
@@ -106,8 +102,8 @@ fn random_synchronizer(
 #[test]
 fn every_message_leaves_once_or_is_held() {
     for_each_seed(|random| {
-        let topics = 1 + below(random, 5);
-        let queue_size = 1 + below(random, 8);
+        let topics = 1 + random.below(5);
+        let queue_size = 1 + random.below(8);
         let trace = wild_trace(random, topics);
         let mut synchronizer = random_synchronizer(random, topics, queue_size);
         let mut left = HashSet::new();
@@ -135,8 +131,8 @@ fn every_message_leaves_once_or_is_held() {
 #[test]
 fn approximate_sets_are_in_the_order_of_arrival_in_each_topic() {
     for_each_seed(|random| {
-        let topics = 1 + below(random, 5);
-        let queue_size = 1 + below(random, 8);
+        let topics = 1 + random.below(5);
+        let queue_size = 1 + random.below(8);
         let trace = wild_trace(random, topics);
         let mut approximate = ApproximateTime::new(parameters(topics, queue_size));
         let departures = feed(&mut approximate, &trace);
@@ -185,8 +181,8 @@ fn exact_by_brute_force(trace: &Trace, topics: usize, queue_size: usize) -> Vec<
 #[test]
 fn exact_agrees_with_brute_force() {
     for_each_seed(|random| {
-        let topics = 1 + below(random, 4);
-        let queue_size = 1 + below(random, 8);
+        let topics = 1 + random.below(4);
+        let queue_size = 1 + random.below(8);
         let trace = wild_trace(random, topics);
         let expected = exact_by_brute_force(&trace, topics, queue_size);
         assert_eq!(
@@ -221,7 +217,7 @@ fn least_size(topics: &[Vec<u64>], given: usize, given_ns: u64) -> u64 {
 fn with_no_penalty_each_set_is_the_smallest_around_its_pivot() {
     let mut sets = 0;
     for_each_seed(|random| {
-        let topics = 2 + below(random, 2);
+        let topics = 2 + random.below(2);
         let trace = ordered_trace(random, topics, &[0; 3], 36);
         let no_penalty = AgePenalty::from_factor(1, 0).unwrap();
         let parameters = parameters(topics, 100).age_penalty(no_penalty);
@@ -251,7 +247,7 @@ fn with_no_penalty_each_set_is_the_smallest_around_its_pivot() {
 fn lower_bounds_that_hold_change_when_sets_come_but_not_which() {
     let mut sooner = 0;
     for_each_seed(|random| {
-        let topics = 2 + below(random, 3);
+        let topics = 2 + random.below(3);
         let gaps_ns: Vec<u64> = (0..topics).map(|_| random.between(0, 30)).collect();
         let trace = ordered_trace(random, topics, &gaps_ns, 100);
         let unbounded = parameters(topics, 100);
@@ -282,8 +278,8 @@ fn lower_bounds_that_hold_change_when_sets_come_but_not_which() {
 #[test]
 fn only_differences_of_stamps_matter() {
     for_each_seed(|random| {
-        let topics = 1 + below(random, 4);
-        let queue_size = 1 + below(random, 8);
+        let topics = 1 + random.below(4);
+        let queue_size = 1 + random.below(8);
         let trace = wild_trace(random, topics);
         let later = trace
             .iter()

@@ -3,14 +3,15 @@
 //! queue 1000. Seeds differ, so figures agree as far as samples do: over seeds, the
 //! sets per job have a standard deviation of at most 0.009.
 
-mod support;
+#[path = "../../../sched-dag/tests/support/random.rs"]
+mod random;
 
 use std::num::NonZeroUsize;
 
 use pub_sub::metrics::Record;
 use pub_sub::workload::{self, Stamping};
 use pub_sub::{ApproximateTime, ExactTime, Parameters, Synchronizer};
-use support::Random;
+use random::Random;
 
 const JOBS: usize = 2000;
 const QUEUE_SIZE: usize = 1000;

@@ -3,7 +3,8 @@
 
 #![allow(dead_code, reason = "each test uses a part of this")]
 
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
+/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014, doi 10.1145/2660193.2660195).
+#[derive(Clone)]
 pub(crate) struct Random(u64);
 
 impl Random {
