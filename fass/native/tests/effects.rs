@@ -1,14 +1,16 @@
-//! What instances leave outside their DAGs: signals and latest values, on threads.
+//! What instances share beside their edges, on threads: signals, latest values, states.
 //!
-//! Both take effect when the instance is complete, neither earlier nor later: so a
-//! sporadic DAG that a signal releases finds the value of the very job that raised it.
+//! Signals and latest values take effect when the instance is complete, neither earlier
+//! nor later: so a sporadic DAG that a signal releases finds the value of the very job
+//! that raised it. A state is never claimed by two, also where jobs are aborted.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use fass::{
-    Dag, Latest, Policy, Raiser, Sample, Signal, SubtaskAttributes, create_dag, finish_create_dags,
+    Dag, Latest, OverrunPolicy, Policy, Raiser, Sample, Signal, SubtaskAttributes, create_dag,
+    finish_create_dags,
 };
 use native::{Native, Report};
 
@@ -180,4 +182,44 @@ fn a_sporadic_dag_without_a_limit_keeps_no_run_going() {
 #[should_panic(expected = "dag `answers` has no limit of jobs and cannot be recorded")]
 fn a_sporadic_dag_without_a_limit_is_not_recorded() {
     without_a_limit().run_recorded();
+}
+
+#[test]
+fn nobody_finds_a_state_taken_though_jobs_are_aborted() {
+    for workers in 1..=3 {
+        let machine = Native::new().workers(workers);
+        let dag = create_dag();
+        dag.name("sharing").jobs(JOBS).in_flight(1);
+        dag.overrun(OverrunPolicy::Abort);
+        let period = Duration::from_nanos(2);
+        // How often each of the three has changed it. They take turns, and a turn that
+        // one loses by an abort the next ones lose, too.
+        let turns = dag.state("turns", [0u64; 3]);
+        dag.register_periodic_subtask(|| (1u64,), vec!["one"], period, named("source"));
+        for (index, name) in ["a", "b", "c"].into_iter().enumerate() {
+            dag.using(turns.update()).register_subtask(
+                move |turns: &mut [u64; 3], (one,): (u64,)| {
+                    turns[index] += one;
+                    assert!(turns[0] >= turns[1] && turns[1] >= turns[2]);
+                    (one,)
+                },
+                vec!["one"],
+                vec![name],
+                named(name),
+            );
+        }
+        dag.using(turns.read()).register_sink_subtask(
+            |turns: &[u64; 3], (a, b, c): (u64, u64, u64)| {
+                assert_eq!((a, b, c), (1, 1, 1));
+                assert!(turns[2] > 0);
+            },
+            vec!["a", "b", "c"],
+            period,
+            named("sink"),
+        );
+        finish_create_dags(&[dag]).expect("the dag is right");
+        let recorded = machine.run_recorded();
+        assert_eq!(recorded.violations, [], "{workers} workers");
+        assert!(recorded.report.statistics[0].aborts > 0);
+    }
 }
