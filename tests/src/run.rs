@@ -129,13 +129,16 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let outcome = outcome.map_err(Refusal::Failure)?;
     if let Some(file) = options.text("trace") {
         screen.say(&format!(
-            "trace: `./scripts/check-trace {file}` judges it, `./scripts/trace {file}` draws it"
+            "{file}: the log with its trace; `./scripts/check-trace {file}` judges it, \
+             `./scripts/trace {file} -o {file}.json` draws it"
         ));
     }
     let drawn = seeing::write_dot(options, &outcome);
     if outcome.judge().is_ok() {
         // Otherwise there are worse news.
-        drawn.map_err(Refusal::Failure)?;
+        if let Some(line) = drawn.map_err(Refusal::Failure)? {
+            screen.say(&line);
+        }
     }
     Ok(Booted {
         outcome,

@@ -119,6 +119,8 @@ fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
     let output = call("trace", &[log, "-o", out.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(0));
     assert_eq!(fs::read_to_string(&out).expect("written"), drawn);
+    let hint = format!("{}: open it at https://ui.perfetto.dev\n", out.display());
+    assert_eq!(text(&output.stderr), hint);
     let refused = |words: &[&str]| {
         let output = call("trace", words);
         (output.status.code(), text(&output.stderr).to_string())

@@ -53,17 +53,21 @@ fn not_writable(file: &str, error: &io::Error) -> String {
     format!("`--dot {file}`: cannot be written: {error}; name another file")
 }
 
-/// Writes the DAGs that a run has committed, if the options ask for it.
+/// Writes the DAGs that a run has committed, if the options ask for it, and returns
+/// what to say of the file.
 ///
 /// # Errors
 ///
 /// In words: there are none, or the file cannot be written.
-pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<(), String> {
+pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<Option<String>, String> {
     let Some(file) = options.text("dot") else {
-        return Ok(());
+        return Ok(None);
     };
     let text = dot::text(&outcome.transcript)?;
-    fs::write(file, text).map_err(|error| not_writable(file, &error))
+    fs::write(file, text).map_err(|error| not_writable(file, &error))?;
+    Ok(Some(format!(
+        "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
+    )))
 }
 
 /// Hands standard input on to the guest's serial port, until either ends.

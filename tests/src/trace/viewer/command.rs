@@ -60,7 +60,10 @@ pub fn trace(words: &[String]) -> ExitCode {
         return ExitCode::SUCCESS;
     };
     match fs::write(out, text) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => {
+            eprintln!("{out}: open it at https://ui.perfetto.dev");
+            ExitCode::SUCCESS
+        }
         Err(error) => TRACE.fail(&format!("cannot write {out}: {error}")),
     }
 }
