@@ -8,7 +8,7 @@ use std::process::Command;
 use dag_file::Length;
 use harness::dag_file::{Import, load};
 use harness::protocol::Status;
-use harness::{Guest, Outcome, system};
+use harness::{Guest, Outcome, guide, system};
 
 const GOOD: &str = "dag x period 10ms\nsubtask a wcet 2ms\nsubtask b wcet 3ms\nedge a -> b\nend\n";
 
@@ -182,4 +182,52 @@ fn more_subtasks_than_memory_are_refused() {
         reason.contains("2000 subtasks and 4 cores need"),
         "{reason}"
     );
+}
+
+#[test]
+fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
+    let page = system::workspace().join("docs/dag-file.md");
+    let blocks = guide::blocks(&fs::read_to_string(page).expect("the page"));
+    let of_info = |info: &str| blocks.iter().find(|block| block.info == info);
+    let commands = &of_info("console").expect("commands").text;
+    let words = |line: &str| -> Vec<String> {
+        let command = line.split(" #").next().unwrap_or_default();
+        let words = command.split_whitespace();
+        words
+            .skip_while(|word| *word != "--dag")
+            .map(String::from)
+            .collect()
+    };
+    let commands: Vec<Vec<String>> = commands.lines().map(words).collect();
+    assert_eq!(commands.len(), 5);
+    for words in &commands {
+        let path = system::workspace().join(&words[1]);
+        assert!(path.exists(), "{} is not there", words[1]);
+    }
+    let demo = system::workspace().join(&commands[0][1]);
+    let demo = fs::read_to_string(demo).expect("it is there");
+    assert_eq!(of_info("text").expect("the example").text, demo);
+
+    let written = ["dot", "trace"].map(|option| {
+        let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("demo.{option}"));
+        (
+            format!("--{option}"),
+            file.to_str().expect("UTF-8").to_string(),
+        )
+    });
+    let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
+    run.current_dir(system::workspace()).arg("run");
+    run.args(&commands[0]).args(["--mode", "deterministic"]);
+    for (option, file) in &written {
+        run.args([option, file]);
+    }
+    let output = run.output().expect("the tool can be started");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("\"dag\":\"camera\""), "{said}");
+    // What else was written is said.
+    for (_, file) in &written {
+        let hint = |line: &str| line.starts_with(&format!("{file}: "));
+        assert!(said.lines().any(hint), "{said}");
+    }
 }
