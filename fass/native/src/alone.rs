@@ -2,7 +2,7 @@
 
 use sched_dag::{CoreId, HandOff, Scheduler, Vertex};
 
-use crate::execute::Execute;
+use crate::execute::{Execute, keep_signal};
 use crate::reports::Reports;
 use crate::watch::Watch;
 
@@ -23,7 +23,7 @@ pub(crate) fn run<B: Execute, W: Watch>(
             let body = &mut reports.bodies[vertex.index()];
             body.run(job);
             now_ns += W::STEP_NS;
-            body.complete(&mut |dag| signals.push(dag));
+            body.complete(&mut |dag| keep_signal(&mut signals, dag));
             if W::STEP_NS > 0 {
                 reports.watch.instant(now_ns);
                 reports.watch.finished(scheduler.instance_of(vertex), CORE);

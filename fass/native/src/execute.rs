@@ -20,6 +20,14 @@ pub(crate) trait Execute: Send {
     }
 }
 
+/// Keeps a signal that an instance has raised. A subtask may use a signal several
+/// times; it is one signal then, and the list has room for each DAG once.
+pub(crate) fn keep_signal(signals: &mut Vec<DagId>, dag: DagId) {
+    if !signals.contains(&dag) {
+        signals.push(dag);
+    }
+}
+
 impl<F: FnMut(u64) + Send + ?Sized> Execute for Box<F> {
     #[inline]
     fn run(&mut self, job: u64) {

@@ -30,7 +30,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use sched_dag::{CoreId, Decision, HandOff, Instance, Scheduler, Vertex};
 
-use crate::execute::Execute;
+use crate::execute::{Execute, keep_signal};
 use crate::mailbox::{Assignment, Mailbox, Post};
 use crate::relax::poll;
 use crate::reports::{Line, Reports, Shared};
@@ -114,7 +114,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
             let mailbox = &self.mailboxes[core.index()];
             running.body.complete(&mut |dag| {
                 has_signals = true;
-                mailbox.signals().push(dag);
+                keep_signal(&mut mailbox.signals(), dag);
             });
             drop(running.body);
             me.posted = Some(mailbox.post(running.vertex, has_signals));

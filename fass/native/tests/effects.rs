@@ -223,3 +223,32 @@ fn nobody_finds_a_state_taken_though_jobs_are_aborted() {
         assert!(recorded.report.statistics[0].aborts > 0);
     }
 }
+
+#[test]
+fn a_signal_that_an_instance_uses_twice_is_one() {
+    in_all_settings(|| {
+        let answers = create_dag();
+        answers
+            .name("answers")
+            .jobs(JOBS)
+            .relative_deadline(SHORTER);
+        let signal = answers.register_sporadic_subtask(|| (), vec![], SHORTER, named("answer"));
+        let asks = create_dag();
+        asks.name("asks").jobs(JOBS).relative_deadline(PERIOD);
+        asks.using((signal.raising(), signal.raising()))
+            .register_periodic_subtask(
+                |(mut once, mut again): (Raiser<'_>, Raiser<'_>)| {
+                    once.raise();
+                    again.raise();
+                },
+                vec![],
+                PERIOD,
+                named("ask"),
+            );
+        finish_create_dags(&[answers, asks]).expect("a correct set");
+        Box::new(|report| {
+            let of_answers = &report.statistics[0];
+            assert_eq!((of_answers.signals, of_answers.dropped_signals), (JOBS, 0));
+        })
+    });
+}
