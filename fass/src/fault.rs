@@ -7,6 +7,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
+use core::time::Duration;
 
 use sched_dag::{DagLabel, SubtaskLabel, Warning};
 
@@ -242,8 +243,10 @@ impl fmt::Display for Fault {
                 second_ns,
             } => write!(
                 f,
-                "{subtask} gives {dag} a period of {second_ns} ns where {first_ns} ns were given \
-                 before; a DAG has one period, make two DAGs or give the same period"
+                "{subtask} gives {dag} a period of {:?} where {:?} were given before; a DAG has \
+                 one period, make two DAGs or give the same period",
+                Duration::from_nanos(*second_ns),
+                Duration::from_nanos(*first_ns)
             ),
             Self::ActivationsDiffer { dag, subtask } => write!(
                 f,
@@ -271,8 +274,10 @@ impl fmt::Display for Fault {
                 second_ns,
             } => write!(
                 f,
-                "{subtask} gives {dag} a relative deadline of {second_ns} ns where {first_ns} ns \
-                 were given before; a DAG has one deadline, give the same to every sink"
+                "{subtask} gives {dag} a relative deadline of {:?} where {:?} were given before; \
+                 a DAG has one deadline, give the same to every sink",
+                Duration::from_nanos(*second_ns),
+                Duration::from_nanos(*first_ns)
             ),
             Self::NotProven { dag, unproven } => write!(
                 f,

@@ -119,13 +119,13 @@ fn two_periods_and_two_deadlines_are_faults() {
     }
     assert_eq!(
         error.faults()[0].to_string(),
-        "subtask `second source` gives dag `twice` a period of 20000000 ns where 10000000 ns \
+        "subtask `second source` gives dag `twice` a period of 20ms where 10ms \
          were given before; a DAG has one period, make two DAGs or give the same period"
     );
     assert_eq!(
         error.faults()[1].to_string(),
-        "subtask `second sink` gives dag `twice` a relative deadline of 20000000 ns where \
-         10000000 ns were given before; a DAG has one deadline, give the same to every sink"
+        "subtask `second sink` gives dag `twice` a relative deadline of 20ms where \
+         10ms were given before; a DAG has one deadline, give the same to every sink"
     );
 }
 

@@ -12,6 +12,7 @@
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
+use core::time::Duration;
 
 use alloc::string::ToString;
 
@@ -101,15 +102,13 @@ pub(crate) fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         timer::set(Alarm::Budget, context.budget_end_ns());
         return;
     }
-    let budget_ns = execution::budget_ns(instance);
+    let budget = Duration::from_nanos(execution::budget_ns(instance));
     let rip = interrupted.instruction();
     report(
         instance,
         &Fault {
             cause: "budget overrun",
-            message: &fmt::from_fn(|f| {
-                write!(f, "executed for more than its budget of {budget_ns} ns")
-            }),
+            message: &format_args!("executed for more than its budget of {budget:?}"),
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: None,
         },

@@ -208,8 +208,8 @@ fn what_is_certain_to_miss_is_accepted_with_a_warning() {
     assert_eq!(codes, ["certain_miss"]);
     assert_eq!(
         commit.warnings()[0].to_string(),
-        "dag `long` cannot keep its deadlines at its WCETs: its longest path alone takes 10000000 \
-         ns, which is more than its relative deadline; shorten the path or relax the deadline"
+        "dag `long` cannot keep its deadlines at its WCETs: its longest path alone takes 10ms, \
+         which is more than its relative deadline; shorten the path or relax the deadline"
     );
     assert_eq!(machine.run().statistics[0].misses, 50);
 }

@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 use core::fmt;
+use core::time::Duration;
 
 use super::overheads::Overheads;
 use super::task::TaskError;
@@ -168,8 +169,9 @@ impl fmt::Display for Reason {
             Self::NoCores => f.write_str("there are no cores; give it at least one"),
             Self::LengthBeyondDeadline { length_ns } => write!(
                 f,
-                "its longest path alone takes {length_ns} ns, which is more than its relative \
-                 deadline; shorten the path or relax the deadline"
+                "its longest path alone takes {:?}, which is more than its relative deadline; \
+                 shorten the path or relax the deadline",
+                Duration::from_nanos(*length_ns)
             ),
             Self::SubtaskBeyondPeriod { subtask } => write!(
                 f,

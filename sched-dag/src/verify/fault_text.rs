@@ -1,7 +1,11 @@
 //! The text of each fault: fact, offender, remedy, in one line.
+//!
+//! Times stand in it as a `Duration` prints them, in the unit that a person reads and
+//! with every digit: `20ms`, `6.000001ms`.
 
 use alloc::string::String;
 use core::fmt::{self, Display};
+use core::time::Duration;
 
 use super::fault::{Direction, Fault, Time};
 use crate::MAX_ARITY;
@@ -107,8 +111,10 @@ impl Display for Fault {
                 relative_deadline_ns,
             } => write!(
                 f,
-                "{subtask} of {dag} has a WCET of {wcet_ns} ns, longer than the relative deadline of \
-                 {relative_deadline_ns} ns; shorten it or extend the deadline"
+                "{subtask} of {dag} has a WCET of {:?}, longer than the relative deadline of {:?}; \
+                 shorten it or extend the deadline",
+                Duration::from_nanos(*wcet_ns),
+                Duration::from_nanos(*relative_deadline_ns)
             ),
             Self::ZeroJobs { dag } => {
                 write!(

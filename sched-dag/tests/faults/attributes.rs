@@ -37,9 +37,18 @@ fn periods_deadlines_and_counts() {
         "dag `drive` has room for 0 jobs in flight; give at least 1, or leave it out",
     );
     assert_fault(
+        |spec| {
+            spec.subtasks[1].wcet_ns = Some(20_000_001);
+            spec.relative_deadline_ns = Some(20_000_000);
+        },
+        "wcet_exceeds_deadline",
+        "subtask `fuse` of dag `drive` has a WCET of 20.000001ms, longer than the relative \
+         deadline of 20ms; shorten it or extend the deadline",
+    );
+    assert_fault(
         |spec| spec.subtasks[1].wcet_ns = Some(51),
         "wcet_exceeds_deadline",
-        "subtask `fuse` of dag `drive` has a WCET of 51 ns, longer than the relative deadline of 50 ns; \
+        "subtask `fuse` of dag `drive` has a WCET of 51ns, longer than the relative deadline of 50ns; \
          shorten it or extend the deadline",
     );
 }
