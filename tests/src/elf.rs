@@ -117,6 +117,28 @@ pub(crate) fn sections(file: &[u8]) -> Result<Vec<Section>, String> {
     headers.map(section).collect()
 }
 
+/// Returns the bytes of the section of this name.
+///
+/// # Errors
+///
+/// As [`stripped_bytes`], or there is none.
+pub(crate) fn named_section<'f>(file: &'f [u8], name: &str) -> Result<&'f [u8], String> {
+    let none = || format!("there is no section {name}");
+    let all = sections(file)?;
+    let names = usize::try_from(number(file, 62, 2)?).unwrap_or(usize::MAX);
+    let names = all.get(names).ok_or_else(none)?;
+    let headers = table(file, 40, 60, SECTION_HEADER_BYTES)?;
+    for (section, header) in all.iter().zip(headers) {
+        let at = names.offset.saturating_add(number(file, header, 4)?);
+        if text(file, at)? == name {
+            let from = usize::try_from(section.offset).unwrap_or(usize::MAX);
+            let bytes = usize::try_from(section.bytes).unwrap_or(usize::MAX);
+            return file.get(from..from.saturating_add(bytes)).ok_or_else(none);
+        }
+    }
+    Err(none())
+}
+
 fn check(file: &[u8]) -> Result<(), String> {
     if file.starts_with(b"\x7fELF\x02\x01") {
         Ok(())

@@ -96,6 +96,22 @@ fn a_run_that_comes_to_a_standstill_names_who_runs() {
 }
 
 #[test]
+fn an_overrun_of_an_inlined_closure_names_its_line() {
+    let outcome = guest("overrun").succeed();
+    assert_eq!(outcome.transcript.of_kind("fault").count(), 1);
+    let tail = outcome.tail();
+    let explained = tail.lines().find(|line| line.starts_with("  = 0x"));
+    let explained = explained.unwrap_or_else(|| panic!("no address is explained\n{tail}"));
+    let line = explained.rsplit_once(", of tests/guest/src/overrun.rs:");
+    let line = line.and_then(|(_, line)| line.parse().ok());
+    // The loop, and the call of it.
+    assert!(
+        line.is_some_and(|line: u32| (17..=24).contains(&line)),
+        "{explained}"
+    );
+}
+
+#[test]
 fn a_processor_exception_ends_in_failure_and_is_named() {
     for test in [
         "null_write",

@@ -9,6 +9,7 @@ mod checksum;
 mod endless;
 mod kernel_crimes;
 mod occupation;
+mod overrun;
 mod preemption;
 mod sharing;
 mod stalled;
@@ -23,7 +24,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 16] = [
+const TESTS: [(&str, Test); 17] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -41,6 +42,7 @@ const TESTS: [(&str, Test); 16] = [
     ("preemption", preemption::run),
     ("occupation", occupation::run),
     ("endless", endless::run),
+    ("overrun", overrun::run),
     ("sharing", sharing::run),
     ("stalled", stalled::run),
     ("storm", storm::run),

@@ -4,12 +4,16 @@
 //! image has no names in it that it could read. The host has the image's symbol
 //! table. So wherever the tool shows a line of kind `panic`, `exception` or
 //! `fault` whose `place` is an address, it adds one line that names the function
-//! and the offset in it. What the guest printed stays as it is.
+//! and the offset in it, and the app's line there, if debugging information has one.
+//! What the guest printed stays as it is.
 //!
 //! An image without symbols, or one that cannot be read, adds nothing: whoever
 //! looks at a fault must not be told about another one.
 
+mod cursor;
 mod demangle;
+mod inlined;
+mod lines;
 mod symbols;
 mod v0;
 
@@ -45,11 +49,13 @@ impl Places {
     #[must_use]
     pub fn explain(&self, line: &str) -> Option<String> {
         let address = address(&read_line(0, line)?.ok()?)?;
-        let name = self.symbols()?.name(address);
-        Some(name.map_or_else(
-            || format!("{address:#x} is not in the image's code"),
-            |name| format!("{address:#x} is {name}"),
-        ))
+        let Some(name) = self.symbols()?.name(address) else {
+            return Some(format!("{address:#x} is not in the image's code"));
+        };
+        let line = fs::read(&self.image).ok();
+        let line = line.and_then(|image| inlined::line_of_app(&image, address));
+        let line = line.map_or_else(String::new, |line| format!(", of {line}"));
+        Some(format!("{address:#x} is {name}{line}"))
     }
 
     fn symbols(&self) -> Option<&Symbols> {
