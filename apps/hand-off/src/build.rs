@@ -128,17 +128,12 @@ impl Builder<'_> {
 
     fn source(&mut self, output: &str) {
         let (dag, attributes) = (self.dag, self.attributes(0));
-        let (outputs, period) = (vec![output], self.workload.period);
-        match self.pen(0) {
-            Some(mut pen) => {
-                let body = move || {
-                    twice(&mut pen);
-                    (0u64,)
-                };
-                dag.register_periodic_subtask(body, outputs, period, attributes);
-            }
-            None => dag.register_periodic_subtask(|| (0u64,), outputs, period, attributes),
-        }
+        let mut pen = self.stamps.pen(self.workload.jobs);
+        let body = move || {
+            twice(&mut pen);
+            (0u64,)
+        };
+        dag.register_periodic_subtask(body, vec![output], self.workload.period, attributes);
     }
 
     fn between(&mut self, number: usize, input: &str, output: &str) {
@@ -168,14 +163,9 @@ impl Builder<'_> {
 
     fn sink<Args: VecToSubs>(&mut self, number: usize, inputs: Vec<&str>) {
         let (dag, attributes) = (self.dag, self.attributes(number));
-        let deadline = self.workload.period;
-        match self.pen(number) {
-            Some(mut pen) => {
-                let body = move |_: Args| twice(&mut pen);
-                dag.register_sink_subtask(body, inputs, deadline, attributes);
-            }
-            None => dag.register_sink_subtask(|_: Args| (), inputs, deadline, attributes),
-        }
+        let mut pen = self.stamps.pen(self.workload.jobs);
+        let body = move |_: Args| twice(&mut pen);
+        dag.register_sink_subtask(body, inputs, self.workload.period, attributes);
     }
 
     fn pen(&mut self, number: usize) -> Option<Pen> {

@@ -5,8 +5,6 @@
 //! are released at that instant (R3), so such a job ends by the same rules as
 //! any other, only without running.
 
-use alloc::vec::Vec;
-
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
@@ -131,12 +129,13 @@ impl Scheduler {
         let job = jobs.job_mut(sequence);
         job.unfinished -= 1;
         let is_last = job.unfinished == 0;
-        if is_cut {
-            cancel_successors(&ended, vertices, job, ending, observer);
-        } else {
-            for place in Vertices::successors(&ended) {
-                let next = vertices.successor(place);
-                if let Some(successor) = vertices.arrive(next, sequence) {
+        for place in Vertices::successors(&ended) {
+            let next = vertices.successor(place);
+            if let Some(successor) = vertices.arrive(next, sequence) {
+                if is_cut {
+                    observer.cancelled(successor.instance(job));
+                    ending.push(next);
+                } else {
                     line_up(next, successor, job, ready, observer);
                     *fresh += 1;
                 }
@@ -210,24 +209,6 @@ impl Scheduler {
             None => self.timers.remove(dag.index()),
         }
         self.quiet_until_ns = earliest_ns(&self.timers);
-    }
-}
-
-/// Cancels what becomes ready by the end of an instance of a job that was cut.
-#[cold]
-fn cancel_successors(
-    ended: &Vertex,
-    vertices: &mut Vertices,
-    job: &Job,
-    ending: &mut Vec<u32>,
-    observer: &mut impl Observer,
-) {
-    for place in Vertices::successors(ended) {
-        let next = vertices.successor(place);
-        if let Some(successor) = vertices.arrive(next, ended.progress) {
-            observer.cancelled(successor.instance(job));
-            ending.push(next);
-        }
     }
 }
 

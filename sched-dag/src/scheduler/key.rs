@@ -45,10 +45,16 @@ impl Key {
     #[inline]
     pub(super) fn new(order: Order, number: u32, vertex: &Vertex, job: &Job) -> Self {
         match order {
-            Order::Rank => Self::of_parts(u64::from(vertex.rank) << 32, 0, number),
+            Order::Rank => Self::of_rank(vertex.rank, number),
             Order::Job => Self::by_job(number, vertex),
             Order::Deadline => Self::of_parts(job.deadline_ns, job.slot, number),
         }
+    }
+
+    /// Makes the key of a vertex under the order `Rank`.
+    #[inline]
+    pub(super) const fn of_rank(rank: u32, vertex: u32) -> Self {
+        Self::of_parts((rank as u64) << 32, 0, vertex)
     }
 
     /// Apart, as it is rare, and its shifts would be made for every key.

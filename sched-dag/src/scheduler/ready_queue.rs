@@ -50,8 +50,10 @@ enum Rest {
     /// For keys that are ranks up to 63.
     Word {
         ranks: u64,
-        /// The key of each rank.
-        keys: Box<[Key]>,
+        /// The vertex of each rank. Keys are made of both, not loaded: loaded by
+        /// halves or as one, the front would have to be loaded the same way, and a
+        /// processor cannot load as one what it has just stored by halves.
+        vertices: Box<[u32]>,
     },
     /// For keys that are ranks.
     Ranked {
@@ -158,7 +160,11 @@ impl ReadyQueue {
 impl Rest {
     fn peek(&self) -> Option<Key> {
         match self {
-            Self::Word { ranks, keys } => keys.get(ranks.trailing_zeros() as usize).copied(),
+            Self::Word { ranks, vertices } => {
+                let rank = ranks.trailing_zeros();
+                let vertex = vertices.get(rank as usize)?;
+                Some(Key::of_rank(rank, *vertex))
+            }
             Self::Ranked { ranks, keys } => ranks.first().map(|rank| keys[rank]),
             Self::ByDeadline(jobs) => jobs.peek(),
             Self::Keyed(heap) => heap.peek().map(|(key, _)| key),
@@ -196,10 +202,10 @@ impl Rest {
     #[inline]
     fn pop(&mut self) -> Key {
         match self {
-            Self::Word { ranks, keys } => {
-                let first = ranks.trailing_zeros() as usize;
+            Self::Word { ranks, vertices } => {
+                let rank = ranks.trailing_zeros();
                 *ranks &= ranks.wrapping_sub(1);
-                keys[first]
+                Key::of_rank(rank, vertices[rank as usize])
             }
             _ => self.pop_beyond_a_word(),
         }
@@ -252,15 +258,17 @@ fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
 
 /// Makes the rest for vertices in the order of their ranks.
 fn ranked(order: &[u32]) -> Rest {
-    let keys = (0u64..).zip(order);
-    let keys = keys
-        .map(|(rank, &vertex)| Key::of_parts(rank << 32, 0, vertex))
-        .collect();
+    let keys = (0u32..).zip(order);
     match order.len() {
-        0..=64 => Rest::Word { ranks: 0, keys },
+        0..=64 => Rest::Word {
+            ranks: 0,
+            vertices: order.into(),
+        },
         count => Rest::Ranked {
             ranks: BitSet::new(count),
-            keys,
+            keys: keys
+                .map(|(rank, &vertex)| Key::of_rank(rank, vertex))
+                .collect(),
         },
     }
 }
