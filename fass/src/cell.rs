@@ -5,14 +5,15 @@
 //!
 //! For our purposes an *edge* is a topic as one of its readers sees it. Each
 //! edge is a ring of J *slots*, J being the number of jobs that the DAG may
-//! have in flight, so a job always finds a free slot. A ring has exactly one
+//! have in flight, up to the next power of two; so a job always finds a free slot. A
+//! ring has exactly one
 //! [`Writer`] and one [`Reader`]. Neither can be cloned, and everything they do
 //! takes `&mut self`; so at any time at most one thread acts for each side.
 //!
 //! Which slot a job gets carries no meaning; what identifies a value is its job
 //! number. Both ends go round the ring in the order of jobs, so that each looks
-//! at the right slot at once; after a job was cancelled they may look at up to
-//! J. (A slot could be chosen by `k mod J` only if jobs in flight were
+//! at the right slot at once; after a job was cancelled they may look at all of
+//! them. (A slot could be chosen by `k mod J` only if jobs in flight were
 //! consecutive. They are not where an overrun skips releases: with J = 2, jobs
 //! 1 and 3 can be in flight together.)
 //!

@@ -65,4 +65,6 @@ fn what_comes_before_time_0_releases_nothing_yet() {
     assert_eq!(number(&outcome, "answers_to_bytes"), 1);
     assert_eq!(number(&outcome, "violations"), 0);
     assert_eq!(outcome.transcript.of_kind("fault").count(), 0);
+    let before_time_0 = "[0,\"signalled\",0,4,0,-1]";
+    assert!(outcome.serial.contains(before_time_0), "the byte came late");
 }
