@@ -7,6 +7,7 @@
 //! code here ([`parse()`]).
 //!
 //! - [`lines`]: words and numbers of a reference file, with line numbers;
+//! - [`shown`]: words of a file, or of a person, in messages;
 //! - [`Case`], [`parse()`]: what a case says, read strictly;
 //! - [`build`]: DAGs that execute for its times.
 //!
@@ -21,6 +22,7 @@ mod case;
 mod dags;
 pub mod lines;
 mod parse;
+pub mod shown;
 
 pub use case::{Case, CaseDag, InstanceTimes, JobTimes};
 pub use dags::{Epoch, Scale, build};

@@ -12,6 +12,8 @@ use core::fmt;
 use core::num::IntErrorKind;
 use core::str::FromStr;
 
+pub use crate::shown::quoted;
+
 /// What is wrong with a reference file, and on which line, counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Malformed {
@@ -176,16 +178,6 @@ impl Line<'_> {
     }
 }
 
-/// Returns a word of the file for a message: the beginning of it, for a file
-/// that is not text may be one word of megabytes.
-pub fn quoted(word: &str) -> impl fmt::Display {
-    const MOST_SHOWN: usize = 40;
-    fmt::from_fn(move |out| match word.char_indices().nth(MOST_SHOWN) {
-        Some((end, _)) => write!(out, "`{}...`", &word[..end]),
-        None => write!(out, "`{word}`"),
-    })
-}
-
 impl fmt::Display for Malformed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "line {}: {}", self.line, self.reason)
@@ -196,14 +188,7 @@ impl core::error::Error for Malformed {}
 
 #[cfg(test)]
 mod tests {
-    use super::{Lines, quoted};
-
-    #[test]
-    fn a_word_is_shown_in_part_if_it_is_long() {
-        assert_eq!(quoted("cäse").to_string(), "`cäse`");
-        let shown = quoted(&"ä".repeat(1000)).to_string();
-        assert_eq!(shown, format!("`{}...`", "ä".repeat(40)));
-    }
+    use super::Lines;
 
     #[test]
     fn records_know_their_lines() {

@@ -1,0 +1,84 @@
+//! Words of a person or of a file, as messages show them.
+//!
+//! A message repeats what is wrong, and that may be anything: megabytes without a
+//! blank, an escape sequence that rewrites the terminal, a byte-order mark that no one
+//! can see. So a message shows the beginning only, and whatever cannot be seen by its
+//! number in Unicode.
+
+use core::fmt::{self, Write};
+
+/// The most characters of a word that a message shows.
+const MOST_SHOWN: usize = 40;
+
+/// Returns a word between backquotes, visibly: its beginning, if it is long.
+pub fn quoted(word: &str) -> impl fmt::Display {
+    fmt::from_fn(move |out| {
+        let (shown, dots) = match word.char_indices().nth(MOST_SHOWN) {
+            Some((end, _)) => (&word[..end], "..."),
+            None => (word, ""),
+        };
+        write!(out, "`{}{dots}`", visible(shown))
+    })
+}
+
+/// Returns all of a text, with each character that cannot be seen, or that changes how
+/// others are, as an escape of Rust's: `\n`, `\u{1b}`, `\u{feff}`.
+pub fn visible(text: &str) -> impl fmt::Display {
+    fmt::from_fn(move |out| {
+        text.chars().try_for_each(|character| match character {
+            '\n' | '\r' | '\t' => write!(out, "{}", character.escape_default()),
+            _ if is_seen(character) => out.write_char(character),
+            _ => write!(out, "{}", character.escape_unicode()),
+        })
+    })
+}
+
+/// Reports whether a character is seen as itself: it is no control character, and none
+/// of those that Unicode calls default-ignorable, or by which text changes direction.
+fn is_seen(character: char) -> bool {
+    let is_hidden = matches!(
+        character,
+        '\u{ad}'
+            | '\u{34f}'
+            | '\u{61c}'
+            | '\u{115f}'..='\u{1160}'
+            | '\u{17b4}'..='\u{17b5}'
+            | '\u{180b}'..='\u{180f}'
+            | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}'
+            | '\u{3164}'
+            | '\u{fe00}'..='\u{fe0f}'
+            | '\u{feff}'
+            | '\u{ffa0}'
+            | '\u{fff0}'..='\u{fffb}'
+            | '\u{1d173}'..='\u{1d17a}'
+            | '\u{e0000}'..='\u{e0fff}'
+    );
+    !is_hidden && !character.is_control()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{quoted, visible};
+
+    #[test]
+    fn a_word_is_shown_in_part_if_it_is_long() {
+        assert_eq!(quoted("cäse").to_string(), "`cäse`");
+        let shown = quoted(&"ä".repeat(1000)).to_string();
+        assert_eq!(shown, format!("`{}...`", "ä".repeat(40)));
+    }
+
+    #[test]
+    fn what_cannot_be_seen_is_shown_by_its_number() {
+        for (text, shown) in [
+            ("\u{1b}[2J", r"\u{1b}[2J"),
+            ("\u{feff}dag", r"\u{feff}dag"),
+            ("a\u{202e}b\nc\td", r"a\u{202e}b\nc\td"),
+            ("\u{0}\u{7f}\u{9b}", r"\u{0}\u{7f}\u{9b}"),
+            ("größe-車 \u{1f680} '\\", "größe-車 \u{1f680} '\\"),
+        ] {
+            assert_eq!(visible(text).to_string(), shown);
+        }
+    }
+}
