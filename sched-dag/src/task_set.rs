@@ -129,6 +129,12 @@ impl Dag {
         self.in_flight
     }
 
+    /// Returns the number of slots for the jobs in flight: a power of two, so that
+    /// finding a job's slot needs no division.
+    pub(crate) fn slots(&self) -> usize {
+        (self.in_flight as usize).next_power_of_two()
+    }
+
     /// Returns what happens at a release beyond [`in_flight`](Self::in_flight).
     #[must_use]
     pub const fn overrun(&self) -> OverrunPolicy {

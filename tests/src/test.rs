@@ -10,8 +10,11 @@
 //! without its result line, or does not end within its time is a failure.
 
 mod checks;
+mod code;
 mod crates;
 mod disk;
+mod imports;
+mod layers;
 mod libtest;
 mod lint;
 mod table;

@@ -10,7 +10,6 @@ use alloc::vec::Vec;
 use super::bits::BitSet;
 use super::heap::IndexedHeap;
 use super::key::Key;
-use super::vertices::slots;
 use crate::ids::to_u32;
 use crate::task_set::TaskSet;
 
@@ -38,7 +37,7 @@ impl ByDeadline {
         let mut first = 0;
         for dag in task_set.dags() {
             let subtasks = dag.subtasks().len();
-            lines.extend((0..slots(dag)).map(|_| Line {
+            lines.extend((0..dag.slots()).map(|_| Line {
                 first: to_u32(first),
                 subtasks: BitSet::new(subtasks),
             }));

@@ -22,7 +22,6 @@
 
 use alloc::boxed::Box;
 
-use super::vertices::slots;
 use crate::ids::to_u32;
 use crate::task_set::Dag;
 
@@ -77,7 +76,7 @@ pub(super) struct Job {
 impl Jobs {
     /// Makes the jobs of a DAG whose slots are counted from `first_slot`.
     pub(super) fn new(dag: &Dag, first_slot: u32) -> Self {
-        let slots = (first_slot..).take(slots(dag)).map(|slot| Job {
+        let slots = (first_slot..).take(dag.slots()).map(|slot| Job {
             slot,
             ..Job::default()
         });

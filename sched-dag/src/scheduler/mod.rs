@@ -154,7 +154,7 @@ impl Scheduler {
                 let first_vertex = to_u32(subtasks);
                 let first_slot = to_u32(slots);
                 subtasks += dag.subtasks().len();
-                slots += vertices::slots(dag);
+                slots += dag.slots();
                 DagState {
                     first_vertex,
                     jobs: Jobs::new(dag, first_slot),

@@ -7,7 +7,7 @@
 //! Jobs in flight are known by *sequence number*: the how-manieth released job
 //! of its DAG it is. Skipped jobs have none, so the sequence has no gaps, and
 //! the job before the one with number s is the one with number s - 1. A job's
-//! *slot* is its sequence number modulo the DAG's [`slots`].
+//! *slot* is its sequence number modulo the number of slots of its DAG.
 //!
 //! Each vertex has a counter for each slot: the predecessors that have not
 //! finished yet, and for a source the release. Each has its *progress*: the
@@ -27,7 +27,7 @@ use core::ops::Range;
 use super::jobs::Job;
 use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
 use crate::policy::Preemption;
-use crate::task_set::{Dag, TaskSet};
+use crate::task_set::TaskSet;
 
 /// What the next instance of a subtask does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,10 +104,10 @@ impl Vertices {
                         && !attributes.is_non_preemptive(),
                     initial,
                     counters: to_u32(counters.len()),
-                    slot_mask: to_u32(slots(dag) - 1),
+                    slot_mask: to_u32(dag.slots() - 1),
                     successors: [from, to_u32(successors.len())],
                 });
-                counters.extend((0..slots(dag)).map(|_| initial));
+                counters.extend((0..dag.slots()).map(|_| initial));
             }
         }
         all.vertices = vertices.into_boxed_slice();
@@ -211,10 +211,4 @@ impl Vertex {
             self.counters as usize + slot as usize
         }
     }
-}
-
-/// Returns the number of slots for the jobs in flight of a DAG: a power of two,
-/// so that finding a slot needs no division.
-pub(super) fn slots(dag: &Dag) -> usize {
-    (dag.in_flight() as usize).next_power_of_two()
 }

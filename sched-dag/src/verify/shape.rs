@@ -23,6 +23,23 @@ pub(super) struct Shape {
     pub(super) state_precedences: Vec<StatePrecedence>,
 }
 
+impl Shape {
+    /// Adds the precedence of shared states to the graph, of which `edges` are the edges.
+    fn add(&mut self, precedences: Vec<StatePrecedence>, mut edges: Vec<(u32, u32)>) {
+        if precedences.is_empty() {
+            return;
+        }
+        edges.extend(
+            precedences
+                .iter()
+                .map(|added| (added.earlier.0, added.later.0)),
+        );
+        self.graph = Graph::new(self.graph.len(), &edges);
+        self.topological_order = self.graph.topological_order();
+        self.state_precedences = precedences;
+    }
+}
+
 /// Checks the graph of DAG number `dag`.
 pub(super) fn check(
     specs: &[DagSpec],
@@ -63,7 +80,8 @@ pub(super) fn check(
     };
     // Last, so that all other checks judge the graph that the author stated.
     if shape.topological_order.len() == shape.graph.len() {
-        states::order_users(spec, &mut topology.edges, &mut shape);
+        let precedences = states::order_users(spec, &shape.graph);
+        shape.add(precedences, topology.edges);
     }
     shape
 }

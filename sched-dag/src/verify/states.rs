@@ -28,7 +28,6 @@ use super::fault::Fault;
 use super::findings::Findings;
 use super::graph::Graph;
 use super::label::{DagLabel, SubtaskLabel};
-use super::shape::Shape;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
 use crate::spec::{DagSpec, StateSpec};
@@ -107,24 +106,22 @@ fn check_users(specs: &[DagSpec], dag: usize, state: &StateSpec, findings: &mut 
     }
 }
 
-/// Adds the precedence of shared states to a graph without cycle, of which
-/// `edges` are the edges.
-pub(super) fn order_users(spec: &DagSpec, edges: &mut Vec<(u32, u32)>, shape: &mut Shape) {
+/// Returns the precedence that shared states add to a graph without cycle.
+pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence> {
+    let mut precedences = Vec::new();
     if !spec.states.iter().any(is_shared) {
-        return;
+        return precedences;
     }
-    let place = places(&shape.graph);
+    let place = places(graph);
     for state in spec.states.iter().filter(|state| is_shared(state)) {
         let place_of = |user: usize| place.get(state.users[user].subtask).copied();
         let users = sorted_by_key(state.users.len(), place_of);
         let users: Vec<_> = users.iter().map(|&user| state.users[user]).collect();
         let mut add = |earlier: usize, later: usize| {
-            let (earlier, later) = (to_u32(earlier), to_u32(later));
-            edges.push((earlier, later));
-            shape.state_precedences.push(StatePrecedence {
+            precedences.push(StatePrecedence {
                 state: state.name.clone(),
-                earlier: SubtaskId(earlier),
-                later: SubtaskId(later),
+                earlier: SubtaskId(to_u32(earlier)),
+                later: SubtaskId(to_u32(later)),
             });
         };
         let mut updater: Option<usize> = None;
@@ -150,8 +147,7 @@ pub(super) fn order_users(spec: &DagSpec, edges: &mut Vec<(u32, u32)>, shape: &m
             }
         }
     }
-    shape.graph = Graph::new(spec.subtasks.len(), edges);
-    shape.topological_order = shape.graph.topological_order();
+    precedences
 }
 
 /// Returns each subtask's place in the order in which one core runs the DAG if it

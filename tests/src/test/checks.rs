@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::libtest::Plan;
 use super::tally::Tally;
-use super::{lint, unsafe_places};
+use super::{layers, lint, unsafe_places};
 use crate::bench::hand_off;
 use crate::image::{self, MOST_STRIPPED_BYTES};
 use crate::probe;
@@ -24,7 +24,7 @@ const MOST_LINES: usize = 400;
 /// Runs the checks that the plan wants.
 pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     let sources = sources();
-    let quick: [(&str, Result<(), String>); 4] = [
+    let quick: [(&str, Result<(), String>); 5] = [
         ("Cargo.lock names only our own packages", lock_is_ours()),
         (
             "unsafe stands only where it may",
@@ -38,6 +38,7 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
             "every source file opens with an essay",
             files_have_essays(&sources),
         ),
+        ("layers name only layers below them", layers::check()),
     ];
     for (name, result) in quick {
         if plan.wants(name) {
