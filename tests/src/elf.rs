@@ -1,5 +1,5 @@
-//! As much of ELF as it takes to weigh an image, to find its symbols, and to tell it
-//! from a program for the host.
+//! As much of ELF as it takes to weigh an image, and to tell it from a program for the
+//! host.
 //!
 //! *Stripped size* is what `strip` would leave: the file's headers, every
 //! byte that is loaded or a note, and a section table of the sections left
@@ -11,14 +11,10 @@
 const SECTION_HEADER_BYTES: u64 = 64;
 const PROGRAM_HEADER_BYTES: u64 = 56;
 const SHF_ALLOC: u64 = 2;
-const SHF_EXECINSTR: u64 = 4;
 const PT_NOTE: u64 = 4;
 
 /// Xen's number for the note that holds the 32-bit entry address.
 const XEN_ELFNOTE_PHYS32_ENTRY: u64 = 18;
-
-/// The type of the section that holds all symbols.
-pub(crate) const SHT_SYMTAB: u64 = 2;
 
 /// The mean length that we take for a section's name, and its alignment.
 const NAME_BYTES: u64 = 24;
@@ -75,70 +71,6 @@ pub fn check_bootable(file: &[u8]) -> Result<(), String> {
     Err("it has no PVH note, by which QEMU would enter it".into())
 }
 
-/// A section of the file.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Section {
-    pub(crate) kind: u64,
-    flags: u64,
-    /// Where it is in memory, if it is loaded.
-    pub(crate) address: u64,
-    /// Where it begins in the file.
-    pub(crate) offset: u64,
-    pub(crate) bytes: u64,
-    /// For symbols: the number of the section with their names.
-    pub(crate) link: u64,
-}
-
-impl Section {
-    /// Reports whether it holds instructions.
-    pub(crate) const fn is_code(&self) -> bool {
-        self.flags & SHF_EXECINSTR != 0
-    }
-}
-
-/// Returns the sections of an ELF file, by number.
-///
-/// # Errors
-///
-/// As [`stripped_bytes`].
-pub(crate) fn sections(file: &[u8]) -> Result<Vec<Section>, String> {
-    check(file)?;
-    let headers = table(file, 40, 60, SECTION_HEADER_BYTES)?.into_iter();
-    let section = |at: u64| {
-        Ok(Section {
-            kind: number(file, at + 4, 4)?,
-            flags: number(file, at + 8, 8)?,
-            address: number(file, at + 16, 8)?,
-            offset: number(file, at + 24, 8)?,
-            bytes: number(file, at + 32, 8)?,
-            link: number(file, at + 40, 4)?,
-        })
-    };
-    headers.map(section).collect()
-}
-
-/// Returns the bytes of the section of this name.
-///
-/// # Errors
-///
-/// As [`stripped_bytes`], or there is none.
-pub(crate) fn named_section<'f>(file: &'f [u8], name: &str) -> Result<&'f [u8], String> {
-    let none = || format!("there is no section {name}");
-    let all = sections(file)?;
-    let names = usize::try_from(number(file, 62, 2)?).unwrap_or(usize::MAX);
-    let names = all.get(names).ok_or_else(none)?;
-    let headers = table(file, 40, 60, SECTION_HEADER_BYTES)?;
-    for (section, header) in all.iter().zip(headers) {
-        let at = names.offset.saturating_add(number(file, header, 4)?);
-        if text(file, at)? == name {
-            let from = usize::try_from(section.offset).unwrap_or(usize::MAX);
-            let bytes = usize::try_from(section.bytes).unwrap_or(usize::MAX);
-            return file.get(from..from.saturating_add(bytes)).ok_or_else(none);
-        }
-    }
-    Err(none())
-}
-
 fn check(file: &[u8]) -> Result<(), String> {
     if file.starts_with(b"\x7fELF\x02\x01") {
         Ok(())
@@ -162,7 +94,7 @@ fn table(file: &[u8], offset_at: u64, count_at: u64, entry: u64) -> Result<Vec<u
 /// # Errors
 ///
 /// In words: it lies outside the file.
-pub(crate) fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
+fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
     let start = usize::try_from(at).unwrap_or(usize::MAX);
     let bytes = file.get(start..start.saturating_add(length));
     let bytes = bytes.ok_or("a header points outside the file")?;
@@ -170,19 +102,6 @@ pub(crate) fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String>
         .iter()
         .rev()
         .fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
-}
-
-/// Returns the text at `at`, which ends before the next zero byte.
-///
-/// # Errors
-///
-/// In words: it lies outside the file, or has no end.
-pub(crate) fn text(file: &[u8], at: u64) -> Result<String, String> {
-    let start = usize::try_from(at).unwrap_or(usize::MAX);
-    let rest = file.get(start..).ok_or("a name lies outside the file")?;
-    let end = rest.iter().position(|byte| *byte == 0);
-    let bytes = &rest[..end.ok_or("a name has no end")?];
-    Ok(String::from_utf8_lossy(bytes).into_owned())
 }
 
 fn count(length: usize) -> u64 {
