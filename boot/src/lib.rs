@@ -19,6 +19,10 @@
 
 pub mod acpi;
 mod list;
+#[allow(
+    unsafe_code,
+    reason = "what the loader left is at addresses, not in references"
+)]
 pub mod physical;
 pub mod pvh;
 

@@ -50,6 +50,7 @@ pub mod console;
 mod containment;
 mod contexts;
 mod ending;
+#[allow(unsafe_code, reason = "the symbols that an image must define")]
 #[doc(hidden)]
 pub mod entry;
 mod event;
@@ -58,8 +59,10 @@ mod fault_verdict;
 mod graph;
 pub mod json;
 mod lock;
+#[allow(unsafe_code, reason = "registers, ports, interrupts, page tables")]
 mod machine;
 mod machine_handle;
+#[allow(unsafe_code, reason = "the allocator hands out raw memory")]
 mod memory;
 pub mod options;
 mod panic;
@@ -67,6 +70,7 @@ mod platform;
 pub mod report;
 mod run;
 mod settings;
+#[allow(unsafe_code, reason = "the way up to the first safe state")]
 mod start;
 mod trace;
 mod worker;

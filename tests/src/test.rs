@@ -19,7 +19,6 @@ mod libtest;
 mod lint;
 mod table;
 mod tally;
-mod unsafe_places;
 
 use std::process::ExitCode;
 

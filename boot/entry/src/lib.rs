@@ -10,6 +10,10 @@
 //! for an image only, which asks for `pvh_entry` (`image.ld`).
 
 #![no_std]
+#![allow(
+    unsafe_code,
+    reason = "from the reset to Rust, there is nothing safe to stand on"
+)]
 
 pub mod image;
 pub mod processors;

@@ -54,8 +54,10 @@ pub(crate) fn ticks_to_ns(ticks: u64) -> u64 {
 /// Multiplies by a factor in 2^-32. Right for 584 years.
 fn scale(value: u64, factor: u64) -> u64 {
     let product = u128::from(value) * u128::from(factor);
-    // Reading the clock is on every path: no check for what cannot be.
-    #[allow(clippy::cast_possible_truncation)]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "reading the clock is on every path: no check for what cannot be"
+    )]
     {
         (product >> 32) as u64
     }

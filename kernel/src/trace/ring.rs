@@ -178,8 +178,10 @@ impl Ring {
     #[inline]
     fn index(&self, number: u64) -> usize {
         let mask = (self.events.len() as u64).wrapping_sub(1);
-        // Less than the length, unless that is 0.
-        #[allow(clippy::cast_possible_truncation)]
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "less than the length, unless that is 0"
+        )]
         {
             (number & mask) as usize
         }

@@ -110,8 +110,10 @@ impl Jobs {
     fn slot(&self, sequence: u64) -> usize {
         // A mask, as the number of slots is a power of two.
         let slot = sequence & (self.in_flight.len() as u64 - 1);
-        // It is less than the number of slots, a `usize`.
-        #[allow(clippy::cast_possible_truncation)]
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "it is less than the number of slots, a `usize`"
+        )]
         {
             slot as usize
         }

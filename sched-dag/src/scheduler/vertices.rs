@@ -205,8 +205,10 @@ impl Vertex {
     #[inline]
     fn counter(&self, sequence: u64) -> usize {
         let slot = sequence & u64::from(self.slot_mask);
-        // The slot is less than a count that came from a u32.
-        #[allow(clippy::cast_possible_truncation)]
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "the slot is less than a count that came from a u32"
+        )]
         {
             self.counters as usize + slot as usize
         }

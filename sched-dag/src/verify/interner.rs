@@ -31,8 +31,10 @@ impl<'a> Interner<'a> {
     pub(super) fn intern(&mut self, name: &'a str) -> usize {
         let hash = hash(name);
         let mask = self.table.len() - 1;
-        // The low bits suffice for a place in the table on every target.
-        #[allow(clippy::cast_possible_truncation)]
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "the low bits suffice for a place in the table on every target"
+        )]
         let mut place = hash as usize & mask;
         loop {
             let entry = self.table[place];

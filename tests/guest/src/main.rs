@@ -7,6 +7,7 @@ extern crate alloc;
 
 mod checksum;
 mod endless;
+#[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod occupation;
 mod overrun;

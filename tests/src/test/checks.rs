@@ -1,8 +1,7 @@
 //! Checks: properties of the whole tree, each counted as one test.
 //!
 //! They hold the promises that no unit test can: the image's weight, no
-//! package but our own, `unsafe` only where it may stand, no file too long,
-//! nothing for the formatter, the linter and the documentation to complain
+//! package but our own, no file too long, nothing for the formatter, the linter and the documentation to complain
 //! of, a hand-off of no more instructions than its baseline, and a guest under
 //! KVM where KVM works.
 
@@ -11,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use super::libtest::Plan;
 use super::tally::Tally;
-use super::{layers, lint, unsafe_places};
+use super::{layers, lint};
 use crate::bench::hand_off;
 use crate::image::{self, MOST_STRIPPED_BYTES};
 use crate::probe;
@@ -24,12 +23,8 @@ const MOST_LINES: usize = 400;
 /// Runs the checks that the plan wants.
 pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     let sources = sources();
-    let quick: [(&str, Result<(), String>); 5] = [
+    let quick: [(&str, Result<(), String>); 4] = [
         ("Cargo.lock names only our own packages", lock_is_ours()),
-        (
-            "unsafe stands only where it may",
-            unsafe_places::check(&sources),
-        ),
         (
             "no source file has more than 400 lines",
             files_are_short(&sources),
