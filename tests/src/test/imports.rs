@@ -236,7 +236,7 @@ mod tests {
         let of = |module: &[&str]| names[&owned(module)].iter().cloned().collect::<Vec<_>>();
         assert_eq!(of(&["a"]), [owned(&["a", "x"]), owned(&["b"])]);
         assert_eq!(of(&["a", "x"]), [owned(&["a"]), owned(&["b"])]);
-        assert_eq!(of(&["b"]), [Vec::<String>::new(); 0]);
+        assert!(of(&["b"]).is_empty());
     }
 
     #[test]
