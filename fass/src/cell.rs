@@ -18,18 +18,24 @@
 //! 1 and 3 can be in flight together.)
 //!
 //! A slot holds a value and one atomic word, its *turn*: 0 while the slot is
-//! empty, `2k + 1` (modulo 2^64) while it holds the value of job k, which is never 0.
-//! (It is the same for job k + 2^63, to which no run gets in 292 years.) One soundness
-//! argument covers the ring, and the `SAFETY` comments below cite it by its name:
+//! empty, `2k + 1` (modulo 2^64) while it holds the value of job k, and 2 while it holds
+//! one that was given up. (Job k + 2^63 has the turn of job k, but no run gets there in
+//! 292 years.) One soundness argument, cited below by its name, covers the ring:
 //!
-//! > **Turn invariant.** While a slot's turn is 0, only the ring's writer may
-//! > touch the slot's value, and the value is uninitialised. While it is not 0,
-//! > only the ring's reader may touch the value, and the value is initialised.
+//! > **Turn invariant.** While a slot's turn is even, only the ring's writer may
+//! > touch the slot's value; while it is odd, only the ring's reader. The value is
+//! > uninitialised if the turn is 0, and initialised otherwise.
 //! > Only the side whose turn it is changes the turn: the writer from 0 to
 //! > `2k + 1` once the value is written, the reader back to 0 once the value is
-//! > moved out. The change is a `Release` store and the other side's look at
+//! > moved out, or to 2 to leave it to the writer, which makes that 0 before it drops the
+//! > value. A change of sides is a `Release` store and the other side's look at
 //! > it an `Acquire` load, so all that one side did to the value
 //! > happens before all that the other does.
+//!
+//! The reader *gives up* the value of a cancelled job, which takes a few instructions,
+//! and the writer drops it in its place once it needs the slot. Dropping is the app's
+//! code: it may panic, take long or never end. A job is cancelled by the scheduler in
+//! mid-step, while the writer runs as a subtask of that DAG: preempted and contained.
 //!
 //! Because there is one thread a side, a load and a store suffice: nothing here
 //! is a locked read-modify-write. The invariant does not lean on the scheduler:
@@ -66,6 +72,9 @@ use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 /// The turn of a slot that holds no value.
 const EMPTY_SLOT: u64 = 0;
+
+/// The turn of a slot whose value was given up.
+const GIVEN_UP: u64 = 2;
 
 /// Returns the turn of a slot that holds the value of a job.
 #[inline]
@@ -107,11 +116,15 @@ pub(crate) struct Reader<T> {
 
 impl<T> Writer<T> {
     /// Puts the value of `job` into a free slot, or gives the value back if all
-    /// are taken.
+    /// are taken. Drops the value in a slot that was given up, if it takes that.
     #[inline]
     pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
-        let Some(slot) = find(&self.slots, &mut self.next, EMPTY_SLOT) else {
-            return Err(value);
+        let slot = match first(&self.slots, &mut self.next, EMPTY_SLOT) {
+            Some(slot) => slot,
+            None => match self.make_room() {
+                Some(slot) => slot,
+                None => return Err(value),
+            },
         };
         let place = slot.value.get().cast::<T>();
         // SAFETY: by the turn invariant an empty slot is the writer's alone,
@@ -120,6 +133,22 @@ impl<T> Writer<T> {
         slot.turn.store(turn_of(job), Ordering::Release);
         Ok(())
     }
+
+    /// Finds an empty slot, or makes one so that was given up.
+    #[cold]
+    fn make_room(&mut self) -> Option<&Slot<T>> {
+        let slot = search(&self.slots, &mut self.next, |turn| turn & 1 == 0)?;
+        if slot.turn.load(Ordering::Relaxed) == GIVEN_UP {
+            // First, so that the value is not dropped again should its `drop` panic.
+            slot.turn.store(EMPTY_SLOT, Ordering::Relaxed);
+            let place = slot.value.get().cast::<T>();
+            // SAFETY: by the turn invariant the value of a slot that was given up is
+            // initialised and the writer's alone, and `&mut self` makes us the only
+            // thread that acts as the writer. The turn says already that it is gone.
+            unsafe { place.drop_in_place() };
+        }
+        Some(slot)
+    }
 }
 
 impl<T> Reader<T> {
@@ -127,7 +156,7 @@ impl<T> Reader<T> {
     /// holds that very job's value.
     #[inline]
     pub(crate) fn take(&mut self, job: u64) -> Option<T> {
-        let slot = find(&self.slots, &mut self.next, turn_of(job))?;
+        let slot = self.slot_of(job)?;
         let place = slot.value.get().cast::<T>();
         // SAFETY: by the turn invariant a slot with a turn other than 0 is
         // initialised and the reader's alone, and `&mut self` makes us the only
@@ -136,6 +165,22 @@ impl<T> Reader<T> {
         let value = unsafe { place.read() };
         slot.turn.store(EMPTY_SLOT, Ordering::Release);
         Some(value)
+    }
+
+    /// Leaves the value of `job`, if some slot holds it, to the writer.
+    pub(crate) fn give_up(&mut self, job: u64) {
+        if let Some(slot) = self.slot_of(job) {
+            slot.turn.store(GIVEN_UP, Ordering::Release);
+        }
+    }
+
+    #[inline]
+    fn slot_of(&mut self, job: u64) -> Option<&Slot<T>> {
+        let turn = turn_of(job);
+        match first(&self.slots, &mut self.next, turn) {
+            Some(slot) => Some(slot),
+            None => search(&self.slots, &mut self.next, |other| other == turn),
+        }
     }
 }
 
@@ -150,25 +195,30 @@ struct Slot<T> {
 // shared, which is why `T: Send` is enough.
 unsafe impl<T: Send> Sync for Slot<T> {}
 
-/// Finds a slot with the given turn, from slot `next` on and round the ring once,
-/// and moves `next` behind it. Its look at the turn is an `Acquire`.
+/// Returns slot `next` if it has the given turn, as it nearly always does, and moves
+/// `next` behind it. Its look at the turn is an `Acquire`.
 #[inline]
-fn find<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
+fn first<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
     let slot = at(slots, *next)?;
-    // Nearly always it is the first one.
     if slot.turn.load(Ordering::Acquire) != turn {
-        return search(slots, next, turn);
+        return None;
     }
     *next = next.wrapping_add(1);
     Some(slot)
 }
 
+/// Finds a slot whose turn is meant as [`first`] does, from slot `next` on and round
+/// the ring once.
 #[cold]
-fn search<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
+fn search<'s, T>(
+    slots: &'s [Slot<T>],
+    next: &mut usize,
+    is_meant: impl Fn(u64) -> bool,
+) -> Option<&'s Slot<T>> {
     for _ in 0..slots.len() {
         let slot = at(slots, *next)?;
         *next = next.wrapping_add(1);
-        if slot.turn.load(Ordering::Acquire) == turn {
+        if is_meant(slot.turn.load(Ordering::Acquire)) {
             return Some(slot);
         }
     }

@@ -112,6 +112,66 @@ fn values_that_nobody_took_are_dropped_once() {
     assert_eq!(alive.load(Ordering::Relaxed), 0);
 }
 
+#[test]
+fn a_value_that_is_given_up_makes_room_and_is_dropped_once() {
+    let alive = Arc::new(AtomicUsize::new(0));
+    let (mut writer, mut reader) = ring(2);
+    assert!(writer.put(0, Counted::new(&alive, 0)).is_ok());
+    assert!(writer.put(1, Counted::new(&alive, 1)).is_ok());
+    reader.give_up(0);
+    reader.give_up(0);
+    reader.give_up(7);
+    assert!(reader.take(0).is_none(), "it is the writer's");
+    assert_eq!(alive.load(Ordering::Relaxed), 2);
+    assert!(writer.put(2, Counted::new(&alive, 2)).is_ok());
+    assert_eq!(alive.load(Ordering::Relaxed), 2, "0 has made way for 2");
+    assert!(writer.put(3, Counted::new(&alive, 3)).is_err(), "full");
+    assert_eq!(reader.take(1).map(|value| value.1), Some(1));
+    reader.give_up(2);
+    drop((writer, reader));
+    assert_eq!(alive.load(Ordering::Relaxed), 0);
+}
+
+/// The reader takes every other job's value and gives up the rest, at full speed.
+#[test]
+fn given_up_slots_race_with_their_writer() {
+    for slots in [1, 2, 4] {
+        let alive = Arc::new(AtomicUsize::new(0));
+        let (mut writer, mut reader) = ring(slots);
+        let counter = Arc::clone(&alive);
+        let sender = thread::spawn(move || {
+            for job in 0..JOBS / 8 {
+                let mut message = ([job; 5], Counted::new(&counter, job));
+                while let Err(back) = writer.put(job, message) {
+                    message = back;
+                    thread::yield_now();
+                }
+            }
+        });
+        for job in 0..JOBS / 8 {
+            let is_there = |reader: &super::Reader<_>| {
+                let mut turns = reader
+                    .slots
+                    .iter()
+                    .map(|slot| slot.turn.load(Ordering::Acquire));
+                turns.any(|turn| turn == super::turn_of(job))
+            };
+            while !is_there(&reader) {
+                thread::yield_now();
+            }
+            if job % 2 == 0 {
+                reader.give_up(job);
+            } else {
+                let (words, counted) = reader.take(job).expect("it is there");
+                assert_eq!((words, counted.1), ([job; 5], job));
+            }
+        }
+        sender.join().expect("the sender ends");
+        drop(reader);
+        assert_eq!(alive.load(Ordering::Relaxed), 0);
+    }
+}
+
 /// The two ends race at full speed; every value arrives, whole, in its job.
 #[test]
 fn two_threads_hand_over_every_job_intact() {

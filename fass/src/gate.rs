@@ -17,15 +17,6 @@
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 
-/// What the platform grants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Grant {
-    /// Do the subtask's part of this job.
-    Run(u64),
-    /// Drop what has arrived for this job, which was cancelled.
-    Discard(u64),
-}
-
 /// A shared handle of one subtask's gate.
 #[derive(Clone)]
 pub(crate) struct Gate(Arc<State>);
@@ -37,12 +28,10 @@ struct State {
 
 /// Waiting for a grant.
 const CLOSED: u8 = 0;
-/// A run is granted and not yet begun.
-const RUN: u8 = 1;
-/// A discard is granted and not yet begun.
-const DISCARD: u8 = 2;
+/// A job is granted and not yet begun.
+const OPEN: u8 = 1;
 /// The future passed the gate and has not reported the end.
-const PASSED: u8 = 3;
+const PASSED: u8 = 2;
 
 impl Gate {
     pub(crate) fn new() -> Self {
@@ -52,28 +41,21 @@ impl Gate {
         }))
     }
 
-    /// Opens the gate for one grant.
-    pub(crate) fn open(&self, grant: Grant) {
-        let (phase, job) = match grant {
-            Grant::Run(job) => (RUN, job),
-            Grant::Discard(job) => (DISCARD, job),
-        };
+    /// Opens the gate for the subtask's part of one job.
+    pub(crate) fn open(&self, job: u64) {
         self.0.job.store(job, Ordering::Relaxed);
-        self.0.phase.store(phase, Ordering::Relaxed);
+        self.0.phase.store(OPEN, Ordering::Relaxed);
     }
 
-    /// Passes the gate if it is open. If it is not, whoever polls again has opened
-    /// it before, so no waker needs to be kept.
+    /// Passes the gate if it is open, and returns the job. If it is not, whoever polls
+    /// again has opened it before, so no waker needs to be kept.
     #[inline]
-    pub(crate) fn pass(&self) -> Option<Grant> {
-        let job = self.job();
-        let grant = match self.0.phase.load(Ordering::Relaxed) {
-            RUN => Grant::Run(job),
-            DISCARD => Grant::Discard(job),
-            _ => return None,
-        };
+    pub(crate) fn pass(&self) -> Option<u64> {
+        if self.0.phase.load(Ordering::Relaxed) != OPEN {
+            return None;
+        }
         self.0.phase.store(PASSED, Ordering::Relaxed);
-        Some(grant)
+        Some(self.job())
     }
 
     /// Closes the gate behind a grant that has been carried out.
@@ -94,7 +76,7 @@ impl Gate {
 
 #[cfg(test)]
 mod tests {
-    use super::{Gate, Grant};
+    use super::Gate;
 
     #[test]
     fn a_closed_gate_lets_nobody_pass() {
@@ -106,9 +88,9 @@ mod tests {
     #[test]
     fn one_grant_passes_once() {
         let gate = Gate::new();
-        gate.open(Grant::Run(7));
+        gate.open(7);
         assert!(!gate.is_closed());
-        assert_eq!(gate.pass(), Some(Grant::Run(7)));
+        assert_eq!(gate.pass(), Some(7));
         assert_eq!(gate.pass(), None);
         assert!(!gate.is_closed(), "open until the end is reported");
         gate.close();

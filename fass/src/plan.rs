@@ -5,12 +5,13 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use core::pin::Pin;
 use core::task::{Context, Poll, Waker};
 
 use sched_dag::{DagId, TaskSet};
 
 use crate::effect::Effect;
-use crate::gate::{Gate, Grant};
+use crate::gate::Gate;
 use crate::subtask::SubtaskFuture;
 
 /// A committed set of DAGs, ready to be scheduled.
@@ -60,14 +61,14 @@ pub struct Plan {
 /// # is_send::<Body>();
 /// ```
 pub struct Body {
-    future: SubtaskFuture,
+    future: Box<dyn SubtaskFuture>,
     gate: Gate,
     /// What its completions do beyond the DAG.
     effects: Vec<Box<dyn Effect>>,
 }
 
 impl Body {
-    pub(crate) fn new(future: SubtaskFuture, gate: Gate) -> Self {
+    pub(crate) fn new(future: Box<dyn SubtaskFuture>, gate: Gate) -> Self {
         Self {
             future,
             gate,
@@ -103,7 +104,18 @@ impl Body {
     /// }
     /// ```
     pub fn run(&mut self, job: u64) {
-        self.grant(Grant::Run(job));
+        assert!(
+            self.gate.is_closed(),
+            "the subtask panicked in job {} and cannot continue",
+            self.gate.job()
+        );
+        self.gate.open(job);
+        let mut context = Context::from_waker(Waker::noop());
+        match Pin::new(&mut *self.future).poll(&mut context) {
+            // The future waits at the gate only, so it is back there.
+            Poll::Pending => debug_assert!(self.gate.is_closed()),
+            Poll::Ready(never) => match never {},
+        }
     }
 
     /// Lets happen what the last [`run`](Self::run) has prepared outside the DAG:
@@ -141,15 +153,16 @@ impl Body {
         !self.effects.is_empty()
     }
 
-    /// Drops the inputs of job `job` that have arrived, instead of running it.
+    /// Gives up the inputs of job `job` that have arrived, instead of running it.
     ///
     /// To be called for an instance that will not run, once no predecessor of
     /// it runs any more: a value that arrives later would stay in its slot.
     /// Calling it again, or for a job of which nothing arrived, does no harm.
     ///
-    /// # Panics
-    ///
-    /// If the body panicked before.
+    /// Takes a bounded time, little stack, and runs no code of the app, so that it
+    /// may be called by a scheduler in mid-step: a value is not dropped here, but
+    /// by the predecessor that next needs its slot, in [`run`](Self::run), or with
+    /// the bodies.
     ///
     /// ```
     /// fn cancelled(body: &mut fass::Body, instance: sched_dag::Instance) {
@@ -157,22 +170,7 @@ impl Body {
     /// }
     /// ```
     pub fn discard(&mut self, job: u64) {
-        self.grant(Grant::Discard(job));
-    }
-
-    fn grant(&mut self, grant: Grant) {
-        assert!(
-            self.gate.is_closed(),
-            "the subtask panicked in job {} and cannot continue",
-            self.gate.job()
-        );
-        self.gate.open(grant);
-        let mut context = Context::from_waker(Waker::noop());
-        match self.future.as_mut().poll(&mut context) {
-            // The future waits at the gate only, so it is back there.
-            Poll::Pending => debug_assert!(self.gate.is_closed()),
-            Poll::Ready(never) => match never {},
-        }
+        self.future.discard(job);
     }
 }
 

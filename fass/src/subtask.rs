@@ -25,7 +25,10 @@ use crate::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 pub(crate) type MakeBody = Box<dyn FnOnce(&mut Wiring, usize) -> Body>;
 
 /// The future of a subtask, which never ends.
-pub(crate) type SubtaskFuture = Pin<Box<dyn Future<Output = Infallible> + Send>>;
+pub(crate) trait SubtaskFuture: Future<Output = Infallible> + Send + Unpin {
+    /// Gives up what has arrived for a job that the subtask will not run.
+    fn discard(&mut self, job: u64);
+}
 
 /// Defers [`create_subtask`] until the commit knows the wiring.
 pub(crate) fn defer<F, Args, Ret>(f: F) -> MakeBody
@@ -37,7 +40,7 @@ where
     Box::new(move |wiring, subtask| {
         let gate = Gate::new();
         let future = create_subtask(f, wiring, subtask, &gate);
-        Body::new(Box::pin(future), gate)
+        Body::new(Box::new(future), gate)
     })
 }
 
@@ -86,5 +89,15 @@ where
         let sent = pin!(pubs.send_all(results)).poll(context);
         debug_assert!(sent.is_ready());
         Poll::Pending
+    }
+}
+
+impl<F, Subs: MulRecv, Pubs: MulSend> SubtaskFuture for Turns<F, Subs, Pubs>
+where
+    F: FnMut(Subs::Items) -> Pubs::Items,
+    Self: Send,
+{
+    fn discard(&mut self, job: u64) {
+        self.subs.discard_all(job);
     }
 }

@@ -48,9 +48,9 @@ impl<T> Subscriber<T> {
         self.0.take(job).unwrap_or_else(|| missing(job))
     }
 
-    /// Drops the value of `job` if it has arrived.
+    /// Gives up the value of `job` if it has arrived.
     pub(crate) fn discard(&mut self, job: u64) {
-        drop(self.0.take(job));
+        self.0.give_up(job);
     }
 }
 

@@ -23,7 +23,7 @@ use core::future::ready;
 use core::pin::Pin;
 use core::task::{Context, Poll};
 
-use crate::gate::{Gate, Grant};
+use crate::gate::Gate;
 use crate::message::{Message, MessageType};
 use crate::topic::{Ports, Publisher, Subscriber};
 
@@ -60,6 +60,16 @@ pub trait MulRecv {
     /// }
     /// ```
     fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send;
+
+    /// Gives up the inputs of `job` that have arrived, which no instance will take.
+    /// Runs no code of the app and waits for nothing.
+    ///
+    /// ```
+    /// fn cancelled<Subs: fass::MulRecv>(subs: &mut Subs, job: u64) {
+    ///     subs.discard_all(job);
+    /// }
+    /// ```
+    fn discard_all(&mut self, job: u64);
 }
 
 /// Sends all outputs of an instance at once; never blocks.
@@ -254,15 +264,15 @@ macro_rules! implement_arity {
                     AtTheGate(move || {
                         let ($($end,)*) = &mut self.ends;
                         match self.gate.pass() {
-                            Some(Grant::Run(job)) => Poll::Ready(($($end.recv(job),)*)),
-                            Some(Grant::Discard(job)) => {
-                                $($end.discard(job);)*
-                                self.gate.close();
-                                Poll::Pending
-                            }
+                            Some(job) => Poll::Ready(($($end.recv(job),)*)),
                             None => Poll::Pending,
                         }
                     })
+                }
+
+                fn discard_all(&mut self, job: u64) {
+                    let ($($end,)*) = &mut self.ends;
+                    $($end.discard(job);)*
                 }
             }
 

@@ -19,13 +19,13 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::convert::Infallible;
 use core::fmt;
-use core::future::poll_fn;
-use core::task::Poll;
+use core::pin::Pin;
+use core::task::{Context, Poll};
 
 use crate::draft::Draft;
-use crate::gate::{Gate, Grant};
+use crate::gate::Gate;
 use crate::plan::Body;
-use crate::subtask::MakeBody;
+use crate::subtask::{MakeBody, SubtaskFuture};
 use crate::topic::{Publisher, Subscriber};
 
 /// A subtask without types, by which edges name it. Made by
@@ -65,30 +65,46 @@ pub(crate) fn defer<F: FnMut(u64) + Send + 'static>(f: F) -> MakeBody {
     Box::new(move |wiring, subtask| {
         let gate = Gate::new();
         let (before, after) = wiring.signals(subtask);
-        let future = create_subtask(f, before, after, gate.clone());
-        Body::new(Box::pin(future), gate)
+        let turns = UntypedTurns {
+            f,
+            before,
+            after,
+            gate: gate.clone(),
+        };
+        Body::new(Box::new(turns), gate)
     })
 }
 
 /// The loop of an untyped subtask: as that of figure 4, with signals for values.
-async fn create_subtask<F: FnMut(u64)>(
-    mut f: F,
-    mut before: Vec<Subscriber<Signal>>,
-    mut after: Publisher<Signal>,
+struct UntypedTurns<F> {
+    f: F,
+    before: Vec<Subscriber<Signal>>,
+    after: Publisher<Signal>,
     gate: Gate,
-) -> Infallible {
-    loop {
-        let grant = poll_fn(|_| gate.pass().map_or(Poll::Pending, Poll::Ready)).await;
-        match grant {
-            Grant::Run(job) => {
-                before.iter_mut().for_each(|edge| {
-                    edge.recv(job);
-                });
-                f(job);
-                after.send(job, Signal);
-            }
-            Grant::Discard(job) => before.iter_mut().for_each(|edge| edge.discard(job)),
+}
+
+/// Nothing in it is pinned.
+impl<F> Unpin for UntypedTurns<F> {}
+
+impl<F: FnMut(u64)> Future for UntypedTurns<F> {
+    type Output = Infallible;
+
+    fn poll(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Infallible> {
+        let turns = self.get_mut();
+        if let Some(job) = turns.gate.pass() {
+            turns.before.iter_mut().for_each(|edge| {
+                edge.recv(job);
+            });
+            (turns.f)(job);
+            turns.after.send(job, Signal);
+            turns.gate.close();
         }
-        gate.close();
+        Poll::Pending
+    }
+}
+
+impl<F: FnMut(u64) + Send> SubtaskFuture for UntypedTurns<F> {
+    fn discard(&mut self, job: u64) {
+        self.before.iter_mut().for_each(|edge| edge.discard(job));
     }
 }

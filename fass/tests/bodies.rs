@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 
-use fass::{Dag, SubtaskAttributes, create_dag};
+use fass::{Dag, Plan, SubtaskAttributes, Unique, create_dag};
 use support::{commit, run_job};
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -151,8 +151,9 @@ fn discarding_makes_room_for_a_later_job() {
 }
 
 #[test]
-fn discarding_drops_the_value() {
+fn a_discarded_value_is_dropped_by_who_needs_its_slot() {
     let (dag, value) = (create_dag(), Arc::new(()));
+    dag.in_flight(1);
     let source = {
         let value = Arc::clone(&value);
         move || (Arc::clone(&value),)
@@ -163,10 +164,88 @@ fn discarding_drops_the_value() {
     plan.bodies[0][0].run(0);
     assert_eq!(Arc::strong_count(&value), 3);
     plan.bodies[0][1].discard(0);
-    assert_eq!(Arc::strong_count(&value), 2);
+    assert_eq!(Arc::strong_count(&value), 3, "not by the scheduler's step");
     plan.bodies[0][0].run(1);
+    assert_eq!(Arc::strong_count(&value), 3, "one went, one came");
+    plan.bodies[0][1].discard(1);
     drop(plan);
     assert_eq!(Arc::strong_count(&value), 1, "dropped with the plan");
+}
+
+/// A value whose `drop` panics does so in its writer, once, and not where it is
+/// discarded.
+#[test]
+fn what_drops_a_discarded_value_is_the_writers_fault() {
+    struct Sharp(bool, Arc<AtomicUsize>);
+    impl Drop for Sharp {
+        fn drop(&mut self) {
+            self.1.fetch_add(1, Ordering::Relaxed);
+            assert!(!self.0, "it cannot be dropped");
+        }
+    }
+    let (dag, drops) = (create_dag(), Arc::new(AtomicUsize::new(0)));
+    dag.in_flight(1);
+    let mut is_first = true;
+    let source = {
+        let drops = Arc::clone(&drops);
+        move || {
+            let sharp = Sharp(is_first, Arc::clone(&drops));
+            is_first = false;
+            (Unique::new(sharp),)
+        }
+    };
+    dag.register_periodic_subtask(source, vec!["value"], PERIOD, named("source"));
+    dag.register_sink_subtask(
+        |_: (Unique<Sharp>,)| (),
+        vec!["value"],
+        PERIOD,
+        named("sink"),
+    );
+    let mut plan = commit(&[dag]);
+    let [source, sink] = &mut plan.bodies[0][..] else {
+        panic!("two subtasks");
+    };
+    source.run(0);
+    sink.discard(0);
+    assert_eq!(drops.load(Ordering::Relaxed), 0);
+    assert_eq!(panic_message(|| source.run(1)), "it cannot be dropped");
+    assert_eq!(drops.load(Ordering::Relaxed), 2, "and the one of job 1");
+    drop(plan);
+    assert_eq!(drops.load(Ordering::Relaxed), 2, "each once");
+}
+
+/// Whoever discards may have a small stack, as an interrupt's handler has.
+#[test]
+fn discarding_a_large_value_takes_little_stack() {
+    const BYTES: usize = 1 << 20;
+    const STACK: usize = 128 << 10; // what a thread of a test's needs at least, and room
+    const LARGE: usize = 64 << 20;
+    let on_stack = |bytes, f: Box<dyn FnOnce() -> Plan + Send>| {
+        let thread = thread::Builder::new().stack_size(bytes).spawn(f);
+        (thread.expect("a thread").join()).expect("its stack is enough")
+    };
+    let make = || {
+        let dag = create_dag();
+        let source = || ([1_u8; BYTES],);
+        dag.register_periodic_subtask(source, vec!["value"], PERIOD, named("source"));
+        let sink = |_: ([u8; BYTES],)| ();
+        dag.register_sink_subtask(sink, vec!["value"], PERIOD, named("sink"));
+        let mut plan = commit(&[dag]);
+        plan.bodies[0][0].run(0);
+        plan
+    };
+    let mut plan = on_stack(LARGE, Box::new(make));
+    let discard = move || {
+        plan.bodies[0][1].discard(0);
+        plan
+    };
+    let mut plan = on_stack(STACK, Box::new(discard));
+    let look = move || {
+        let early = panic_message(|| plan.bodies[0][1].run(0));
+        assert!(early.contains("an input of job 0 is missing"), "{early}");
+        plan
+    };
+    on_stack(LARGE, Box::new(look));
 }
 
 #[test]
@@ -206,7 +285,7 @@ fn a_body_that_panicked_cannot_run_again() {
     assert_eq!(panic_message(|| source.run(7)), "broken sensor");
     let again = "the subtask panicked in job 7 and cannot continue";
     assert_eq!(panic_message(|| source.run(8)), again);
-    assert_eq!(panic_message(|| source.discard(8)), again);
+    source.discard(8); // runs nothing
 }
 
 #[test]

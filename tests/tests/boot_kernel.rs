@@ -79,6 +79,26 @@ fn a_fault_that_the_app_does_not_look_at_is_a_failure() {
 }
 
 #[test]
+fn values_that_are_left_behind_harm_nobody() {
+    for cores in [1, 4] {
+        let outcome = guest("large").cores(cores).succeed();
+        let faults = outcome.transcript.of_kind("fault").map(|line| {
+            let text = |name| line.text_at(name).unwrap_or_default().to_string();
+            (text("subtask_name"), text("cause"), line.number_at("job"))
+        });
+        let expected = [
+            ("panics", "panic", 3),
+            ("source", "page fault", 0),
+            ("source", "panic", 1),
+            ("source", "budget overrun", 1),
+        ];
+        let expected =
+            expected.map(|(subtask, cause, job)| (subtask.into(), cause.into(), Some(job)));
+        assert_eq!(faults.collect::<Vec<_>>(), expected, "{}", outcome.tail());
+    }
+}
+
+#[test]
 fn a_run_that_comes_to_a_standstill_names_who_runs() {
     for cores in [1, 4] {
         let outcome = guest("stalled").cores(cores).succeed();

@@ -1,8 +1,9 @@
 //! What the scheduler reports during a run: to who looks on, and to bodies.
 //!
 //! An instance that is *cancelled* never runs, but its predecessors may have run and
-//! sent it values. These have to go before a later job needs their slots. So its body
-//! [discards](Execute::discard) them at once, on the worker that steps the scheduler.
+//! sent it values. Later jobs need their slots. So its body
+//! [discards](Execute::discard) them at once, on the worker that steps the scheduler;
+//! what is in a slot is dropped by the predecessor that next uses it.
 //!
 //! # The body is at rest
 //!

@@ -155,14 +155,6 @@ impl Runner<'_> {
         &mut self.bodies[instance.dag.index()][instance.subtask.index()]
     }
 
-    /// Reports whether the instance's subtask has panicked, in whatever job. Its
-    /// body then takes no call any more; what was sent to it stays in its slots.
-    fn has_panicked(&self, instance: Instance) -> bool {
-        let Instance { dag, subtask, .. } = instance;
-        let mut panics = self.recorder.panics.iter();
-        panics.any(|panic| panic.instance.dag == dag && panic.instance.subtask == subtask)
-    }
-
     /// Returns the recorder, unless the run has failed.
     fn recorder(&mut self) -> Option<&mut Recorder> {
         self.panic.is_none().then_some(&mut *self.recorder)
@@ -305,9 +297,7 @@ impl Observer for Runner<'_> {
         self.recorder.now(EventKind::Cancelled { instance });
         // Functions run at the start of their instances, so whatever the
         // predecessors will ever send has been sent.
-        if !self.has_panicked(instance) {
-            self.body(instance).discard(instance.job);
-        }
+        self.body(instance).discard(instance.job);
     }
 
     fn ended(&mut self, dag: DagId) {

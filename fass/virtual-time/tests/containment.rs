@@ -2,7 +2,7 @@
 
 mod support;
 
-use fass::{Dag, create_dag};
+use fass::{Dag, OverrunPolicy, Unique, create_dag};
 use support::{commit, diamond, execute, ms, named, pair};
 use virtual_time::{Instance, JobOutcome, Report, VirtualTime};
 
@@ -128,10 +128,50 @@ fn a_branch_that_has_started_runs_to_its_end() {
     assert_eq!(report.violations(), []);
 }
 
+/// A value that the sink of an aborted job leaves behind, and that cannot be dropped.
+struct Sharp(bool);
+
+impl Drop for Sharp {
+    fn drop(&mut self) {
+        assert!(!self.0, "it cannot be dropped");
+    }
+}
+
+#[test]
+fn a_value_that_cannot_be_dropped_is_the_fault_of_the_subtask_that_replaces_it() {
+    let machine = VirtualTime::new().cores(2).contain_panics();
+    let dag = create_dag();
+    dag.name("sharp").jobs(5).in_flight(1);
+    dag.overrun(OverrunPolicy::Abort);
+    let mut is_sharp = true;
+    let source = move || (Unique::new(Sharp(core::mem::take(&mut is_sharp))), ());
+    dag.register_periodic_subtask(source, vec!["value", "go"], ms(10), named("source"));
+    let slow = |((),): ((),)| {
+        execute(ms(12));
+        ((),)
+    };
+    dag.register_subtask(slow, vec!["go"], vec!["went"], named("slow"));
+    let sink = |(value, ()): (Unique<Sharp>, ())| std::mem::forget(value);
+    dag.register_sink_subtask(sink, vec!["value", "went"], ms(10), named("sink"));
+    commit(&[healthy(), dag]);
+    let report = machine.run();
+    let [panic] = &report.panics[..] else {
+        panic!("{:?}", report.panics);
+    };
+    assert_eq!(panic.message, "it cannot be dropped");
+    assert_eq!((panic.instance.subtask.0, panic.instance.job), (0, 1));
+    let [healthy, sharp] = report.statistics[..] else {
+        panic!("two DAGs");
+    };
+    assert_eq!((healthy.completed, healthy.misses), (30, 0));
+    assert_eq!((sharp.aborts, sharp.faults), (1, 1));
+    assert_eq!(report.violations(), []);
+}
+
 #[test]
 fn values_that_wait_for_a_broken_body_do_no_harm() {
     // The source runs ahead: when the sink panics, later jobs' values are in its
-    // slots, and its body can no longer drop them.
+    // slots.
     let machine = VirtualTime::new().cores(2).contain_panics();
     let dag = create_dag();
     dag.name("ahead").jobs(8).in_flight(4);

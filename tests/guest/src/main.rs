@@ -9,6 +9,7 @@ mod checksum;
 mod endless;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
+mod large;
 mod occupation;
 mod overrun;
 mod preemption;
@@ -25,7 +26,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 17] = [
+const TESTS: [(&str, Test); 18] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -43,6 +44,7 @@ const TESTS: [(&str, Test); 17] = [
     ("preemption", preemption::run),
     ("occupation", occupation::run),
     ("endless", endless::run),
+    ("large", large::run),
     ("overrun", overrun::run),
     ("sharing", sharing::run),
     ("stalled", stalled::run),
