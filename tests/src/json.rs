@@ -233,6 +233,24 @@ mod tests {
         let (column, message) = refused(r#"{"kind":"a","kind":"b"}"#);
         assert_eq!(column, 13);
         assert_eq!(message, "key `kind` stands twice in one object");
+        // The first one that is too many, whatever the order of the keys.
+        assert_eq!(refused(r#"{"b":1,"a":1,"b":2,"a":2}"#).0, 14);
+        let long = format!("\\u001b{}", "k".repeat(5000));
+        let (_, message) = refused(&format!(r#"{{"{long}":1,"{long}":2}}"#));
+        assert!(
+            message.len() < 100 && message.contains("\\u{1b}"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn reads_an_object_of_very_many_keys() {
+        // Comparing each key with each would take half a minute.
+        let members: Vec<String> = (0..100_000).map(|key| format!("\"k{key}\":0")).collect();
+        let text = format!("{{{}}}", members.join(","));
+        assert!(
+            matches!(parse(&text).unwrap(), Value::Object(members) if members.len() == 100_000)
+        );
     }
 
     #[test]

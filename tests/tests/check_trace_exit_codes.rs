@@ -82,6 +82,11 @@ fn a_file_without_a_trace_or_with_a_damaged_one_is_2() {
     let no_trace = "2: the file ends without a trace; `./scripts/run --trace FILE` makes one";
     refused("none.log", "hello\nbye\n", no_trace);
     let lines: Vec<&str> = GOOD.lines().collect();
+    let ends = "1: the file ends without a trace; `./scripts/run --trace FILE` makes one";
+    refused("nothing.log", "", ends);
+    let many = GOOD.replace("\"cores\":1", "\"cores\":10000000");
+    let most = "2: `trace_begin`: `cores` is 10000000 and must be from 1 to 64";
+    refused("many.log", &many, most);
     let no_event = format!(
         "{}\n{}\n",
         lines[1],

@@ -3,6 +3,8 @@
 //! It walks over the bytes once. `position` is always the byte to be read
 //! next, and stands on a character's first byte whenever a message is made.
 
+use replay::shown::quoted;
+
 use super::{DEEPEST, JsonError, Value};
 
 pub(super) struct Parser<'t> {
@@ -60,21 +62,18 @@ impl<'t> Parser<'t> {
 
     fn object(&mut self) -> Result<Value, JsonError> {
         let mut members: Vec<(String, Value)> = Vec::new();
+        let mut starts = Vec::new();
         self.skip_blanks();
         if self.take(b'}') {
             return Ok(Value::Object(members));
         }
         loop {
             self.skip_blanks();
-            let start = self.position;
+            starts.push(self.position);
             if self.peek() != Some(b'"') {
                 return Err(self.unexpected("a key in double quotes"));
             }
             let key = self.string()?;
-            if members.iter().any(|(known, _)| *known == key) {
-                self.position = start;
-                return Err(self.error(format!("key `{key}` stands twice in one object")));
-            }
             self.skip_blanks();
             if !self.take(b':') {
                 return Err(self.unexpected("`:`"));
@@ -83,10 +82,18 @@ impl<'t> Parser<'t> {
             members.push((key, value));
             self.skip_blanks();
             if self.take(b'}') {
-                return Ok(Value::Object(members));
+                break;
             }
             if !self.take(b',') {
                 return Err(self.unexpected("`,` or `}`"));
+            }
+        }
+        match repeated(&members) {
+            None => Ok(Value::Object(members)),
+            Some(second) => {
+                self.position = starts[second];
+                let key = quoted(&members[second].0);
+                Err(self.error(format!("key {key} stands twice in one object")))
             }
         }
     }
@@ -210,7 +217,7 @@ impl<'t> Parser<'t> {
                 .filter(|number: &f64| number.is_finite());
             number.map(Value::Decimal)
         };
-        value.ok_or_else(|| self.error(format!("number `{lexeme}` is out of range")))
+        value.ok_or_else(|| self.error(format!("number {} is out of range", quoted(lexeme))))
     }
 
     fn digits(&mut self) -> Result<(), JsonError> {
@@ -264,4 +271,14 @@ impl<'t> Parser<'t> {
             message,
         }
     }
+}
+
+/// Returns the first member whose key stands before it, too.
+fn repeated(members: &[(String, Value)]) -> Option<usize> {
+    let mut order: Vec<usize> = (0..members.len()).collect();
+    // Stable: of equal keys the first stands first.
+    order.sort_by(|&one, &other| members[one].0.cmp(&members[other].0));
+    let pairs = order.windows(2);
+    let repeated = pairs.filter(|pair| members[pair[0]].0 == members[pair[1]].0);
+    repeated.map(|pair| pair[1]).min()
 }

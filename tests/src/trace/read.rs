@@ -3,15 +3,19 @@
 //! The log is a serial log or any file of JSON lines; lines of other kinds and
 //! lines for people are passed over, also within a run. A trace that is not as
 //! `docs/trace-format.md` says is [`Malformed`] with its line, so that a
-//! damaged log is never taken for a good run or for a breach.
+//! damaged log is never taken for a good run or for a breach. A count that memory
+//! is taken for is held against the most that there can be before.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use sched_dag::{CoreId, DagId, Policy, Preemption, SubtaskId};
 
 use super::model::{Dag, Event, Releases, Run, Subtask, Word};
+use crate::input::quoted;
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
+use crate::qemu::MOST_CORES;
 use replay::lines::Malformed;
 
 /// Reads all runs of a log; there may be none.
@@ -20,10 +24,15 @@ use replay::lines::Malformed;
 ///
 /// The first line that is damaged or out of place.
 pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
-    let mut runs = Vec::new();
+    let mut runs: Vec<Run> = Vec::new();
     let mut open: Option<Run> = None;
+    // A line of a trace that something before its `{` makes one for people.
+    let mut spoilt = None;
     for (index, text) in log.lines().enumerate() {
         let Some(line) = read_line(index + 1, text) else {
+            if text.contains("{\"kind\":\"trace_begin\"") {
+                spoilt = Some(index + 1);
+            }
             continue;
         };
         let line = line.map_err(|error| Malformed {
@@ -32,7 +41,16 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
         })?;
         let line = Line(&line);
         match (line.0.kind.as_str(), &mut open) {
-            ("trace_begin", None) => open = Some(begin(&line)?),
+            ("trace_begin", None) => {
+                let run = begin(&line)?;
+                if let Some(first) = runs.iter().find(|first| first.number == run.number) {
+                    return Err(line.malformed(format!(
+                        "run {} stands here twice, first on line {}; give each boot's log alone",
+                        run.number, first.line
+                    )));
+                }
+                open = Some(run);
+            }
             ("trace_begin", Some(run)) => {
                 let reason = format!("the trace of line {} has not ended yet", run.line);
                 return Err(line.malformed(reason));
@@ -44,7 +62,10 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
                 runs.extend(open.take());
             }
             ("trace_dag" | "trace" | "trace_end", None) => {
-                return Err(line.malformed("no `trace_begin` comes before it"));
+                let hint = spoilt.map_or(String::new(), |number| {
+                    format!("; that of line {number} does not begin with `{{`")
+                });
+                return Err(line.malformed(format!("no `trace_begin` comes before it{hint}")));
             }
             _ => {}
         }
@@ -59,8 +80,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
 }
 
 fn begin(line: &Line<'_>) -> Result<Run, Malformed> {
-    let cores = line.number("cores")?;
-    let cores = u32::try_from(cores).ok().filter(|&cores| cores > 0);
+    let cores = line.within("cores", 1..=MOST_CORES)?;
     Ok(Run {
         number: line.number("run")?,
         line: line.0.number,
@@ -74,7 +94,7 @@ fn begin(line: &Line<'_>) -> Result<Run, Malformed> {
             "off" => Preemption::Disabled,
             other => return Err(line.unknown("preemption", other, "on or off")),
         },
-        cores: cores.ok_or_else(|| line.malformed("`cores` must be from 1 to 2^32 - 1"))?,
+        cores: line.small(cores)?,
         dags: Vec::new(),
         events: Vec::new(),
         lost: 0,
@@ -95,13 +115,14 @@ fn add_dag(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
         "queue" | "skip" | "abort" => {}
         other => return Err(line.unknown("overrun", other, "queue, skip or abort")),
     }
-    line.number("in_flight")?;
+    line.within("in_flight", 1..=u64::from(u32::MAX))?;
     let subtasks = line
         .elements("subtasks")?
         .iter()
         .map(|it| subtask(line, it));
     let subtasks: Vec<Subtask> = subtasks.collect::<Result<_, _>>()?;
     let mut predecessors = vec![Vec::new(); subtasks.len()];
+    let mut followed: Vec<Vec<u32>> = vec![Vec::new(); subtasks.len()];
     for edge in line.elements("edges")? {
         let ends: Option<Vec<u64>> = edge.elements().iter().map(Value::as_u64).collect();
         let count = subtasks.len() as u64;
@@ -113,6 +134,10 @@ fn add_dag(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
         };
         let (from, to) = (line.small(from)?, line.small(to)?);
         predecessors[to as usize].push(SubtaskId(from));
+        followed[from as usize].push(to);
+    }
+    if has_cycle(&followed) {
+        return Err(line.malformed("`edges` have a cycle, which no commit lets pass"));
     }
     for before in &mut predecessors {
         before.sort_unstable();
@@ -120,8 +145,8 @@ fn add_dag(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
     }
     run.dags.push(Dag {
         name: line.text("name")?.to_string(),
-        period_ns: line.number("period_ns")?,
-        relative_deadline_ns: line.number("relative_deadline_ns")?,
+        period_ns: line.within("period_ns", 1..=u64::MAX)?,
+        relative_deadline_ns: line.within("relative_deadline_ns", 1..=u64::MAX)?,
         offset_ns: line.number("offset_ns")?,
         sporadic: releases(line)?,
         subtasks,
@@ -130,9 +155,31 @@ fn add_dag(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
     Ok(())
 }
 
+/// Reports whether subtasks come before themselves; `followed` has the successors of
+/// each.
+fn has_cycle(followed: &[Vec<u32>]) -> bool {
+    let mut waits_for = vec![0_u32; followed.len()];
+    for &to in followed.iter().flatten() {
+        waits_for[to as usize] += 1;
+    }
+    let is_free = |subtask: &usize| waits_for[*subtask] == 0;
+    let mut free: Vec<usize> = (0..followed.len()).filter(is_free).collect();
+    let mut ordered = 0;
+    while let Some(subtask) = free.pop() {
+        ordered += 1;
+        for &to in &followed[subtask] {
+            waits_for[to as usize] -= 1;
+            if waits_for[to as usize] == 0 {
+                free.push(to as usize);
+            }
+        }
+    }
+    ordered < followed.len()
+}
+
 /// Reads the releases of a sporadic DAG.
 fn releases(line: &Line<'_>) -> Result<Option<Releases>, Malformed> {
-    if line.0.value.get("sporadic").and_then(Value::as_bool) != Some(true) {
+    if !line.flag("sporadic")? {
         return Ok(None);
     }
     let mut times_ns = BTreeMap::new();
@@ -141,7 +188,9 @@ fn releases(line: &Line<'_>) -> Result<Option<Releases>, Malformed> {
         let Some(&[job, time_ns]) = pair.as_deref() else {
             return Err(line.malformed("a release is a pair of a job and a time"));
         };
-        times_ns.insert(job, time_ns);
+        if times_ns.insert(job, time_ns).is_some() {
+            return Err(line.malformed(format!("the release of job {job} stands here twice")));
+        }
     }
     Ok(Some(Releases {
         are_exact: !times_ns.is_empty(),
@@ -202,7 +251,7 @@ fn event(run: &Run, value: &Value) -> Result<Event, String> {
         number.ok_or_else(|| format!("its {what} is not a number less than {below}"))
     };
     let text = word.as_text().unwrap_or_default();
-    let word = Word::from_text(text).ok_or_else(|| format!("`{text}` is no event"))?;
+    let word = Word::from_text(text).ok_or_else(|| format!("{} is no event", quoted(text)))?;
     let core = number("core", core, u64::from(run.cores))?;
     let dag = number("dag", dag, run.dags.len() as u64)?;
     let dag = DagId(u32::try_from(dag).map_err(|error| error.to_string())?);
@@ -229,13 +278,20 @@ fn end(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
         return Err(line.malformed(format!("{stated} events are announced, {found} are there")));
     }
     run.lost = line.number("lost")?;
-    run.complete = line.0.value.get("complete").and_then(Value::as_bool) == Some(true);
+    run.complete = line.flag("complete")?;
     if line.0.value.get("lost_by_core").is_some() {
         let counts = line.elements("lost_by_core")?.iter().map(Value::as_u64);
         let counts: Option<Vec<u64>> = counts.collect();
         let counts = counts.filter(|counts| counts.len() == run.cores as usize);
         let reason = "`lost_by_core` is not a list of a count for each core";
-        run.lost_by_core = Some(counts.ok_or_else(|| line.malformed(reason))?);
+        let counts = counts.ok_or_else(|| line.malformed(reason))?;
+        let sum = counts.iter().copied().fold(0, u64::saturating_add);
+        if sum != run.lost {
+            let lost = run.lost;
+            let reason = format!("`lost` is {lost}, and `lost_by_core` has {sum} in all");
+            return Err(line.malformed(reason));
+        }
+        run.lost_by_core = Some(counts);
     }
     estimate_releases(run);
     // Each core's events are in the order of time.
@@ -264,7 +320,33 @@ impl Line<'_> {
     }
 
     fn unknown(&self, name: &str, found: &str, allowed: &str) -> Malformed {
-        self.malformed(format!("`{name}` is `{found}` and must be {allowed}"))
+        let found = quoted(found);
+        self.malformed(format!("`{name}` is {found} and must be {allowed}"))
+    }
+
+    /// Returns a member that is true or false, and false if it is left out.
+    fn flag(&self, name: &str) -> Result<bool, Malformed> {
+        match self.0.value.get(name) {
+            None => Ok(false),
+            Some(Value::Bool(flag)) => Ok(*flag),
+            Some(_) => Err(self.malformed(format!("`{name}` is neither true nor false"))),
+        }
+    }
+
+    fn within(&self, name: &str, range: RangeInclusive<u64>) -> Result<u64, Malformed> {
+        let number = self.number(name)?;
+        match range.contains(&number) {
+            true => Ok(number),
+            false if *range.end() == u64::MAX => {
+                let least = range.start();
+                Err(self.malformed(format!("`{name}` is {number} and must be at least {least}")))
+            }
+            false => {
+                let (least, most) = range.into_inner();
+                let reason = format!("`{name}` is {number} and must be from {least} to {most}");
+                Err(self.malformed(reason))
+            }
+        }
     }
 
     fn number(&self, name: &str) -> Result<u64, Malformed> {

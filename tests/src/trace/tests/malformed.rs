@@ -21,8 +21,8 @@ fn a_good_log_is_read() {
     assert_eq!((run.events.len(), run.dags.len()), (3, 1));
     assert!(run.dags[0].subtasks[1].non_preemptive);
     assert_eq!(read("hello\n").unwrap().len(), 0);
-    let twice = format!("{GOOD}{GOOD}");
-    assert_eq!(read(&twice).unwrap().len(), 2);
+    let second = GOOD.replace("\"run\":3", "\"run\":4");
+    assert_eq!(read(&format!("{GOOD}{second}")).unwrap().len(), 2);
 }
 
 #[test]
@@ -44,7 +44,67 @@ fn whatever_is_wrong_is_named_with_its_line() {
             "\"cores\":2",
             "\"cores\":0",
             2,
-            "`trace_begin`: `cores` must be from 1 to 2^32 - 1",
+            "`trace_begin`: `cores` is 0 and must be from 1 to 64",
+        ),
+        (
+            "\"cores\":2",
+            "\"cores\":4294967295",
+            2,
+            "`trace_begin`: `cores` is 4294967295 and must be from 1 to 64",
+        ),
+        (
+            "\"period_ns\":10,",
+            "\"period_ns\":0,",
+            3,
+            "`trace_dag`: `period_ns` is 0 and must be at least 1",
+        ),
+        (
+            "\"relative_deadline_ns\":10,",
+            "\"relative_deadline_ns\":0,",
+            3,
+            "`trace_dag`: `relative_deadline_ns` is 0 and must be at least 1",
+        ),
+        (
+            "\"in_flight\":1",
+            "\"in_flight\":0",
+            3,
+            "`trace_dag`: `in_flight` is 0 and must be from 1 to 4294967295",
+        ),
+        (
+            "\"overrun\":\"skip\"",
+            "\"overrun\":\"skip\",\"sporadic\":\"true\"",
+            3,
+            "`trace_dag`: `sporadic` is neither true nor false",
+        ),
+        (
+            "\"overrun\":\"skip\"",
+            "\"overrun\":\"skip\",\"sporadic\":true,\"releases\":[[1,5],[1,6]]",
+            3,
+            "`trace_dag`: the release of job 1 stands here twice",
+        ),
+        (
+            "[[0,1]]",
+            "[[0,1],[1,0]]",
+            3,
+            "`trace_dag`: `edges` have a cycle, which no commit lets pass",
+        ),
+        (
+            "[[0,1]]",
+            "[[1,1]]",
+            3,
+            "`trace_dag`: `edges` have a cycle, which no commit lets pass",
+        ),
+        (
+            "\"lost\":0",
+            "\"lost\":5,\"lost_by_core\":[7,0]",
+            7,
+            "`trace_end`: `lost` is 5, and `lost_by_core` has 7 in all",
+        ),
+        (
+            "\"lost\":0",
+            "\"lost\":0,\"complete\":\"yes\"",
+            7,
+            "`trace_end`: `complete` is neither true nor false",
         ),
         (
             "\"dag\":0,",
@@ -172,4 +232,49 @@ fn times_that_go_back_within_a_core_are_refused() {
     let reason = "`trace_end`: time goes back 2 times in the events of 2 cores; each core's must \
                   be in the order of time";
     assert_eq!((fault.line, fault.reason.as_str()), (7, reason));
+}
+
+#[test]
+fn a_run_that_stands_twice_is_refused_with_both_lines() {
+    let fault = read(&format!("{GOOD}{GOOD}")).unwrap_err();
+    let reason = "`trace_begin`: run 3 stands here twice, first on line 2; give each boot's log \
+                  alone";
+    assert_eq!((fault.line, fault.reason.as_str()), (10, reason));
+}
+
+#[test]
+fn a_first_line_that_something_spoils_is_named() {
+    for spoiler in [" ", "\u{feff}"] {
+        let log = GOOD.replace(
+            "{\"kind\":\"trace_begin\"",
+            &format!("{spoiler}{{\"kind\":\"trace_begin\""),
+        );
+        let fault = read(&log).unwrap_err();
+        let reason = "`trace_dag`: no `trace_begin` comes before it; that of line 2 does not begin \
+                      with `{`";
+        assert_eq!((fault.line, fault.reason.as_str()), (3, reason));
+    }
+}
+
+#[test]
+fn what_a_message_repeats_is_short_and_can_be_seen() {
+    let long = "x".repeat(5000);
+    for (from, to) in [
+        ("\"edf\"", format!("\"\\u001b[2J{long}\"")),
+        ("\"start\"", format!("\"\\u202e{long}\"")),
+    ] {
+        let fault = read(&GOOD.replace(from, &to)).unwrap_err();
+        assert!(fault.reason.len() < 150, "{}", fault.reason);
+        assert!(fault.reason.contains("\\u{"), "{}", fault.reason);
+    }
+}
+
+#[test]
+fn a_chain_of_many_subtasks_is_no_cycle() {
+    let subtasks = vec!["[\"a\",0,0,null]"; 3000].join(",");
+    let edges: Vec<String> = (1..3000).map(|n| format!("[{},{n}]", n - 1)).collect();
+    let log = GOOD
+        .replace("[[\"a\",0,0,null],[\"b\",1,1,7]]", &format!("[{subtasks}]"))
+        .replace("[[0,1]]", &format!("[{}]", edges.join(",")));
+    assert_eq!(read(&log).unwrap()[0].dags[0].predecessors.len(), 3000);
 }
