@@ -87,7 +87,7 @@ pub(super) fn read_file(file: &str) -> Result<Vec<Run>, String> {
     // A person's line may be damaged; a machine line then is found to be.
     let text = String::from_utf8_lossy(&bytes);
     let runs = read(&text).map_err(|fault| format!("{file}:{}: {}", fault.line, fault.reason))?;
-    let last = text.lines().count();
+    let last = text.lines().count().max(1);
     match runs.first() {
         None => Err(format!(
             "{file}:{last}: the file ends without a trace; `./scripts/run --trace FILE` makes one"

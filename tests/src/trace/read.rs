@@ -12,11 +12,11 @@ use std::ops::RangeInclusive;
 use sched_dag::{CoreId, DagId, Policy, Preemption, SubtaskId};
 
 use super::model::{Dag, Event, Releases, Run, Subtask, Word};
-use crate::input::quoted;
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
 use crate::qemu::MOST_CORES;
 use replay::lines::Malformed;
+use replay::shown::quoted;
 
 /// Reads all runs of a log; there may be none.
 ///
