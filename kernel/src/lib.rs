@@ -67,6 +67,7 @@ mod memory;
 pub mod options;
 mod panic;
 mod platform;
+mod probe;
 pub mod report;
 mod run;
 mod settings;

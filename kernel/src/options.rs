@@ -251,7 +251,7 @@ mod tests {
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
              budget_factor, overheads_ns, trace, trace_events, graph, measure, \
-             idle, console, status, mode"
+             idle, console, status, mode, probe"
         );
     }
 

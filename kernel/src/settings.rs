@@ -14,6 +14,7 @@
 //! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
 //! | `mode=...` | the host's name for what time means; `deterministic`: timers settle, see `machine::counted_time` | |
+//! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
 
 use alloc::format;
 
@@ -27,7 +28,7 @@ use crate::platform::KERNEL;
 use crate::worker;
 
 /// The words, for messages.
-pub(crate) const WORDS: [&str; 12] = [
+pub(crate) const WORDS: [&str; 13] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -40,6 +41,7 @@ pub(crate) const WORDS: [&str; 12] = [
     "console",
     "status",
     "mode",
+    "probe",
 ];
 
 const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
@@ -81,6 +83,8 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     if options.text("mode") == Some("deterministic") {
         counted_time::enable();
     }
+    // `on` never comes here: the probe runs in place of all this.
+    options.choice("probe", &[("off", ()), ("on", ())])?;
     let events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
     let status_s = options.number("status", 0..=86_400, 0)?;
     let consoles = [

@@ -15,7 +15,7 @@ use crate::machine_handle::Machine;
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
 use crate::platform::KERNEL;
-use crate::{console, contexts, json, panic, println, settings, trace, worker};
+use crate::{console, contexts, json, panic, println, probe, settings, trace, worker};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -28,12 +28,16 @@ const HANDLER_STACK: u64 = 16 * 1024;
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
     serial::initialize();
     legacy::silence_interrupt_controllers();
-    interrupt::install(interrupt::Handlers {
-        timer: worker::timer_interrupt,
-        wake: worker::wake_interrupt,
-        exception: panic::exception,
-        work: worker::work,
-        release: contexts::give_back,
+    interrupt::install(if probe::is_asked_for(info) {
+        probe::HANDLERS
+    } else {
+        interrupt::Handlers {
+            timer: worker::timer_interrupt,
+            wake: worker::wake_interrupt,
+            exception: panic::exception,
+            work: worker::work,
+            release: contexts::give_back,
+        }
     });
     let platform = read_platform(info);
     let module = module(info);
@@ -111,7 +115,10 @@ extern "C" fn start_cores(start: &Start) -> ! {
         others + 1
     );
     cpu::enable_interrupts();
-    worker::set_heartbeats(0);
+    let probes = probe::is_asked_for(info);
+    if !probes {
+        worker::set_heartbeats(0);
+    }
     // A second installation would come from a second boot, which there is not.
     let _ = fass::install(&KERNEL);
     let command_line = info.command_line().unwrap_or("(not UTF-8)");
@@ -124,7 +131,11 @@ extern "C" fn start_cores(start: &Start) -> ! {
             .number("ready_ns", clock::now_ns())
             .text("command_line", command_line);
     });
-    end(run_app(info, *app))
+    end(if probes {
+        probe::run()
+    } else {
+        run_app(info, *app)
+    })
 }
 
 fn read_platform(info: &BootInfo) -> Platform {

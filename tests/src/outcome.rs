@@ -216,10 +216,13 @@ mod tests {
             reason(success, USAGE),
             "the verdict line says Usage, QEMU's exit status Success"
         );
-        let limit = Duration::from_millis(1500);
+        let timed_out = Ending::TimedOut {
+            limit: Duration::from_millis(1500),
+            load: "the load".into(),
+        };
         assert_eq!(
-            reason(Ending::TimedOut(limit), SUCCESS),
-            "no end within 1.5 s, QEMU was killed"
+            reason(timed_out, SUCCESS),
+            "no end within 1.5 s, QEMU was killed; the load"
         );
         assert!(reason(Ending::Status(0), SUCCESS).contains("triple fault"));
         let ended = Outcome {

@@ -1,62 +1,99 @@
-//! Whether virtualization truly works here.
+//! Whether KVM is of use here, and so in which mode a guest is booted.
 //!
-//! The device `/dev/kvm` may exist and be of no use: no permission, no
-//! hardware behind it, or a guest that never gets on. So a guest is run: one
-//! that does nothing but say that it ran.
+//! The device `/dev/kvm` may exist and be of no use: no permission, no hardware
+//! behind it, or hardware that runs a guest of a few instructions and no kernel. So the
+//! image that is to be booted is booted first with the word `probe=on`, on the machine
+//! that it is to have: it then only shows that its cores come up, take interrupts and
+//! calculate (`kernel/src/probe.rs`).
+//!
+//! Every command that boots takes its mode from [`choose`].
 
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
 use crate::outcome::boot;
-use crate::protocol::Status;
 use crate::qemu::{Ending, Mode, Qemu};
 use crate::system;
-use crate::tiny::{TinyEnd, tiny_image};
 
-/// How long the guest may take; where all is well it takes a tenth of this.
-const LIMIT: Duration = Duration::from_secs(4);
+/// How long the probe may take; where all is well it takes a tenth of this.
+const LIMIT: Duration = Duration::from_secs(3);
 
-/// Runs a guest under KVM.
+/// Settles the mode in which `image` is booted on `machine`: the one that the person has
+/// named; without one, KVM if it is of use and else `otherwise`, and the reason.
+///
+/// # Errors
+///
+/// In words: the person has named KVM, and it is of no use.
+pub fn choose(
+    named: Option<Mode>,
+    otherwise: Mode,
+    machine: &Qemu,
+    image: &Path,
+) -> Result<(Mode, Option<String>), String> {
+    if let Some(mode) = named.filter(|mode| *mode != Mode::Kvm) {
+        return Ok((mode, None));
+    }
+    match (kvm(machine, image), named) {
+        (Ok(()), None) => Ok((
+            Mode::Kvm,
+            Some("the image passed its probe under KVM".into()),
+        )),
+        (Ok(()), Some(mode)) => Ok((mode, None)),
+        (Err(why), None) => Ok((otherwise, Some(format!("KVM is of no use here: {why}")))),
+        (Err(why), Some(_)) => Err(format!(
+            "`--mode kvm`: KVM is of no use here: {why}; use deterministic or threads"
+        )),
+    }
+}
+
+/// Boots the probe under KVM.
 ///
 /// # Errors
 ///
 /// Why KVM is of no use here, in words.
-pub fn kvm(program: &Path) -> Result<(), String> {
-    if !Path::new("/dev/kvm").exists() {
-        return Err("there is no /dev/kvm".into());
-    }
-    let qemu = Qemu {
-        program: program.into(),
-        mode: Mode::Kvm,
-        ..Qemu::default()
-    };
-    run_tiny(&qemu)
+pub fn kvm(machine: &Qemu, image: &Path) -> Result<(), String> {
+    let mode = Mode::Kvm;
+    run(
+        &Qemu {
+            mode,
+            ..machine.clone()
+        },
+        image,
+        LIMIT,
+    )
 }
 
-/// Runs the tiny guest on `qemu`.
+/// Boots the probe on `machine`, for at most `limit`.
 ///
 /// # Errors
 ///
-/// What happened instead of the agreed exit status, in words.
-pub fn run_tiny(qemu: &Qemu) -> Result<(), String> {
+/// What happened instead of success, in words.
+pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> {
+    let qemu = Qemu {
+        guest_words: "probe=on".into(),
+        module: None,
+        has_input: false,
+        wait_for_debugger: false,
+        ..machine.clone()
+    };
     let log = system::new_log("probe")?;
-    let image = log.with_extension("image");
-    let written = fs::write(&image, tiny_image("", TinyEnd::Exit(0x10)));
-    written.map_err(|error| format!("cannot write `{}`: {error}", image.display()))?;
-    let outcome = boot(qemu, &image, &log, LIMIT, |_| {});
-    // Both are ours, and a failure to remove them harms no one.
-    let _ = fs::remove_file(&image);
+    let outcome = boot(&qemu, image, &log, limit, |_| {});
+    // It is ours, and in the way of no one if it cannot be removed.
     let _ = fs::remove_file(&log);
     let outcome = outcome?;
-    match outcome.ending {
-        Ending::Guest(Status::Success) => Ok(()),
-        ending if outcome.complaints.is_empty() => Err(ending.to_string()),
-        ending => {
-            // The first complaint is the cause, the others follow from it.
-            let first = outcome.complaints.split("; ").next().unwrap_or_default();
-            let first = first.rsplit("qemu-system-x86_64: ").next().unwrap_or(first);
-            Err(format!("{ending} ({first})"))
-        }
+    let Err(fault) = outcome.judge() else {
+        return Ok(());
+    };
+    if matches!(outcome.ending, Ending::Guest(_)) {
+        return Err(fault.reason);
     }
+    // The first complaint is the cause, the others follow from it.
+    let mut complaints = outcome.complaints.split("; ");
+    let first = complaints.find(|line| !line.is_empty() && !line.contains("warning: "));
+    let ending = outcome.ending;
+    Err(first.map_or(ending.to_string(), |line| {
+        let line = line.rsplit("qemu-system-x86_64: ").next().unwrap_or(line);
+        format!("{ending} ({line})")
+    }))
 }

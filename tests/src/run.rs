@@ -1,7 +1,7 @@
 //! The subcommand `run`: from a command line to a judged run of an app.
 //!
 //! The order matters: first everything that can be refused is checked, then
-//! QEMU is made sure of, the mode is settled, the image is built, the guest
+//! QEMU is made sure of, the image is built, the mode is settled by it, the guest
 //! is booted, and its output is shown while it runs. Whatever is refused
 //! before the build leaves nothing behind.
 //!
@@ -103,7 +103,6 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let program = choose_program(options)?;
     let log = Log::choose(options, &app)?;
 
-    let (mode, why) = choose_mode(options, &program)?;
     let image = match options.text("image") {
         Some(path) => PathBuf::from(path),
         None => {
@@ -113,7 +112,16 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
                 .path
         }
     };
-    let qemu = describe(options, &program, mode, memory_mib, dags);
+    let describe = |mode| describe(options, &program, mode, memory_mib, dags);
+    let named = options.text("mode").and_then(Mode::from_name);
+    // A person needs time to type.
+    let otherwise = match options.is_given("console") {
+        true => Mode::Threads,
+        false => Mode::Deterministic,
+    };
+    let chosen = probe::choose(named, otherwise, &describe(Mode::Kvm), &image);
+    let (mode, why) = chosen.map_err(Refusal::Failure)?;
+    let qemu = describe(mode);
     let limit = limit(options, dags);
     let mut screen = Screen::new(options, &image);
     introduce(&screen, &app, &qemu, why);
@@ -176,31 +184,6 @@ fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
     }
     install::ensure_qemu().map_err(Refusal::Failure)?;
     Ok(PROGRAM.into())
-}
-
-/// Settles the mode, and says why if the person did not.
-fn choose_mode(options: &Parsed, program: &Path) -> Result<(Mode, Option<String>), Refusal> {
-    let named = options.text("mode").and_then(Mode::from_name);
-    match named {
-        None => match probe::kvm(program) {
-            Ok(()) => Ok((Mode::Kvm, Some("a guest ran under KVM".into()))),
-            // A person needs time to type.
-            Err(why) if options.is_given("console") => {
-                Ok((Mode::Threads, Some(format!("KVM is of no use here: {why}"))))
-            }
-            Err(why) => Ok((
-                Mode::Deterministic,
-                Some(format!("KVM is of no use here: {why}")),
-            )),
-        },
-        Some(Mode::Kvm) => match probe::kvm(program) {
-            Ok(()) => Ok((Mode::Kvm, None)),
-            Err(why) => Err(Refusal::Usage(format!(
-                "`--mode kvm`: KVM is of no use here: {why}; use deterministic or threads"
-            ))),
-        },
-        Some(mode) => Ok((mode, None)),
-    }
 }
 
 fn describe(
@@ -290,7 +273,7 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
         Err(_) => eprint!("{}", outcome.tail()),
     }
     let remedy = match outcome.ending {
-        Ending::TimedOut(_) => format!(
+        Ending::TimedOut { .. } => format!(
             "{}; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
              if it has a WCET or a budget",
             stalled(&outcome.transcript)

@@ -41,6 +41,18 @@ fn is_program(file: &Path) -> bool {
     fs::metadata(file).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
 }
 
+/// Says how busy the host is, and what to do about it: for what did not end in time.
+#[must_use]
+pub fn host_load() -> String {
+    let averages = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let load = averages.split(' ').next().unwrap_or_default();
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    format!(
+        "the host's load was {load} on {processors} processors: if that is more than it has, \
+         try again when it is less"
+    )
+}
+
 /// Returns a path for a new log, unique to this process and call.
 ///
 /// # Errors

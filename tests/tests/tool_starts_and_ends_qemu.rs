@@ -3,6 +3,7 @@
 //! tool's or the host's.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -10,7 +11,7 @@ use harness::outcome::{Outcome, boot};
 use harness::protocol::Status;
 use harness::qemu::{Ending, Machine, Mode, Qemu};
 use harness::tiny::{TinyEnd, tiny_image};
-use harness::{install, probe, system};
+use harness::{install, system};
 
 const VERDICT: &str = "{\"kind\":\"verdict\",\"status\":\"success\",\"reason\":\"\"}\n";
 
@@ -29,7 +30,7 @@ fn boot_tiny(qemu: &Qemu, text: &str, end: TinyEnd, limit: Duration) -> (Outcome
 }
 
 fn quick(qemu: &Qemu, text: &str, end: TinyEnd) -> (Outcome, Vec<String>) {
-    boot_tiny(qemu, text, end, Duration::from_secs(30))
+    boot_tiny(qemu, text, end, Duration::from_secs(300))
 }
 
 #[test]
@@ -67,16 +68,25 @@ fn the_byte_at_the_exit_port_becomes_the_ending() {
 
 #[test]
 fn a_guest_that_does_not_end_is_killed() {
-    let limit = Duration::from_millis(700);
     for mode in [Mode::Deterministic, Mode::Threads] {
         let qemu = Qemu {
             mode,
             ..Qemu::default()
         };
-        let (outcome, shown) = boot_tiny(&qemu, "no line end", TinyEnd::Never, limit);
-        assert_eq!(outcome.ending, Ending::TimedOut(limit));
-        assert!(outcome.elapsed >= limit);
-        assert!(outcome.elapsed < limit + Duration::from_secs(20));
+        // A busy host may not get as far as the text within the first limit.
+        let mut limit = Duration::from_millis(500);
+        let shown = loop {
+            let (outcome, shown) = boot_tiny(&qemu, "no line end", TinyEnd::Never, limit);
+            let Ending::TimedOut { limit: over, load } = &outcome.ending else {
+                panic!("{outcome:?}");
+            };
+            assert_eq!(*over, limit);
+            assert!(load.starts_with("the host's load was "), "{load}");
+            if !shown.is_empty() || limit > Duration::from_secs(100) {
+                break shown;
+            }
+            limit *= 4;
+        };
         assert_eq!(shown, ["no line end"]);
     }
 }
@@ -90,7 +100,7 @@ fn a_wrong_image_ends_with_qemus_own_words() {
         &Qemu::default(),
         &image,
         &log,
-        Duration::from_secs(30),
+        Duration::from_secs(300),
         |_| {},
     )
     .unwrap();
@@ -114,14 +124,26 @@ fn a_missing_qemu_is_named() {
     assert!(error.contains("no program `/no/such/qemu`"), "{error}");
 }
 
+/// What QEMU says and does where KVM cannot run the guest: it stays, paused.
 #[test]
-fn the_probe_tells_a_guest_that_ran_from_one_that_did_not() {
-    install::ensure_qemu().unwrap();
-    assert_eq!(probe::run_tiny(&Qemu::default()), Ok(()));
-    let broken = Qemu {
-        program: "false".into(),
-        ..Qemu::default()
-    };
-    let why = probe::run_tiny(&broken).unwrap_err();
-    assert_eq!(why, "QEMU ended with status 1");
+fn a_guest_that_kvm_has_given_up_is_killed_at_once() {
+    let stub = system::new_log("kvm-stub").unwrap();
+    let script = "#!/bin/sh\necho 'KVM internal error. Suberror: 1' >&2\nexec sleep 600\n";
+    fs::write(&stub, script).unwrap();
+    fs::set_permissions(&stub, fs::Permissions::from_mode(0o755)).unwrap();
+    for mode in [Mode::Kvm, Mode::Deterministic] {
+        let qemu = Qemu {
+            program: stub.clone(),
+            mode,
+            ..Qemu::default()
+        };
+        let (outcome, _) = boot_tiny(&qemu, "", TinyEnd::Never, Duration::from_secs(300));
+        assert_eq!(outcome.ending, Ending::KvmFailed);
+        let reason = outcome.judge().unwrap_err().reason;
+        assert!(
+            reason.ends_with("QEMU says: KVM internal error. Suberror: 1"),
+            "{reason}"
+        );
+    }
+    fs::remove_file(&stub).unwrap();
 }

@@ -76,15 +76,12 @@ fn on_machine<Plan>(
         Ok(options) => options,
         Err(code) => return code,
     };
-    // Settling the mode may need QEMU.
-    if let Err(line) = install::ensure_qemu() {
-        return table.fail(&line);
-    }
     let plan = match plan(&options) {
         Ok(plan) => plan,
         Err(line) => return table.refuse(&line),
     };
-    match measure(&plan) {
+    let measured = install::ensure_qemu().and_then(|()| measure(&plan));
+    match measured {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(line) => table.fail(&line),

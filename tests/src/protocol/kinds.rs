@@ -17,6 +17,7 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "command_line",
         ],
     ),
+    ("probe", &["cpus", "steps", "took_ns"]),
     ("progress", &["done", "total"]),
     (
         "status",

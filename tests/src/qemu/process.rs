@@ -17,9 +17,19 @@ use std::time::Duration;
 
 use crate::child::{Child, Waited};
 use crate::protocol::Status;
+use crate::system;
 
 /// The most that a guest may print; beyond it something prints without end.
 const MOST_SERIAL_BYTES: u64 = 64 << 20;
+
+/// What QEMU says when KVM cannot run the guest any further. It then keeps the guest
+/// paused for ever, and none of its options makes it end.
+const KVM_FAILURES: [&str; 4] = [
+    "KVM internal error",
+    "KVM: entry failed",
+    "KVM: unknown exit",
+    "error: kvm run failed",
+];
 
 /// How a QEMU process ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,7 +41,14 @@ pub enum Ending {
     /// A signal ended it.
     Signal,
     /// It did not end within this limit and was killed.
-    TimedOut(Duration),
+    TimedOut {
+        /// The limit.
+        limit: Duration,
+        /// How busy the host was then, in words.
+        load: String,
+    },
+    /// KVM could not run the guest any further, and it was killed.
+    KvmFailed,
     /// It printed more than a run may and was killed.
     TooMuchOutput,
 }
@@ -47,12 +64,13 @@ impl fmt::Display for Ending {
             ),
             Ending::Status(status) => write!(f, "QEMU ended with status {status}"),
             Ending::Signal => f.write_str("a signal ended QEMU"),
-            Ending::TimedOut(limit) => {
-                write!(
-                    f,
-                    "no end within {} s, QEMU was killed",
-                    limit.as_secs_f64()
-                )
+            Ending::TimedOut { limit, load } => write!(
+                f,
+                "no end within {} s, QEMU was killed; {load}",
+                limit.as_secs_f64()
+            ),
+            Ending::KvmFailed => {
+                f.write_str("KVM could not run the guest any further, QEMU was killed")
             }
             Ending::TooMuchOutput => write!(
                 f,
@@ -108,14 +126,22 @@ impl Running {
     /// Waits for the end, for at most `limit` since the start. `look` is
     /// called between two looks at the process, to show what was printed.
     pub fn wait(&mut self, limit: Duration, mut look: impl FnMut()) -> Ending {
-        let serial = &self.serial;
+        let (serial, complaints) = (&self.serial, &self.complaints);
+        let mut kvm_failed = false;
         let waited = self.child.wait(limit, || {
             look();
-            fs::metadata(serial).is_ok_and(|file| file.len() <= MOST_SERIAL_BYTES)
+            let said = fs::read(complaints).unwrap_or_default();
+            let said = String::from_utf8_lossy(&said);
+            kvm_failed = KVM_FAILURES.iter().any(|failure| said.contains(failure));
+            !kvm_failed && fs::metadata(serial).is_ok_and(|file| file.len() <= MOST_SERIAL_BYTES)
         });
         match waited {
             Waited::Ended(status) => ending_of(status),
-            Waited::TimedOut => Ending::TimedOut(limit),
+            Waited::TimedOut => Ending::TimedOut {
+                limit,
+                load: system::host_load(),
+            },
+            Waited::GivenUp if kvm_failed => Ending::KvmFailed,
             Waited::GivenUp => Ending::TooMuchOutput,
         }
     }

@@ -25,7 +25,7 @@ use std::time::Duration;
 
 use crate::outcome::{self, Outcome};
 use crate::qemu::{Mode, Qemu};
-use crate::{image, install, system};
+use crate::{image, install, probe, system};
 use judge::{Judged, judge};
 use plan::{Boot, Part, Plan};
 
@@ -62,6 +62,12 @@ pub struct Report {
 pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
     install::ensure_qemu()?;
     let image = image::build("soak").map_err(|error| error.to_string())?;
+    let machine = Qemu {
+        cores: plan.cores,
+        memory_mib: MEMORY_MIB,
+        ..Qemu::default()
+    };
+    probe::choose(Some(plan.mode), plan.mode, &machine, &image.path)?;
     let waiting = Mutex::new(plan.boots().collect::<VecDeque<_>>());
     let next = || {
         waiting

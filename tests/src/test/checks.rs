@@ -6,7 +6,7 @@
 //! KVM where KVM works.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::libtest::Plan;
 use super::tally::Tally;
@@ -14,7 +14,7 @@ use super::{layers, lint};
 use crate::bench::hand_off;
 use crate::image::{self, MOST_STRIPPED_BYTES};
 use crate::probe;
-use crate::qemu::PROGRAM;
+use crate::qemu::Qemu;
 use crate::system;
 
 /// The most lines of a source file.
@@ -65,7 +65,8 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     }
     let name = "a guest runs under KVM";
     if plan.wants(name) {
-        match probe::kvm(Path::new(PROGRAM)) {
+        let image = image::build("fork-join").map_err(|error| error.to_string());
+        match image.and_then(|image| probe::kvm(&Qemu::default(), &image.path)) {
             Ok(()) => tally.add(name, Ok(())),
             Err(why) => tally.skip(name, &why),
         }

@@ -30,7 +30,7 @@ use super::on_machine;
 use crate::options::Request;
 use crate::outcome::boot;
 use crate::qemu::Mode;
-use crate::{image, install, system};
+use crate::{image, install, probe, system};
 
 /// How long a boot may take in wall time.
 const LIMIT: Duration = Duration::from_secs(300);
@@ -53,7 +53,8 @@ pub fn check() -> Result<(), String> {
     };
     install::ensure_qemu()?;
     let before = baseline::read(&plan.baseline)?;
-    let now = measure_mode(&plan, Mode::Deterministic)?;
+    let image = image::build("hand-off").map_err(|error| error.to_string())?;
+    let now = measure_mode(&plan, Mode::Deterministic, &image.path)?;
     let comparison = report::comparison(&now, &before);
     print!("{}", comparison.text);
     if comparison.complaints.is_empty() {
@@ -72,9 +73,10 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
     } else {
         None
     };
+    let image = image::build("hand-off").map_err(|error| error.to_string())?;
     let mut measured = Vec::new();
-    for &mode in &plan.modes {
-        let figures = measure_mode(plan, mode)?;
+    for mode in modes(plan, &image.path)? {
+        let figures = measure_mode(plan, mode, &image.path)?;
         for figure in &figures {
             println!("{}", figure.machine_line(mode));
         }
@@ -126,12 +128,23 @@ fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
     Ok(())
 }
 
+/// Settles the modes: where none is named, instructions, and time as real as can be had.
+fn modes(plan: &Plan, image: &Path) -> Result<Vec<Mode>, String> {
+    let machine = plan.boots.iter().max_by_key(|boot| boot.cores);
+    let machine = machine.map_or_else(Default::default, |boot| boot.qemu(Mode::Kvm));
+    let (mode, why) = probe::choose(plan.mode, Mode::Threads, &machine, image)?;
+    if let Some(why) = why {
+        println!("mode {mode} besides deterministic because {why}");
+        return Ok(vec![Mode::Deterministic, mode]);
+    }
+    Ok(vec![mode])
+}
+
 /// Makes all boots in one mode.
-fn measure_mode(plan: &Plan, mode: Mode) -> Result<Vec<Figure>, String> {
-    let image = image::build("hand-off").map_err(|error| error.to_string())?;
+fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     let mut figures: Vec<Figure> = Vec::new();
     for boot in &plan.boots {
-        for figure in measure(boot, mode, &image.path)? {
+        for figure in measure(boot, mode, image)? {
             // What is counted afterwards stands with its workload.
             let end = figures.iter().rposition(|other| {
                 (other.cores, &other.workload) == (figure.cores, &figure.workload)

@@ -1,10 +1,9 @@
 //! What is to be measured, and on what: settled before anything is built.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::options::Parsed;
-use crate::probe;
-use crate::qemu::{Mode, PROGRAM, Qemu};
+use crate::qemu::{Mode, Qemu};
 use crate::system;
 
 /// The options of a baseline: it is of the defaults of these.
@@ -29,7 +28,8 @@ pub(super) struct Boot {
 /// Everything that is to be measured.
 #[derive(Debug)]
 pub(super) struct Plan {
-    pub(super) modes: Vec<Mode>,
+    /// The one mode to measure in; else instructions and time.
+    pub(super) mode: Option<Mode>,
     pub(super) boots: Vec<Boot>,
     /// Numbers of cores and of subtasks to count the cost of, instead.
     pub(super) scale: Option<Scale>,
@@ -69,11 +69,7 @@ impl Plan {
     ///
     /// What the options ask for cannot be: one line that says why.
     pub(super) fn new(options: &Parsed) -> Result<Plan, String> {
-        let modes = match options.text("mode").and_then(Mode::from_name) {
-            Some(mode) => vec![mode],
-            None if probe::kvm(Path::new(PROGRAM)).is_ok() => vec![Mode::Deterministic, Mode::Kvm],
-            None => vec![Mode::Deterministic, Mode::Threads],
-        };
+        let mode = options.text("mode").and_then(Mode::from_name);
         let [compares, saves] =
             ["compare", "save-baseline"].map(|name| options.is_given(name).then_some(name));
         if let Some(name) = compares.or(saves) {
@@ -83,7 +79,7 @@ impl Plan {
                      leave one of them out"
                 ));
             }
-            if !modes.contains(&Mode::Deterministic) {
+            if mode.is_some_and(|mode| mode != Mode::Deterministic) {
                 return Err(format!(
                     "`--{name}` needs the instructions, which this mode does not count; \
                      leave `--mode` out"
@@ -115,7 +111,7 @@ impl Plan {
             ));
         }
         Ok(Plan {
-            modes,
+            mode,
             scale,
             boots: boots(options),
             compares: compares.is_some(),

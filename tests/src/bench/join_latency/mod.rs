@@ -38,7 +38,7 @@ use progress::Progress;
 use super::on_machine;
 use crate::outcome::boot;
 use crate::qemu::Mode;
-use crate::{image, system};
+use crate::{image, probe, system};
 
 /// Runs `bench join-latency` with the words after its name.
 pub(super) fn run(words: &[String]) -> ExitCode {
@@ -50,6 +50,12 @@ pub(super) fn run(words: &[String]) -> ExitCode {
 /// Measures what is not there yet, and writes all results.
 fn measure_all(plan: &Plan) -> Result<(), String> {
     let image = image::build("join-latency").map_err(|error| error.to_string())?;
+    let machine = plan.qemu(&plan.conditions[0]);
+    let (mode, why) = probe::choose(plan.named, Mode::Deterministic, &machine, &image.path)?;
+    let plan = &Plan {
+        mode,
+        ..plan.clone()
+    };
     let provenance = Provenance::of(&image.path);
     println!(
         "{} conditions of {} jobs; mode {}, {} cores; {}",
@@ -60,6 +66,9 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
         provenance.qemu
     );
     println!("time: {}", plan.mode.meaning());
+    if let Some(why) = why {
+        println!("mode {mode} because {why}");
+    }
     let mut progress = Progress::new(plan.conditions.len());
     let mut measured = Measured::new();
     for condition in &plan.conditions {

@@ -6,12 +6,11 @@ use std::process::Command;
 
 use super::condition::{Condition, Policy};
 use crate::options::Parsed;
-use crate::probe;
 use crate::qemu::{Machine, Mode, PROGRAM, Qemu};
 use crate::system;
 
 /// Everything that all conditions have in common, and the conditions.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Plan {
     pub(super) out: PathBuf,
     pub(super) conditions: Vec<Condition>,
@@ -22,6 +21,8 @@ pub(super) struct Plan {
     pub(super) queue: u64,
     pub(super) cores: u64,
     pub(super) memory_mib: u64,
+    /// The mode that was named; which one it is, the built image settles.
+    pub(super) named: Option<Mode>,
     pub(super) mode: Mode,
     /// Whether a deterministic condition is booted once only.
     pub(super) once: bool,
@@ -61,6 +62,7 @@ impl Plan {
             last_seed.ok_or("`--repeat`: there are not so many seeds after `--seed`")?;
         let seeds: Vec<u64> = (seed..=last_seed).collect();
         let jobs = number("jobs");
+        let named = named_mode(options)?;
         let mut conditions = Vec::new();
         for &subtasks in &subtasks {
             for &policy in &policies {
@@ -83,7 +85,8 @@ impl Plan {
             cores,
             // The kernel records each instance, and the app its joins: half a KiB.
             memory_mib: 64 + (jobs * least_cores).div_ceil(2048),
-            mode: choose_mode(options)?,
+            named,
+            mode: named.unwrap_or(Mode::Deterministic),
             once: options.is_given("once"),
         })
     }
@@ -108,22 +111,14 @@ impl Plan {
     }
 }
 
-fn choose_mode(options: &Parsed) -> Result<Mode, String> {
+fn named_mode(options: &Parsed) -> Result<Option<Mode>, String> {
     let named = options.text("mode").and_then(Mode::from_name);
     match (named, options.is_given("deterministic")) {
-        (None | Some(Mode::Deterministic), true) => Ok(Mode::Deterministic),
+        (None | Some(Mode::Deterministic), true) => Ok(Some(Mode::Deterministic)),
         (Some(mode), true) => Err(format!(
             "`--mode {mode}` and `--deterministic` exclude each other; give one"
         )),
-        (Some(Mode::Kvm), false) => match probe::kvm(Path::new(PROGRAM)) {
-            Ok(()) => Ok(Mode::Kvm),
-            Err(why) => Err(format!("`--mode kvm`: KVM is of no use here: {why}")),
-        },
-        (Some(mode), false) => Ok(mode),
-        (None, false) => Ok(match probe::kvm(Path::new(PROGRAM)) {
-            Ok(()) => Mode::Kvm,
-            Err(_) => Mode::Deterministic,
-        }),
+        (named, false) => Ok(named),
     }
 }
 

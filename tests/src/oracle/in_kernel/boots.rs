@@ -10,7 +10,7 @@ use super::transcript::read;
 use super::{Judged, Settings};
 use crate::outcome::{Outcome, boot};
 use crate::qemu::Qemu;
-use crate::{image, install, system};
+use crate::{image, install, probe, system};
 
 /// The most cases of one boot: the guest has them all in memory.
 const MOST_CASES: usize = 64;
@@ -27,6 +27,16 @@ const MEMORY_MIB: u64 = 64;
 pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<Judged>, String> {
     install::ensure_qemu()?;
     let image = image::build("replay").map_err(|error| error.to_string())?;
+    let machine = Qemu {
+        machine: settings.machine,
+        cores: cases
+            .iter()
+            .map(|case| case.cores.into())
+            .max()
+            .unwrap_or(1),
+        ..Qemu::default()
+    };
+    probe::choose(Some(settings.mode), settings.mode, &machine, &image.path)?;
     let mut by_cores: Vec<(&Case, &str)> =
         cases.iter().zip(texts.iter().map(String::as_str)).collect();
     by_cores.sort_by_key(|(case, _)| case.cores);
