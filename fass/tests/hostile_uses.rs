@@ -16,8 +16,8 @@ use support::commit;
 
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// How long a test waits for what has to come.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// How long a test waits for what has to come, on however busy a host.
+const PATIENCE: Duration = Duration::from_secs(300);
 
 fn named(name: &str) -> SubtaskAttributes {
     SubtaskAttributes::named(name)

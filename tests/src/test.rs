@@ -85,8 +85,8 @@ fn build_images(plan: &Plan, tally: &mut Tally) {
     for app in image::apps() {
         let name = format!("image of {app} builds");
         if plan.wants(&name) {
-            let built = image::build(&app);
-            tally.add(&name, built.map(|_| ()).map_err(|error| error.to_string()));
+            let build = || image::build(&app).map_err(|error| error.to_string());
+            tally.run(&name, || build().map(|_| ()));
         }
     }
 }

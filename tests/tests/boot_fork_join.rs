@@ -3,7 +3,7 @@
 //! the same run every time.
 
 use harness::protocol::{MachineLine, Status};
-use harness::{Guest, Mode, Outcome};
+use harness::{Guest, Outcome};
 
 const JOBS: u64 = 60;
 
@@ -61,7 +61,7 @@ fn every_job_joins_on_one_processor() {
 
 #[test]
 fn every_job_joins_in_real_time() {
-    let guest = demo().mode(Mode::Threads).word("subtasks=4");
+    let guest = demo().in_real_time().word("subtasks=4");
     joins_are_right(&guest.succeed(), JOBS, &[4]);
 }
 

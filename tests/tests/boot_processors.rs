@@ -1,6 +1,6 @@
 //! The kernel boots with one processor and with many, on both boards.
 
-use harness::{Guest, Machine, Mode};
+use harness::{Guest, Machine};
 
 /// Boots the demo, short, and checks that all processors came up.
 fn boots_with(guest: Guest, cores: u64) {
@@ -44,11 +44,11 @@ fn four_processors_on_a_q35() {
 
 #[test]
 fn four_processors_in_real_time() {
-    boots_with(Guest::new("fork-join").mode(Mode::Threads), 4);
+    boots_with(Guest::new("fork-join").in_real_time(), 4);
 }
 
 #[test]
 fn four_processors_in_real_time_on_a_q35() {
-    let guest = Guest::new("fork-join").mode(Mode::Threads);
+    let guest = Guest::new("fork-join").in_real_time();
     boots_with(guest.machine(Machine::Q35), 4);
 }

@@ -1,7 +1,7 @@
 //! States, latest values and signals on the machine.
 
 use harness::protocol::MachineLine;
-use harness::{Guest, Mode, Outcome};
+use harness::{Guest, Outcome};
 
 fn sharing(policy: &str) -> Guest {
     let policy = format!("policy={policy}");
@@ -41,9 +41,7 @@ fn samples_are_whole_and_signals_keep_their_distance() {
 
 #[test]
 fn samples_are_whole_where_cores_really_run_side_by_side() {
-    // A busy host lets budgets run out.
-    let guest = sharing("edf").mode(Mode::Threads).word("budget_factor=0");
-    let outcome = guest.succeed();
+    let outcome = sharing("edf").in_real_time().succeed();
     assert_eq!(number(&outcome, "violations"), 0);
     assert_eq!(number(&outcome, "signals"), 90);
 }

@@ -4,8 +4,8 @@
 //! anything but the scheduler (relaxed atomics, which the processor may reorder); and
 //! every run is written down and held against R1 to R5.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Barrier};
 
 use native::{Closure, Setting};
 use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, TaskSet, verify};
@@ -149,12 +149,20 @@ fn both_workers_work() {
         workers: 2,
     };
     let task_set = commit(&[spec(6, &fork_join(4), 20)], setting);
-    let body =
-        || Box::new(|_| std::thread::sleep(std::time::Duration::from_micros(200))) as Closure;
-    let bodies = vec![(0..6).map(|_| body()).collect()];
+    // The branches meet in pairs, and nobody can meet who does not work. How many
+    // instances each worker has is up to the host, which may hold one of them back.
+    let meeting = Arc::new(Barrier::new(2));
+    let body = |subtask| {
+        let meeting = Arc::clone(&meeting);
+        Box::new(move |_| {
+            if (1..=4).contains(&subtask) {
+                meeting.wait();
+            }
+        }) as Closure
+    };
+    let bodies = vec![(0..6).map(body).collect()];
     let recorded = native::run_recorded(task_set, bodies, setting);
     assert_eq!(recorded.violations, []);
-    // How many each has is up to the host, which may hold one of them back.
     assert!(recorded.by_worker.iter().all(|&instances| instances > 0));
 }
 

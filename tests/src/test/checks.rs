@@ -44,7 +44,7 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
         match (plan.wants(name), plan.quick) {
             (false, _) => {}
             (true, true) => tally.skip(name, "left out by --quick"),
-            (true, false) => tally.add(name, check()),
+            (true, false) => tally.run(name, check),
         }
     }
     if plan.quick {
@@ -56,12 +56,12 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
             MOST_STRIPPED_BYTES >> 10
         );
         if plan.wants(&name) {
-            tally.add(&name, image_is_light(&app));
+            tally.run(&name, || image_is_light(&app));
         }
     }
     let name = "the hand-off takes no more instructions than its baseline";
     if plan.wants(name) {
-        tally.add(name, hand_off::check());
+        tally.run(name, hand_off::check);
     }
     let name = "a guest runs under KVM";
     if plan.wants(name) {

@@ -25,7 +25,7 @@ pub static TEST: Command = Command {
     ],
     notes: "\
 The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
-the reasons above it.
+the reasons above it; above these stand the parts that took longest, in seconds.
 
 exit codes: 0 nothing failed; 1 something failed; 2 a refused command line, or
 a FILTER by which nothing has run

@@ -1,6 +1,10 @@
 //! The count of everything that ran, failed, or could not run.
 
 use std::fmt;
+use std::time::{Duration, Instant};
+
+/// How many parts are shown with the time that they took.
+const SHOWN_PARTS: usize = 12;
 
 /// The count, and the names behind it.
 #[derive(Debug, Default)]
@@ -8,6 +12,7 @@ pub struct Tally {
     passed: u64,
     failures: Vec<String>,
     skips: Vec<String>,
+    parts: Vec<(String, Duration)>,
 }
 
 impl Tally {
@@ -23,6 +28,19 @@ impl Tally {
                 self.fail(name, &why);
             }
         }
+    }
+
+    /// Runs a test or check, counts it, and notes how long it took.
+    pub fn run(&mut self, name: &str, check: impl FnOnce() -> Result<(), String>) {
+        let start = Instant::now();
+        let result = check();
+        self.took(name, start.elapsed());
+        self.add(name, result);
+    }
+
+    /// Notes how long a part took.
+    pub fn took(&mut self, part: &str, time: Duration) {
+        self.parts.push((part.into(), time));
     }
 
     /// Counts tests that passed.
@@ -63,6 +81,7 @@ impl Tally {
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f)?;
+        self.write_times(f)?;
         for skip in &self.skips {
             writeln!(f, "skipped: {skip}")?;
         }
@@ -77,9 +96,51 @@ impl fmt::Display for Tally {
     }
 }
 
+impl Tally {
+    /// Writes the parts that took longest, and the sum of all.
+    fn write_times(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut parts: Vec<_> = self.parts.iter().collect();
+        parts.sort_by_key(|(_, time)| std::cmp::Reverse(*time));
+        let (shown, rest) = parts.split_at(parts.len().min(SHOWN_PARTS));
+        let sum = |parts: &[&(String, Duration)]| parts.iter().map(|(_, time)| *time).sum();
+        let mut line = |time: Duration, part: &str| {
+            let seconds = time.as_secs_f64();
+            writeln!(f, "{seconds:>8.1} s  {part}")
+        };
+        for (part, time) in shown {
+            line(*time, part)?;
+        }
+        if !rest.is_empty() {
+            line(sum(rest), &format!("{} other parts", rest.len()))?;
+        }
+        if parts.len() > 1 {
+            line(sum(&parts), "all parts")?;
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Tally;
+    use super::{SHOWN_PARTS, Tally};
+    use std::time::Duration;
+
+    #[test]
+    fn the_longest_parts_are_shown_and_the_others_summed() {
+        let mut tally = Tally::default();
+        for part in 0..SHOWN_PARTS + 2 {
+            let tenths = u64::try_from(part).expect("a few");
+            tally.took(&format!("part {part}"), Duration::from_millis(100 * tenths));
+        }
+        tally.run("a check", || Err("left is not right".into()));
+        let text = tally.to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[1], "     1.3 s  part 13");
+        assert_eq!(lines[SHOWN_PARTS], "     0.2 s  part 2");
+        assert_eq!(lines[SHOWN_PARTS + 1], "     0.1 s  3 other parts");
+        assert_eq!(lines[SHOWN_PARTS + 2], "     9.1 s  all parts");
+        assert_eq!(lines.last(), Some(&"0 passed, 1 failed"));
+    }
 
     #[test]
     fn the_last_line_counts_and_the_reasons_stand_above() {
