@@ -88,54 +88,37 @@
 //! once for each instance; the [`Platform`] gets the [`Plan`] and runs bodies
 //! when its scheduler says so. Values travel in rings that have a slot for each
 //! job that may be in flight. The crate names no kernel and needs only `alloc`;
-//! its `unsafe` is in one file, `cell.rs`.
+//! its `unsafe` is in one file, `run/cell.rs`.
 //!
 //! `docs/paper-map.md` relates the paper's figures 3 and 4 to this code.
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
 
-mod answer;
-mod attributes;
-#[allow(unsafe_code, reason = "the one cell type of the job slots")]
-mod cell;
+mod api;
 mod commit;
-mod dag;
 mod draft;
-mod effect;
-mod fault;
-mod gate;
-mod latest;
-mod message;
-mod plan;
 mod platform;
-mod signal;
-mod staleness;
-mod state;
-mod subtask;
-mod tie;
-mod topic;
-mod tuple;
-mod untyped;
-mod uses;
+mod run;
 
-pub use answer::{Answer, Unproven, Verdict};
-pub use attributes::SubtaskAttributes;
+pub use api::dag::{Dag, create_dag};
+pub use api::latest::{Latest, Sample, Sampling};
+pub use api::signal::{Raiser, Raising, Signal};
+pub use api::state::{Read, State, StateValue, Update};
+pub use api::untyped::Untyped;
+pub use api::uses::Uses;
+pub use api::using::Using;
+pub use commit::answer::{Answer, Unproven, Verdict};
+pub use commit::fault::{CommitError, Fault};
+pub use commit::staleness::Staleness;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
-pub use dag::{Dag, create_dag};
-pub use fault::{CommitError, Fault};
-pub use latest::{Latest, Sample, Sampling};
-pub use message::{Message, MessageType, Unique};
-pub use plan::{Body, Plan};
+pub use draft::attributes::SubtaskAttributes;
 pub use platform::{
     AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
 };
+pub use run::message::{Message, MessageType, Unique};
+pub use run::plan::{Body, Plan};
+pub use run::topic::{Ports, Publisher, Subscriber};
+pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use sched_dag::analysis::{Overheads, Reason, Test};
 pub use sched_dag::{ConstructionPolicy, Count, OverrunPolicy, Policy, Preemption, Warning};
-pub use signal::{Raiser, Raising, Signal};
-pub use staleness::Staleness;
-pub use state::{Read, State, StateValue, Update};
-pub use topic::{Ports, Publisher, Subscriber};
-pub use tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
-pub use untyped::Untyped;
-pub use uses::{Uses, Using};

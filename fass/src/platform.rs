@@ -12,8 +12,8 @@ use core::time::Duration;
 use sched_dag::analysis::Overheads;
 use sched_dag::{DagId, Policy, Preemption};
 
-use crate::cell::SetOnce;
-use crate::plan::Plan;
+use crate::run::cell::SetOnce;
+use crate::run::plan::Plan;
 
 static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
 

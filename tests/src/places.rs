@@ -183,7 +183,7 @@ mod tests {
              {{closure#0}}\n{root}/apps/vision/src/lib.rs:?\n\
              edges\n{root}/apps/vision/src/lib.rs:7 (discriminator 2)\n\
              {{closure#1}}\n{root}/apps/vision/src/lib.rs:9\n\
-             poll\n{root}/fass/src/subtask.rs:81\n"
+             poll\n{root}/fass/src/run/subtask.rs:81\n"
         );
         assert_eq!(
             sentence(0x20_e0b8, &found),

@@ -145,7 +145,7 @@ fn every_fault_is_found_and_said_as_documented() {
 fn every_kind_of_fault_has_an_entry() {
     let documented: BTreeSet<String> = documented_faults().expect("the page").into_keys().collect();
     let mut codes = BTreeSet::new();
-    for file in ["sched-dag/src/verify/fault.rs", "fass/src/fault.rs"] {
+    for file in ["sched-dag/src/verify/fault.rs", "fass/src/commit/fault.rs"] {
         let source = fs::read_to_string(workspace().join(file)).expect("the source");
         let body = source
             .split("fn code(")
@@ -214,9 +214,9 @@ fn every_panic_of_a_wrong_program_is_one() {
     let documented = table("| text | remedy |").expect("the page");
     assert!(documented.len() >= 5, "{documented:?}");
     let sources = sources(&[
-        "fass/src/dag.rs",
-        "fass/src/signal.rs",
-        "fass/src/uses.rs",
+        "fass/src/api/dag.rs",
+        "fass/src/api/signal.rs",
+        "fass/src/api/using.rs",
         "fass/virtual-time/src/platform.rs",
     ]);
     all_are_in(&documented, &sources);

@@ -15,20 +15,14 @@ use core::convert::Infallible;
 use core::pin::{Pin, pin};
 use core::task::{Context, Poll, ready};
 
-use crate::gate::Gate;
-use crate::plan::Body;
-use crate::topic::Wiring;
-use crate::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
+use super::gate::Gate;
+use super::plan::{Body, SubtaskFuture};
+use super::topic::Wiring;
+use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
 /// What the commit calls to make a registered subtask's body: with the DAG's
 /// wiring and the subtask's number.
 pub(crate) type MakeBody = Box<dyn FnOnce(&mut Wiring, usize) -> Body>;
-
-/// The future of a subtask, which never ends.
-pub(crate) trait SubtaskFuture: Future<Output = Infallible> + Send + Unpin {
-    /// Gives up what has arrived for a job that the subtask will not run.
-    fn discard(&mut self, job: u64);
-}
 
 /// Defers [`create_subtask`] until the commit knows the wiring.
 pub(crate) fn defer<F, Args, Ret>(f: F) -> MakeBody

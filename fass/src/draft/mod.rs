@@ -7,26 +7,28 @@
 //! keeps its topics in the spec, but with the type [`Unknown`], which the commit
 //! takes to be whatever the topic's other end says.
 
+pub(crate) mod attributes;
+pub(crate) mod flaw;
+
 use alloc::boxed::Box;
 use alloc::rc::Rc;
-use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
-use sched_dag::{Activation, DagId, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId};
+use sched_dag::{Activation, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
-use crate::attributes::SubtaskAttributes;
-use crate::effect::Effect;
-use crate::fault::Fault;
-use crate::latest::AnyLatest;
-use crate::message::MessageType;
-use crate::signal::{Signal, Target};
-use crate::subtask::{MakeBody, defer};
-use crate::tuple::{VecToPubs, VecToSubs};
-use crate::untyped;
+use crate::run::effect::Effect;
+use crate::run::latest::AnyLatest;
+use crate::run::message::MessageType;
+use crate::run::signal::Target;
+use crate::run::subtask::{MakeBody, defer};
+use crate::run::tuple::{VecToPubs, VecToSubs};
+use crate::run::untyped;
+use attributes::SubtaskAttributes;
+use flaw::Flaw;
 
 /// A DAG as registered so far.
 #[derive(Default)]
@@ -34,8 +36,8 @@ pub(crate) struct Draft {
     pub(crate) spec: DagSpec,
     /// One for each of `spec.subtasks`.
     pub(crate) make_bodies: Vec<MakeBody>,
-    /// What only this crate can find wrong; the DAG's label is still a blank.
-    pub(crate) faults: Vec<Fault>,
+    /// What only this crate can find wrong.
+    pub(crate) flaws: Vec<Flaw>,
     pub(crate) is_committed: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
     pub(crate) demands_proof: bool,
@@ -44,7 +46,7 @@ pub(crate) struct Draft {
     /// The latest values that subtasks sample, of whatever DAG.
     pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>)>,
     /// The signals that subtasks may raise, of whatever DAG.
-    pub(crate) raises: Vec<(usize, Signal)>,
+    pub(crate) raises: Vec<(usize, Arc<Target>)>,
     /// What completions of subtasks do beyond the DAG, latest values apart.
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// What releases this DAG, if it is sporadic.
@@ -72,16 +74,14 @@ impl Draft {
         let subtask = self.next_label(&attributes);
         let (input_types, output_types) = (Args::input_types(), Ret::output_types());
         if input_types.len() != inputs.len() {
-            self.faults.push(Fault::InputArity {
-                dag: blank(),
+            self.flaws.push(Flaw::InputArity {
                 subtask: subtask.clone(),
                 expected: input_types.len(),
                 given: inputs.len(),
             });
         }
         if output_types.len() != outputs.len() {
-            self.faults.push(Fault::OutputArity {
-                dag: blank(),
+            self.flaws.push(Flaw::OutputArity {
                 subtask: subtask.clone(),
                 expected: output_types.len(),
                 given: outputs.len(),
@@ -149,10 +149,7 @@ impl Draft {
     ) {
         let is_first = self.spec.period_ns.is_none();
         if !is_first && self.spec.activation != activation {
-            self.faults.push(Fault::ActivationsDiffer {
-                dag: blank(),
-                subtask,
-            });
+            self.flaws.push(Flaw::ActivationsDiffer { subtask });
             return;
         }
         self.spec.activation = activation;
@@ -161,8 +158,7 @@ impl Draft {
         };
         let first_ns = *self.spec.period_ns.get_or_insert(period_ns);
         if first_ns != period_ns {
-            self.faults.push(Fault::PeriodsDiffer {
-                dag: blank(),
+            self.flaws.push(Flaw::PeriodsDiffer {
                 subtask,
                 first_ns,
                 second_ns: period_ns,
@@ -176,8 +172,7 @@ impl Draft {
         };
         let first_ns = *self.spec.relative_deadline_ns.get_or_insert(deadline_ns);
         if first_ns != deadline_ns {
-            self.faults.push(Fault::DeadlinesDiffer {
-                dag: blank(),
+            self.flaws.push(Flaw::DeadlinesDiffer {
                 subtask,
                 first_ns,
                 second_ns: deadline_ns,
@@ -196,9 +191,9 @@ impl Draft {
             })
             .collect();
         let unknown = MessageType::of::<Unknown>().id();
-        let is_arity_fault =
-            |fault: &Fault| matches!(fault, Fault::InputArity { .. } | Fault::OutputArity { .. });
-        if !self.faults.iter().any(is_arity_fault) {
+        let is_of_arity =
+            |flaw: &Flaw| matches!(flaw, Flaw::InputArity { .. } | Flaw::OutputArity { .. });
+        if !self.flaws.iter().any(is_of_arity) {
             return spec;
         }
         let known: Vec<TopicPort> = (self.spec.subtasks.iter())
@@ -228,8 +223,7 @@ impl Draft {
     ) -> Option<u64> {
         let ns = u64::try_from(duration.as_nanos()).ok();
         if ns.is_none() {
-            self.faults.push(Fault::DurationTooLong {
-                dag: blank(),
+            self.flaws.push(Flaw::DurationTooLong {
                 subtask: subtask.cloned(),
                 what,
             });
@@ -259,19 +253,11 @@ fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
         .collect()
 }
 
-/// Stands for the DAG's label until the commit fills it in.
-fn blank() -> DagLabel {
-    DagLabel {
-        id: DagId(0),
-        name: String::new(),
-    }
-}
-
 impl fmt::Debug for Draft {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Draft")
             .field("spec", &self.spec)
-            .field("faults", &self.faults)
+            .field("flaws", &self.flaws)
             .field("is_committed", &self.is_committed)
             .finish_non_exhaustive()
     }

@@ -23,9 +23,9 @@ use core::future::ready;
 use core::pin::Pin;
 use core::task::{Context, Poll};
 
-use crate::gate::Gate;
-use crate::message::{Message, MessageType};
-use crate::topic::{Ports, Publisher, Subscriber};
+use super::gate::Gate;
+use super::message::{Message, MessageType};
+use super::topic::{Ports, Publisher, Subscriber};
 
 /// Receives all inputs of an instance at once.
 ///

@@ -11,7 +11,8 @@ use core::time::Duration;
 
 use sched_dag::{DagLabel, SubtaskLabel, Warning};
 
-use crate::answer::Unproven;
+use super::answer::Unproven;
+use crate::draft::flaw::Flaw;
 use crate::platform::LaunchError;
 
 /// One reason why a commit was refused.
@@ -172,22 +173,52 @@ impl Fault {
         }
     }
 
-    /// Fills in the DAG's label, which registration does not know yet.
-    pub(crate) fn in_dag(mut self, label: &DagLabel) -> Self {
-        match &mut self {
-            Self::GivenTwice { dag }
-            | Self::AlreadyCommitted { dag }
-            | Self::InputArity { dag, .. }
-            | Self::OutputArity { dag, .. }
-            | Self::DurationTooLong { dag, .. }
-            | Self::PeriodsDiffer { dag, .. }
-            | Self::ActivationsDiffer { dag, .. }
-            | Self::LatestNotCommitted { dag, .. }
-            | Self::SignalNotCommitted { dag, .. }
-            | Self::DeadlinesDiffer { dag, .. } => dag.clone_from(label),
-            Self::NoPlatform | Self::NotProven { .. } | Self::Model(_) | Self::NotLaunched(_) => {}
+    /// Makes a fault of a flaw in the registrations of a DAG.
+    pub(crate) fn of(flaw: Flaw, dag: DagLabel) -> Self {
+        match flaw {
+            Flaw::InputArity {
+                subtask,
+                expected,
+                given,
+            } => Self::InputArity {
+                dag,
+                subtask,
+                expected,
+                given,
+            },
+            Flaw::OutputArity {
+                subtask,
+                expected,
+                given,
+            } => Self::OutputArity {
+                dag,
+                subtask,
+                expected,
+                given,
+            },
+            Flaw::DurationTooLong { subtask, what } => Self::DurationTooLong { dag, subtask, what },
+            Flaw::PeriodsDiffer {
+                subtask,
+                first_ns,
+                second_ns,
+            } => Self::PeriodsDiffer {
+                dag,
+                subtask,
+                first_ns,
+                second_ns,
+            },
+            Flaw::ActivationsDiffer { subtask } => Self::ActivationsDiffer { dag, subtask },
+            Flaw::DeadlinesDiffer {
+                subtask,
+                first_ns,
+                second_ns,
+            } => Self::DeadlinesDiffer {
+                dag,
+                subtask,
+                first_ns,
+                second_ns,
+            },
         }
-        self
     }
 }
 

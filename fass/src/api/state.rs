@@ -32,10 +32,10 @@ use core::fmt;
 
 use sched_dag::{StateSpec, StateUser};
 
-use crate::cell::{Changing, Looking, Shared};
-use crate::dag::Dag;
+use super::dag::Dag;
+use super::uses::{Uses, sealed};
 use crate::draft::Draft;
-use crate::uses::{Uses, sealed};
+use crate::run::cell::{Changing, Looking, Shared};
 
 /// What can be a state: any type that several cores may use in turn.
 ///

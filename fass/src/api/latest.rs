@@ -24,30 +24,14 @@
 //!   sample the same topic in one job may get different values. Sample once and send
 //!   the value along an edge to have one for all.
 //! - Values may be sampled several times, or never.
-//!
-//! # How
-//!
-//! Each sampling subtask has three slots for itself: one that the writer fills, one
-//! that the reader looks at, and one in the middle. The writer, when complete, swaps
-//! its slot for the middle one; the reader does so if that is fresh (a triple buffer).
 
-use alloc::boxed::Box;
 use alloc::rc::Rc;
-use alloc::string::String;
-use alloc::sync::Arc;
-use alloc::vec::Vec;
-use core::any::Any;
-use core::cell::RefCell;
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-use sched_dag::{DagId, TopicPort};
-
-use crate::cell::{Looking, Shared};
-use crate::dag::Dag;
-use crate::effect::Effect;
-use crate::message::{Message, MessageType};
-use crate::uses::{Uses, sealed};
+use super::dag::Dag;
+use super::uses::{Uses, sealed};
+use crate::run::latest::{Looked, Sampler, SharedLatest};
+use crate::run::message::Message;
 
 /// The latest value of a topic, for subtasks of any DAG. Made by [`Dag::latest`].
 ///
@@ -164,155 +148,13 @@ impl Dag {
     #[track_caller]
     #[must_use = "a latest value that no subtask samples is a fault at commit"]
     pub fn latest<T: Message + Sync>(&self, topic: &str) -> Latest<T> {
-        let shared = Rc::new(SharedLatest {
-            topic: topic.into(),
-            triples: RefCell::default(),
-        });
+        let shared = Rc::new(SharedLatest::new(topic));
         self.open()
             .latest
             .push(Rc::<SharedLatest<T>>::clone(&shared));
         Latest { shared }
     }
 }
-
-/// A latest value while DAGs are built.
-pub(crate) struct SharedLatest<T> {
-    topic: String,
-    /// One for each sampling subtask.
-    triples: RefCell<Vec<Arc<Triple<T>>>>,
-}
-
-/// A latest value of whatever type.
-pub(crate) trait AnyLatest {
-    fn topic(&self) -> &str;
-
-    /// Returns the topic with the type that is read.
-    fn port(&self) -> TopicPort;
-
-    /// Returns the number of subtasks that sample it.
-    fn samplers(&self) -> usize;
-
-    /// Returns the writing ends: a `Vec<Box<dyn Stage<T>>>`.
-    fn stages(&self) -> Box<dyn Any>;
-
-    /// Returns what the writer's completion does.
-    fn effects(&self) -> Vec<Box<dyn Effect>>;
-}
-
-impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
-    fn topic(&self) -> &str {
-        &self.topic
-    }
-
-    fn port(&self) -> TopicPort {
-        MessageType::of::<T>().port(&self.topic)
-    }
-
-    fn samplers(&self) -> usize {
-        self.triples.borrow().len()
-    }
-
-    fn stages(&self) -> Box<dyn Any> {
-        let triples = self.triples.borrow();
-        let stages: Vec<Box<dyn Stage<T>>> = (triples.iter())
-            .map(|triple| -> Box<dyn Stage<T>> { Box::new(Arc::clone(triple)) })
-            .collect();
-        Box::new(stages)
-    }
-
-    fn effects(&self) -> Vec<Box<dyn Effect>> {
-        let triples = self.triples.borrow();
-        (triples.iter())
-            .map(|triple| -> Box<dyn Effect> { Box::new(Arc::clone(triple)) })
-            .collect()
-    }
-}
-
-/// Where a writer puts what shall show at its completion.
-pub(crate) trait Stage<T>: Send {
-    fn stage(&mut self, job: u64, value: T);
-}
-
-/// The slots of one sampling subtask.
-struct Triple<T> {
-    slots: [Shared<Option<Entry<T>>>; 3],
-    /// The slot in the middle, with [`FRESH`] if the reader has not had it.
-    middle: AtomicU8,
-    /// The writer's slot. Only the writer's body uses it, which is `&mut` there.
-    back: AtomicU8,
-    /// Whether the writer's slot has a value that shall show at its completion.
-    staged: AtomicBool,
-}
-
-struct Entry<T> {
-    value: T,
-    job: u64,
-    completed_ns: u64,
-}
-
-const FRESH: u8 = 0b100;
-const SLOT: u8 = 0b011;
-
-impl<T> Triple<T> {
-    fn new() -> Self {
-        Self {
-            slots: [const { Shared::new(None) }; 3],
-            back: AtomicU8::new(0),
-            middle: AtomicU8::new(1),
-            staged: AtomicBool::new(false),
-        }
-    }
-
-    /// Changes the writer's slot.
-    fn write(&self, change: impl FnOnce(&mut Option<Entry<T>>)) {
-        let back = usize::from(self.back.load(Ordering::Relaxed));
-        let Some(mut slot) = self.slots[back].change() else {
-            panic!("a topic has two writers at one time: the platform runs a subtask twice");
-        };
-        change(&mut slot);
-    }
-}
-
-impl<T: Send + Sync> Stage<T> for Arc<Triple<T>> {
-    fn stage(&mut self, job: u64, value: T) {
-        self.write(|slot| {
-            *slot = Some(Entry {
-                value,
-                job,
-                completed_ns: 0,
-            });
-        });
-        self.staged.store(true, Ordering::Relaxed);
-    }
-}
-
-impl<T: Send + Sync> Effect for Arc<Triple<T>> {
-    fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
-        if !self.staged.load(Ordering::Relaxed) {
-            return;
-        }
-        self.staged.store(false, Ordering::Relaxed);
-        self.write(|slot| {
-            if let Some(entry) = slot {
-                entry.completed_ns = completed_ns;
-            }
-        });
-        let back = self.back.load(Ordering::Relaxed);
-        let middle = self.middle.swap(back | FRESH, Ordering::AcqRel);
-        self.back.store(middle & SLOT, Ordering::Relaxed);
-    }
-}
-
-/// The reading end, kept by the sampling subtask.
-#[doc(hidden)]
-pub struct Sampler<T> {
-    triple: Arc<Triple<T>>,
-    front: u8,
-}
-
-/// The reader's slot for the time of an instance.
-#[doc(hidden)]
-pub struct Looked<'a, T>(Looking<'a, Option<Entry<T>>>);
 
 impl<T> sealed::Sealed for Sampling<T> {}
 
@@ -326,25 +168,17 @@ impl<T: Message + Sync> Uses for Sampling<T> {
     }
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let triple = Arc::new(Triple::new());
-        self.shared.triples.borrow_mut().push(Arc::clone(&triple));
+        let sampler = self.shared.sampler();
         dag.draft.borrow_mut().samples.push((subtask, self.shared));
-        Sampler { triple, front: 2 }
+        sampler
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        let Sampler { triple, front } = held;
-        if triple.middle.load(Ordering::Relaxed) & FRESH != 0 {
-            *front = triple.middle.swap(*front, Ordering::AcqRel) & SLOT;
-        }
-        match triple.slots[usize::from(*front)].look() {
-            Some(slot) => Looked(slot),
-            None => unreachable!("the writer has another slot"),
-        }
+        held.look()
     }
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        guard.0.as_ref().map(|entry| Sample {
+        guard.entry().map(|entry| Sample {
             value: &entry.value,
             job: entry.job,
             completed_ns: entry.completed_ns,
@@ -363,7 +197,3 @@ impl<T> fmt::Debug for Sampling<T> {
         f.debug_tuple("Sampling").field(&self.shared.topic).finish()
     }
 }
-
-#[cfg(test)]
-#[path = "latest_tests.rs"]
-mod tests;

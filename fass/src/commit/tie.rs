@@ -8,9 +8,10 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::{DagId, DagSpec, SubtaskSpec, TaskSet};
 
-use crate::dag::Dag;
-use crate::plan::{Body, Plan};
-use crate::topic::Wiring;
+use crate::api::dag::Dag;
+use crate::run::plan::{Body, Plan};
+use crate::run::subtask::MakeBody;
+use crate::run::topic::Wiring;
 
 /// The plans made so far.
 static PLANS: AtomicU64 = AtomicU64::new(0);
@@ -38,7 +39,7 @@ pub(crate) fn tie(dags: &[Dag], task_set: TaskSet) -> Plan {
             };
             let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
             let mut wiring = Wiring::new(&spec, &latest, slots);
-            let make = |(subtask, make_body): (usize, crate::subtask::MakeBody)| -> Body {
+            let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
                 make_body(&mut wiring, subtask)
             };
             let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();

@@ -1,80 +1,17 @@
-//! What a subtask uses beside its inputs, stated at registration.
+//! Registering a subtask that uses something besides its inputs.
 //!
-//! Values of the same job come along edges, as arguments. What comes from elsewhere
-//! is stated with [`Dag::using`]: a [`State`](crate::State) that subtasks of the DAG
-//! share, the [latest value](crate::Latest) of a topic of any DAG, a
-//! [signal](crate::Signal) that the subtask may raise. The function then gets what
-//! it uses as its *first* argument, in front of the inputs:
-//!
-//! | use | first argument | theory |
-//! |---|---|---|
-//! | [`State::update`](crate::State::update) | `&mut T` | precedence |
-//! | [`State::read`](crate::State::read) | `&T` | precedence |
-//! | [`Latest::sample`](crate::Latest::sample) | `Option<Sample<T>>` | bounded staleness |
-//! | [`Signal::raising`](crate::Signal::raising) | `Raiser` | sporadic release |
-//!
-//! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
-//! all of them for one call only, nothing can be kept beyond the instance.
+//! The methods are those of [`Dag`]. Each wraps the function in one that begins the
+//! uses, lends them to the function for one call, and ends them.
 
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use crate::attributes::SubtaskAttributes;
-use crate::dag::Dag;
-use crate::signal::Signal;
-use crate::tuple::{VecToPubs, VecToSubs};
-use crate::untyped::Untyped;
-
-pub(crate) mod sealed {
-    /// Keeps the trait to the types of this crate.
-    pub trait Sealed {}
-}
-
-/// One thing that a subtask uses, or a tuple of up to 8.
-///
-/// Apps do not call its methods; they meet the trait in [`Dag::using`].
-///
-/// ```
-/// use fass::{State, Uses, create_dag};
-///
-/// fn first_argument<U: Uses>(_: &U) -> &'static str {
-///     std::any::type_name::<U::Borrowed<'_>>()
-/// }
-/// let dag = create_dag();
-/// let (pose, map): (State<f64>, State<u8>) = (dag.state("pose", 0.0), dag.state("map", 0));
-/// assert_eq!(first_argument(&(pose.update(), map.read())), "(&mut f64, &u8)");
-/// ```
-#[diagnostic::on_unimplemented(
-    message = "`{Self}` is nothing that a subtask uses",
-    label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()` and `signal.raising()`"
-)]
-pub trait Uses: sealed::Sealed {
-    /// What the function gets.
-    type Borrowed<'a>;
-    /// What the subtask keeps from its registration on.
-    #[doc(hidden)]
-    type Held: Send + 'static;
-    /// What it has for the time of an instance.
-    #[doc(hidden)]
-    type Guard<'a>;
-
-    /// Reports whether it may be used by subtasks of this DAG.
-    #[doc(hidden)]
-    fn is_of(&self, dag: &Dag) -> bool;
-
-    /// Notes that a subtask uses it.
-    #[doc(hidden)]
-    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held;
-
-    /// Begins the use at the start of an instance.
-    #[doc(hidden)]
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_>;
-
-    /// Lends it to the function.
-    #[doc(hidden)]
-    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a>;
-}
+use super::dag::Dag;
+use super::signal::Signal;
+use super::untyped::Untyped;
+use super::uses::Uses;
+use crate::draft::attributes::SubtaskAttributes;
+use crate::run::tuple::{VecToPubs, VecToSubs};
 
 /// A DAG whose next subtask uses something. Made by [`Dag::using`].
 ///
@@ -241,45 +178,3 @@ impl<U: Uses> Using<'_, U> {
         (self.dag, self.uses.hold(self.dag, subtask))
     }
 }
-
-/// Implements the trait for tuples.
-macro_rules! implement_tuple {
-    ($(($Use:ident $use_:ident $guard:ident))*) => {
-        impl<$($Use: Uses),*> sealed::Sealed for ($($Use,)*) {}
-
-        impl<$($Use: Uses),*> Uses for ($($Use,)*) {
-            type Borrowed<'a> = ($($Use::Borrowed<'a>,)*);
-            type Held = ($($Use::Held,)*);
-            type Guard<'a> = ($($Use::Guard<'a>,)*);
-
-            fn is_of(&self, dag: &Dag) -> bool {
-                let ($($use_,)*) = self;
-                $($use_.is_of(dag))&&*
-            }
-
-            fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-                let ($($use_,)*) = self;
-                ($($use_.hold(dag, subtask),)*)
-            }
-
-            fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-                let ($($use_,)*) = held;
-                ($($Use::enter($use_),)*)
-            }
-
-            fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-                let ($($guard,)*) = guard;
-                ($($Use::borrow($guard),)*)
-            }
-        }
-    };
-}
-
-implement_tuple!((A a a_guard));
-implement_tuple!((A a a_guard)(B b b_guard));
-implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard));
-implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard));
-implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard));
-implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard));
-implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard)(G g g_guard));
-implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard)(G g g_guard)(H h h_guard));

@@ -10,19 +10,25 @@
 //! 3. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 4. *Launch.* The platform takes the plan.
 
+pub(crate) mod answer;
+pub(crate) mod fault;
+pub(crate) mod staleness;
+mod tie;
+
 use alloc::rc::Rc;
 use alloc::string::ToString;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
 use sched_dag::{Policy, Verified, Warning};
 
-use crate::answer::{Answer, Answers};
-use crate::dag::Dag;
-use crate::fault::{CommitError, Fault};
+use crate::api::dag::Dag;
 use crate::platform;
-use crate::signal::Signal;
-use crate::staleness::{self, Staleness};
-use crate::tie::tie;
+use crate::run::signal::Target;
+use answer::{Answer, Answers};
+use fault::{CommitError, Fault};
+use staleness::Staleness;
+use tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
 ///
@@ -268,12 +274,10 @@ fn missing_others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
         subtask: staleness::label_of(dag, *subtask),
         topic: latest.topic().into(),
     });
-    let is_target = |signal: &Signal, other: &Dag| {
+    let is_target = |signal: &Arc<Target>, other: &Dag| {
         let other = other.draft.borrow();
-        other
-            .signal
-            .as_ref()
-            .is_some_and(|target| signal.is(target))
+        let own = other.signal.as_ref();
+        own.is_some_and(|target| Arc::ptr_eq(signal, target))
     };
     let raises = draft.raises.iter();
     let unknown = raises.filter(|(_, signal)| !dags.iter().any(|other| is_target(signal, other)));
@@ -325,7 +329,7 @@ fn verify(dags: &[Dag], options: CommitOptions) -> Result<Verified, CommitError>
             id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
             name: spec.name.clone(),
         };
-        faults.extend((draft.faults.iter()).map(|fault| fault.clone().in_dag(&label)));
+        faults.extend((draft.flaws.iter()).map(|flaw| Fault::of(flaw.clone(), label.clone())));
         faults.extend(missing_others(dags, dag, &label));
         specs.push(spec);
     }

@@ -20,11 +20,10 @@ use core::any::Any;
 
 use sched_dag::DagSpec;
 
-use crate::cell::{Reader, Writer, ring};
-use crate::gate::Gate;
-use crate::latest::{AnyLatest, Stage};
-use crate::message::Message;
-use crate::untyped::Signal;
+use super::cell::{Reader, Writer, ring};
+use super::gate::Gate;
+use super::latest::{AnyLatest, Stage};
+use super::message::Message;
 
 /// The reading end of a topic in one subtask. Made by the commit only.
 ///
@@ -146,6 +145,11 @@ fn no_free_slot(job: u64) -> ! {
     )
 }
 
+/// What an edge between untyped subtasks carries: that the predecessor's
+/// instance is complete.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Token;
+
 /// The edges of one DAG while the commit ties them.
 pub(crate) struct Wiring {
     /// The number of slots of every ring.
@@ -158,10 +162,10 @@ pub(crate) struct Wiring {
     edges_of_inputs: Vec<Vec<usize>>,
     /// For each subtask the topics of its output ports.
     outputs: Vec<Vec<String>>,
-    /// For each subtask the edges that lead to it carrying signals.
-    signals_to: Vec<Vec<usize>>,
-    /// For each subtask the edges that lead from it carrying signals.
-    signals_from: Vec<Vec<usize>>,
+    /// For each subtask the edges that lead to it carrying tokens.
+    tokens_to: Vec<Vec<usize>>,
+    /// For each subtask the edges that lead from it carrying tokens.
+    tokens_from: Vec<Vec<usize>>,
     /// For each latest value its topic, and where the writer puts it: a
     /// `Vec<Box<dyn Stage<T>>>`.
     stages: Vec<(String, Box<dyn Any>)>,
@@ -190,10 +194,10 @@ impl Wiring {
             .map(Iterator::collect)
             .collect();
         let none = || alloc::vec![Vec::new(); spec.subtasks.len()];
-        let (mut signals_to, mut signals_from) = (none(), none());
+        let (mut tokens_to, mut tokens_from) = (none(), none());
         for (edge, &(earlier, later)) in (edges..).zip(&spec.edges) {
-            signals_to[later].push(edge);
-            signals_from[earlier].push(edge);
+            tokens_to[later].push(edge);
+            tokens_from[earlier].push(edge);
         }
         edges += spec.edges.len();
         Self {
@@ -202,8 +206,8 @@ impl Wiring {
             edges_of_topic,
             edges_of_inputs,
             outputs,
-            signals_to,
-            signals_from,
+            tokens_to,
+            tokens_from,
             stages: (latest.iter())
                 .map(|latest| (latest.topic().into(), latest.stages()))
                 .collect(),
@@ -211,12 +215,9 @@ impl Wiring {
     }
 
     /// Returns the ends of the edges that lead to an untyped subtask, and from it.
-    pub(crate) fn signals(
-        &mut self,
-        subtask: usize,
-    ) -> (Vec<Subscriber<Signal>>, Publisher<Signal>) {
-        let to = core::mem::take(&mut self.signals_to[subtask]);
-        let from = core::mem::take(&mut self.signals_from[subtask]);
+    pub(crate) fn tokens(&mut self, subtask: usize) -> (Vec<Subscriber<Token>>, Publisher<Token>) {
+        let to = core::mem::take(&mut self.tokens_to[subtask]);
+        let from = core::mem::take(&mut self.tokens_from[subtask]);
         let readers = to.into_iter().map(|edge| Subscriber(self.reader(edge)));
         let readers = readers.collect();
         let writers = from.into_iter().map(|edge| self.writer(edge)).collect();

@@ -19,9 +19,9 @@ use core::time::Duration;
 
 use sched_dag::{DagLabel, SubtaskId, SubtaskLabel, TaskSet};
 
-use crate::answer::Answer;
-use crate::dag::Dag;
-use crate::latest::AnyLatest;
+use super::answer::Answer;
+use crate::api::dag::Dag;
+use crate::run::latest::AnyLatest;
 
 /// How old the value that a subtask samples can be at its start.
 ///

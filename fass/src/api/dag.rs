@@ -16,10 +16,10 @@ use core::time::Duration;
 
 use sched_dag::{Activation, OverrunPolicy};
 
-use crate::attributes::SubtaskAttributes;
+use super::untyped::Untyped;
 use crate::draft::Draft;
-use crate::tuple::{VecToPubs, VecToSubs};
-use crate::untyped::Untyped;
+use crate::draft::attributes::SubtaskAttributes;
+use crate::run::tuple::{VecToPubs, VecToSubs};
 
 /// Creates an empty DAG.
 ///

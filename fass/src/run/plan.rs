@@ -5,14 +5,14 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use core::convert::Infallible;
 use core::pin::Pin;
 use core::task::{Context, Poll, Waker};
 
 use sched_dag::{DagId, TaskSet};
 
-use crate::effect::Effect;
-use crate::gate::Gate;
-use crate::subtask::SubtaskFuture;
+use super::effect::Effect;
+use super::gate::Gate;
 
 /// A committed set of DAGs, ready to be scheduled.
 ///
@@ -65,6 +65,12 @@ pub struct Body {
     gate: Gate,
     /// What its completions do beyond the DAG.
     effects: Vec<Box<dyn Effect>>,
+}
+
+/// The future of a subtask, which never ends.
+pub(crate) trait SubtaskFuture: Future<Output = Infallible> + Send + Unpin {
+    /// Gives up what has arrived for a job that the subtask will not run.
+    fn discard(&mut self, job: u64);
 }
 
 impl Body {

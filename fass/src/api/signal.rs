@@ -17,17 +17,17 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use sched_dag::{Activation, DagId};
 
-use crate::attributes::SubtaskAttributes;
-use crate::dag::Dag;
-use crate::effect::Effect;
+use super::dag::Dag;
+use super::uses::{Uses, sealed};
+use crate::draft::attributes::SubtaskAttributes;
 use crate::platform;
-use crate::tuple::VecToPubs;
-use crate::uses::{Uses, sealed};
+use crate::run::signal::{Raised, Target};
+use crate::run::tuple::VecToPubs;
 
 /// What releases a sporadic DAG. Clones are handles of the same signal.
 ///
@@ -83,13 +83,6 @@ pub struct Raising(Signal);
 #[derive(Debug)]
 pub struct Raiser<'a> {
     raised: &'a AtomicBool,
-}
-
-/// Which DAG a signal releases, known from the commit on.
-pub(crate) struct Target {
-    /// The plan's number, 0 before the commit.
-    plan: AtomicU64,
-    dag: AtomicU32,
 }
 
 impl Raiser<'_> {
@@ -157,20 +150,7 @@ impl Signal {
     /// ```
     #[must_use]
     pub fn target(&self) -> Option<(u64, DagId)> {
-        let plan = self.target.plan.load(Ordering::Acquire);
-        (plan > 0).then(|| (plan, DagId(self.target.dag.load(Ordering::Relaxed))))
-    }
-
-    pub(crate) fn is(&self, target: &Arc<Target>) -> bool {
-        Arc::ptr_eq(&self.target, target)
-    }
-}
-
-impl Target {
-    /// Tells the signal its DAG.
-    pub(crate) fn set(&self, plan: u64, dag: DagId) {
-        self.dag.store(dag.0, Ordering::Relaxed);
-        self.plan.store(plan, Ordering::Release);
+        self.target.get()
     }
 }
 
@@ -221,29 +201,9 @@ impl Dag {
     #[track_caller]
     fn signal(&self) -> Signal {
         let mut draft = self.open();
-        let target = draft.signal.get_or_insert_with(|| {
-            Arc::new(Target {
-                plan: AtomicU64::new(0),
-                dag: AtomicU32::new(0),
-            })
-        });
+        let target = draft.signal.get_or_insert_with(|| Arc::new(Target::new()));
         Signal {
             target: Arc::clone(target),
-        }
-    }
-}
-
-/// A signal that an instance may have raised.
-struct Raised {
-    raised: Arc<AtomicBool>,
-    target: Arc<Target>,
-}
-
-impl Effect for Raised {
-    fn happen(&mut self, _completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
-        if self.raised.load(Ordering::Relaxed) {
-            self.raised.store(false, Ordering::Relaxed);
-            raise(DagId(self.target.dag.load(Ordering::Relaxed)));
         }
     }
 }
@@ -262,12 +222,9 @@ impl Uses for Raising {
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let raised = Arc::new(AtomicBool::new(false));
         let mut draft = dag.draft.borrow_mut();
-        let effect = Raised {
-            raised: Arc::clone(&raised),
-            target: Arc::clone(&self.0.target),
-        };
+        let effect = Raised::new(Arc::clone(&raised), Arc::clone(&self.0.target));
         draft.effects.push((subtask, Box::new(effect)));
-        draft.raises.push((subtask, self.0));
+        draft.raises.push((subtask, self.0.target));
         raised
     }
 

@@ -4,16 +4,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use super::{Sampler, Sampling, Stage, Triple};
-use crate::effect::Effect;
-use crate::uses::Uses;
+use super::{Sampler, Stage, Triple};
+use crate::run::effect::Effect;
 
 const JOBS: u64 = if cfg!(miri) { 100 } else { 300_000 };
 
 fn sample(sampler: &mut Sampler<[u64; 8]>) -> Option<(u64, u64)> {
-    let mut guard = <Sampling<[u64; 8]> as Uses>::enter(sampler);
-    let sample = <Sampling<[u64; 8]> as Uses>::borrow(&mut guard)?;
-    assert_eq!(*sample.value, [sample.job; 8], "whole");
+    let guard = sampler.look();
+    let sample = guard.entry()?;
+    assert_eq!(sample.value, [sample.job; 8], "whole");
     Some((sample.job, sample.completed_ns))
 }
 

@@ -1,0 +1,12 @@
+//! What an app builds DAGs with: handles of DAGs, and of what subtasks use.
+//!
+//! Everything said here is noted in a draft; nothing is judged before the commit, and
+//! nothing runs.
+
+pub(crate) mod dag;
+pub(crate) mod latest;
+pub(crate) mod signal;
+pub(crate) mod state;
+pub(crate) mod untyped;
+pub(crate) mod uses;
+pub(crate) mod using;

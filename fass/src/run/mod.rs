@@ -1,0 +1,19 @@
+//! What runs: a body for each subtask, and the ways that values take between them.
+//!
+//! A *body* holds the function with its ends of the topics; a *ring* is one edge, with a
+//! slot for each job in flight; an *effect* is what a completion does beyond the DAG.
+//! Nothing in here knows how a DAG is built or verified, and nothing allocates once the
+//! commit has made it.
+
+#[allow(unsafe_code, reason = "the one cell type of the job slots")]
+pub(crate) mod cell;
+pub(crate) mod effect;
+pub(crate) mod gate;
+pub(crate) mod latest;
+pub(crate) mod message;
+pub(crate) mod plan;
+pub(crate) mod signal;
+pub(crate) mod subtask;
+pub(crate) mod topic;
+pub(crate) mod tuple;
+pub(crate) mod untyped;
