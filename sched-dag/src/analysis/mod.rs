@@ -91,7 +91,7 @@ pub use long_paths::{long_paths, long_paths_among, path_list};
 pub use melani::{melani_edf, melani_edf_width, melani_fp, melani_fp_width};
 pub use non_preemptive::{np_safe_edf, np_safe_fp, np_safe_fp_width};
 pub use overheads::Overheads;
-pub use pipelined::{pipelined_fp, pipelined_fp_reference};
+pub use pipelined::pipelined_fp;
 pub use refusal::Refusal;
 pub use task::{Task, TaskError};
 pub use width::{parallelism, width};

@@ -13,27 +13,23 @@
 //! cross: to cross the `j`-th, its part since the first must be able to last
 //! until then. A set is accepted only when that ends.
 //!
-//! Traps: [`pipelined_fp_reference`] differs in two steps, and is *unsafe*.
+//! Traps, both found in an earlier form:
 //!
-//! 1. It follows the chain back only over the jobs that the job itself can meet
+//! 1. To follow the chain back only over the jobs that the job itself can meet
 //!    (`j T < R`). But each job may delay only the next, and a delay still be
 //!    handed on for ever: a subtask with a WCET of one period never catches up.
-//!    In the test `delays_handed_on_are_counted` that form claims 18 where
+//!    In the test `delays_handed_on_are_counted` that would claim 18 where
 //!    observed response times grow without end.
-//! 2. It takes another DAG to use no more cores than one of its jobs can, also
-//!    when its jobs overlap. In the test `overlapping_jobs_stack` that form
-//!    claims 8 and 9 is observed.
+//! 2. To take another DAG to use no more cores than one of its jobs can, also
+//!    when its jobs overlap. In the test `overlapping_jobs_stack` that would
+//!    claim 8, and 9 is observed.
 //!
-//! It also does not compare with the deadline. It is here as a value to compare
-//! other implementations with, and never used for a verdict.
-//!
-//! With `D <= T` both are [`melani_fp_width`](super::melani_fp_width).
+//! With `D <= T` this is [`melani_fp_width`](super::melani_fp_width).
 
 use alloc::vec::Vec;
 
 use super::melani::widths;
 use super::refusal::Refusal;
-use super::response::Form;
 use super::set::Set;
 use super::task::Task;
 
@@ -44,27 +40,11 @@ use super::task::Task;
 ///
 /// [`Refusal`] if there is no core, or a DAG has no bound within its deadline.
 pub fn pipelined_fp(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
-    bound(tasks, cores, Form::Sound)
-}
-
-/// As [`pipelined_fp`] without its two corrections (see the module) and without
-/// regard to the deadlines: values to compare other implementations with, *not*
-/// bounds.
-///
-/// # Errors
-///
-/// [`Refusal`] if there is no core, or the values do not settle.
-pub fn pipelined_fp_reference(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
-    bound(tasks, cores, Form::Reference)
-}
-
-fn bound(tasks: &[&Task], cores: u32, form: Form) -> Result<Vec<u64>, Refusal> {
     if cores == 0 {
         return Err(Refusal::DoesNotApply);
     }
     let widths = widths(tasks, cores);
-    let mut set = Set::new(tasks, cores.into(), &widths);
-    set.form = form;
+    let set = Set::new(tasks, cores.into(), &widths);
     for (position, task) in tasks.iter().enumerate() {
         if u128::from(task.volume_ns()) > u128::from(cores) * u128::from(task.period_ns()) {
             return Err(Refusal::Fails { position });
@@ -76,7 +56,7 @@ fn bound(tasks: &[&Task], cores: u32, form: Form) -> Result<Vec<u64>, Refusal> {
 
 #[cfg(test)]
 mod tests {
-    use super::{pipelined_fp, pipelined_fp_reference};
+    use super::pipelined_fp;
     use crate::analysis::{Refusal, Task};
 
     #[test]
@@ -85,8 +65,6 @@ mod tests {
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let other = Task::new(25, 50, vec![1, 3, 3, 1], &diamond).unwrap();
         assert_eq!(pipelined_fp(&[&chain, &other], 3), Ok(vec![12, 14]));
-        let reference = pipelined_fp_reference(&[&chain, &other], 3);
-        assert_eq!(reference, Ok(vec![12, 8]));
     }
 
     #[test]
@@ -96,8 +74,6 @@ mod tests {
         let edges = [(0, 1), (1, 2)];
         let chain = Task::new(10, 30, vec![6, 6, 6], &edges).unwrap();
         let wide = Task::new(100, 60, vec![3; 6], &[]).unwrap();
-        let reference = pipelined_fp_reference(&[&chain, &wide], 4);
-        assert_eq!(reference, Ok(vec![20, 8]));
         let bounds = pipelined_fp(&[&chain, &wide], 4).unwrap();
         assert!(bounds[1] >= 9, "{bounds:?}");
     }
@@ -108,8 +84,6 @@ mod tests {
         // second subtask below falls behind by 5, and can never catch up.
         let burst = Task::new(1000, 1000, vec![5; 4], &[]).unwrap();
         let full = Task::new(10, 30, vec![1, 10], &[(0, 1)]).unwrap();
-        let reference = pipelined_fp_reference(&[&burst, &full], 4);
-        assert_eq!(reference, Ok(vec![8, 18]));
         let refusal = pipelined_fp(&[&burst, &full], 4);
         assert_eq!(refusal, Err(Refusal::Fails { position: 1 }));
         // With one unit of slack a period it does catch up.

@@ -55,18 +55,6 @@ pub(super) struct Figures {
     pub(super) blocking: Blocking,
 }
 
-/// How jobs that overlap are treated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
-    /// The chain is followed back for as long as it can last until the next
-    /// release, and overlapping jobs of other DAGs stack.
-    Sound,
-    /// The chain is followed back over the jobs that the job itself can meet
-    /// (`j T < R`), and other DAGs are as narrow as one job; the deadline is
-    /// no limit. For comparisons.
-    Reference,
-}
-
 /// Lower-ranked work that a chain may find on the cores and must wait for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Blocking {
@@ -116,7 +104,6 @@ impl Figures {
         &self,
         interference: &[Workload],
         start_ns: u64,
-        form: Form,
         steps: &mut u64,
     ) -> Result<u64, Unsolved> {
         let mut response = u128::from(start_ns);
@@ -130,15 +117,11 @@ impl Figures {
                 if index == windows.len() {
                     windows.push(0);
                 }
-                let window = self.window(back, own, interference, windows[index], form, steps)?;
+                let window = self.window(back, own, interference, windows[index], steps)?;
                 windows[index] = window;
                 let offset = u128::from(back) * self.period;
                 largest = largest.max(window.saturating_sub(offset));
-                let goes_on = match form {
-                    Form::Sound => window > offset + self.period,
-                    Form::Reference => offset + self.period < largest,
-                };
-                if !goes_on {
+                if window <= offset + self.period {
                     break;
                 }
                 back += 1;
@@ -180,15 +163,11 @@ impl Figures {
         own: u128,
         interference: &[Workload],
         start: u128,
-        form: Form,
         steps: &mut u64,
     ) -> Result<u128, Unsolved> {
         let back = u128::from(back);
         let chain = self.length + back * self.largest;
-        let limit = match form {
-            Form::Sound => self.deadline + back * self.period,
-            Form::Reference => u64::MAX.into(),
-        };
+        let limit = self.deadline + back * self.period;
         let Blocking { first, later, .. } = self.blocking;
         let repeats = (self.blocking.chain + back).saturating_sub(1);
         let constant = (back + 1) * self.volume - chain

@@ -18,7 +18,7 @@
 use alloc::vec::Vec;
 
 use super::graham::graham;
-use super::response::{Figures, Form, STEP_LIMIT, Unsolved};
+use super::response::{Figures, STEP_LIMIT, Unsolved};
 use super::task::Task;
 use super::workload::Workload;
 
@@ -31,7 +31,6 @@ pub(super) struct Set<'a> {
     pub(super) figures: Vec<Figures>,
     /// Whether only jobs with deadlines no later count (EDF with `D <= T`).
     pub(super) deadlines_limit: bool,
-    pub(super) form: Form,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
 }
@@ -68,7 +67,6 @@ impl<'a> Set<'a> {
                 .map(|(task, &p)| Figures::of(task, cores, p))
                 .collect(),
             deadlines_limit: false,
-            form: Form::Sound,
             known: alloc::vec![None; tasks.len()],
         }
     }
@@ -95,7 +93,7 @@ impl<'a> Set<'a> {
                 let after = match self.interference(dag, &responses, &may_outrank) {
                     Err(other) => Err(Failure::Other(other)),
                     Ok(others) => self.figures[dag]
-                        .solve(&others, before, self.form, &mut steps)
+                        .solve(&others, before, &mut steps)
                         .map_err(|why| {
                             first_failing.get_or_insert((dag, why));
                             Failure::Own(why)
@@ -145,7 +143,7 @@ impl<'a> Set<'a> {
             }
             let others = self.interference(dag, &deadlines, &may_outrank).ok()?;
             self.figures[dag]
-                .solve(&others, 0, self.form, &mut steps)
+                .solve(&others, 0, &mut steps)
                 .ok()
                 .map(Some)
         });
@@ -168,7 +166,6 @@ impl<'a> Set<'a> {
                 responses[other].ok_or(other)?,
                 self.parallelism[other],
                 self.cores,
-                self.form,
             );
             Ok(if self.deadlines_limit {
                 let deadline = self.tasks[dag].relative_deadline_ns();

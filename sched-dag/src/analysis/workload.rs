@@ -25,7 +25,6 @@
 //!
 //! Trap: the closed form overshoots `p L` for short windows; hence the cap.
 
-use super::response::Form;
 use super::task::Task;
 
 /// A DAG that may execute beside the one under analysis.
@@ -59,17 +58,8 @@ pub(super) struct Piece {
 impl Workload {
     /// Describes a task whose jobs are complete within `response_ns`, with at
     /// most `parallelism` cores a job and `cores < 2^32` cores for all jobs.
-    pub(super) fn new(
-        task: &Task,
-        response_ns: u64,
-        parallelism: u64,
-        cores: u64,
-        form: Form,
-    ) -> Self {
-        let lanes = match form {
-            Form::Sound => u128::from(response_ns.div_ceil(task.period_ns()).max(1)),
-            Form::Reference => 1,
-        };
+    pub(super) fn new(task: &Task, response_ns: u64, parallelism: u64, cores: u64) -> Self {
+        let lanes = u128::from(response_ns.div_ceil(task.period_ns()).max(1));
         let parallelism = u128::from(parallelism);
         Self {
             volume: task.volume_ns().into(),
@@ -200,7 +190,7 @@ impl Piece {
 
 #[cfg(test)]
 mod tests {
-    use super::{Form, Workload};
+    use super::Workload;
     use crate::analysis::Task;
 
     #[test]
@@ -208,26 +198,17 @@ mod tests {
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let one = Task::new(10, 10, vec![1, 2, 2, 1], &diamond).unwrap();
         let at = |workload: Workload, windows: [u64; 3]| windows.map(|l| workload.at(l).value);
-        assert_eq!(
-            at(Workload::new(&one, 5, 2, 2, Form::Sound), [8, 11, 14]),
-            [6, 12, 12]
-        );
+        assert_eq!(at(Workload::new(&one, 5, 2, 2), [8, 11, 14]), [6, 12, 12]);
 
         let chain = Task::new(10, 10, vec![2, 3], &[(0, 1)]).unwrap();
-        assert_eq!(
-            at(Workload::new(&chain, 6, 2, 2, Form::Sound), [4, 9, 14]),
-            [5, 10, 10]
-        );
-        assert_eq!(
-            at(Workload::new(&chain, 6, 1, 2, Form::Sound), [4, 9, 14]),
-            [4, 5, 10]
-        );
+        assert_eq!(at(Workload::new(&chain, 6, 2, 2), [4, 9, 14]), [5, 10, 10]);
+        assert_eq!(at(Workload::new(&chain, 6, 1, 2), [4, 9, 14]), [4, 5, 10]);
 
         let forks = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
         let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
-        let in_two = Workload::new(&one, 9, 2, 2, Form::Sound).under_edf(10, 20);
+        let in_two = Workload::new(&one, 9, 2, 2).under_edf(10, 20);
         assert_eq!(in_two.at(1000).value, 12);
-        let in_one = Workload::new(&two, 14, 2, 2, Form::Sound).under_edf(20, 10);
+        let in_one = Workload::new(&two, 14, 2, 2).under_edf(20, 10);
         assert_eq!(in_one.at(1000).value, 8);
     }
 
@@ -236,7 +217,7 @@ mod tests {
         for parallelism in 1..4 {
             for response in 10..22 {
                 let task = Task::new(9, 9, vec![2, 3, 5], &[(0, 1)]).unwrap();
-                let plain = Workload::new(&task, response, parallelism, 3, Form::Sound);
+                let plain = Workload::new(&task, response, parallelism, 3);
                 for workload in [plain, plain.under_edf(13, 30)] {
                     let values: Vec<u128> = (0..80).map(|l| workload.at(l).value).collect();
                     assert!(values.is_sorted(), "{values:?}");

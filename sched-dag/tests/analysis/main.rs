@@ -168,7 +168,7 @@ fn e4_blocking_is_observed_beyond_the_published_bound() {
 
 #[test]
 fn pipelined_counterexamples_are_real_and_not_accepted() {
-    // Values claimed by the reference form: 8 for the second DAG.
+    // An earlier form claimed 8 for the second DAG.
     let mut wide = spec(100, 60, &[3; 6], &[], 1);
     wide.offset_ns = 20;
     let chain = spec(10, 30, &[6, 6, 6], &[(0, 1), (1, 2)], 0);

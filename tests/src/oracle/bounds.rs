@@ -9,19 +9,16 @@
 //! then for each DAG:  dag T D nsub nedge / wcet c_0 .. / edge u v .. / len / vol /
 //!                     bottom_level (by subtask) / single M graham R long_paths R ..
 //! then for the set:   dm_order width melani_gfp_dm gfp_dm_width np_safe_gfp_dm
-//!                     pipelined_gfp_dm melani_gedf gedf_capacity bonifaci_gedf federated
+//!                     melani_gedf gedf_capacity bonifaci_gedf federated
 //! end
 //! ```
 //!
 //! Bounds under fixed priorities are in the order of `dm_order`. A lone `-`
 //! says that a test does not accept or does not apply.
-//!
-//! What is compared as `pipelined_gfp_dm` is the reference form, which is not
-//! a bound that a commit would rely on; see `sched_dag::analysis`.
 
 use sched_dag::analysis::{
     Federation, Task, bonifaci_edf, federated, gedf_capacity, graham, long_paths, melani_edf,
-    melani_fp, melani_fp_width, np_safe_fp, pipelined_fp_reference, width,
+    melani_fp, melani_fp_width, np_safe_fp, width,
 };
 
 use replay::lines::{Line, Lines, Malformed, cases};
@@ -48,13 +45,12 @@ struct ExpectedDag {
 }
 
 /// The quantities of a set; each case has each of them once.
-const QUANTITIES: [&str; 10] = [
+const QUANTITIES: [&str; 9] = [
     "dm_order",
     "width",
     "melani_gfp_dm",
     "gfp_dm_width",
     "np_safe_gfp_dm",
-    "pipelined_gfp_dm",
     "melani_gedf",
     "gedf_capacity",
     "bonifaci_gedf",
@@ -124,7 +120,6 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
         "melani_gfp_dm" => bounds(melani_fp(&by_deadline, cores).ok()),
         "gfp_dm_width" => bounds(melani_fp_width(&by_deadline, cores).ok()),
         "np_safe_gfp_dm" => bounds(np_safe_fp(&by_deadline, cores).ok()),
-        "pipelined_gfp_dm" => bounds(pipelined_fp_reference(&by_deadline, cores).ok()),
         "melani_gedf" => bounds(melani_edf(tasks, cores).ok()),
         "gedf_capacity" => gedf_capacity(tasks, cores).map(accepted),
         "bonifaci_gedf" => Some(accepted(bonifaci_edf(tasks, cores))),

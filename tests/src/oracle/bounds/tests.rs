@@ -63,10 +63,10 @@ fn malformed_files_are_refused_with_their_line() {
     assert_eq!(refused("wcet 2 8 1", "wcet 2 8 18446744073709551615").0, 2);
     assert_eq!(refused("case bpub000 7 3", "case bpub000 0 3").0, 1);
     assert_eq!(refused("case bpub000 7 3", "case bpub000 7 4").0, 28);
-    assert_eq!(refused("width 1 1 2\n", "").0, 37);
-    assert_eq!(refused("bonifaci_gedf 0", "bonifaci_gedf 2").0, 36);
-    assert_eq!(refused("federated 7", "federated 7 0").0, 37);
-    assert_eq!(refused("\nend\n", "\n").0, 38);
+    assert_eq!(refused("width 1 1 2\n", "").0, 36);
+    assert_eq!(refused("bonifaci_gedf 0", "bonifaci_gedf 2").0, 35);
+    assert_eq!(refused("federated 7", "federated 7 0").0, 36);
+    assert_eq!(refused("\nend\n", "\n").0, 37);
     assert_eq!(parse("").unwrap_err().line, 1);
     assert_eq!(parse("\nfoo\n").unwrap_err().line, 2);
 }
