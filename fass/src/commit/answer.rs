@@ -18,9 +18,10 @@
 //!   itself. Two exceptions are faults of the model whatever is demanded: the
 //!   WCET of a single subtask beyond the deadline, and times that overflow.
 //! - A DAG without all its WCETs is not analysed, and neither are those that
-//!   it may delay; they are not proven.
+//!   it may delay; they are not proven. A WCET of 0 is none.
 
 use alloc::string::{String, ToString};
+use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
@@ -29,6 +30,9 @@ use sched_dag::analysis::{self, Reason, Settings, TaskError, Test};
 use sched_dag::{DagId, DagLabel, SubtaskId, SubtaskLabel, TaskSet};
 
 use crate::platform::Platform;
+
+/// So many subtasks without WCET are named, and the rest counted.
+const MOST_NAMED: usize = 8;
 
 /// What is known at commit about the deadlines of one DAG.
 ///
@@ -111,14 +115,15 @@ pub enum Verdict {
 /// };
 /// assert_eq!(
 ///     unproven.to_string(),
-///     "subtask `source` has no WCET; give every subtask one to have the dag analysed"
+///     "no WCET above 0 is given for subtask `source`, subtask `sink`; give every subtask one \
+///      to have the dag analysed"
 /// );
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unproven {
     reason: Reason,
-    /// The subtask that the reason is about.
-    subtask: Option<SubtaskLabel>,
+    /// The subtasks that the reason is about.
+    subtasks: Vec<SubtaskLabel>,
     /// The other DAG that the reason is about.
     other: Option<DagLabel>,
 }
@@ -184,18 +189,23 @@ impl Unproven {
     }
 
     fn new(task_set: &TaskSet, dag: DagId, reason: Reason) -> Self {
-        let subtask = match reason {
-            Reason::Unknown(TaskError::MissingWcet { subtask })
-            | Reason::SubtaskBeyondPeriod { subtask } => Some(subtask),
-            _ => None,
+        let subtasks = match reason {
+            Reason::Unknown(TaskError::MissingWcet { .. }) => {
+                let subtasks = (0..).map(SubtaskId).zip(task_set.dag(dag).subtasks());
+                let lacking = subtasks.filter(|(_, subtask)| subtask.wcet_ns().unwrap_or(0) == 0);
+                lacking.map(|(id, _)| id).collect()
+            }
+            Reason::SubtaskBeyondPeriod { subtask } => vec![subtask],
+            _ => Vec::new(),
         };
+        let labels = subtasks.into_iter();
         let other = match reason {
             Reason::DelayedBy { dag } => Some(dag),
             _ => None,
         };
         Self {
             reason,
-            subtask: subtask.map(|subtask| subtask_label(task_set, dag, subtask)),
+            subtasks: labels.map(|id| subtask_label(task_set, dag, id)).collect(),
             other: other.map(|other| dag_label(task_set, other)),
         }
     }
@@ -276,12 +286,17 @@ impl fmt::Display for Answer {
 
 impl fmt::Display for Unproven {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.reason, &self.subtask, &self.other) {
-            (Reason::Unknown(TaskError::MissingWcet { .. }), Some(subtask), _) => write!(
-                f,
-                "{subtask} has no WCET; give every subtask one to have the dag analysed"
-            ),
-            (Reason::SubtaskBeyondPeriod { .. }, Some(subtask), _) => write!(
+        match (&self.reason, &self.subtasks[..], &self.other) {
+            (Reason::Unknown(TaskError::MissingWcet { .. }), [first, others @ ..], _) => {
+                write!(f, "no WCET above 0 is given for {first}")?;
+                let (named, more) = others.split_at(others.len().min(MOST_NAMED - 1));
+                named.iter().try_for_each(|other| write!(f, ", {other}"))?;
+                if !more.is_empty() {
+                    write!(f, " and {} more", more.len())?;
+                }
+                f.write_str("; give every subtask one to have the dag analysed")
+            }
+            (Reason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
                 f,
                 "{subtask} alone takes more than a period; split it or lengthen the period"
             ),

@@ -5,8 +5,8 @@ mod support;
 use std::time::Duration;
 
 use fass::{
-    Answer, Dag, Fault, Overheads, Policy, Preemption, Reason, SubtaskAttributes, Test, Verdict,
-    create_dag, finish_create_dags,
+    Answer, Dag, Fault, Overheads, Policy, Preemption, Reason, SubtaskAttributes, Test, Untyped,
+    Verdict, create_dag, finish_create_dags,
 };
 use support::{execute, ms, named};
 use virtual_time::VirtualTime;
@@ -178,8 +178,8 @@ fn dags_without_all_wcets_say_so() {
     assert_eq!(
         texts(commit.answers()),
         [
-            "dag `unknown` is not proven to meet its deadlines: subtask `sink` has no WCET; give \
-             every subtask one to have the dag analysed",
+            "dag `unknown` is not proven to meet its deadlines: no WCET above 0 is given for \
+             subtask `sink`; give every subtask one to have the dag analysed",
             "dag `urgent` takes at most 2ms, by long paths (He et al. 2022)",
             "dag `lax` is not proven to meet its deadlines: dag `unknown`, which may delay it, is \
              not proven itself; see to that one first",
@@ -241,4 +241,68 @@ fn measured_overheads_are_added_to_every_wcet() {
     tight.demand_proof();
     let error = finish_create_dags(&[tight]).expect_err("5.003 ms are more than 5 ms");
     assert_eq!(error.faults()[0].code(), "not_proven");
+}
+
+/// One core without preemption, a source of 2 ms, seven branches and a sink that takes
+/// no time, all in all the period: counting work alone, each job is complete after 13
+/// ms. By priorities the next job's source comes before that sink.
+#[test]
+fn a_wcet_of_zero_proves_nothing() {
+    for policy in [Policy::StaticPriority, Policy::Edf] {
+        let machine = VirtualTime::new()
+            .policy(policy)
+            .preemption(Preemption::Disabled);
+        let commit = finish_create_dags(&[star([2, 2, 2, 1, 1, 1, 2], 0)]).expect("accepted");
+        assert_eq!(
+            texts(commit.answers()),
+            [
+                "dag `star` is not proven to meet its deadlines: no WCET above 0 is given for \
+                 subtask `sink`; give every subtask one to have the dag analysed"
+            ]
+        );
+        assert_eq!(commit.warnings()[0].code(), "zero_wcet");
+        let report = machine.run();
+        let responses = report
+            .jobs
+            .iter()
+            .filter_map(|job| job.finish_ns.map(|end| end - job.release_ns));
+        let observed_ns = match policy {
+            Policy::StaticPriority => 26_000_000,
+            Policy::Edf => 13_000_000,
+        };
+        assert_eq!(responses.max(), Some(observed_ns));
+        drop(machine);
+        // With what a subtask takes at least, the bound holds.
+        let machine = VirtualTime::new()
+            .policy(policy)
+            .preemption(Preemption::Disabled);
+        let commit = finish_create_dags(&[star([2, 2, 2, 1, 1, 1, 1], 1)]).expect("accepted");
+        let bound = commit.answers()[0].verdict.bound();
+        assert_eq!(bound, Some(ms(13)));
+        assert_eq!(machine.run().statistics[0].misses, 0);
+    }
+}
+
+fn star(branches: [u64; 7], sink: u64) -> Dag {
+    let dag = create_dag();
+    dag.name("star")
+        .jobs(20)
+        .period(ms(13))
+        .relative_deadline(ms(13));
+    let subtask = |name: &str, priority, time| {
+        let time = ms(time);
+        let attributes = named(name).wcet(time).priority(priority);
+        dag.register_untyped_subtask(move |_job| execute(time), attributes)
+    };
+    let source = subtask("source", 0, 2);
+    let names = ["a", "b", "c", "d", "e", "f", "g"];
+    let branches = names.iter().zip(branches);
+    let branches: Vec<Untyped> = branches
+        .map(|(name, time)| subtask(name, 1, time))
+        .collect();
+    let sink = subtask("sink", 2, sink);
+    for branch in &branches {
+        dag.precede(&source, branch).precede(branch, &sink);
+    }
+    dag
 }

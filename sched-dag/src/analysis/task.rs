@@ -9,6 +9,12 @@
 //! Words: the *volume* is the sum of all WCETs; the *length* is the largest sum
 //! of WCETs along a path. Both are computed once, checked against overflow, so
 //! every other analysis may rely on `length <= volume <= u64::MAX`.
+//!
+//! No WCET is 0. All tests here count the work that delays a subtask, and one without
+//! any would be delayed by what they do not count: say a subtask of WCET 0 becomes
+//! ready at the very end of a busy period, as the last one of its job. All of the work
+//! is done then, so the equations call the job complete; but a dispatch has yet to
+//! choose it, and may choose the next job, which is released at this instant.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -35,7 +41,7 @@ pub struct Task {
 /// Why a DAG cannot be analysed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TaskError {
-    /// No WCET is known for this subtask.
+    /// No WCET above 0 is known for this subtask, perhaps for further ones.
     MissingWcet {
         /// The subtask.
         subtask: SubtaskId,
@@ -65,7 +71,7 @@ impl Task {
     ///
     /// # Errors
     ///
-    /// Any [`TaskError`] but [`MissingWcet`](TaskError::MissingWcet).
+    /// The first [`TaskError`] that is found.
     pub fn new(
         period_ns: u64,
         relative_deadline_ns: u64,
@@ -83,6 +89,10 @@ impl Task {
         }
         let (starts, successors) = adjacency(count, edges);
         let order = topological_order(&starts, &successors).ok_or(TaskError::Cycle)?;
+        let mut ids = (0_u32..).map(SubtaskId).zip(&wcets_ns);
+        if let Some((subtask, _)) = ids.find(|&(_, &wcet)| wcet == 0) {
+            return Err(TaskError::MissingWcet { subtask });
+        }
         Self::assemble(
             period_ns,
             relative_deadline_ns,
@@ -99,8 +109,9 @@ impl Task {
     ///
     /// # Errors
     ///
-    /// [`MissingWcet`](TaskError::MissingWcet) for the first subtask without
-    /// one, or [`VolumeOverflow`](TaskError::VolumeOverflow).
+    /// [`MissingWcet`](TaskError::MissingWcet) for the first subtask without one
+    /// above 0, whatever the overhead, or
+    /// [`VolumeOverflow`](TaskError::VolumeOverflow).
     pub fn from_dag(dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
         let order = dag.topological_order();
         let count = dag.subtasks().len();
@@ -109,10 +120,9 @@ impl Task {
         let mut successors = Vec::new();
         starts.push(0);
         for (id, subtask) in (0_u32..).map(SubtaskId).zip(dag.subtasks()) {
-            let wcet = subtask
-                .wcet_ns()
-                .ok_or(TaskError::MissingWcet { subtask: id })?;
+            let wcet = (subtask.wcet_ns()).filter(|&wcet| wcet > 0);
             let charged = wcet
+                .ok_or(TaskError::MissingWcet { subtask: id })?
                 .checked_add(overhead_ns)
                 .ok_or(TaskError::VolumeOverflow)?;
             wcets_ns.push(charged);
@@ -265,7 +275,7 @@ impl fmt::Display for TaskError {
         match self {
             Self::MissingWcet { subtask } => write!(
                 f,
-                "subtask {} has no WCET; give it one to have the DAG analysed",
+                "no WCET above 0 is given for subtask {}; give it one to have the DAG analysed",
                 subtask.0
             ),
             Self::VolumeOverflow => {
@@ -290,7 +300,7 @@ impl core::error::Error for TaskError {}
 
 #[cfg(test)]
 mod tests {
-    use super::{Task, TaskError};
+    use super::{SubtaskId, Task, TaskError};
 
     #[test]
     fn faults_are_named() {
@@ -301,6 +311,8 @@ mod tests {
         assert_eq!(make(1, 0, &[1], &[]), TaskError::ZeroDeadline);
         assert_eq!(make(1, 1, &[u64::MAX, 1], &[]), TaskError::VolumeOverflow);
         assert_eq!(make(1, 1, &[1, 1], &[(0, 1), (1, 0)]), TaskError::Cycle);
+        let subtask = SubtaskId(1);
+        assert_eq!(make(9, 9, &[1, 0], &[]), TaskError::MissingWcet { subtask });
         assert_eq!(
             make(1, 1, &[1, 1], &[(0, 2)]),
             TaskError::EdgeOutOfRange {

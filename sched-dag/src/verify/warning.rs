@@ -13,7 +13,7 @@ use crate::policy::Priority;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the fields' names are the words of the model")]
 pub enum Warning {
-    /// A WCET of 0, which makes every bound that uses it too small.
+    /// A WCET of 0, on which no bound can rest.
     ZeroWcet {
         dag: DagLabel,
         subtask: SubtaskLabel,

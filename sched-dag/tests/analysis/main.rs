@@ -12,8 +12,8 @@ mod random;
 mod simulate;
 mod worked;
 
-use sched_dag::analysis::{Overheads, Reason, Settings, Test, answer};
-use sched_dag::{DagId, Policy, Preemption};
+use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer};
+use sched_dag::{DagId, Policy, Preemption, SubtaskId};
 
 use random::{Random, Sample, sample};
 use simulate::{commit, responses, spec};
@@ -82,7 +82,7 @@ fn accepted_sets_keep_their_bounds() {
             let observed = responses(&task_set, platform, until, |instance| {
                 let full = wcet(instance);
                 if shorten {
-                    random.within(full.div_ceil(2), full)
+                    random.within(0, full)
                 } else {
                     full
                 }
@@ -110,6 +110,46 @@ fn accepted_sets_keep_their_bounds() {
         );
         assert!(by_test.len() >= 7, "some test was never used: {by_test:?}");
     }
+}
+
+/// A DAG with a WCET of 0 gets no bound, and neither does what it may delay; where
+/// others have one, they keep it.
+#[test]
+fn no_bound_rests_on_a_wcet_of_zero() {
+    let mut bounds = 0_u64;
+    for seed in 1..3_000 {
+        let mut random = Random::new(seed);
+        let mut sample = sample(&mut random);
+        let dag = usize::try_from(random.within(0, sample.specs.len() as u64 - 1)).unwrap();
+        let subtasks = &mut sample.specs[dag].subtasks;
+        let subtask = random.within(0, subtasks.len() as u64 - 1);
+        subtasks[usize::try_from(subtask).unwrap()].wcet_ns = Some(0);
+        let (policy, preemption, cores) = (sample.policy, sample.preemption, sample.cores);
+        let options = sched_dag::CommitOptions::new(policy, cores)
+            .with_construction(sched_dag::ConstructionPolicy::any_graph());
+        let Ok(verified) = sched_dag::verify(&sample.specs, &options) else {
+            continue;
+        };
+        let task_set = verified.task_set;
+        let answer = answer(&task_set, &settings((policy, preemption), cores));
+        let subtask = SubtaskId(u32::try_from(subtask).unwrap());
+        let missing = Reason::Unknown(TaskError::MissingWcet { subtask });
+        assert_eq!(answer.reasons[dag], Some(missing), "seed {seed}");
+        let longest = task_set.dags().iter().map(|dag| dag.period_ns()).max();
+        let platform = (policy, preemption, cores);
+        let observed = responses(&task_set, platform, 12 * longest.unwrap(), |instance| {
+            let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
+            subtask.wcet_ns().unwrap()
+        });
+        for (bound, observed) in answer.bounds.iter().zip(observed) {
+            bounds += u64::from(bound.is_some());
+            assert!(
+                bound.is_none_or(|bound| observed <= bound.bound_ns),
+                "seed {seed}"
+            );
+        }
+    }
+    assert!(bounds > 300, "too few bounds say little: {bounds}");
 }
 
 #[test]
