@@ -73,6 +73,12 @@ pub trait Workload: Observer {
         None
     }
 
+    /// Reports whether the run is to stop, though jobs are left. Asked before each
+    /// instant.
+    fn stops(&self) -> bool {
+        false
+    }
+
     /// An instant begins, in which all that follows happens until the next one.
     /// There may be several at one time.
     fn instant(&mut self, now_ns: u64) {
@@ -157,6 +163,8 @@ pub enum End {
     /// The instance would finish after the last time there is. The run cannot
     /// be continued.
     TimeOverflow(Instance),
+    /// The workload has [stopped](Workload::stops) it.
+    Stopped,
 }
 
 impl VirtualTime {
@@ -194,7 +202,7 @@ impl VirtualTime {
     /// Runs all events up to and including those at `until_ns`. May be called
     /// again with a later time.
     pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload) -> End {
-        loop {
+        while !workload.stops() {
             let finish_ns = self.cores.next_finish_ns();
             let scheduler_ns = self.scheduler.next_event_ns();
             let signal_ns =
@@ -210,6 +218,7 @@ impl VirtualTime {
                 return End::TimeOverflow(instance);
             }
         }
+        End::Stopped
     }
 
     /// Returns the time of the last event, in nanoseconds.

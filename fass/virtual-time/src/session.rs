@@ -75,7 +75,7 @@ impl Session {
         self.recorder.run_until_ns = until_ns;
         machine.now_ns.set(match end {
             End::TimeReached => until_ns,
-            End::Finished | End::TimeOverflow(_) => self.recorder.now_ns,
+            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recorder.now_ns,
         });
         if let Some(PanicRecord { instance, message }) = panic {
             return Err(RunError::Panicked {
@@ -87,7 +87,7 @@ impl Session {
             });
         }
         match end {
-            End::Finished | End::TimeReached => Ok(self.report()),
+            End::Finished | End::TimeReached | End::Stopped => Ok(self.report()),
             End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
                 dag: self.dag_label(instance.dag),
                 subtask: self.subtask_label(instance),
@@ -143,8 +143,8 @@ struct Runner<'s> {
     machine: &'s Machine,
     bodies: &'s mut [Vec<Body>],
     recorder: &'s mut Recorder,
-    /// The panic that fails the run. The driver cannot be stopped, so from here
-    /// on nothing runs and nothing is recorded.
+    /// The panic that fails the run and stops it. In what is left of its instant
+    /// nothing runs, and nothing is recorded.
     panic: Option<PanicRecord>,
     /// The present instant.
     now_ns: u64,
@@ -220,6 +220,10 @@ impl Workload for Runner<'_> {
             return;
         };
         recorder.at(now_ns, EventKind::Resumed { instance, core });
+    }
+
+    fn stops(&self) -> bool {
+        self.panic.is_some()
     }
 
     fn instant(&mut self, now_ns: u64) {

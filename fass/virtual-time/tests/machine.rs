@@ -41,6 +41,46 @@ fn a_panic_names_dag_subtask_and_job_and_ends_the_run() {
     assert!(matches!(again, RunError::NothingToRun));
 }
 
+/// What is to come costs nothing: neither where a panic ends the run, nor where it ends
+/// its DAG.
+#[test]
+fn a_panic_ends_at_once_however_many_jobs_are_to_come() {
+    for is_contained in [false, true] {
+        let machine = VirtualTime::new().cores(2);
+        let machine = if is_contained {
+            machine.contain_panics()
+        } else {
+            machine
+        };
+        let dag = pair("endless", ms(10), ms(10), [ms(1), ms(1)]);
+        dag.jobs(1 << 40);
+        let broken = create_dag();
+        broken.name("broken").jobs(1 << 40);
+        let mut jobs = 0;
+        let panics = move || {
+            jobs += 1;
+            assert!(jobs < 4, "a panic on purpose");
+        };
+        broken.relative_deadline(ms(10));
+        broken.register_periodic_subtask(panics, vec![], ms(10), named("panics"));
+        let dags = if is_contained {
+            vec![broken]
+        } else {
+            vec![broken, dag]
+        };
+        commit(&dags);
+        let (dags, report) = match machine.try_run() {
+            Ok(report) => (1, report),
+            Err(RunError::Panicked { report, .. }) => (2, *report),
+            Err(error) => panic!("{error}"),
+        };
+        // Job 3 is the fourth.
+        let released = report.statistics.iter().map(|of_dag| of_dag.released);
+        assert_eq!(released.collect::<Vec<_>>(), vec![4; dags]);
+        assert!(report.events.len() < 80);
+    }
+}
+
 #[test]
 fn running_in_steps_is_running_at_once() {
     let make = || {

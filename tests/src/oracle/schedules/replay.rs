@@ -84,7 +84,7 @@ fn replay(case: &Case) -> Result<Record<'_>, String> {
     let mut run = VirtualTime::new(Scheduler::new(case.task_set.clone(), options));
     match run.run(&mut record) {
         End::Finished => {}
-        End::TimeReached => return Err("the replay stopped early".to_owned()),
+        End::TimeReached | End::Stopped => return Err("the replay stopped early".to_owned()),
         End::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
     }
     let jobs: usize = case.dags.iter().map(|dag| dag.jobs).sum();
