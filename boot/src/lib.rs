@@ -34,11 +34,16 @@ pub const MAX_PROCESSORS: usize = 255;
 /// The most modules that are noted; loaders in use pass one.
 pub const MAX_MODULES: usize = 4;
 
+/// The most bytes of the loader's words that are kept.
+pub const MOST_COMMAND_LINE_BYTES: usize = 2048;
+
 /// What is known of the machine when the kernel takes over.
 #[derive(Debug)]
 pub struct BootInfo {
     /// The words that the loader passed, without interpretation.
-    pub command_line: List<u8, 2048>,
+    pub command_line: List<u8, MOST_COMMAND_LINE_BYTES>,
+    /// Whether the loader passed more than that.
+    pub is_command_line_cut: bool,
     /// The physical memory map.
     pub memory: List<MemoryRegion, 64>,
     /// The files that the loader left in memory, in its order.

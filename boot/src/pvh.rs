@@ -25,12 +25,13 @@ mod offset {
 /// Reads the start info at `address` into a [`BootInfo`].
 ///
 /// `entry_tsc` is passed through. A memory map with more than 64 entries is cut
-/// off there, a command line of more than 2048 bytes and a list of more than 4
-/// modules likewise. Where modules lie is the loader's word, which the kernel
+/// off there, and a list of more than 4 modules likewise; so is a command line of more
+/// than 2048 bytes, which the kernel refuses. Where modules lie is the loader's word, which the kernel
 /// compares with the memory map.
 pub fn boot_info(memory: &impl PhysicalMemory, address: u64, entry_tsc: u64) -> BootInfo {
     let mut info = BootInfo {
         command_line: List::new(0),
+        is_command_line_cut: false,
         memory: List::new(MemoryRegion {
             start: 0,
             end: 0,
@@ -67,6 +68,7 @@ fn read_command_line(memory: &impl PhysicalMemory, address: u64, info: &mut Boot
         .take_while(|byte| *byte != 0);
     for byte in text {
         if info.command_line.push(byte).is_err() {
+            info.is_command_line_cut = true;
             return;
         }
     }
@@ -165,6 +167,20 @@ mod tests {
             usable: true,
         };
         assert_eq!(info.memory.as_slice(), &[region]);
+    }
+
+    #[test]
+    fn tells_that_a_command_line_was_cut() {
+        for (bytes, is_cut) in [(crate::MOST_COMMAND_LINE_BYTES, false), (2049, true)] {
+            let mut memory = start_info(MAGIC);
+            memory.0.truncate(160);
+            memory.0[24] = 160;
+            memory.0.extend(std::iter::repeat_n(b'x', bytes));
+            memory.0.push(0);
+            let info = boot_info(&memory, 0, 0);
+            assert_eq!(info.command_line().map(str::len), Ok(2048));
+            assert_eq!(info.is_command_line_cut, is_cut, "{bytes} bytes");
+        }
     }
 
     /// A start info that names `count` modules in a list at 160, where `entries`

@@ -200,9 +200,7 @@ impl<'a> Options<'a> {
 }
 
 fn parse_number(key: &str, value: &str, allowed: &RangeInclusive<u64>) -> Result<u64, UsageError> {
-    value
-        .parse()
-        .ok()
+    whole_number(value)
         .filter(|number| allowed.contains(number))
         .ok_or_else(|| {
             let (low, high) = (allowed.start(), allowed.end());
@@ -210,6 +208,12 @@ fn parse_number(key: &str, value: &str, allowed: &RangeInclusive<u64>) -> Result
                 "`{key}={value}`: allowed are whole numbers from {low} to {high}"
             ))
         })
+}
+
+/// Reads a whole number: digits alone, without the sign that `parse` would take.
+pub(crate) fn whole_number(text: &str) -> Option<u64> {
+    let is_whole = text.bytes().all(|byte| byte.is_ascii_digit());
+    is_whole.then(|| text.parse().ok()).flatten()
 }
 
 #[cfg(test)]
@@ -253,6 +257,18 @@ mod tests {
              budget_factor, overheads_ns, trace, trace_events, graph, measure, \
              idle, console, status, mode, probe"
         );
+    }
+
+    #[test]
+    fn a_number_has_digits_alone() {
+        for (text, number) in [("5", Some(5)), ("007", Some(7)), ("+5", None), ("-5", None)] {
+            assert_eq!(whole_number(text), number, "{text}");
+        }
+        for text in ["", " 5", "5 ", "1e3", "0x5", "18446744073709551616"] {
+            assert_eq!(whole_number(text), None, "{text}");
+        }
+        let options = Options::parse("jobs=+5").unwrap();
+        assert!(options.number("jobs", 1..=9, 5).is_err());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! From the handover by `boot` to the app's function, and its end.
 
+use alloc::format;
 use alloc::vec::Vec;
 use core::cell::Cell;
 
@@ -184,6 +185,12 @@ extern "C" fn other_core(apic_id: u32) -> ! {
 
 fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
     let usage = |message: &str| Ending::Usage(crate::options::UsageError::new(message));
+    if info.is_command_line_cut {
+        return Err(usage(&format!(
+            "the command line is longer than {} bytes and was cut; give fewer words",
+            boot::MOST_COMMAND_LINE_BYTES
+        )));
+    }
     let line = info
         .command_line()
         .map_err(|_| usage("the command line is not UTF-8"))?;

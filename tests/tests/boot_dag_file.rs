@@ -163,6 +163,21 @@ fn what_only_the_guest_finds_has_the_line_of_the_persons_file() {
 }
 
 #[test]
+fn no_jobs_and_no_seconds_are_refused_and_so_are_signs() {
+    for (words, allowed) in [
+        ("jobs=0", "1 to 1000000"),
+        ("seconds=0", "1 to 1000000000"),
+        ("jobs=+5", "1 to 1000000"),
+    ] {
+        let said = refusal(GOOD.as_bytes(), words);
+        assert_eq!(
+            said,
+            format!("`{words}`: allowed are whole numbers from {allowed}")
+        );
+    }
+}
+
+#[test]
 fn misses_are_a_failure_only_where_none_may_be_missed() {
     let late = GOOD.replace("period 10ms", "period 10ms deadline 4ms");
     boot(late.as_bytes(), "jobs=3", Status::Success);

@@ -77,6 +77,7 @@ fn what_is_no_command_is_answered_by_the_list_of_commands() {
         (said, "stop nothing"),
         (said, "trace"),
         (said, "stats 1"),
+        (said, "stats +1"),
         (said, "shutdown"),
     ];
     let outcome = endless().conversation(&conversation).succeed();
@@ -85,6 +86,7 @@ fn what_is_no_command_is_answered_by_the_list_of_commands() {
         ("stop nothing", false),
         ("trace", false),
         ("stats 1", true),
+        ("stats +1", false),
         ("shutdown", true),
     ];
     let expected = expected.map(|(command, accepted)| (command.to_string(), accepted));

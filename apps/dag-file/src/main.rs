@@ -112,13 +112,15 @@ fn wishes(machine: &Machine) -> Result<Wishes, Ending> {
         .map_or(Ok(Execution::Wcet), |text| {
             Execution::parse(text).map_err(|message| usage(format!("`execution`: {message}")))
         })?;
-    let seconds = options.number("seconds", 0..=1_000_000_000, 0)?;
-    let jobs = options.number("jobs", 0..=1_000_000, 0)?;
-    let length = match (jobs, seconds) {
-        (0, 0) => Length::Jobs(50),
-        (jobs, 0) => Length::Jobs(jobs),
-        (0, seconds) => Length::Span(seconds * 1_000_000_000),
-        _ => return Err(usage("`jobs` and `seconds` exclude each other; give one")),
+    let length = match (options.text("jobs"), options.text("seconds")) {
+        (Some(_), Some(_)) => {
+            return Err(usage("`jobs` and `seconds` exclude each other; give one"));
+        }
+        (None, Some(_)) => {
+            let seconds = options.number("seconds", 1..=1_000_000_000, 1)?;
+            Length::Span(seconds * 1_000_000_000)
+        }
+        (_, None) => Length::Jobs(options.number("jobs", 1..=1_000_000, 50)?),
     };
     let grid_ns = options.number("grid_ns", 0..=10_000_000_000, 0)?;
     let grid = (grid_ns > 0).then_some(Scale {

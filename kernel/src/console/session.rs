@@ -16,6 +16,7 @@ use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
 use crate::execution::{self, Control, Snapshot, State};
 use crate::machine::serial;
+use crate::options::whole_number;
 use crate::{json, println, trace};
 
 /// How often core 0 looks for bytes, at least.
@@ -275,7 +276,8 @@ fn change(line: &str, task_set: &TaskSet, name: &str, how: fn(DagId) -> Control,
 /// Finds a DAG by its name or, if none has it, by its number.
 fn find(task_set: &TaskSet, name: &str) -> Option<DagId> {
     let by_name = ids(task_set).find(|dag| task_set.dag(*dag).name() == name);
-    by_name.or_else(|| ids(task_set).find(|dag| name.parse() == Ok(dag.0)))
+    let number = whole_number(name);
+    by_name.or_else(|| ids(task_set).find(|dag| number == Some(u64::from(dag.0))))
 }
 
 fn ids(task_set: &TaskSet) -> impl Iterator<Item = DagId> {
