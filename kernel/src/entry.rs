@@ -30,6 +30,12 @@ macro_rules! entry {
             $crate::entry::panic(info)
         }
 
+        // SAFETY: the linker script makes the section part of the notes, and this is one.
+        #[used]
+        #[unsafe(link_section = ".note.app")]
+        static APP_NOTE: $crate::entry::AppNote =
+            $crate::entry::AppNote::new(env!("CARGO_PKG_NAME"));
+
         // SAFETY: `boot` declares the function with this signature and calls it
         // once; no other symbol has the name.
         #[unsafe(no_mangle)]
@@ -93,6 +99,39 @@ macro_rules! memory_functions {
             unreachable!("nothing unwinds")
         }
     };
+}
+
+/// The note of the image that names its app: an ELF note, which the host reads without a
+/// boot.
+#[repr(C)]
+pub struct AppNote {
+    owner_bytes: u32,
+    content_bytes: u32,
+    kind: u32,
+    owner: [u8; 4],
+    content: [u8; 64],
+}
+
+impl AppNote {
+    /// Names the app.
+    ///
+    /// # Panics
+    ///
+    /// While the app is compiled, if the name is longer than 64 bytes.
+    #[must_use]
+    pub const fn new(app: &str) -> AppNote {
+        assert!(app.len() <= 64, "an app's name has 64 bytes at most");
+        let mut content = [0; 64];
+        let (name, _) = content.split_at_mut(app.len());
+        name.copy_from_slice(app.as_bytes());
+        AppNote {
+            owner_bytes: 4,
+            content_bytes: 64,
+            kind: 1,
+            owner: *b"App\0",
+            content,
+        }
+    }
 }
 
 /// Runs `kernel_main` of the image.

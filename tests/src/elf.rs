@@ -48,27 +48,64 @@ pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
 ///
 /// In words: it is none, it has no such note, or a table points outside it.
 pub fn check_bootable(file: &[u8]) -> Result<(), String> {
+    let is_entry = |note: &Note| (note.owner, note.kind) == (*b"Xen\0", XEN_ELFNOTE_PHYS32_ENTRY);
+    match notes(file)?.iter().any(is_entry) {
+        true => Ok(()),
+        false => Err("it has no PVH note, by which QEMU would enter it".into()),
+    }
+}
+
+/// Returns the name of the app that an image is of, which `kernel::entry!` notes there;
+/// `None` if no note tells.
+#[must_use]
+pub fn app_name(file: &[u8]) -> Option<String> {
+    let notes = notes(file).ok()?;
+    let note = notes.iter().find(|note| note.owner == *b"App\0")?;
+    let from = usize::try_from(note.content).ok()?;
+    let bytes = usize::try_from(note.content_bytes).ok()?;
+    let content = file.get(from..from.checked_add(bytes)?)?;
+    let name = content.split(|byte| *byte == 0).next()?;
+    let is_of_names = |byte: &u8| byte.is_ascii_alphanumeric() || b"-_".contains(byte);
+    let is_name = !name.is_empty() && name.iter().all(is_of_names);
+    is_name.then(|| String::from_utf8_lossy(name).into_owned())
+}
+
+/// A note whose owner's name has four bytes.
+struct Note {
+    owner: [u8; 4],
+    kind: u64,
+    /// Where its content begins in the file.
+    content: u64,
+    content_bytes: u64,
+}
+
+fn notes(file: &[u8]) -> Result<Vec<Note>, String> {
     check(file)?;
+    let mut notes = Vec::new();
     for segment in table(file, 32, 56, PROGRAM_HEADER_BYTES)? {
         if number(file, segment, 4)? != PT_NOTE {
             continue;
         }
-        let mut note = number(file, segment + 8, 8)?;
-        let end = note.saturating_add(number(file, segment + 32, 8)?);
+        let mut at = number(file, segment + 8, 8)?;
+        let end = at.saturating_add(number(file, segment + 32, 8)?);
         // A note: the lengths of name and content, its type, and both, padded.
-        while note < end {
-            let name = number(file, note, 4)?;
-            let content = number(file, note + 4, 4)?;
-            let kind = number(file, note + 8, 4)?;
-            if (name, kind) == (4, XEN_ELFNOTE_PHYS32_ENTRY)
-                && number(file, note + 12, 4)? == u64::from(u32::from_le_bytes(*b"Xen\0"))
-            {
-                return Ok(());
+        while at < end {
+            let owner_bytes = number(file, at, 4)?;
+            let content_bytes = number(file, at + 4, 4)?;
+            let content = at + 12 + owner_bytes.next_multiple_of(4);
+            if owner_bytes == 4 {
+                let owner = number(file, at + 12, 4)?;
+                notes.push(Note {
+                    owner: u32::try_from(owner).unwrap_or(0).to_le_bytes(),
+                    kind: number(file, at + 8, 4)?,
+                    content,
+                    content_bytes,
+                });
             }
-            note += 12 + name.next_multiple_of(4) + content.next_multiple_of(4);
+            at = content + content_bytes.next_multiple_of(4);
         }
     }
-    Err("it has no PVH note, by which QEMU would enter it".into())
+    Ok(notes)
 }
 
 fn check(file: &[u8]) -> Result<(), String> {
