@@ -11,7 +11,10 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
+use replay::shown::quoted;
+
 use crate::elf;
+use crate::files;
 use crate::json::{self, Value};
 use crate::options::nearest;
 use crate::system;
@@ -84,22 +87,24 @@ pub fn check_app(name: &str) -> Result<(), ImageError> {
     let hint =
         nearest(name, &names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(ImageError::Unknown(format!(
-        "no app `{name}`; there are: {}{hint}",
+        "no app {}; there are: {}{hint}",
+        quoted(name),
         names.join(", ")
     )))
 }
 
-/// Makes sure that a file is an image.
+/// Makes sure that a file is an image, and returns the name of its app, if it tells.
 ///
 /// # Errors
 ///
 /// One line that says why not, and which files are.
-pub fn check_file(path: &Path) -> Result<(), String> {
-    let bytes = fs::read(path).map_err(|error| format!("cannot be read: {error}"));
-    let is_one = bytes.and_then(|bytes| {
-        elf::check_bootable(&bytes).map_err(|what| format!("is no image: {what}"))
+pub fn check_file(path: &Path) -> Result<Option<String>, String> {
+    let app = files::read(path).and_then(|bytes| {
+        let bootable = elf::check_bootable(&bytes);
+        bootable.map_err(|what| format!("is no image: {what}"))?;
+        Ok(elf::app_name(&bytes))
     });
-    is_one.map_err(|why| {
+    app.map_err(|why| {
         format!(
             "{why}; name what `cargo build --release -p APP` leaves in target/release, or \
              give --app instead"

@@ -14,7 +14,8 @@
 //! - [`elf`], [`image`], [`places`], [`tiny`]: what is booted;
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
-//! - [`options`]: command lines by a table; [`output`]: printing without a panic;
+//! - [`options`]: command lines by a table; [`files`]: what they name;
+//!   [`output`]: printing without a panic;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`guest`]: all that for a test;
 //! - [`fault_page`], [`guide`]: pages of `docs/` that tests hold to their word;
@@ -39,6 +40,7 @@ pub mod dag_file;
 pub mod dot;
 pub mod elf;
 pub mod fault_page;
+pub mod files;
 pub mod guest;
 pub mod guide;
 pub mod image;

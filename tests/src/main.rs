@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 use std::env;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use harness::options::{Choice, Menu};
@@ -64,6 +65,6 @@ fn main() -> ExitCode {
         // Set by `scripts/harness`. If the folder is gone, we stay where we are.
         let _ = env::set_current_dir(folder);
     }
-    let words: Vec<String> = env::args().skip(1).collect();
+    let words: Vec<OsString> = env::args_os().skip(1).collect();
     TOOL.run(&words)
 }

@@ -14,6 +14,7 @@
 mod name;
 mod table;
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -49,7 +50,7 @@ pub enum NewAppError {
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
-pub fn new_app(words: &[String]) -> ExitCode {
+pub fn new_app(words: &[OsString]) -> ExitCode {
     let options = match NEW_APP.read(words) {
         Ok(options) => options,
         Err(code) => return code,

@@ -8,17 +8,26 @@
 //! Whatever is not in the table is refused with one line that names it, says
 //! what is allowed and, where a name is near, suggests it. Nothing is guessed
 //! and nothing is done before the whole line is understood.
+//!
+//! Words come as the system hands them over, and need not be text. The name of a file
+//! may be anything; every other word must be UTF-8.
 
 mod help;
 mod menu;
+mod parsed;
 mod read;
 mod suggest;
+mod value;
 
-use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::ops::RangeInclusive;
+use std::os::unix::ffi::OsStrExt;
+
+use replay::shown::quoted;
 
 pub use menu::{Choice, Menu};
+pub use parsed::Parsed;
 pub use suggest::nearest;
 
 /// A subcommand of the tool.
@@ -28,9 +37,9 @@ pub struct Command {
     pub invocation: &'static str,
     /// One sentence on what it does.
     pub about: &'static str,
-    /// The positional words it takes, if any: their name and their help. One
-    /// word, or any number if the name ends in `...`.
-    pub positional: Option<(&'static str, &'static str)>,
+    /// The positional words it takes, if any, and their help. One word, or any
+    /// number if the name that stands for it ends in `...`.
+    pub positional: Option<(Takes, &'static str)>,
     /// The options, in the order of the help text.
     pub options: &'static [Opt],
     /// What else the help text says, after the options.
@@ -75,6 +84,8 @@ pub enum Takes {
     OneOf(&'static [&'static str]),
     /// Any text; the word stands for it in the help text.
     Text(&'static str),
+    /// The name of a file or folder, of any bytes; the word stands for it likewise.
+    File(&'static str),
 }
 
 impl Takes {
@@ -91,14 +102,6 @@ impl Takes {
         let (least, most) = (*range.start(), *range.end());
         Takes::Numbers { least, most }
     }
-}
-
-/// A command line that was understood.
-#[derive(Clone, Debug)]
-pub struct Parsed {
-    values: BTreeMap<&'static str, String>,
-    given: Vec<&'static str>,
-    positionals: Vec<String>,
 }
 
 /// What a command line asks for.
@@ -128,88 +131,89 @@ impl Command {
     /// # Errors
     ///
     /// The first word that the table does not allow.
-    pub fn parse(&self, words: &[String]) -> Result<Request, UsageError> {
-        let mut parsed = self.defaults();
-        let mut words = words.iter();
+    pub fn parse(&self, words: &[OsString]) -> Result<Request, UsageError> {
+        let mut parsed = Parsed::new(self.options);
+        let mut words = words.iter().map(OsString::as_os_str).peekable();
         while let Some(word) = words.next() {
             if word == "--help" || word == "-h" {
                 return Ok(Request::Help(self.help()));
             }
-            if !word.starts_with('-') || word == "-" {
+            if !word.as_bytes().starts_with(b"-") || word == "-" {
                 self.take_positional(&mut parsed, word)?;
                 continue;
             }
-            let (option, attached) = self.find(word)?;
-            if parsed.given.contains(&option.name) {
+            let (name, attached) = split(word);
+            let option = self.find(name, attached)?;
+            if parsed.is_given(option.name) {
                 return Err(UsageError(format!(
                     "option `--{}` stands twice; give it once",
                     option.name
                 )));
             }
             let value = match (option.takes, attached) {
-                (Takes::Nothing, None) => "yes".into(),
-                (Takes::Nothing, Some(_)) => {
-                    return Err(UsageError(format!(
-                        "option `--{}` takes no value; write it alone",
-                        option.name
-                    )));
-                }
-                (_, Some(value)) => value.to_string(),
-                (_, None) => words.next().cloned().ok_or_else(|| option.missing())?,
+                (Takes::Nothing, None) => OsStr::new("yes"),
+                (Takes::Nothing, Some(_)) => return Err(takes_no_value(option.name)),
+                (_, Some(value)) => value,
+                // What looks like an option is meant as one.
+                (_, None) => words
+                    .next_if(|next| !self.is_option(next))
+                    .ok_or_else(|| option.missing(words.peek().is_some()))?,
             };
-            option.check(&value)?;
-            parsed.values.insert(option.name, value);
-            parsed.given.push(option.name);
+            option.check(value)?;
+            parsed.take(option.name, value);
         }
         Ok(Request::Work(parsed))
     }
 
-    fn defaults(&self) -> Parsed {
-        let with_default = self
-            .options
-            .iter()
-            .filter(|option| !option.default.is_empty());
-        Parsed {
-            values: with_default
-                .map(|option| (option.name, option.default.to_string()))
-                .collect(),
-            given: Vec::new(),
-            positionals: Vec::new(),
-        }
-    }
-
-    fn take_positional(&self, parsed: &mut Parsed, word: &str) -> Result<(), UsageError> {
-        match (self.positional, parsed.positionals.first()) {
-            (Some((name, _)), Some(first)) if !name.ends_with("...") => Err(UsageError(format!(
-                "`{word}`: only one {name} is allowed, and `{first}` is one"
-            ))),
-            (Some(_), _) => {
-                parsed.positionals.push(word.to_string());
-                Ok(())
-            }
-            (None, _) => Err(UsageError(format!(
-                "unknown word `{word}`; options begin with `--`, see {} --help",
+    fn take_positional(&self, parsed: &mut Parsed, word: &OsStr) -> Result<(), UsageError> {
+        let shown = quoted(&word.to_string_lossy()).to_string();
+        let Some((takes, _)) = self.positional else {
+            return Err(UsageError(format!(
+                "unknown word {shown}; options begin with `--`, see {} --help",
                 self.invocation
-            ))),
+            )));
+        };
+        let name = takes.name();
+        if let Some(first) = parsed.files().next()
+            && !name.ends_with("...")
+        {
+            return Err(UsageError(format!(
+                "{shown}: only one {name} is allowed, and {} is one",
+                quoted(&first.to_string_lossy())
+            )));
         }
+        if matches!(takes, Takes::Text(_)) && word.to_str().is_none() {
+            return Err(UsageError(format!(
+                "{shown}: a {name} must be UTF-8 text; write it so"
+            )));
+        }
+        parsed.take_positional(word);
+        Ok(())
     }
 
-    /// Finds the option that a word names, and the value attached by `=`.
-    fn find<'w>(&self, word: &'w str) -> Result<(&'static Opt, Option<&'w str>), UsageError> {
-        let (name, attached) = match word.split_once('=') {
-            Some((name, value)) => (name, Some(value)),
-            None => (word, None),
-        };
-        let is_it = |option: &&Opt| match name.strip_prefix("--") {
-            Some(long) => option.name == long,
-            None => option
-                .short
-                .is_some_and(|short| name[1..] == *short.to_string()),
-        };
-        match self.options.iter().find(is_it) {
-            Some(option) => Ok((option, attached)),
-            None => Err(self.unknown(name)),
+    /// Reports whether a word begins as an option does, or is the short form of one.
+    fn is_option(&self, word: &OsStr) -> bool {
+        let is_short = |name: &str| self.named(name).is_some();
+        word.as_bytes().starts_with(b"--") || word.to_str().is_some_and(is_short)
+    }
+
+    fn named(&self, name: &str) -> Option<&'static Opt> {
+        self.options
+            .iter()
+            .find(|option| match name.strip_prefix("--") {
+                Some(long) => option.name == long,
+                None => (option.short)
+                    .is_some_and(|short| name.strip_prefix('-') == Some(&*short.to_string())),
+            })
+    }
+
+    /// Finds the option of this name, to which this value is attached.
+    fn find(&self, name: &OsStr, attached: Option<&OsStr>) -> Result<&'static Opt, UsageError> {
+        let name = name.to_string_lossy();
+        if attached.is_some() && (name == "--help" || name == "-h") {
+            return Err(takes_no_value("help"));
         }
+        self.named(&name).ok_or_else(|| self.unknown(&name))
     }
 
     fn unknown(&self, name: &str) -> UsageError {
@@ -219,7 +223,23 @@ impl Command {
             Some(near) => format!("did you mean `--{near}`?"),
             None => format!("allowed are --{}", allowed.join(", --")),
         };
-        UsageError(format!("unknown option `{name}`; {hint}"))
+        UsageError(format!("unknown option {}; {hint}", quoted(name)))
+    }
+}
+
+fn takes_no_value(name: &str) -> UsageError {
+    UsageError(format!("option `--{name}` takes no value; write it alone"))
+}
+
+/// Splits a word into the name of an option and the value attached by `=`.
+fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
+    let bytes = word.as_bytes();
+    match bytes.iter().position(|byte| *byte == b'=') {
+        Some(at) => (
+            OsStr::from_bytes(&bytes[..at]),
+            Some(OsStr::from_bytes(&bytes[at + 1..])),
+        ),
+        None => (word, None),
     }
 }
 
@@ -248,104 +268,6 @@ impl Opt {
     pub const fn or(mut self, default: &'static str) -> Opt {
         self.default = default;
         self
-    }
-
-    /// Checks a value against what the option takes.
-    fn check(&self, value: &str) -> Result<(), UsageError> {
-        let valid = match self.takes {
-            Takes::Nothing => true,
-            Takes::Number { least, most } => is_number(value, least, most),
-            Takes::Numbers { least, most } => value
-                .split(',')
-                .all(|number| is_number(number, least, most)),
-            Takes::OneOf(words) => words.contains(&value),
-            Takes::Text(_) => !value.is_empty(),
-        };
-        if valid {
-            return Ok(());
-        }
-        let hint = match self.takes {
-            Takes::OneOf(words) => nearest(value, words),
-            _ => None,
-        };
-        let hint = hint.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        Err(UsageError(format!(
-            "`--{} {value}`: must be {}{hint}",
-            self.name,
-            self.allowed()
-        )))
-    }
-
-    fn missing(&self) -> UsageError {
-        UsageError(format!(
-            "option `--{}` lacks its value: {}",
-            self.name,
-            self.allowed()
-        ))
-    }
-
-    /// Says in words which values are allowed.
-    fn allowed(&self) -> String {
-        match self.takes {
-            Takes::Nothing => "nothing".into(),
-            Takes::Number { least, most } => format!("a number from {least} to {most}"),
-            Takes::Numbers { least, most } => {
-                format!("numbers from {least} to {most} with commas between")
-            }
-            Takes::OneOf(words) => format!("one of {}", words.join(", ")),
-            Takes::Text(what) => format!("a {}", what.to_lowercase()),
-        }
-    }
-}
-
-fn is_number(text: &str, least: u64, most: u64) -> bool {
-    // `parse` alone would let `+1` pass.
-    let number = text
-        .bytes()
-        .all(|byte| byte.is_ascii_digit())
-        .then(|| text.parse::<u64>());
-    matches!(number, Some(Ok(number)) if (least..=most).contains(&number))
-}
-
-impl Parsed {
-    /// Returns whether the person gave the option (or flag).
-    #[must_use]
-    pub fn is_given(&self, name: &str) -> bool {
-        self.given.contains(&name)
-    }
-
-    /// Returns the option's value or default; `None` if it has neither.
-    #[must_use]
-    pub fn text(&self, name: &str) -> Option<&str> {
-        self.values.get(name).map(String::as_str)
-    }
-
-    /// Returns a number's value or default; `None` if it has neither.
-    #[must_use]
-    pub fn number(&self, name: &str) -> Option<u64> {
-        self.text(name).and_then(|value| value.parse().ok())
-    }
-
-    /// Returns the same command line with another value of an option, as if the
-    /// person had given it.
-    #[must_use]
-    pub fn with(&self, name: &'static str, value: &str) -> Parsed {
-        let mut other = self.clone();
-        other.values.insert(name, value.into());
-        other.given.push(name);
-        other
-    }
-
-    /// Returns the first positional word, if one was given.
-    #[must_use]
-    pub fn positional(&self) -> Option<&str> {
-        self.positionals.first().map(String::as_str)
-    }
-
-    /// Returns all positional words.
-    #[must_use]
-    pub fn positionals(&self) -> &[String] {
-        &self.positionals
     }
 }
 

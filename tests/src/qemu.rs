@@ -13,8 +13,12 @@
 
 mod process;
 
+use std::ffi::OsString;
 use std::fmt;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
+
+use boot::MOST_COMMAND_LINE_BYTES;
 
 pub use process::{Ending, Running};
 
@@ -183,59 +187,92 @@ impl Qemu {
     /// Returns QEMU's arguments for booting `image` with its serial output
     /// going to `serial`.
     #[must_use]
-    pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<String> {
-        let mut arguments = vec!["-machine".into(), self.machine.name().into()];
-        arguments.extend(self.mode.arguments().iter().map(ToString::to_string));
-        arguments.extend(["-smp".into(), self.cores.to_string()]);
-        arguments.extend(["-m".into(), format!("{}M", self.memory_mib)]);
-        arguments.extend(["-kernel".into(), image.display().to_string()]);
-        arguments.extend(["-append".into(), self.guest_words.clone()]);
+    pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<OsString> {
+        let mut arguments: Vec<OsString> = vec!["-machine".into(), self.machine.name().into()];
+        arguments.extend(self.mode.arguments().iter().map(OsString::from));
+        arguments.extend(["-smp".into(), self.cores.to_string().into()]);
+        arguments.extend(["-m".into(), format!("{}M", self.memory_mib).into()]);
+        arguments.extend(["-kernel".into(), image.into()]);
+        arguments.extend(["-append".into(), OsString::from(&self.guest_words)]);
         if let Some(module) = &self.module {
-            arguments.extend(["-initrd".into(), module.display().to_string()]);
+            arguments.extend(["-initrd".into(), module.into()]);
         }
         // A comma would end the file's name in QEMU's syntax unless doubled.
-        let serial = serial.display().to_string().replace(',', ",,");
+        let serial = with_doubled_commas(serial);
         if self.has_input {
             // The log file gets every byte; QEMU's own output goes nowhere.
-            let port = format!("stdio,id=console,signal=off,logfile={serial}");
+            let mut port = OsString::from("stdio,id=console,signal=off,logfile=");
+            port.push(serial);
             arguments.extend(["-chardev".into(), port]);
-            arguments.extend(["-serial", "chardev:console"].map(String::from));
+            arguments.extend(["-serial", "chardev:console"].map(OsString::from));
         } else {
-            arguments.extend(["-serial".into(), format!("file:{serial}")]);
+            let mut port = OsString::from("file:");
+            port.push(serial);
+            arguments.extend(["-serial".into(), port]);
         }
         let exit_device = "isa-debug-exit,iobase=0xf4,iosize=0x04";
-        arguments.extend(["-device", exit_device].map(String::from));
-        arguments.extend(["-nodefaults", "-no-user-config"].map(String::from));
-        arguments.extend(["-display", "none", "-no-reboot"].map(String::from));
+        arguments.extend(["-device", exit_device].map(OsString::from));
+        arguments.extend(["-nodefaults", "-no-user-config"].map(OsString::from));
+        arguments.extend(["-display", "none", "-no-reboot"].map(OsString::from));
         if self.wait_for_debugger {
-            arguments.extend(["-S", "-gdb", "tcp::1234"].map(String::from));
+            arguments.extend(["-S", "-gdb", "tcp::1234"].map(OsString::from));
         }
         arguments
+    }
+
+    /// Makes sure that the guest gets all of its command line.
+    ///
+    /// # Errors
+    ///
+    /// In words: it is too long.
+    pub fn check_words(&self) -> Result<(), String> {
+        let bytes = self.guest_words.len();
+        if bytes <= MOST_COMMAND_LINE_BYTES {
+            return Ok(());
+        }
+        Err(format!(
+            "the guest's command line has {bytes} bytes, and {MOST_COMMAND_LINE_BYTES} is the \
+             most that it takes; give fewer or shorter words"
+        ))
     }
 
     /// Starts the guest. QEMU's own complaints go to a file beside `serial`.
     ///
     /// # Errors
     ///
-    /// In words: a file could not be made, or QEMU could not be started.
+    /// In words: the guest's command line is too long, a file could not be made, or QEMU
+    /// could not be started.
     pub fn start(&self, image: &Path, serial: &Path) -> Result<Running, String> {
-        let name = self.program.display().to_string();
-        let program = crate::system::find_program(&name)
-            .ok_or_else(|| format!("there is no program `{name}`; install QEMU or name another"))?;
+        self.check_words()?;
+        let program = crate::system::find_program(&self.program).ok_or_else(|| {
+            let name = self.program.display();
+            format!("there is no program `{name}`; install QEMU or name another")
+        })?;
         let mut command = crate::child::bound_to_us(&program);
         command.args(self.arguments(image, serial));
         Running::start(command, serial, self.has_input)
     }
 }
 
+fn with_doubled_commas(path: &Path) -> OsString {
+    let parts: Vec<&[u8]> = path
+        .as_os_str()
+        .as_bytes()
+        .split(|byte| *byte == b',')
+        .collect();
+    OsString::from_vec(parts.join(&b",,"[..]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::{Machine, Mode, Qemu};
+    use std::ffi::OsStr;
     use std::path::Path;
 
     fn line(qemu: &Qemu) -> String {
-        qemu.arguments(Path::new("image"), Path::new("a,b.log"))
-            .join(" ")
+        let words = qemu.arguments(Path::new("image"), Path::new("a,b.log"));
+        let line = words.join(OsStr::new(" "));
+        line.into_string().unwrap()
     }
 
     #[test]

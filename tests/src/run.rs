@@ -9,17 +9,19 @@
 //! the guest's).
 
 mod folder;
+mod log;
 mod screen;
 mod seeing;
 mod status;
 mod table;
 
-use std::fs::{self, File};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use crate::dag_file::{self, Prepared};
+use crate::files;
 use crate::image;
 use crate::install;
 use crate::options::Parsed;
@@ -28,6 +30,7 @@ use crate::probe;
 use crate::protocol::{Status, Transcript};
 use crate::qemu::{Ending, LEAST_MEMORY_MIB, Machine, Mode, PROGRAM, Qemu};
 use crate::system;
+use log::Log;
 use screen::Screen;
 
 pub use table::RUN;
@@ -42,7 +45,7 @@ enum Refusal {
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
-pub fn run(words: &[String]) -> ExitCode {
+pub fn run(words: &[OsString]) -> ExitCode {
     let options = match RUN.read(words) {
         Ok(options) => options,
         Err(code) => return code,
@@ -66,18 +69,27 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     if let Some(folder) = dag_file::batch::folder(options) {
         return folder::run(options, &folder);
     }
-    let dags = prepare(options)?;
+    check_files(options)?;
+    let mut dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
         print!("{}", dags.file);
         return Ok(ExitCode::SUCCESS);
     }
-    let booted = boot_app(options, dags.as_ref(), true)?;
+    let booted = boot_app(options, dags.as_mut(), true)?;
     Ok(conclude(&booted, dags.as_ref()))
 }
 
 /// Reads the file that `--dag` names, if there is one.
 fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
     dag_file::prepare(options).map_err(|lines| Refusal::Usage(lines.join("\n")))
+}
+
+/// Makes sure of all files that the options name, before any is opened.
+fn check_files(options: &Parsed) -> Result<(), Refusal> {
+    let inputs = options.named(&["dag", "image", "qemu"]);
+    let outputs = options.named(&["serial", "trace", "dot"]);
+    files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
+    log::check(options).map_err(Refusal::Usage)
 }
 
 /// A guest that has been booted and has ended, somehow.
@@ -88,23 +100,27 @@ struct Booted {
 }
 
 /// Boots what the options name, and shows its lines if it shall.
-fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Booted, Refusal> {
-    let app = match dags {
-        Some(_) => "dag-file".into(),
-        None => options.text("app").unwrap_or_default().to_string(),
-    };
-    image::check_app(&app).map_err(|error| Refusal::Usage(error.to_string()))?;
-    let memory_mib = choose_memory(options, dags)?;
-    seeing::check_dot(options).map_err(Refusal::Usage)?;
-    if let Some(path) = options.text("image") {
-        let checked = image::check_file(Path::new(path));
-        checked.map_err(|why| Refusal::Usage(format!("`--image {path}`: {why}")))?;
-    }
+fn boot_app(
+    options: &Parsed,
+    mut dags: Option<&mut Prepared>,
+    shows: bool,
+) -> Result<Booted, Refusal> {
+    let app = choose_app(options, dags.is_some())?;
+    let memory_mib = choose_memory(options, dags.as_deref())?;
     let program = choose_program(options)?;
-    let log = Log::choose(options, &app)?;
 
-    let image = match options.text("image") {
-        Some(path) => PathBuf::from(path),
+    let named = options.text("mode").and_then(Mode::from_name);
+    if let Some(dags) = dags.as_deref_mut() {
+        dags.write_module().map_err(Refusal::Failure)?;
+    }
+    let dags = dags.as_deref();
+    let describe = |mode| describe(options, &program, mode, memory_mib, dags);
+    // No mode has a longer name than this one.
+    let longest = describe(named.unwrap_or(Mode::Deterministic));
+    longest.check_words().map_err(Refusal::Usage)?;
+    let log = Log::choose(options, &app).map_err(Refusal::Failure)?;
+    let image = match options.path("image") {
+        Some(path) => path.into(),
         None => {
             let built = image::build(&app);
             built
@@ -112,8 +128,6 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
                 .path
         }
     };
-    let describe = |mode| describe(options, &program, mode, memory_mib, dags);
-    let named = options.text("mode").and_then(Mode::from_name);
     // A person needs time to type.
     let otherwise = match options.is_given("console") {
         true => Mode::Threads,
@@ -135,7 +149,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
-    if let Some(file) = options.text("trace") {
+    if let Some(file) = options.path("trace").map(files::place) {
         screen.say(&format!(
             "{file}: the log with its trace; `./scripts/check-trace {file}` judges it, \
              `./scripts/trace {file} -o {file}.json` draws it"
@@ -153,6 +167,32 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         log,
         screen,
     })
+}
+
+/// Settles which app runs: the one that the options name, which a given image must be of,
+/// or else the one that the image names.
+fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
+    let app = match is_dag_file {
+        true => "dag-file",
+        false => options.text("app").unwrap_or_default(),
+    };
+    let Some(path) = options.path("image") else {
+        image::check_app(app).map_err(|error| Refusal::Usage(error.to_string()))?;
+        return Ok(app.into());
+    };
+    let place = files::place(path);
+    let of_image = image::check_file(path)
+        .map_err(|why| Refusal::Usage(format!("`--image {place}`: {why}")))?;
+    let wanted = (is_dag_file || options.is_given("app")).then_some(app);
+    match (of_image, wanted) {
+        (Some(own), Some(wanted)) if own != wanted => Err(Refusal::Usage(format!(
+            "`--image {place}`: the image is of app `{own}`, and `{wanted}` is wanted; name an \
+             image of that one, or leave `--image` out to have it built"
+        ))),
+        (Some(own), _) => Ok(own),
+        (None, Some(wanted)) => Ok(wanted.into()),
+        (None, None) => Ok("unknown".into()),
+    }
 }
 
 /// Settles the memory: the person's choice, or what is usual, and in both
@@ -178,9 +218,11 @@ fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refus
 
 /// Finds the QEMU to use, installing one if none is named and none is there.
 fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
-    if let Some(named) = options.text("qemu") {
-        return system::find_program(named)
-            .ok_or_else(|| Refusal::Usage(format!("`--qemu {named}`: there is no such program")));
+    if let Some(named) = options.path("qemu") {
+        return system::find_program(named).ok_or_else(|| {
+            let place = files::place(named);
+            Refusal::Usage(format!("`--qemu {place}`: there is no such program"))
+        });
     }
     install::ensure_qemu().map_err(Refusal::Failure)?;
     Ok(PROGRAM.into())
@@ -209,7 +251,7 @@ fn describe(
         cores: options.number("cores").unwrap_or(1),
         memory_mib,
         guest_words: words.join(" "),
-        module: dags.map(|dags| dags.module.clone()),
+        module: dags.and_then(|dags| dags.module.clone()),
         has_input: options.is_given("console"),
         wait_for_debugger: options.is_given("gdb"),
     }
@@ -264,7 +306,7 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
         let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
         let lines = of_file
             .unwrap_or_else(|| format!("the guest refused its command line: {}", fault.reason));
-        log.discard();
+        log.restore();
         return RUN.refuse(&lines);
     }
     match outcome.transcript.verdict() {
@@ -293,36 +335,4 @@ fn stalled(transcript: &Transcript) -> String {
         ))
     });
     named.collect()
-}
-
-/// Where the serial log goes, and whether it stays.
-struct Log {
-    path: PathBuf,
-    stays: bool,
-}
-
-impl Log {
-    fn choose(options: &Parsed, app: &str) -> Result<Log, Refusal> {
-        let named = ["serial", "trace"]
-            .into_iter()
-            .find_map(|option| Some((option, options.text(option)?)));
-        let Some((option, named)) = named else {
-            let path = system::new_log(app).map_err(Refusal::Failure)?;
-            return Ok(Log { path, stays: false });
-        };
-        File::create(named).map_err(|error| {
-            Refusal::Usage(format!(
-                "`--{option} {named}`: cannot be written: {error}; name another file"
-            ))
-        })?;
-        let path = named.into();
-        Ok(Log { path, stays: true })
-    }
-
-    fn discard(&self) {
-        if !self.stays {
-            // It is ours, and in the way of no one if it cannot be removed.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
 }

@@ -2,7 +2,9 @@
 //! there, where the workspace lies, and where logs go.
 
 use std::env;
+use std::ffi::OsStr;
 use std::fs;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -27,8 +29,9 @@ pub fn cargo() -> Command {
 /// Returns where a program lies: a path that is one itself, or a name found
 /// on the `PATH`.
 #[must_use]
-pub fn find_program(name: &str) -> Option<PathBuf> {
-    if name.contains('/') {
+pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
+    let name = name.as_ref();
+    if name.as_bytes().contains(&b'/') {
         return is_program(Path::new(name)).then(|| name.into());
     }
     let path = env::var_os("PATH")?;

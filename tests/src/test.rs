@@ -20,6 +20,7 @@ mod lint;
 mod table;
 mod tally;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use crate::image;
@@ -31,7 +32,7 @@ pub use tally::Tally;
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
-pub fn test(words: &[String]) -> ExitCode {
+pub fn test(words: &[OsString]) -> ExitCode {
     let options = match TEST.read(words) {
         Ok(options) => options,
         Err(code) => return code,

@@ -138,7 +138,7 @@ fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
     );
     assert_eq!(refused(&[]).0, Some(2));
     assert_eq!(refused(&["/no/such/file"]).0, Some(2));
-    assert_eq!(refused(&[log, "-o", "/no/such/folder/file"]).0, Some(1));
+    assert_eq!(refused(&[log, "-o", "/no/such/folder/file"]).0, Some(2));
 }
 
 #[test]

@@ -12,12 +12,14 @@ const MOST_SHOWN: usize = 40;
 
 /// Returns a word between backquotes, visibly: its beginning, if it is long.
 pub fn quoted(word: &str) -> impl fmt::Display {
-    fmt::from_fn(move |out| {
-        let (shown, dots) = match word.char_indices().nth(MOST_SHOWN) {
-            Some((end, _)) => (&word[..end], "..."),
-            None => (word, ""),
-        };
-        write!(out, "`{}{dots}`", visible(shown))
+    fmt::from_fn(move |out| write!(out, "`{}`", shown(word)))
+}
+
+/// Returns a word as [`quoted`] does, for a message with backquotes of its own.
+pub fn shown(word: &str) -> impl fmt::Display {
+    fmt::from_fn(move |out| match word.char_indices().nth(MOST_SHOWN) {
+        Some((end, _)) => write!(out, "{}...", visible(&word[..end])),
+        None => write!(out, "{}", visible(word)),
     })
 }
 

@@ -18,6 +18,7 @@ pub mod makespan;
 pub mod native;
 pub mod scheduler;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -60,7 +61,7 @@ static BENCH: Menu = Menu {
 
 /// Runs the subcommand.
 #[must_use]
-pub fn bench(words: &[String]) -> ExitCode {
+pub fn bench(words: &[OsString]) -> ExitCode {
     BENCH.run(words)
 }
 
@@ -68,7 +69,7 @@ pub fn bench(words: &[String]) -> ExitCode {
 /// and says whether all limits hold.
 fn on_machine<Plan>(
     table: &Command,
-    words: &[String],
+    words: &[OsString],
     plan: impl Fn(&Parsed) -> Result<Plan, String>,
     measure: impl Fn(&Plan) -> Result<bool, String>,
 ) -> ExitCode {

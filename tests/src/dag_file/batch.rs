@@ -15,7 +15,7 @@ use crate::protocol::MachineLine;
 /// Returns the folder that `--dag` names, if it is one.
 #[must_use]
 pub fn folder(options: &Parsed) -> Option<PathBuf> {
-    let path = Path::new(options.text("dag")?);
+    let path = options.path("dag")?;
     path.is_dir().then(|| path.to_path_buf())
 }
 

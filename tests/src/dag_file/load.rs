@@ -1,12 +1,12 @@
 //! Reading a file of any of the formats.
 
-use std::fs;
 use std::path::Path;
 
 use dag_file::{DagFile, Length, Malformed, check, parse};
 use sched_dag::Policy;
 
 use super::{rd_gen, stg};
+use crate::files;
 
 /// How a file is read.
 #[derive(Clone, Debug)]
@@ -29,18 +29,15 @@ pub struct Import {
 ///
 /// Lines for people, each beginning with the file and mostly the line.
 pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
-    let place = path.display();
+    let place = files::place(path);
     let located = |faults: Vec<Malformed>| -> Vec<String> {
         let located = faults.into_iter();
         located
             .map(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))
             .collect()
     };
-    let bytes = fs::read(path).map_err(|error| {
-        vec![format!(
-            "{place}: cannot be read: {error}; name another file"
-        )]
-    })?;
+    let bytes =
+        files::read(path).map_err(|why| vec![format!("{place}: {why}; name another file")])?;
     let text = str::from_utf8(&bytes).map_err(|error| {
         let before = bytes[..error.valid_up_to()].iter();
         let line = 1 + before.filter(|byte| **byte == b'\n').count();

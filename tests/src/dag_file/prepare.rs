@@ -2,13 +2,14 @@
 //! guest, and enough memory and time.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use dag_file::time::parse_ns;
 use dag_file::{DagFile, Execution, FileDag, Length, Set};
 
 use super::load::{Import, load};
 use super::source_lines;
+use crate::files;
 use crate::options::Parsed;
 use crate::system;
 
@@ -39,8 +40,8 @@ pub struct Prepared {
     pub path: PathBuf,
     /// What it says.
     pub file: DagFile,
-    /// Where the boot module lies. It is removed with this value.
-    pub module: PathBuf,
+    /// Where the boot module lies, once it is written. It is removed with this value.
+    pub module: Option<PathBuf>,
     /// The least memory for it, in MiB.
     pub memory_mib: u64,
     /// Words for the guest beside those that options become.
@@ -50,6 +51,20 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// Writes the boot module.
+    ///
+    /// # Errors
+    ///
+    /// In words: it cannot be written.
+    pub fn write_module(&mut self) -> Result<(), String> {
+        let module = system::new_log("dag-file")?.with_extension("dag");
+        let written = fs::write(&module, self.file.to_string());
+        let written =
+            written.map_err(|error| format!("cannot write `{}`: {error}", module.display()));
+        self.module = Some(module);
+        written
+    }
+
     /// Returns what the guest says of the file as [`load`] would have said it, one line a
     /// fault; `None` if it speaks of something else.
     #[must_use]
@@ -60,8 +75,10 @@ impl Prepared {
 
 impl Drop for Prepared {
     fn drop(&mut self) {
-        // It is ours, and in the way of no one if it cannot be removed.
-        let _ = fs::remove_file(&self.module);
+        if let Some(module) = &self.module {
+            // It is ours, and in the way of no one if it cannot be removed.
+            let _ = fs::remove_file(module);
+        }
     }
 }
 
@@ -71,7 +88,7 @@ impl Drop for Prepared {
 ///
 /// Lines for people: what is wrong with the options or with the file.
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
-    let Some(path) = options.text("dag") else {
+    let Some(path) = options.path("dag") else {
         let lonely = COMPANIONS.iter().find(|name| options.is_given(name));
         return lonely.map_or(Ok(None), |name| {
             Err(vec![format!(
@@ -108,20 +125,16 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         cores: u32::try_from(cores).unwrap_or(u32::MAX),
         length,
     };
-    let file = load(Path::new(path), &import)?;
+    let file = load(path, &import)?;
     let memory_mib = memory_mib(&file, length, cores);
     if memory_mib > MOST_MEMORY_MIB && !options.is_given("memory") {
         return Err(refuse(format!(
-            "{path}: its {} subtasks and their jobs need {memory_mib} MiB, and a guest has \
+            "{}: its {} subtasks and their jobs need {memory_mib} MiB, and a guest has \
              {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
+            files::place(path),
             file.most_subtasks()
         )));
     }
-    let module = system::new_log("dag-file")
-        .map_err(refuse)?
-        .with_extension("dag");
-    fs::write(&module, file.to_string())
-        .map_err(|error| refuse(format!("cannot write `{}`: {error}", module.display())))?;
     let mut words = Vec::new();
     if options.is_given("strict-deadlines") {
         words.push("deadlines=strict".into());
@@ -137,7 +150,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         limit_s: limit_s(&file, length),
         path: path.into(),
         file,
-        module,
+        module: None,
         words,
     }))
 }
@@ -200,13 +213,28 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{limit_s, memory_mib};
+    use super::{limit_s, memory_mib, prepare};
+    use crate::run::RUN;
+    use crate::system::workspace;
     use dag_file::{DagFile, Length, parse};
 
     fn file(subtasks: usize) -> DagFile {
         let subtasks = (0..subtasks).map(|number| format!("subtask s{number} wcet 1ms\n"));
         let subtasks: String = subtasks.collect();
         parse(&format!("dag x period 1s\n{subtasks}end")).unwrap()
+    }
+
+    #[test]
+    fn a_file_is_read_without_a_write() {
+        let demo = workspace().join("tests/data/demo.dag");
+        let options = RUN.right("--print-dag --jobs 3").with("dag", demo);
+        let mut prepared = prepare(&options).unwrap().unwrap();
+        assert_eq!(prepared.module, None);
+        prepared.write_module().unwrap();
+        let module = prepared.module.clone().unwrap();
+        assert!(module.is_file());
+        drop(prepared);
+        assert!(!module.exists());
     }
 
     #[test]

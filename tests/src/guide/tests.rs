@@ -1,5 +1,6 @@
 //! The guide holds what it promises; the README's index of pages is complete.
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 
@@ -51,14 +52,14 @@ fn every_command_is_one_that_its_script_accepts() {
         let words = line
             .strip_prefix("$ ")
             .expect("a console shows commands only");
-        let mut words = words.split(' ').map(String::from);
+        let mut words = words.split(' ');
         let script = words.next().unwrap_or_default();
         let command = COMMANDS
             .iter()
             .find(|command| command.invocation == script)
             .unwrap_or_else(|| panic!("`{script}` is no script that the guide may name"));
-        assert!(workspace().join(&script).is_file(), "{script}");
-        let parsed = command.parse(&words.collect::<Vec<_>>());
+        assert!(workspace().join(script).is_file(), "{script}");
+        let parsed = command.parse(&words.map(OsString::from).collect::<Vec<_>>());
         assert!(matches!(parsed, Ok(Request::Work(_))), "{line}: {parsed:?}");
         commands += 1;
     }

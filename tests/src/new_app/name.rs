@@ -7,6 +7,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use replay::shown::quoted;
+
 /// The longest name, in bytes, with which the template's lines stay short.
 const LONGEST: usize = 32;
 
@@ -81,7 +83,7 @@ const RESERVED: &[&str] = &[
 ///
 /// One line: the name, what is wrong with it, and what is possible.
 pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
-    let refuse = |why: &str| Err(format!("`{name}` cannot be an app's name: {why}"));
+    let refuse = |why: &str| Err(format!("{} cannot be an app's name: {why}", quoted(name)));
     if name.is_empty() {
         return Err("the name is empty; give one, such as `brake-assist`".into());
     }

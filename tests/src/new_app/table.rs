@@ -1,6 +1,6 @@
 //! What `new-app` accepts: the one table behind its parser and its help text.
 
-use crate::options::Command;
+use crate::options::{Command, Takes};
 
 /// The table of `new-app`.
 pub static NEW_APP: Command = Command {
@@ -9,7 +9,7 @@ pub static NEW_APP: Command = Command {
 Makes an app of your own under apps/: a library with functions and their DAG, a
 program that boots it, and a test that runs it on the host in virtual time.",
     positional: Some((
-        "NAME",
+        Takes::Text("NAME"),
         "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
     )),
     options: &[],

@@ -15,14 +15,14 @@ impl Command {
     pub fn help(&self) -> String {
         let mut text = String::new();
         let positional = match self.positional {
-            Some((name, _)) => format!(" [{name}]"),
+            Some((takes, _)) => format!(" [{}]", takes.name()),
             None => String::new(),
         };
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{}\n", self.about);
         let _ = writeln!(text, "usage: {}{positional} [options]\n", self.invocation);
-        if let Some((name, help)) = self.positional {
-            add_entry(&mut text, name, help);
+        if let Some((takes, help)) = self.positional {
+            add_entry(&mut text, takes.name(), help);
         }
         for option in self.options {
             add_entry(&mut text, &option.heading(), &option.sentence());
@@ -41,12 +41,9 @@ impl Opt {
             Some(short) => format!("-{short}, "),
             None => "    ".into(),
         };
-        let value = match self.takes {
-            Takes::Nothing => "",
-            Takes::Number { .. } => " N",
-            Takes::Numbers { .. } => " N,N,...",
-            Takes::OneOf(_) => " WORD",
-            Takes::Text(what) => &format!(" {what}"),
+        let value = match self.takes.name() {
+            "" => "",
+            value => &format!(" {value}"),
         };
         format!("{short}--{}{value}", self.name)
     }
@@ -63,7 +60,7 @@ impl Opt {
                 }
             }
             Takes::OneOf(words) => parts.push(words.join(" | ")),
-            Takes::Nothing | Takes::Text(_) => {}
+            Takes::Nothing | Takes::Text(_) | Takes::File(_) => {}
         }
         if !self.default.is_empty() {
             parts.push(format!("default {}", self.default));

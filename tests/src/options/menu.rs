@@ -1,6 +1,9 @@
 //! A first word that chooses what the rest is for: `bench WHAT`, `oracle KIND`.
 
+use std::ffi::{OsStr, OsString};
 use std::process::ExitCode;
+
+use replay::shown::quoted;
 
 use super::nearest;
 
@@ -27,14 +30,14 @@ pub struct Choice {
     /// A few words for the help text.
     pub about: &'static str,
     /// What it does with the words after it, and its exit code.
-    pub work: fn(&[String]) -> ExitCode,
+    pub work: fn(&[OsString]) -> ExitCode,
 }
 
 impl Menu {
     /// Does what a command line chooses, shows the help text, or refuses the word with
     /// exit code 2.
     #[must_use]
-    pub fn run(&self, words: &[String]) -> ExitCode {
+    pub fn run(&self, words: &[OsString]) -> ExitCode {
         let name = self.invocation.trim_start_matches("./scripts/");
         match words.split_first() {
             Some((word, _)) if word == "--help" || word == "-h" => {
@@ -55,7 +58,8 @@ impl Menu {
         }
     }
 
-    fn choose(&self, word: &str) -> Result<&Choice, String> {
+    fn choose(&self, word: &OsStr) -> Result<&Choice, String> {
+        let word = &*word.to_string_lossy();
         if let Some(choice) = self.choices.iter().find(|choice| choice.name == word) {
             return Ok(choice);
         }
@@ -63,8 +67,8 @@ impl Menu {
         let hint = nearest(word, &names)
             .map_or_else(|| self.remedy(), |near| format!("did you mean `{near}`?"));
         Err(match word.starts_with('-') {
-            true => format!("unknown option `{word}`; {}", self.remedy()),
-            false => format!("unknown {} `{word}`; {hint}", self.word),
+            true => format!("unknown option {}; {}", quoted(word), self.remedy()),
+            false => format!("unknown {} {}; {hint}", self.word, quoted(word)),
         })
     }
 
@@ -92,6 +96,7 @@ impl Menu {
 #[cfg(test)]
 mod tests {
     use super::{Choice, Menu};
+    use std::ffi::{OsStr, OsString};
     use std::process::ExitCode;
 
     static MENU: Menu = Menu {
@@ -115,13 +120,13 @@ mod tests {
 
     #[test]
     fn a_word_gets_those_after_it() {
-        let words = ["soup", "--help", "x"].map(String::from);
+        let words = ["soup", "--help", "x"].map(OsString::from);
         assert_eq!(MENU.run(&words), ExitCode::from(2));
     }
 
     #[test]
     fn an_unknown_word_is_named_with_the_nearest_or_with_all() {
-        let refusal = |word| MENU.choose(word).unwrap_err();
+        let refusal = |word| MENU.choose(OsStr::new(word)).unwrap_err();
         assert_eq!(refusal("sop"), "unknown DISH `sop`; did you mean `soup`?");
         assert_eq!(
             refusal("steak-tartare"),

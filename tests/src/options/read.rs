@@ -1,7 +1,10 @@
 //! From a command line to work, or to the exit code that ends the tool: the part that
 //! is the same for all commands.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
+
+use replay::shown::visible;
 
 use super::{Command, Parsed, Request};
 
@@ -12,7 +15,7 @@ impl Command {
     /// # Errors
     ///
     /// The exit code with which the tool ends: 0 after the help text, 2 after a complaint.
-    pub fn read(&self, words: &[String]) -> Result<Parsed, ExitCode> {
+    pub fn read(&self, words: &[OsString]) -> Result<Parsed, ExitCode> {
         match self.parse(words) {
             Ok(Request::Work(options)) => Ok(options),
             Ok(Request::Help(text)) => {
@@ -39,15 +42,17 @@ impl Command {
     /// Returns the options of a command line that is right, for tests.
     #[cfg(test)]
     pub(crate) fn right(&self, line: &str) -> Parsed {
-        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
+        let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
         match self.parse(&words) {
             Ok(Request::Work(options)) => options,
             other => panic!("`{line}` gave {other:?}"),
         }
     }
 
-    fn complain(&self, lines: &str) {
+    /// Says lines under the command's name. What they repeat of files and of words must
+    /// not rewrite a terminal.
+    pub(crate) fn complain(&self, lines: &str) {
         let name = self.invocation.trim_start_matches("./scripts/");
-        lines.lines().for_each(|line| eprintln!("{name}: {line}"));
+        (lines.lines()).for_each(|line| eprintln!("{name}: {}", visible(line)));
     }
 }

@@ -1,5 +1,9 @@
 //! What a table accepts, what it refuses, and in which words.
 
+use std::ffi::{OsStr, OsString};
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::path::Path;
+
 use super::{Command, Opt, Parsed, Request, Takes};
 
 static COMMAND: Command = Command {
@@ -14,14 +18,15 @@ static COMMAND: Command = Command {
             Takes::OneOf(&["kvm", "deterministic", "threads"]),
             "What time means.",
         ),
-        Opt::new("serial", Takes::Text("FILE"), "Keep the log."),
+        Opt::new("serial", Takes::File("FILE"), "Keep the log."),
+        Opt::new("only", Takes::Text("NAME"), "Only this."),
         Opt::new("quiet", Takes::Nothing, "Say less.").short('q'),
     ],
     notes: "Exit codes: none.",
 };
 
 fn request(line: &str) -> Result<Request, String> {
-    let words: Vec<String> = line.split_whitespace().map(String::from).collect();
+    let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
     COMMAND.parse(&words).map_err(|error| error.to_string())
 }
 
@@ -74,7 +79,7 @@ fn an_unknown_option_is_named_with_the_nearest() {
     assert_eq!(
         refusal("--frobnicate"),
         "unknown option `--frobnicate`; \
-         allowed are --cores, --subtasks, --mode, --serial, --quiet, --help"
+         allowed are --cores, --subtasks, --mode, --serial, --only, --quiet, --help"
     );
     assert!(refusal("-x").starts_with("unknown option `-x`; "));
     assert!(refusal("-é").starts_with("unknown option `-é`; "));
@@ -107,6 +112,73 @@ fn a_line_that_is_not_whole_is_refused() {
         "option `--quiet` takes no value; write it alone"
     );
     assert_eq!(refusal("--serial="), "`--serial `: must be a file");
+    for word in ["--help=1", "-h="] {
+        let said = "option `--help` takes no value; write it alone";
+        assert_eq!(refusal(word), said);
+    }
+}
+
+#[test]
+fn an_option_is_no_value() {
+    for line in ["--serial --quiet", "--serial -q", "--serial --frobnicate"] {
+        assert_eq!(
+            refusal(line),
+            "option `--serial` lacks its value: a file; \
+             one that begins with `-` is written `--serial=VALUE`"
+        );
+    }
+    assert_eq!(
+        refusal("--cores --quiet"),
+        "option `--cores` lacks its value: a number from 1 to 64"
+    );
+    assert_eq!(
+        parsed("--serial=--quiet").path("serial"),
+        Some(Path::new("--quiet"))
+    );
+    assert_eq!(parsed("--serial -x").path("serial"), Some(Path::new("-x")));
+}
+
+#[test]
+fn only_a_file_may_have_a_name_that_is_not_utf_8() {
+    let odd = OsStr::from_bytes(b"\xff.log");
+    let with = |option: &str| {
+        let words = [OsString::from(option), odd.into()];
+        let mut attached = OsString::from(format!("{option}=")).into_vec();
+        attached.extend(odd.as_bytes());
+        let attached = COMMAND.parse(&[OsString::from_vec(attached)]);
+        (COMMAND.parse(&words), attached)
+    };
+    let (Ok(Request::Work(one)), Ok(Request::Work(other))) = with("--serial") else {
+        panic!("a file may have any name");
+    };
+    assert_eq!(one.path("serial"), Some(Path::new(odd)));
+    assert_eq!(other.path("serial"), Some(Path::new(odd)));
+    for (option, must) in [
+        ("--cores", "a number from 1 to 64"),
+        ("--mode", "one of kvm, deterministic, threads"),
+        ("--only", "a name"),
+    ] {
+        let (one, other) = with(option);
+        let said = format!("`{option} \u{fffd}.log`: is not UTF-8 text; must be {must}");
+        assert_eq!(one.unwrap_err().0, said);
+        assert_eq!(other.unwrap_err().0, said);
+    }
+    let word = COMMAND.parse(&[odd.into()]).unwrap_err().0;
+    assert!(word.starts_with("unknown word `\u{fffd}.log`; "), "{word}");
+}
+
+#[test]
+fn a_value_is_repeated_in_part_and_visibly() {
+    let long = "9".repeat(5000);
+    let shown = "9".repeat(40);
+    let range = "must be a number from 1 to 64";
+    assert_eq!(
+        refusal(&format!("--cores {long}")),
+        format!("`--cores {shown}...`: {range}")
+    );
+    let words = [OsString::from("--cores"), "1\n\u{1b}[2J".into()];
+    let said = COMMAND.parse(&words).unwrap_err().0;
+    assert_eq!(said, format!("`--cores 1\\n\\u{{1b}}[2J`: {range}"));
 }
 
 #[test]
@@ -123,6 +195,7 @@ usage: ./scripts/example [options]
       --subtasks N,N,...  Parallel subtasks. [1 to 14]
       --mode WORD         What time means. [kvm | deterministic | threads]
       --serial FILE       Keep the log.
+      --only NAME         Only this.
   -q, --quiet             Say less.
   -h, --help              Show this text.
 

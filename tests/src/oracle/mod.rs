@@ -17,10 +17,13 @@ pub mod schedules;
 pub mod synchronizer;
 mod table;
 
+use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 use replay::lines::Malformed;
 
+use crate::files;
 use crate::options::{Choice, Command, Menu};
 
 /// One kind of reference file: how to read its cases and how to check one.
@@ -84,16 +87,16 @@ static ORACLE: Menu = Menu {
 
 /// Runs the subcommand.
 #[must_use]
-pub fn oracle(words: &[String]) -> ExitCode {
+pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }
 
-fn run_files<Case>(kind: &Kind<Case>, words: &[String]) -> ExitCode {
+fn run_files<Case>(kind: &Kind<Case>, words: &[OsString]) -> ExitCode {
     let options = match kind.table.read(words) {
         Ok(options) => options,
         Err(code) => return code,
     };
-    let cases = match read(options.positionals(), kind.parse) {
+    let cases = match read(options.files(), kind.parse) {
         Ok(cases) => cases,
         Err(line) => return kind.table.refuse(&line),
     };
@@ -109,19 +112,21 @@ fn run_files<Case>(kind: &Kind<Case>, words: &[String]) -> ExitCode {
 }
 
 /// Reads the cases of all files, of which there must be one.
-fn read<Case>(
-    files: &[String],
+fn read<'f, Case>(
+    names: impl ExactSizeIterator<Item = &'f Path> + Clone,
     parse: impl Fn(&str) -> Result<Vec<Case>, Malformed>,
 ) -> Result<Vec<Case>, String> {
-    if files.is_empty() {
+    if names.len() == 0 {
         return Err("which files? name at least one reference file".into());
     }
+    files::check_once(names.clone())?;
     let mut cases = Vec::new();
-    for file in files {
-        let text = std::fs::read_to_string(file)
-            .map_err(|error| format!("cannot read {file}: {error}"))?;
+    for file in names {
+        let place = files::place(file);
+        let text =
+            files::read_text(file).map_err(|why| format!("{place}: {why}; name another file"))?;
         let parsed = parse(&text)
-            .map_err(|Malformed { line, reason }| format!("{file}:{line}: {reason}"))?;
+            .map_err(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))?;
         cases.extend(parsed);
     }
     Ok(cases)

@@ -9,7 +9,10 @@ Prints the first difference of each failing case, then `N passed, M failed`.
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
 ";
 
-const FILES: Option<(&str, &str)> = Some(("FILE...", "Reference files, as in tests/oracle."));
+const FILES: Option<(Takes, &str)> = Some((
+    Takes::File("FILE..."),
+    "Reference files, as in tests/oracle.",
+));
 
 pub(super) static BOUNDS: Command = Command {
     invocation: "./scripts/oracle bounds",

@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use super::{Refusal, boot_app, conclude, prepare};
+use super::{RUN, Refusal, boot_app, conclude, prepare};
 use crate::dag_file::batch;
+use crate::files;
 use crate::options::Parsed;
 use crate::protocol::Status;
 
@@ -32,19 +33,19 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
     }
     let (mut refused, mut failed) = (0, 0);
     for file in &files {
-        let place = file.display();
-        let one = options.with("dag", &place.to_string()).with("quiet", "yes");
+        let place = files::place(file);
+        let one = options.with("dag", file).with("quiet", "yes");
         let booted =
-            prepare(&one).and_then(|dags| Ok((boot_app(&one, dags.as_ref(), false)?, dags)));
+            prepare(&one).and_then(|mut dags| Ok((boot_app(&one, dags.as_mut(), false)?, dags)));
         let (booted, dags) = match booted {
             Ok(booted) => booted,
             Err(Refusal::Usage(lines)) => {
-                lines.lines().for_each(|line| eprintln!("run: {line}"));
+                RUN.complain(&lines);
                 refused += 1;
                 continue;
             }
             Err(Refusal::Failure(line)) => {
-                eprintln!("run: {place}: {line}");
+                RUN.complain(&format!("{place}: {line}"));
                 failed += 1;
                 continue;
             }
@@ -53,7 +54,7 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
             Ok(()) => {}
             Err(fault) if fault.status == Status::Usage => refused += 1,
             Err(_) => {
-                eprintln!("run: {place}:");
+                RUN.complain(&format!("{place}:"));
                 failed += 1;
             }
         }

@@ -5,12 +5,13 @@
 //! looks: what a guest prints changes its times, and a run whose output goes to a
 //! file or a pipe must not depend on who started it.
 
-use std::fs::{self, OpenOptions};
-use std::io::{self, ErrorKind, IsTerminal, Read, Write, stderr, stdin, stdout};
+use std::fs;
+use std::io::{ErrorKind, IsTerminal, Read, Write, stderr, stdin, stdout};
 use std::process::ChildStdin;
 use std::thread;
 
 use crate::dot;
+use crate::files;
 use crate::options::Parsed;
 use crate::outcome::Outcome;
 
@@ -34,25 +35,6 @@ fn is_watched(options: &Parsed) -> bool {
         && !silent.into_iter().any(|name| options.is_given(name))
 }
 
-/// Makes sure that the file for the drawing can be written, before anything boots.
-///
-/// What is in it stays until there is something new.
-///
-/// # Errors
-///
-/// In words: it cannot be written.
-pub(super) fn check_dot(options: &Parsed) -> Result<(), String> {
-    let Some(file) = options.text("dot") else {
-        return Ok(());
-    };
-    let opened = OpenOptions::new().append(true).create(true).open(file);
-    opened.map(drop).map_err(|error| not_writable(file, &error))
-}
-
-fn not_writable(file: &str, error: &io::Error) -> String {
-    format!("`--dot {file}`: cannot be written: {error}; name another file")
-}
-
 /// Writes the DAGs that a run has committed, if the options ask for it, and returns
 /// what to say of the file.
 ///
@@ -60,11 +42,12 @@ fn not_writable(file: &str, error: &io::Error) -> String {
 ///
 /// In words: there are none, or the file cannot be written.
 pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<Option<String>, String> {
-    let Some(file) = options.text("dot") else {
+    let Some(path) = options.path("dot") else {
         return Ok(None);
     };
     let text = dot::text(&outcome.transcript)?;
-    fs::write(file, text).map_err(|error| not_writable(file, &error))?;
+    let file = files::place(path);
+    fs::write(path, text).map_err(|error| format!("`--dot {file}`: cannot be written: {error}"))?;
     Ok(Some(format!(
         "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
     )))

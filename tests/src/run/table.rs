@@ -72,7 +72,7 @@ pub static RUN: Command = Command {
         ),
         Opt::new(
             "dag",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "Run the DAGs of a file, see docs/dag-file.md: our text format, RD-Gen's .yaml, \
              or task graphs in .json; of a folder, each of its files, in one table.",
         ),
@@ -132,18 +132,18 @@ pub static RUN: Command = Command {
         ),
         Opt::new(
             "serial",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "Keep the serial log in this file.",
         ),
         Opt::new(
             "trace",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "Keep the serial log in this file, with the trace of each run, which is not \
              shown; ./scripts/check-trace FILE judges it.",
         ),
         Opt::new(
             "dot",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "Write the committed DAGs to this file, for Graphviz: `dot -Tsvg FILE`.",
         ),
         Opt::new(
@@ -180,12 +180,12 @@ pub static RUN: Command = Command {
         ),
         Opt::new(
             "image",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "Boot this image; build nothing.",
         ),
         Opt::new(
             "qemu",
-            Takes::Text("PROGRAM"),
+            Takes::File("PROGRAM"),
             "Use this QEMU; install nothing.",
         ),
     ],

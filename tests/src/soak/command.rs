@@ -1,7 +1,10 @@
 //! The command line of `soak`, and what it prints.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 use std::time::Duration;
+
+use replay::shown::shown;
 
 use super::figures::Figures;
 use super::plan::{Length, Part, Plan, usual_bound_ns};
@@ -115,7 +118,7 @@ exit codes: 0 no round failed; 1 some did; 2 a refused command line
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
-pub fn soak(words: &[String]) -> ExitCode {
+pub fn soak(words: &[OsString]) -> ExitCode {
     let options = match SOAK.read(words) {
         Ok(options) => options,
         Err(code) => return code,
@@ -143,15 +146,23 @@ pub fn soak(words: &[String]) -> ExitCode {
 
 /// Makes the plan that the options ask for.
 fn plan(options: &Parsed) -> Result<Plan, String> {
+    let lengths = ["seconds", "overload-seconds"];
+    for whole in ["short", "rounds"] {
+        if let Some(part) = lengths.iter().find(|name| options.is_given(name))
+            && options.is_given(whole)
+        {
+            return Err(format!(
+                "`--{whole}` and `--{part}` both say how long it takes; give one"
+            ));
+        }
+    }
     let number = |name| options.number(name).unwrap_or(0);
     let mut length = match options.is_given("short") {
         true => Length::SHORT,
         false => Length::LONG,
     };
-    for (name, place) in [
-        ("seconds", &mut length.seconds),
-        ("overload-seconds", &mut length.overload_seconds),
-    ] {
+    let places = [&mut length.seconds, &mut length.overload_seconds];
+    for (name, place) in lengths.into_iter().zip(places) {
         if options.is_given(name) {
             *place = number(name);
         }
@@ -181,7 +192,8 @@ fn plan(options: &Parsed) -> Result<Plan, String> {
         plan.parts.retain(|part| part.to_string() == only);
         plan.parts.truncate(1);
         if plan.parts.is_empty() {
-            return Err(format!("`--only {only}`: there are {}", names.join(", ")));
+            let (only, names) = (shown(only), names.join(", "));
+            return Err(format!("`--only {only}`: there are {names}"));
         }
     }
     Ok(plan)

@@ -7,7 +7,7 @@ pub static TEST: Command = Command {
     invocation: "./scripts/test",
     about: "Runs every test, on the host and in QEMU, and counts them.",
     positional: Some((
-        "FILTER",
+        Takes::Text("FILTER"),
         "Run only tests and checks whose name contains this.",
     )),
     options: &[

@@ -3,11 +3,13 @@
 //! All files are read before the first run is judged, so that a damaged one
 //! does not hide behind the breaches of another.
 
-use std::fs;
+use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 use super::model::Run;
 use super::{check, read, report};
+use crate::files;
 use crate::options::{Command, Opt, Parsed, Takes};
 
 /// The table of `check-trace`.
@@ -15,7 +17,7 @@ pub static CHECK_TRACE: Command = Command {
     invocation: "./scripts/check-trace",
     about: "Replays the traces of runs against the model's rules and reports each breach.",
     positional: Some((
-        "FILE...",
+        Takes::File("FILE..."),
         "Serial logs, or other files of JSON lines, with traces: \
          `./scripts/run --trace FILE` makes one.",
     )),
@@ -59,18 +61,21 @@ well-formed trace with events
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
-pub fn check_trace(words: &[String]) -> ExitCode {
+pub fn check_trace(words: &[OsString]) -> ExitCode {
     let options = match CHECK_TRACE.read(words) {
         Ok(options) => options,
         Err(code) => return code,
     };
-    if options.positionals().is_empty() {
+    if options.files().len() == 0 {
         return CHECK_TRACE.refuse("which files? name at least one serial log with a trace");
     }
+    if let Err(line) = files::check_once(options.files()) {
+        return CHECK_TRACE.refuse(&line);
+    }
     let mut runs = Vec::new();
-    for file in options.positionals() {
+    for file in options.files() {
         match read_file(file) {
-            Ok(found) => runs.extend(found.into_iter().map(|run| (file.as_str(), run))),
+            Ok(found) => runs.extend(found.into_iter().map(|run| (files::place(file), run))),
             Err(line) => return CHECK_TRACE.refuse(&line),
         }
     }
@@ -82,8 +87,9 @@ pub fn check_trace(words: &[String]) -> ExitCode {
 }
 
 /// Reads a file's runs, of which at least one must have events.
-pub(super) fn read_file(file: &str) -> Result<Vec<Run>, String> {
-    let bytes = fs::read(file).map_err(|error| format!("cannot read {file}: {error}"))?;
+pub(super) fn read_file(path: &Path) -> Result<Vec<Run>, String> {
+    let file = files::place(path);
+    let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
     // A person's line may be damaged; a machine line then is found to be.
     let text = String::from_utf8_lossy(&bytes);
     let runs = read(&text).map_err(|fault| format!("{file}:{}: {}", fault.line, fault.reason))?;

@@ -18,6 +18,7 @@ mod scale;
 mod table;
 mod traced;
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
@@ -36,7 +37,7 @@ use crate::{image, install, probe, system};
 const LIMIT: Duration = Duration::from_secs(300);
 
 /// Runs `bench hand-off` with the words after its name.
-pub(super) fn run(words: &[String]) -> ExitCode {
+pub(super) fn run(words: &[OsString]) -> ExitCode {
     on_machine(&table::TABLE, words, Plan::new, measure_all)
 }
 
@@ -52,10 +53,10 @@ pub fn check() -> Result<(), String> {
         Err(error) => return Err(error.to_string()),
     };
     install::ensure_qemu()?;
-    let before = baseline::read(&plan.baseline)?;
+    let before = plan.before.as_deref().unwrap_or_default();
     let image = image::build("hand-off").map_err(|error| error.to_string())?;
     let now = measure_mode(&plan, Mode::Deterministic, &image.path)?;
-    let comparison = report::comparison(&now, &before);
+    let comparison = report::comparison(&now, before);
     print!("{}", comparison.text);
     if comparison.complaints.is_empty() {
         return Ok(());
@@ -68,11 +69,6 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
     if let Some(scale) = &plan.scale {
         return measure_scale(scale).map(|()| true);
     }
-    let before = if plan.compares {
-        Some(baseline::read(&plan.baseline)?)
-    } else {
-        None
-    };
     let image = image::build("hand-off").map_err(|error| error.to_string())?;
     let mut measured = Vec::new();
     for mode in modes(plan, &image.path)? {
@@ -90,8 +86,8 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
         return Ok(true);
     };
     let mut is_good = true;
-    if let Some(before) = before {
-        let comparison = report::comparison(instructions, &before);
+    if let Some(before) = &plan.before {
+        let comparison = report::comparison(instructions, before);
         print!("{}", comparison.text);
         is_good = comparison.complaints.is_empty();
     }

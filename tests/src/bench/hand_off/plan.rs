@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use super::baseline;
+use super::figure::Figure;
+use crate::files::{self, Named};
 use crate::options::Parsed;
 use crate::qemu::{Mode, Qemu};
 use crate::system;
@@ -33,7 +36,8 @@ pub(super) struct Plan {
     pub(super) boots: Vec<Boot>,
     /// Numbers of cores and of subtasks to count the cost of, instead.
     pub(super) scale: Option<Scale>,
-    pub(super) compares: bool,
+    /// The figures of the baseline, if they are to be compared.
+    pub(super) before: Option<Vec<Figure>>,
     pub(super) saves: bool,
     pub(super) baseline: PathBuf,
 }
@@ -72,6 +76,12 @@ impl Plan {
         let mode = options.text("mode").and_then(Mode::from_name);
         let [compares, saves] =
             ["compare", "save-baseline"].map(|name| options.is_given(name).then_some(name));
+        options.check_distinct(&["chain", "branches", "layered", "cores", "subtasks"])?;
+        if options.is_given("baseline") && compares.or(saves).is_none() {
+            let line = "`--baseline` without `--compare` and `--save-baseline`: it has no use; \
+                        give one of them, or leave it out";
+            return Err(line.into());
+        }
         if let Some(name) = compares.or(saves) {
             if let Some(size) = SIZES.iter().find(|size| options.is_given(size)) {
                 return Err(format!(
@@ -86,10 +96,17 @@ impl Plan {
                 ));
             }
         }
-        let baseline = options.text("baseline").map_or_else(
+        let baseline = options.path("baseline").map_or_else(
             || system::workspace().join("tests/baselines/hand-off.json"),
             PathBuf::from,
         );
+        if saves.is_some() {
+            let output = Named {
+                option: "baseline",
+                path: &baseline,
+            };
+            files::check(&[], &[output])?;
+        }
         let scale = options.is_given("scale").then(|| Scale::new(options));
         let (idle, reason) = if scale.is_some() {
             let others = ["compare", "save-baseline", "baseline", "mode", "append"];
@@ -114,7 +131,10 @@ impl Plan {
             mode,
             scale,
             boots: boots(options),
-            compares: compares.is_some(),
+            before: match compares {
+                Some(_) => Some(baseline::read(&baseline)?),
+                None => None,
+            },
             saves: saves.is_some(),
             baseline,
         })
@@ -196,6 +216,12 @@ mod tests {
         assert!(refused("--scale --compare").contains("leave `--compare` out"));
         assert!(refused("--scale --chain 5").contains("leave `--chain` out"));
         assert!(refused("--cores 5").contains("without `--scale`"));
+        assert!(refused("--scale --cores 2,2").contains("`2` stands twice"));
+        assert!(refused("--baseline x").contains("without `--compare`"));
+        let missing = refused("--compare --baseline /none/x --mode deterministic");
+        assert!(missing.starts_with("the baseline `/none/x`: "), "{missing}");
+        let unwritable = refused("--save-baseline --baseline /none/x --mode deterministic");
+        assert!(unwritable.contains("cannot be written"), "{unwritable}");
         assert!(plan("--scale --cores 5 --jobs 9").is_ok());
     }
 }

@@ -27,7 +27,7 @@ pub(super) static TABLE: Command = Command {
         ),
         Opt::new(
             "baseline",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "The baseline; tests/baselines/hand-off.json if not given.",
         ),
         Opt::new("jobs", Takes::number(2..=10_000), "Jobs of each workload.").or("200"),

@@ -23,6 +23,7 @@ mod report;
 mod table;
 mod times;
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
@@ -41,7 +42,7 @@ use crate::qemu::Mode;
 use crate::{image, probe, system};
 
 /// Runs `bench join-latency` with the words after its name.
-pub(super) fn run(words: &[String]) -> ExitCode {
+pub(super) fn run(words: &[OsString]) -> ExitCode {
     on_machine(&table::TABLE, words, Plan::new, |plan| {
         measure_all(plan).map(|()| true)
     })

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::condition::{Condition, Policy};
+use crate::files;
 use crate::options::Parsed;
 use crate::qemu::{Machine, Mode, PROGRAM, Qemu};
 use crate::system;
@@ -36,6 +37,7 @@ impl Plan {
     /// What the options ask for cannot be: one line that says why.
     pub(super) fn new(options: &Parsed) -> Result<Plan, String> {
         let number = |name| options.number(name).unwrap_or(1);
+        (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
         let policies = Policy::list(options.text("policies").unwrap_or_default())?;
         let mut subtasks: Vec<usize> = Vec::new();
         for text in options.text("subtasks").unwrap_or_default().split(',') {
@@ -74,8 +76,16 @@ impl Plan {
                 conditions.extend(seeds.iter().map(with_seed));
             }
         }
+        if options.is_given("once")
+            && let Some(mode) = named.filter(|mode| *mode != Mode::Deterministic)
+        {
+            return Err(format!(
+                "`--once` is for deterministic conditions, and the mode is {mode}, in which each \
+                 is booted once; leave it out"
+            ));
+        }
         Ok(Plan {
-            out: options.text("out").unwrap_or_default().into(),
+            out: options.path("out").unwrap_or(Path::new("")).into(),
             conditions,
             policies,
             subtasks,
@@ -185,14 +195,9 @@ fn checksum(bytes: &[u8]) -> u64 {
 mod tests {
     use super::{Plan, checksum};
     use crate::bench::join_latency::table::TABLE;
-    use crate::options::Request;
 
     fn plan(line: &str) -> Result<Plan, String> {
-        let words: Vec<String> = line.split_whitespace().map(String::from).collect();
-        match TABLE.parse(&words) {
-            Ok(Request::Work(options)) => Plan::new(&options),
-            other => panic!("{other:?}"),
-        }
+        Plan::new(&TABLE.right(line))
     }
 
     #[test]

@@ -12,7 +12,7 @@ pub(super) static TABLE: Command = Command {
         Opt {
             name: "out",
             short: Some('o'),
-            takes: Takes::Text("DIR"),
+            takes: Takes::File("DIR"),
             default: "target/join-latency",
             help: "The folder for all results; what is there already is not measured again.",
         },

@@ -17,13 +17,17 @@
 mod measure;
 mod report;
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 pub use measure::{Makespan, measure};
 
+use replay::shown::quoted;
+
 use crate::dag_file::stg::{TaskGraph, read_graphs};
+use crate::files;
 use crate::options::{Command, Opt, Parsed, Takes};
 use crate::qemu::MOST_CORES;
 use crate::system;
@@ -36,7 +40,7 @@ static TABLE: Command = Command {
     options: &[
         Opt::new(
             "file",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "The set of task graphs; tests/data/stg50.json.",
         ),
         Opt::new(
@@ -52,7 +56,7 @@ static TABLE: Command = Command {
         ),
         Opt::new(
             "out",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "Write the figures, too: as CSV, or as JSON Lines if the name ends in .json.",
         ),
     ],
@@ -67,7 +71,7 @@ Graham's bound; 2 the command line or the file is refused.
 };
 
 /// Runs `bench makespan` with the words after its name.
-pub(super) fn run(words: &[String]) -> ExitCode {
+pub(super) fn run(words: &[OsString]) -> ExitCode {
     let options = match TABLE.read(words) {
         Ok(options) => options,
         Err(code) => return code,
@@ -79,13 +83,7 @@ pub(super) fn run(words: &[String]) -> ExitCode {
         Ok(graphs) => graphs,
         Err(line) => return TABLE.refuse(&line),
     };
-    // A place that cannot be written is found before the work, not after.
-    let out = options.text("out").map(PathBuf::from);
-    if let Some(out) = &out
-        && let Err(error) = fs::write(out, "")
-    {
-        return TABLE.refuse(&format!("`--out {}`: {error}", out.display()));
-    }
+    let out = options.path("out");
     let mut all = Vec::new();
     for cores in cores {
         match measure(&graphs, cores) {
@@ -94,7 +92,7 @@ pub(super) fn run(words: &[String]) -> ExitCode {
         }
     }
     print!("{}", report::table(&all));
-    if let Some(out) = &out {
+    if let Some(out) = out {
         let as_json = out.extension().is_some_and(|extension| extension == "json");
         let text = if as_json {
             report::json_lines(&all)
@@ -102,7 +100,7 @@ pub(super) fn run(words: &[String]) -> ExitCode {
             report::csv(&all)
         };
         if let Err(error) = fs::write(out, text) {
-            return TABLE.fail(&format!("`--out {}`: {error}", out.display()));
+            return TABLE.fail(&format!("`--out {}`: {error}", files::place(out)));
         }
     }
     let broken: Vec<String> = all.iter().filter_map(Makespan::complaint).collect();
@@ -114,10 +112,13 @@ pub(super) fn run(words: &[String]) -> ExitCode {
 
 /// Reads the graphs that are wanted, with an optimum for each number of cores.
 fn graphs(options: &Parsed, cores: &[u64]) -> Result<Vec<TaskGraph>, String> {
+    options.check_distinct(&["cores", "graphs"])?;
+    files::check(&options.named(&["file"]), &options.named(&["out"]))?;
     let usual = || system::workspace().join("tests/data/stg50.json");
-    let path = options.text("file").map_or_else(usual, PathBuf::from);
-    let place = path.display();
-    let text = fs::read_to_string(&path).map_err(|error| format!("{place}: {error}"))?;
+    let path = options.path("file").map_or_else(usual, PathBuf::from);
+    let place = files::place(&path);
+    let text =
+        files::read_text(&path).map_err(|why| format!("{place}: {why}; name another file"))?;
     let graphs = read_graphs(&text)
         .map_err(|malformed| format!("{place}:{}: {}", malformed.line, malformed.reason))?;
     let wanted: Option<Vec<&str>> = options
@@ -126,7 +127,8 @@ fn graphs(options: &Parsed, cores: &[u64]) -> Result<Vec<TaskGraph>, String> {
     for name in wanted.iter().flatten() {
         if !graphs.iter().any(|graph| graph.name == *name) {
             return Err(format!(
-                "`--graphs`: {place} has no graph `{name}`; name one of its own"
+                "`--graphs`: {place} has no graph {}; name one of its own",
+                quoted(name)
             ));
         }
     }

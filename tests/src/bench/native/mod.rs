@@ -19,10 +19,13 @@ mod join;
 mod throughput;
 mod workload;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use figure::Figure;
 use workload::Graph;
+
+use replay::shown::quoted;
 
 use crate::options::{Command, Opt, Parsed, Takes};
 
@@ -72,7 +75,7 @@ Exit code: 0 measured; 1 a run did not complete its jobs; 2 the command line is 
 const JOIN: &str = "join";
 
 /// Runs `bench native` with the words after its name.
-pub(super) fn run(words: &[String]) -> ExitCode {
+pub(super) fn run(words: &[OsString]) -> ExitCode {
     let options = match TABLE.read(words) {
         Ok(options) => options,
         Err(code) => return code,
@@ -94,6 +97,7 @@ struct Plan {
 
 impl Plan {
     fn read(options: &Parsed) -> Result<Self, String> {
+        options.check_distinct(&["workers", "only"])?;
         let names: Option<Vec<&str>> = options.text("only").map(|names| names.split(',').collect());
         let is_wanted = |name: &str| names.as_ref().is_none_or(|names| names.contains(&name));
         let known: Vec<String> = Graph::ALL.iter().map(Graph::to_string).collect();
@@ -103,7 +107,8 @@ impl Plan {
         });
         if let Some(name) = of_nothing {
             return Err(format!(
-                "`--only {name}`: no workload is called so; there are {} and {JOIN}",
+                "`--only`: no workload is called {}; there are {} and {JOIN}",
+                quoted(name),
                 known.join(", ")
             ));
         }
@@ -175,7 +180,7 @@ mod tests {
     #[test]
     fn an_unknown_workload_is_refused_with_those_there_are() {
         let line = plan("--only chain-65").err().expect("refused");
-        assert!(line.contains("`--only chain-65`") && line.contains("chain-64, fork-join-2"));
+        assert!(line.contains("called `chain-65`") && line.contains("chain-64, fork-join-2"));
     }
 
     #[test]

@@ -8,6 +8,7 @@
 mod commit;
 mod dispatch;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use crate::options::Command;
@@ -28,7 +29,7 @@ Exit code: 0 all limits hold; 1 one does not; 2 the command line is refused.
 };
 
 /// Measures, prints, and judges.
-pub(super) fn run(words: &[String]) -> ExitCode {
+pub(super) fn run(words: &[OsString]) -> ExitCode {
     if let Err(code) = TABLE.read(words) {
         return code;
     }

@@ -1,5 +1,6 @@
 //! `oracle schedules --in-kernel`: its command line and what it prints.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use replay::Case;
@@ -13,7 +14,10 @@ use crate::qemu::{MOST_CORES, Machine, Mode};
 static IN_KERNEL: Command = Command {
     invocation: "./scripts/oracle schedules --in-kernel",
     about: "Runs reference schedules on the bare machine in QEMU and compares.",
-    positional: Some(("FILE...", "Reference schedules, as in tests/oracle.")),
+    positional: Some((
+        Takes::File("FILE..."),
+        "Reference schedules, as in tests/oracle.",
+    )),
     options: &[
         Opt::new(
             "in-kernel",
@@ -77,7 +81,7 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 };
 
 /// Runs the command with the words after `schedules`.
-pub(in crate::oracle) fn command(words: &[String]) -> ExitCode {
+pub(in crate::oracle) fn command(words: &[OsString]) -> ExitCode {
     let options = match IN_KERNEL.read(words) {
         Ok(options) => options,
         Err(code) => return code,
@@ -89,7 +93,7 @@ pub(in crate::oracle) fn command(words: &[String]) -> ExitCode {
             "the window and the guard may be a quarter of a unit at most, here {most_us} us"
         ));
     }
-    let mut cases = match read(options.positionals(), with_texts) {
+    let mut cases = match read(options.files(), with_texts) {
         Ok(cases) => cases,
         Err(reason) => return IN_KERNEL.refuse(&reason),
     };

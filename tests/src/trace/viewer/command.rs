@@ -1,9 +1,11 @@
 //! The subcommand `trace`: from a log to a file for a viewer.
 
+use std::ffi::OsString;
 use std::fs;
 use std::process::ExitCode;
 
 use super::convert;
+use crate::files::{self, Named};
 use crate::options::{Command, Opt, Parsed, Takes};
 use crate::trace::command::read_file;
 
@@ -12,14 +14,14 @@ pub static TRACE: Command = Command {
     invocation: "./scripts/trace",
     about: "Converts the traces of runs for Perfetto's viewer.",
     positional: Some((
-        "FILE",
+        Takes::File("FILE"),
         "A serial log, or another file of JSON lines, with traces: \
          `./scripts/run --trace FILE` makes one.",
     )),
     options: &[
         Opt::new(
             "out",
-            Takes::Text("FILE"),
+            Takes::File("FILE"),
             "Write to this file; else to standard output.",
         )
         .short('o'),
@@ -46,7 +48,7 @@ line, or a file without a well-formed trace with events
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
-pub fn trace(words: &[String]) -> ExitCode {
+pub fn trace(words: &[OsString]) -> ExitCode {
     let options = match TRACE.read(words) {
         Ok(options) => options,
         Err(code) => return code,
@@ -55,24 +57,31 @@ pub fn trace(words: &[String]) -> ExitCode {
         Ok(text) => text,
         Err(line) => return TRACE.refuse(&line),
     };
-    let Some(out) = options.text("out") else {
+    let Some(out) = options.path("out") else {
         print!("{text}");
         return ExitCode::SUCCESS;
     };
+    let place = files::place(out);
     match fs::write(out, text) {
         Ok(()) => {
-            eprintln!("{out}: open it at https://ui.perfetto.dev");
+            eprintln!("{place}: open it at https://ui.perfetto.dev");
             ExitCode::SUCCESS
         }
-        Err(error) => TRACE.fail(&format!("cannot write {out}: {error}")),
+        Err(error) => TRACE.fail(&format!("cannot write {place}: {error}")),
     }
 }
 
 /// Converts the runs that the options ask for.
 fn draw(options: &Parsed) -> Result<String, String> {
     let question = "which file? name a serial log with a trace";
-    let file = options.positional().ok_or(question)?;
+    let file = options.files().next().ok_or(question)?;
+    let input = Named {
+        option: "",
+        path: file,
+    };
+    files::check(&[input], &options.named(&["out"]))?;
     let mut runs = read_file(file)?;
+    let file = files::place(file);
     if let Some(number) = options.number("run") {
         let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
         runs.retain(|run| run.number == number);

@@ -1,0 +1,294 @@
+//! Files that a person names: reading what is one, and keeping what is there.
+//!
+//! An *input* is a file that a command reads, an *output* one that it writes. Before a
+//! command begins its work it calls [`check`], which promises: no output is also an
+//! input or another output, by whatever names, and each can be written. Nothing is
+//! emptied meanwhile; an output gets its new content when there is one.
+//!
+//! Inputs are read by [`read`] alone, which takes no folders, no devices, and no named
+//! pipes, which may have no end or no writer.
+
+use std::fmt::Display;
+use std::fs::{self, File, OpenOptions};
+use std::io::Read;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+use replay::shown::visible;
+
+/// The most bytes of an input: far more than a guest or a reader can use.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// A file of a command line.
+#[derive(Clone, Copy, Debug)]
+pub struct Named<'n> {
+    /// The option that names it, without its dashes; empty: it is a word of its own.
+    pub option: &'n str,
+    /// Its name.
+    pub path: &'n Path,
+}
+
+impl Named<'_> {
+    /// Returns the words that name it, for a message.
+    fn words(&self) -> String {
+        let Named { option, path } = self;
+        let place = place(path);
+        match option.is_empty() {
+            true => format!("`{place}`"),
+            false => format!("`--{option} {place}`"),
+        }
+    }
+}
+
+/// Returns a file's name for a message: all of it, visibly.
+#[must_use]
+pub fn place(path: &Path) -> String {
+    visible(&path.to_string_lossy()).to_string()
+}
+
+/// Reads an input.
+///
+/// # Errors
+///
+/// Why not, without the file's name.
+pub fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let cannot = |why: &dyn Display| format!("cannot be read: {why}");
+    let data = fs::metadata(path).map_err(|error| cannot(&error))?;
+    let kind = data.file_type();
+    if kind.is_dir() {
+        return Err(cannot(&"it is a folder"));
+    }
+    // A pipe of the shell's `<(...)` has a writer, and no place in the file system.
+    let is_open_pipe = kind.is_fifo() && path.canonicalize().is_err();
+    if !kind.is_file() && !is_open_pipe {
+        return Err(cannot(&"it is a device or a pipe"));
+    }
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|error| cannot(&error))?;
+    let too_long = || cannot(&format_args!("it is longer than {} MiB", MOST_BYTES >> 20));
+    if data.len() > MOST_BYTES {
+        return Err(too_long());
+    }
+    let all = file.take(MOST_BYTES + 1).read_to_end(&mut bytes);
+    all.map_err(|error| cannot(&error))?;
+    match bytes.len() as u64 > MOST_BYTES {
+        true => Err(too_long()),
+        false => Ok(bytes),
+    }
+}
+
+/// Reads an input that must be text, and does as [`read`] otherwise.
+///
+/// # Errors
+///
+/// As [`read`], and that it is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, String> {
+    let text = String::from_utf8(read(path)?);
+    text.map_err(|_| "is not UTF-8 text".into())
+}
+
+/// Makes sure that outputs overwrite no input and no other output, and that each can be
+/// written. What is in them stays.
+///
+/// # Errors
+///
+/// In words, with the offender: which are one file, or what cannot be written.
+pub fn check(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), String> {
+    for (position, output) in outputs.iter().enumerate() {
+        let before = inputs.iter().chain(&outputs[..position]);
+        let own = identity(output.path);
+        // A device may take what several write: it keeps nothing.
+        let is_kept = fs::metadata(output.path).map_or(true, |data| data.is_file());
+        for other in before.filter(|_| is_kept) {
+            if own.is_some() && own == identity(other.path) {
+                return Err(format!(
+                    "{} and {} are one file, which would be overwritten; name another",
+                    other.words(),
+                    output.words()
+                ));
+            }
+        }
+    }
+    outputs.iter().try_for_each(try_output)
+}
+
+/// Makes sure that no input stands twice, for it would count twice.
+///
+/// # Errors
+///
+/// In words, which two are one file.
+pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), String> {
+    let mut before: Vec<(&Path, Identity)> = Vec::new();
+    for path in inputs {
+        let Some(own) = identity(path) else {
+            continue;
+        };
+        if let Some((other, _)) = before.iter().find(|(_, identity)| *identity == own) {
+            let (other, own) = (place(other), place(path));
+            return Err(format!("`{other}` and `{own}` are one file; give it once"));
+        }
+        before.push((path, own));
+    }
+    Ok(())
+}
+
+/// What two names of one file have in common.
+#[derive(PartialEq, Eq)]
+enum Identity {
+    /// It exists: its device and its number there.
+    There(u64, u64),
+    /// It does not: the folder that it will be in, and its name there.
+    ToCome(PathBuf),
+}
+
+fn identity(path: &Path) -> Option<Identity> {
+    if let Ok(data) = fs::metadata(path) {
+        return Some(Identity::There(data.dev(), data.ino()));
+    }
+    let folder = folder_of(path).canonicalize().ok()?;
+    Some(Identity::ToCome(folder.join(path.file_name()?)))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// Makes sure that an output can be written.
+fn try_output(output: &Named<'_>) -> Result<(), String> {
+    let path = output.path;
+    let there = fs::metadata(path).ok();
+    let cannot = |why: &dyn Display| {
+        let words = output.words();
+        format!("{words}: cannot be written: {why}; name another file")
+    };
+    // To open a named pipe waits for a reader; the shell's `>(...)` has one.
+    if fs::symlink_metadata(path).is_ok_and(|data| data.file_type().is_fifo()) {
+        return Err(cannot(&"it is a named pipe"));
+    }
+    let opened = OpenOptions::new().append(true).create(true).open(path);
+    opened.map_err(|error| cannot(&error))?;
+    if there.is_none() {
+        // It was made for the trial; where a link led to nothing, at its other end.
+        let made = path.canonicalize().map_err(|error| cannot(&error))?;
+        fs::remove_file(made).map_err(|error| cannot(&error))?;
+    }
+    Ok(())
+}
+
+/// Makes sure that files can be written into a folder, which need not exist yet; nothing
+/// is left behind.
+///
+/// # Errors
+///
+/// In words, with the offender.
+pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
+    let there = output.path.ancestors().find_map(|folder| {
+        let folder = match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        };
+        fs::metadata(folder).ok().map(|data| (folder, data))
+    });
+    let why = match there {
+        Some((folder, data)) if data.is_dir() => {
+            let probe = folder.join(format!(".trial-{}", std::process::id()));
+            let trial = Named {
+                path: &probe,
+                ..*output
+            };
+            return try_output(&trial).map_err(|_| {
+                let (words, folder) = (output.words(), place(folder));
+                format!("{words}: nothing can be written into `{folder}`; name another folder")
+            });
+        }
+        Some((file, _)) => format!("`{}` is no folder", place(file)),
+        None => "there is no such folder".into(),
+    };
+    Err(format!("{}: {why}; name another folder", output.words()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MOST_BYTES, Named, check, check_folder, check_once, read};
+    use std::fs::{self, File};
+    use std::os::unix::fs::symlink;
+    use std::path::{Path, PathBuf};
+
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("{name}-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    fn named<'n>(option: &'n str, path: &'n Path) -> Named<'n> {
+        Named { option, path }
+    }
+
+    #[test]
+    fn one_file_of_two_names_is_found_and_kept() {
+        let folder = folder("one-file");
+        let (file, link, hard) = (folder.join("a"), folder.join("b"), folder.join("c"));
+        fs::write(&file, "kept").unwrap();
+        symlink(&file, &link).unwrap();
+        fs::hard_link(&file, &hard).unwrap();
+        let dotted = folder
+            .join("../")
+            .join(folder.file_name().unwrap())
+            .join("a");
+        for other in [&file, &link, &hard, &dotted] {
+            let refused = check(&[named("dag", &file)], &[named("dot", other)]).unwrap_err();
+            assert!(refused.starts_with("`--dag "), "{refused}");
+            assert!(refused.ends_with(" are one file, which would be overwritten; name another"));
+        }
+        let twice = check_once([file.as_path(), &folder, &link].into_iter()).unwrap_err();
+        assert!(twice.ends_with("/b` are one file; give it once"), "{twice}");
+        // Neither is there yet.
+        let new = folder.join("new");
+        let again = folder.join(".").join("new");
+        assert!(check(&[], &[named("dot", &new), named("serial", &again)]).is_err());
+        assert_eq!(check(&[named("", &file)], &[named("dot", &new)]), Ok(()));
+        assert!(!new.exists(), "the trial is removed");
+        assert_eq!(fs::read(&file).unwrap(), b"kept");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_found_before_the_work() {
+        let folder = folder("no-output");
+        let file = folder.join("file");
+        fs::write(&file, "kept").unwrap();
+        for path in [file.join("x"), folder.join("none/x"), folder.clone()] {
+            let refused = check(&[], &[named("out", &path)]).unwrap_err();
+            assert!(refused.contains(": cannot be written: "), "{refused}");
+        }
+        let refused = check_folder(&named("out", &file.join("x"))).unwrap_err();
+        assert!(
+            refused.ends_with("/file` is no folder; name another folder"),
+            "{refused}"
+        );
+        assert_eq!(check_folder(&named("out", &folder.join("to/come"))), Ok(()));
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn only_a_file_of_a_fair_length_is_read() {
+        let folder = folder("no-input");
+        let long = folder.join("long");
+        File::create(&long)
+            .unwrap()
+            .set_len(MOST_BYTES + 1)
+            .unwrap();
+        for (path, why) in [
+            (Path::new("/dev/zero"), "it is a device or a pipe"),
+            (&folder, "it is a folder"),
+            (&long, "it is longer than 1024 MiB"),
+        ] {
+            assert_eq!(read(path).unwrap_err(), format!("cannot be read: {why}"));
+        }
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,116 @@
+//! A command line that was understood: the value of each option.
+
+use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
+
+use replay::shown::quoted;
+
+use super::Opt;
+use crate::files::Named;
+
+/// A command line that was understood.
+#[derive(Clone, Debug)]
+pub struct Parsed {
+    values: BTreeMap<&'static str, OsString>,
+    given: Vec<&'static str>,
+    positionals: Vec<OsString>,
+}
+
+impl Parsed {
+    /// Begins with the defaults of these options.
+    pub(super) fn new(options: &[Opt]) -> Parsed {
+        let with_default = options.iter().filter(|option| !option.default.is_empty());
+        Parsed {
+            values: with_default
+                .map(|option| (option.name, option.default.into()))
+                .collect(),
+            given: Vec::new(),
+            positionals: Vec::new(),
+        }
+    }
+
+    pub(super) fn take(&mut self, name: &'static str, value: &OsStr) {
+        self.values.insert(name, value.into());
+        self.given.push(name);
+    }
+
+    pub(super) fn take_positional(&mut self, word: &OsStr) {
+        self.positionals.push(word.into());
+    }
+
+    /// Returns whether the person gave the option (or flag).
+    #[must_use]
+    pub fn is_given(&self, name: &str) -> bool {
+        self.given.contains(&name)
+    }
+
+    /// Returns the option's value or default; `None` if it has neither. For one that
+    /// takes a file there is [`path`](Self::path).
+    #[must_use]
+    pub fn text(&self, name: &str) -> Option<&str> {
+        self.values.get(name).and_then(|value| value.to_str())
+    }
+
+    /// Returns the file that the option names, or its default; `None` if it has neither.
+    #[must_use]
+    pub fn path(&self, name: &str) -> Option<&Path> {
+        self.values.get(name).map(Path::new)
+    }
+
+    /// Returns the files that options of these names name, as far as they are given.
+    #[must_use]
+    pub fn named(&self, options: &[&'static str]) -> Vec<Named<'_>> {
+        let named = options.iter().filter_map(|option| {
+            let path = self.path(option)?;
+            Some(Named { option, path })
+        });
+        named.collect()
+    }
+
+    /// Returns a number's value or default; `None` if it has neither.
+    #[must_use]
+    pub fn number(&self, name: &str) -> Option<u64> {
+        self.text(name).and_then(|value| value.parse().ok())
+    }
+
+    /// Makes sure that nothing stands twice among the values with commas between of
+    /// these options.
+    ///
+    /// # Errors
+    ///
+    /// In words, with the option and the value.
+    pub fn check_distinct(&self, options: &[&'static str]) -> Result<(), String> {
+        for option in options {
+            let mut before = Vec::new();
+            for value in self.text(option).iter().flat_map(|all| all.split(',')) {
+                if before.contains(&value) {
+                    let value = quoted(value);
+                    return Err(format!("`--{option}`: {value} stands twice; give it once"));
+                }
+                before.push(value);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the same command line with another value of an option, as if the
+    /// person had given it.
+    #[must_use]
+    pub fn with(&self, name: &'static str, value: impl AsRef<OsStr>) -> Parsed {
+        let mut other = self.clone();
+        other.take(name, value.as_ref());
+        other
+    }
+
+    /// Returns the first positional word, if one was given.
+    #[must_use]
+    pub fn positional(&self) -> Option<&str> {
+        self.positionals.first().and_then(|word| word.to_str())
+    }
+
+    /// Returns the files that the positional words name.
+    pub fn files(&self) -> impl ExactSizeIterator<Item = &Path> + Clone {
+        self.positionals.iter().map(Path::new)
+    }
+}
