@@ -12,7 +12,8 @@
 //! from 0. A *subtask* is a function in the DAG: its argument tuple is what it
 //! reads, its result tuple what it writes, one *topic* for each element. One
 //! execution of a subtask, for one job, is an *instance*. A *source* reads
-//! nothing and is started by the release, a *sink* writes nothing.
+//! nothing and is started by the release, a *sink* writes nothing. `docs/glossary.md` has
+//! all words.
 //!
 //! # A first DAG
 //!

@@ -21,6 +21,8 @@
 //! image's first instruction, with which no program of the host can be linked. An app's
 //! own functions need no kernel and run on the host (`virtual-time`).
 //!
+//! The words (*run*, *context*, *step* and others) are in `docs/glossary.md`.
+//!
 //! # Principles
 //!
 //! 1. **The scheduler decides, the kernel carries out.** `sched-dag` is told

@@ -1,7 +1,7 @@
 //! Runs DAGs built with `fass` on the host, in virtual time.
 //!
 //! For our purposes *virtual time* is a clock that jumps from one event to the
-//! next. The real functions run, with real values on real topics, under the very
+//! next (other words are in `docs/glossary.md`). The real functions run, with real values on real topics, under the very
 //! scheduler that the kernel uses; only the passing of time is made up: a
 //! function takes no time except where it says so with `fass::execute_for`. A
 //! second of a DAG's life takes about a millisecond, and every run of the same

@@ -101,10 +101,55 @@ fn the_readme_lists_every_page() {
     assert!(found > 5);
 }
 
-/// Returns the README and all pages of `docs/`, with their texts.
+/// Returns the entries of the decisions' index: number, file, and the last column.
+fn listed_decisions() -> Vec<(usize, String, String)> {
+    let index = workspace().join("docs/decisions/README.md");
+    let index = fs::read_to_string(index).expect("the index");
+    let entry = |row: &str| {
+        let (number, rest) = row.strip_prefix("| [")?.split_once("](")?;
+        let (file, rest) = rest.split_once(") | ")?;
+        let (_, successor) = rest.trim_end_matches('|').rsplit_once('|')?;
+        let number = number.parse().ok()?;
+        Some((number, file.to_string(), successor.trim().to_string()))
+    };
+    index.lines().filter_map(entry).collect()
+}
+
+#[test]
+fn the_index_lists_every_decision() {
+    let listed = listed_decisions();
+    let folder = fs::read_dir(workspace().join("docs/decisions")).expect("the decisions");
+    let names = folder
+        .flatten()
+        .map(|page| page.file_name().to_string_lossy().into_owned());
+    let mut pages: Vec<String> = names.filter(|name| name != "README.md").collect();
+    pages.sort();
+    assert!(pages.len() >= 19, "{pages:?}");
+    let files: Vec<&String> = listed.iter().map(|(_, file, _)| file).collect();
+    assert_eq!(files, pages.iter().collect::<Vec<_>>());
+    for (number, file, successor) in &listed {
+        let page = fs::read_to_string(workspace().join("docs/decisions").join(file));
+        let page = page.expect("the decision");
+        assert!(page.starts_with(&format!("# {number}. ")), "{file}");
+        assert!(file.starts_with(&format!("{number:04}-")), "{file}");
+        let is_there = |of: &str| pages.iter().any(|page| page == of);
+        let link = successor
+            .split("](")
+            .nth(1)
+            .and_then(|rest| rest.split(')').next());
+        assert!(
+            successor.is_empty() || link.is_some_and(is_there),
+            "{file}: {successor}"
+        );
+    }
+}
+
+/// Returns the README, CONTRIBUTING.md and all pages of `docs/`, with their texts.
 fn pages() -> Vec<(PathBuf, String)> {
     let docs = workspace().join("docs");
-    let mut paths = vec![workspace().join("README.md")];
+    let mut paths = ["README.md", "CONTRIBUTING.md"]
+        .map(|page| workspace().join(page))
+        .to_vec();
     for folder in [docs.clone(), docs.join("decisions")] {
         let entries = fs::read_dir(folder).expect("the pages").flatten();
         paths.extend(entries.map(|entry| entry.path()));
