@@ -1,11 +1,10 @@
 //! Whether a fault makes the app fail.
 //!
-//! An app that does not look at its runs' faults has not done what it was written
-//! for if one has ended a DAG of its, so its verdict is a failure. An app to which
-//! faults belong says so ([`Machine::accept_faults`](crate::Machine::accept_faults))
-//! and judges them by itself.
+//! An app that ignores a fault in one of its DAGs has failed, and so says its verdict. An
+//! app to which faults belong says so
+//! ([`Machine::accept_faults`](crate::Machine::accept_faults)) and judges them by itself.
 //!
-//! What else an app has to complain of goes first: it knows better.
+//! The app's own error takes precedence.
 
 use alloc::format;
 use alloc::string::String;

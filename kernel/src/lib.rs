@@ -39,9 +39,11 @@
 //! # From bottom to top
 //!
 //! `machine` (processor, interrupts, time) and `memory` know nothing of what is
-//! above. `execution` holds the scheduler, `worker` is the loop of each core,
-//! `platform` answers `fass`, [`Machine`] is what an app sees. [`console`],
-//! [`json`], [`options`] and [`report`] serve input and output.
+//! above. `contexts` keeps stacks, `trace` what has happened. `execution` holds the
+//! scheduler, `containment` decides what a fault ends, `worker` is the loop of each core,
+//! `background` what core 0 does besides. `platform` answers `fass`, [`Machine`] is what
+//! an app sees, [`Run`] what it gets from a run. [`console`], [`json`], [`options`] and
+//! [`report`] serve input and output.
 
 #![cfg_attr(not(test), no_std)]
 

@@ -177,7 +177,7 @@ impl Machine {
     /// Runs the committed DAGs until each has ended all its jobs.
     ///
     /// The calling core takes part. Progress is printed in machine lines of
-    /// kind `progress`, by an idle core. A fault ends its DAG, and makes the app
+    /// kind `progress`, by core 0's background. A fault ends its DAG, and makes the app
     /// fail (see [`accept_faults`](Self::accept_faults)).
     ///
     /// # Errors

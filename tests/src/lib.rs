@@ -1,5 +1,5 @@
-//! The host tool and the test harness: one place that starts QEMU, one that
-//! reads the serial protocol.
+//! The host tool and the test harness: one place that starts QEMU (besides
+//! `scripts/hot-path`, which logs instructions), one that reads the serial protocol.
 //!
 //! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is
 //! all it printed, lines for people and machine lines mixed. Its *ending* is
@@ -21,6 +21,8 @@
 //! - [`fault_page`], [`guide`]: pages of `docs/` that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`dot`]: committed DAGs as a picture;
+//! - [`mod@bench`]: what is measured, and compared with a baseline;
+//! - [`oracle`]: reference schedules, bounds and synchronizers;
 //! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
 //!   [`new_app`](mod@new_app): the subcommands.
 //!

@@ -1,8 +1,8 @@
 //! One row for each number of values that a join can have.
 //!
 //! The inputs of a subtask are a tuple, and the number of its elements is part of its
-//! type. Who chooses that number at run time has to write each of them once; this table
-//! writes them for all.
+//! type. To choose the number at run time, each arity must be written out; this table does
+//! it for all.
 
 /// Calls a macro with the rows `1: a;`, `2: a b;` and so on to 16: a number and as many
 /// names.

@@ -8,8 +8,8 @@ pub(crate) trait Execute: Send {
     /// Does the subtask's part of a job.
     fn run(&mut self, job: u64);
 
-    /// Lets happen what the last [`run`](Self::run) has prepared outside of its DAG,
-    /// and calls `raise` for each signal. Mostly there is nothing.
+    /// Publishes the effects that the last [`run`](Self::run) prepared outside its DAG,
+    /// and calls `raise` for each signal. Mostly there are none.
     fn complete(&mut self, raise: &mut dyn FnMut(DagId)) {
         let _ = raise;
     }

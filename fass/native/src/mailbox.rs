@@ -60,7 +60,8 @@ struct Incoming {
 }
 
 impl Mailbox {
-    /// Makes one with room for so many signals. Turn 0 of both directions is over.
+    /// Makes one with room for `signals` signals. Turn 0 is taken as already seen, in both
+    /// directions.
     pub(crate) fn new(signals: usize) -> Self {
         Self {
             outgoing: Outgoing {

@@ -124,7 +124,7 @@ impl Body {
         }
     }
 
-    /// Lets happen what the last [`run`](Self::run) has prepared outside the DAG:
+    /// Publishes the effects that the last [`run`](Self::run) prepared outside the DAG:
     /// its latest values show, and `raise` is called with the DAG of each signal.
     ///
     /// The caller does so once the instance is complete for it, at `completed_ns` on

@@ -51,7 +51,7 @@ pub(super) struct Piece {
     pub(super) value: u128,
     /// By how much it grows at least for each further nanosecond of window...
     pub(super) slope: u128,
-    /// ...for so many nanoseconds, at least 1; `None`: for ever.
+    /// ...for this many nanoseconds, at least 1; `None`: without end.
     pub(super) span: Option<u128>,
 }
 

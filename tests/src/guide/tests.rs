@@ -163,6 +163,40 @@ fn pages() -> Vec<(PathBuf, String)> {
 }
 
 #[test]
+fn the_architecture_lists_every_lock() {
+    let mut folders = vec![workspace().join("kernel/src")];
+    let mut locks = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("the kernel").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = fs::read_to_string(&path).expect("a source file");
+            let statics = text.split("static ").skip(1);
+            let names = statics.filter_map(|rest| rest.split_once(": SpinLock<"));
+            let is_name = |name: &&str| name.chars().all(|c| c.is_ascii_uppercase() || c == '_');
+            locks.extend(
+                names
+                    .map(|(name, _)| name)
+                    .filter(is_name)
+                    .map(String::from),
+            );
+        }
+    }
+    let page = workspace().join("docs/architecture.md");
+    let page = fs::read_to_string(page).expect("the page");
+    let table = page.split("| lock | protects |").nth(1).expect("the table");
+    let rows = table.lines().skip(2).take_while(|row| row.starts_with('|'));
+    let mut listed: Vec<_> = rows.filter_map(|row| row.split('`').nth(1)).collect();
+    locks.sort();
+    listed.sort_unstable();
+    assert!(locks.len() >= 5, "{locks:?}");
+    assert_eq!(listed, locks);
+}
+
+#[test]
 fn every_link_between_pages_leads_somewhere() {
     for (page, text) in pages() {
         let links = text.split("](").skip(1);

@@ -1,9 +1,9 @@
 //! Checks: properties of the whole tree, each counted as one test.
 //!
-//! They hold the promises that no unit test can: the image's weight, no
-//! package but our own, no file too long, nothing for the formatter, the linter and the documentation to complain
-//! of, a hand-off of no more instructions than its baseline, and a guest under
-//! KVM where KVM works.
+//! They hold the promises that no unit test can: the image's weight, no package but our
+//! own, no file too long, layers in order, nothing for the formatter, the linter and the
+//! documentation to complain of, a hand-off of no more instructions than its baseline, and
+//! a guest under KVM where KVM works.
 
 use std::fs;
 use std::path::PathBuf;
