@@ -224,7 +224,8 @@ impl Machine {
         let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
         let dropped = console::resume();
         if dropped > 0 {
-            crate::println!("({dropped} bytes of output did not fit in the buffer)");
+            // What was cut off has most likely lost the end of its line.
+            crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
         let ended = execution::end().ok_or_else(nothing)?;
         let run = Run::new(ended, allocations, locks, epoch_ns);

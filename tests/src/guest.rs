@@ -112,6 +112,13 @@ impl Guest {
         self
     }
 
+    /// Boots by this program in QEMU's place.
+    #[must_use]
+    pub fn program(mut self, program: &Path) -> Guest {
+        self.qemu.program = program.into();
+        self
+    }
+
     /// Leaves a file in the guest's memory.
     #[must_use]
     pub fn module(mut self, file: &Path) -> Guest {

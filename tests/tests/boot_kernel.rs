@@ -137,6 +137,7 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
         "stack_overflow",
         "write_to_code",
         "undefined_instruction",
+        "avx",
         "nmi",
         "machine_check",
         "double_fault",
@@ -155,6 +156,35 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
             .any(|line| line.starts_with("  = 0x"));
         assert!(named, "{test}\n{}", outcome.tail());
     }
+}
+
+#[test]
+fn output_that_does_not_fit_is_counted() {
+    let outcome = guest("flood").succeed();
+    let counted = outcome.serial.lines().find_map(|line| {
+        let count = line.strip_suffix(" bytes of output did not fit in the buffer)")?;
+        count.strip_prefix('(')?.parse::<u64>().ok()
+    });
+    // Of 20 lines of 1001 bytes 16 KiB wait. Those that are cut off end somewhere.
+    let counted = counted.unwrap_or_else(|| panic!("nothing is counted\n{}", outcome.tail()));
+    assert!((1..=20_020 - 16_384).contains(&counted), "{counted}");
+}
+
+#[test]
+fn stacks_that_faults_have_cost_are_missed_at_a_commit() {
+    let outcome = guest("spend_stacks").end_in(Status::Failure);
+    let refused = outcome.transcript.of_kind("commit_fault").next();
+    let refused = refused.unwrap_or_else(|| panic!("no commit is refused\n{}", outcome.tail()));
+    assert_eq!(refused.text_at("fault"), Some("not_launched"));
+    let message = refused.text_at("message").unwrap_or_default();
+    assert!(message.contains("need 3 stacks of 64 KiB"), "{message}");
+    assert!(outcome.transcript.of_kind("fault").count() > 10);
+}
+
+#[test]
+fn a_budget_does_not_count_the_time_in_which_an_instance_is_suspended() {
+    let outcome = guest("suspend").succeed();
+    assert_eq!(outcome.transcript.of_kind("fault").count(), 0);
 }
 
 #[test]

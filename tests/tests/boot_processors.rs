@@ -1,6 +1,10 @@
 //! The kernel boots with one processor and with many, on both boards.
 
-use harness::{Guest, Machine};
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+
+use harness::protocol::Status;
+use harness::{Guest, Machine, system};
 
 /// Boots the demo, short, and checks that all processors came up.
 fn boots_with(guest: Guest, cores: u64) {
@@ -51,4 +55,24 @@ fn four_processors_in_real_time() {
 fn four_processors_in_real_time_on_a_q35() {
     let guest = Guest::new("fork-join").in_real_time();
     boots_with(guest.machine(Machine::Q35), 4);
+}
+
+/// The board has no ACPI timer, and the processor does not say that it is QEMU's.
+#[test]
+fn a_machine_without_a_clock_of_known_rate_is_refused() {
+    let unknown = system::new_log("unknown").expect("a file");
+    let script = "#!/bin/bash\nexec qemu-system-x86_64 \"${@/#max/max,-hypervisor}\"\n";
+    fs::write(&unknown, script).expect("the script is written");
+    fs::set_permissions(&unknown, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    let outcome = Guest::new("fork-join")
+        .program(&unknown)
+        .end_in(Status::Failure);
+    fs::remove_file(&unknown).expect("it is ours");
+    let panic = outcome
+        .transcript
+        .of_kind("panic")
+        .next()
+        .expect("a report");
+    let message = panic.text_at("message").unwrap_or_default();
+    assert!(message.starts_with("no clock of known rate: "), "{message}");
 }

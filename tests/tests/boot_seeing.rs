@@ -1,6 +1,8 @@
 //! What people see of a guest and say to it: a conversation at the console with a
 //! guest that runs until it is told to end, its status, and its graph.
 
+use std::process::Command;
+
 use harness::json::Value;
 use harness::protocol::MachineLine;
 use harness::{Guest, Outcome};
@@ -189,6 +191,28 @@ fn each_commit_prints_its_dags_if_asked() {
         "{dot}"
     );
     assert_eq!(dot.matches("subgraph").count(), 2);
+}
+
+#[test]
+fn a_run_whose_output_goes_to_a_program_is_not_asked_for_its_status() {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
+    let words = [
+        "run",
+        "--mode",
+        "deterministic",
+        "--jobs",
+        "2",
+        "--subtasks",
+        "2",
+    ];
+    let output = run.args(words).output().expect("the tool starts");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    let words = said.lines().find(|line| line.contains("guest words: "));
+    assert!(
+        words.is_some_and(|line| !line.contains("status=")),
+        "{said}"
+    );
 }
 
 #[test]

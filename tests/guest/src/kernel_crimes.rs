@@ -4,6 +4,13 @@ use core::arch::asm;
 
 use faults::crimes::Unpunished;
 
+/// Uses a register of AVX, which the kernel does not enable.
+pub(crate) fn use_avx() -> Unpunished {
+    // SAFETY: none; the kernel has to report it (see the module).
+    unsafe { asm!("vxorps ymm0, ymm0, ymm0", out("xmm0") _) };
+    Unpunished
+}
+
 /// Raises the non-maskable interrupt that no core has sent.
 pub(crate) fn raise_nmi() -> Unpunished {
     // SAFETY: none; the kernel has to report it (see the module).

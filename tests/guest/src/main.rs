@@ -10,6 +10,7 @@ mod endless;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
+mod limits;
 mod occupation;
 mod overrun;
 mod preemption;
@@ -26,13 +27,14 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 18] = [
+const TESTS: [(&str, Test); 22] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
     ("stack_overflow", crime),
     ("write_to_code", crime),
     ("undefined_instruction", crime),
+    ("avx", |_| unpunished(kernel_crimes::use_avx())),
     ("nmi", |_| unpunished(kernel_crimes::raise_nmi())),
     ("machine_check", |_| {
         unpunished(kernel_crimes::raise_machine_check())
@@ -44,11 +46,14 @@ const TESTS: [(&str, Test); 18] = [
     ("preemption", preemption::run),
     ("occupation", occupation::run),
     ("endless", endless::run),
+    ("flood", limits::flood),
     ("large", large::run),
     ("overrun", overrun::run),
     ("sharing", sharing::run),
     ("stalled", stalled::run),
+    ("spend_stacks", limits::spend_stacks),
     ("storm", storm::run),
+    ("suspend", limits::suspend),
     ("unnoticed", unnoticed::run),
 ];
 
