@@ -18,7 +18,7 @@
 //!   [`output`]: printing without a panic;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`guest`]: all that for a test;
-//! - [`fault_page`], [`guide`]: pages of `docs/` that tests hold to their word;
+//! - [`fault_page`], [`guide`], [`promises`]: pages that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`dot`]: committed DAGs as a picture;
 //! - [`mod@bench`]: what is measured, and compared with a baseline;
@@ -54,6 +54,7 @@ pub mod oracle;
 pub mod outcome;
 pub mod places;
 pub mod probe;
+pub mod promises;
 pub mod protocol;
 pub mod qemu;
 pub mod run;
