@@ -165,7 +165,7 @@ impl Platform for HostThreads {
             .find(|dag| dag.jobs().is_none() && !dag.is_sporadic())
         {
             return Err(LaunchError::new(format!(
-                "dag `{}` has no limit of jobs and would run for ever; state one by `jobs`",
+                "dag `{}` has no limit of jobs and would run forever; state one by `jobs`",
                 endless.name()
             )));
         }

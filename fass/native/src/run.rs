@@ -153,7 +153,7 @@ fn run_watched<B: Execute, W: Watch>(
     assert!(
         dags.iter()
             .all(|dag| dag.jobs().is_some() || dag.is_sporadic()),
-        "a dag without a limit of jobs would run for ever; give each one a limit"
+        "a dag without a limit of jobs would run forever; give each one a limit"
     );
     let subtasks = dags.iter().map(|dag| dag.subtasks().len());
     assert!(

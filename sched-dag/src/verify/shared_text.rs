@@ -35,7 +35,7 @@ impl Fault {
                 users,
             } => write!(
                 f,
-                "{dag} lets {in_flight} jobs be in flight, and state `{state}` is shared by {}; \
+                "{dag} allows {in_flight} jobs in flight, and state `{state}` is shared by {}; \
                  allow 1 job in flight, or let one subtask own the state",
                 list(users)
             ),

@@ -65,7 +65,7 @@ fn a_shared_state_of_overlapping_jobs() {
     assert_fault(
         share,
         "state_over_jobs",
-        "dag `drive` lets 2 jobs be in flight, and state `pose` is shared by subtask `camera`, \
+        "dag `drive` allows 2 jobs in flight, and state `pose` is shared by subtask `camera`, \
          subtask `fuse`; allow 1 job in flight, or let one subtask own the state",
     );
 }
