@@ -335,7 +335,7 @@ impl Machine {
 /// Reports a run that a person has ended, and returns how its app ends.
 fn shutdown(run: &Run) -> Ending {
     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-        session::emit(dag, model.name(), &run.snapshot(dag));
+        session::show_counts(dag, model, &run.snapshot(dag));
     }
     match run.violations().count() {
         0 => Ending::Shutdown,

@@ -196,7 +196,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
     let settings = settings::apply(&options)?;
-    trace::create(this_core::all().len(), settings.events);
+    trace::create(this_core::all().len(), settings.events)?;
     let machine = Machine {
         options,
         module: module_bytes(info),

@@ -147,13 +147,17 @@ pub(crate) fn set_heartbeats(period_ns: u64) {
     beat(this_core::get(), clock::now_ns());
 }
 
+/// Returns the time between two heartbeats of core 0, which executes this.
+pub(crate) fn own_heartbeat_ns() -> u64 {
+    this_core::get().heartbeat_ns.load(Ordering::Relaxed)
+}
+
 /// Gives core 0, which executes this outside any instance, a heartbeat each
-/// `period_ns`. Returns what it had.
-pub(crate) fn set_own_heartbeat(period_ns: u64) -> u64 {
+/// `period_ns`.
+pub(crate) fn set_own_heartbeat(period_ns: u64) {
     let core = this_core::get();
-    let before_ns = core.heartbeat_ns.swap(period_ns, Ordering::Relaxed);
+    core.heartbeat_ns.store(period_ns, Ordering::Relaxed);
     beat(core, clock::now_ns());
-    before_ns
 }
 
 /// Returns the timer interrupts that all cores have taken since boot.

@@ -325,13 +325,13 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
     RUN.fail(&format!("failed: {}{remedy}", fault.reason))
 }
 
-/// Names whom the guest has found to run when nothing went on, if it has.
+/// Names the subtasks that the guest has found to keep their cores, if it has.
 fn stalled(transcript: &Transcript) -> String {
     let named = transcript.of_kind("stalled").filter_map(|line| {
         let (subtask, dag) = (line.text_at("subtask_name")?, line.text_at("dag_name")?);
-        let seconds = line.number_at("still_ns")? / 1_000_000_000;
+        let ms = line.number_at("still_ns")? / 1_000_000;
         Some(format!(
-            "; subtask `{subtask}` of dag `{dag}` ran for {seconds} s of its time while no job ended"
+            "; subtask `{subtask}` of dag `{dag}` kept its core for more than {ms} ms of its time"
         ))
     });
     named.collect()

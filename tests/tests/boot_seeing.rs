@@ -4,7 +4,7 @@
 use std::process::Command;
 
 use harness::json::Value;
-use harness::protocol::MachineLine;
+use harness::protocol::{MachineLine, Status};
 use harness::{Guest, Outcome};
 
 /// Waits until virtual time has gone on by asking again and again.
@@ -213,6 +213,48 @@ fn a_run_whose_output_goes_to_a_program_is_not_asked_for_its_status() {
         words.is_some_and(|line| !line.contains("status=")),
         "{said}"
     );
+}
+
+#[test]
+fn a_fast_dag_without_end_hides_no_progress_and_makes_none() {
+    let guest = Guest::new("guest-tests").word("test=busy").word("status=1");
+    let said = "console\",\"command\"";
+    let ten = "\"done\":10,\"total\":10";
+    let conversation = [
+        ("kind\":\"status\"", "help"),
+        (said, "dags"),
+        (ten, "shutdown"),
+    ];
+    let outcome = guest.conversation(&conversation).succeed();
+    let numbers = |kind: &str| -> Vec<(u64, u64)> {
+        let lines = outcome.transcript.of_kind(kind);
+        let of = |line: &MachineLine| Some((line.number_at("done")?, line.number_at("total")?));
+        lines.filter_map(of).collect()
+    };
+    let expected: Vec<(u64, u64)> = (1..=10).map(|done| (done, 10)).collect();
+    assert_eq!(numbers("progress"), expected, "{}", outcome.tail());
+    assert!(numbers("status").iter().all(|&(done, total)| done <= total));
+    // What has become of each DAG is said to people, too.
+    let left = outcome
+        .serial
+        .lines()
+        .filter(|line| line.starts_with("  dag "));
+    let left: Vec<&str> = left.skip(2).collect();
+    assert!(
+        left[1].contains("`ten`: ended; 10 jobs released, 10 completed"),
+        "{left:?}"
+    );
+}
+
+#[test]
+fn a_trace_that_memory_does_not_hold_is_refused() {
+    let guest = Guest::new("fork-join").cores(4).word("trace_events=300000");
+    let outcome = guest.end_in(Status::Usage);
+    let verdict = outcome.transcript.verdict().expect("checked before");
+    let says = verdict
+        .reason
+        .starts_with("`trace_events=300000` takes 65536 KiB on 4 cores, and ");
+    assert!(says, "{}", verdict.reason);
 }
 
 #[test]

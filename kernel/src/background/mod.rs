@@ -7,10 +7,11 @@
 //! Under overload that may be for ever, and then a person wants most to see what
 //! goes on, and to stop it. So if the background has not come to run for
 //! [`STARVED_NS`], core 0's heartbeat does a *slice* of the status and the console
-//! instead: one line, a few microseconds. The heartbeat is also what notices that a run
-//! has stalled ([`stall`]).
+//! instead: one line, a few microseconds. The heartbeat is also what notices that an
+//! instance keeps its core for long ([`stall`]).
 
 mod listener;
+mod patience;
 mod progress;
 mod stall;
 mod status;
@@ -101,19 +102,20 @@ pub(crate) struct Background {
     listener: Option<Listener>,
     /// Whether [`SLICED`] has something to do.
     is_sliced: bool,
-    /// The heartbeat that the core had before, if it has another one now.
-    heartbeat_before_ns: Option<u64>,
+    /// The heartbeat that the core had before.
+    heartbeat_before_ns: u64,
 }
 
 impl Background {
     /// Begins the background of a run of `total` jobs; 0: no one knows how many.
     pub(crate) fn begin(wishes: Wishes, total: u64) -> Self {
+        let before_ns = worker::own_heartbeat_ns();
         let periods = [
             (wishes.console.is_some() || wishes.input.is_some()).then_some(session::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
         ];
-        let period_ns = periods.into_iter().flatten().min();
-        let period_ns = period_ns.filter(|&period_ns| period_ns < worker::HEARTBEAT_NS);
+        let periods = periods.into_iter().flatten();
+        worker::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
         let is_sliced = wishes.console.is_some() || wishes.status_ns > 0;
         if is_sliced {
             *SLICED.lock() = Sliced {
@@ -124,7 +126,7 @@ impl Background {
         }
         stall::begin();
         Self {
-            heartbeat_before_ns: period_ns.map(worker::set_own_heartbeat),
+            heartbeat_before_ns: before_ns,
             progress: Progress::new(total),
             is_sliced,
             // What a person says to the console is no event.
@@ -147,9 +149,7 @@ impl Background {
 
     /// Ends it. Reports whether a person has asked for the machine to shut down.
     pub(crate) fn end(self) -> bool {
-        if let Some(before_ns) = self.heartbeat_before_ns {
-            worker::set_own_heartbeat(before_ns);
-        }
+        worker::set_own_heartbeat(self.heartbeat_before_ns);
         stall::end();
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();

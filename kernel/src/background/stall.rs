@@ -1,14 +1,16 @@
-//! Who keeps a run from going on: named once, before the host loses patience.
+//! Who keeps a core for long: named once, before the host loses patience.
 //!
-//! A subtask that never returns and has no budget keeps its core, and a run may not
-//! end because of it. So core 0's heartbeat looks now and then at what the cores
-//! have noted for reports anyway: which instance each runs, and how many jobs have
-//! ended. If neither has changed for [`STALLED_NS`] while some core runs something,
-//! the run has *stalled*, and a line says who runs. The run goes on: it may be no
-//! more than a long computation.
+//! A subtask that never returns and has no budget keeps its core, whether it loops or
+//! waits for a lock of the app's own, and a run may not end because of it. So core 0's
+//! heartbeat looks now and then at what the cores have noted for reports anyway: which
+//! instance each runs. If a core has run the same one for [`STALLED_NS`], and for
+//! longer than its WCET if that is known, a line says so, whatever the other cores do.
+//! The run goes on: it may be no more than a long computation.
 //!
 //! Between two looks nothing is counted, so this costs a run nothing. It also sees
-//! less: an instance that begins and ends between two looks.
+//! less: an instance that was preempted in between counts as if it had not been.
+
+use sched_dag::Instance;
 
 use crate::machine::clock;
 use crate::machine::spinlock::SpinLock;
@@ -16,13 +18,16 @@ use crate::machine::this_core;
 use crate::{console, execution, json};
 
 /// The time between two looks. Heartbeats may come more often.
-const LOOK_NS: u64 = 1_000_000_000;
+pub(super) const LOOK_NS: u64 = 250_000_000;
 
-/// For how long nothing may change. In an emulated processor whose clock counts
-/// instructions this may take a minute of the host's time.
-const STALLED_NS: u64 = 2_000_000_000;
+/// For how long an instance may run without a word. In an emulated processor whose
+/// clock counts instructions this may take some ten seconds of the host's time.
+const STALLED_NS: u64 = 500_000_000;
 
-/// The most instances that are named.
+/// The most cores that are looked at.
+const MOST_CORES: usize = 64;
+
+/// The most instances that are named in a run.
 const MOST_NAMED: usize = 16;
 
 /// What was seen in this run.
@@ -30,11 +35,16 @@ const MOST_NAMED: usize = 16;
 struct Watch {
     /// When to look again, on the clock; `u64::MAX` if there is no run.
     next_look_ns: u64,
-    /// Since when nothing has changed.
+    cores: [Seen; MOST_CORES],
+    named: usize,
+}
+
+/// What a core was seen to run.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    instance: Option<Instance>,
     since_ns: u64,
-    /// What stands for all that could.
-    mark: Option<u64>,
-    has_reported: bool,
+    is_named: bool,
 }
 
 static WATCH: SpinLock<Watch> = SpinLock::new(Watch::from(u64::MAX));
@@ -43,25 +53,41 @@ impl Watch {
     const fn from(now_ns: u64) -> Self {
         Self {
             next_look_ns: now_ns,
-            since_ns: now_ns,
-            mark: None,
-            has_reported: false,
+            cores: [Seen::NOTHING; MOST_CORES],
+            named: 0,
         }
     }
+}
 
-    /// Takes a look. Returns for how long nothing has changed if that is to be
-    /// reported. `mark` says how far the run is, `None` if no core runs anything.
-    fn look(&mut self, now_ns: u64, mark: Option<u64>) -> Option<u64> {
-        if mark.is_none() || mark != self.mark {
-            self.mark = mark;
-            self.since_ns = now_ns;
+impl Seen {
+    const NOTHING: Self = Self {
+        instance: None,
+        since_ns: 0,
+        is_named: false,
+    };
+
+    /// Takes a look at what the core runs. Returns it, and for how long it has run, if
+    /// it is to be named: by then it has, longer than `least_ns` says.
+    fn look(
+        &mut self,
+        now_ns: u64,
+        running: Option<Instance>,
+        least_ns: impl Fn(Instance) -> u64,
+    ) -> Option<(Instance, u64)> {
+        if running != self.instance {
+            *self = Self {
+                instance: running,
+                since_ns: now_ns,
+                is_named: false,
+            };
         }
+        let instance = running.filter(|_| !self.is_named)?;
         let still_ns = now_ns.saturating_sub(self.since_ns);
-        if self.has_reported || still_ns < STALLED_NS {
+        if still_ns < STALLED_NS || still_ns < least_ns(instance) {
             return None;
         }
-        self.has_reported = true;
-        Some(still_ns)
+        self.is_named = true;
+        Some((instance, still_ns))
     }
 }
 
@@ -84,91 +110,97 @@ pub(super) fn beat(now_ns: u64) {
         return;
     }
     watch.next_look_ns = now_ns.saturating_add(LOOK_NS);
-    let still_ns = watch.look(now_ns, mark());
-    let has_reported = watch.has_reported;
-    drop(watch);
-    if let Some(still_ns) = still_ns {
-        report(still_ns);
+    let Watch { cores, named, .. } = &mut *watch;
+    for (core, seen) in this_core::all().iter().zip(cores) {
+        if *named == MOST_NAMED {
+            break;
+        }
+        let running = execution::running(core);
+        if let Some((instance, still_ns)) = seen.look(now_ns, running, wcet_ns) {
+            *named += 1;
+            report(core.index, instance, still_ns);
+        }
     }
-    if has_reported {
+    if *named > 0 {
         // No core may ever be idle to send it.
         console::send_what_goes_at_once();
     }
 }
 
-/// Folds what the cores run and how many jobs have ended into one number, that
-/// changes whenever one of these does, but for a chance of 2^-64. `None` if no core
-/// runs anything.
-fn mark() -> Option<u64> {
-    // FNV-1a, by words instead of bytes.
-    let fold = |mark: u64, word: u64| (mark ^ word).wrapping_mul(0x100_0000_01b3);
-    let mut mark = fold(0xcbf2_9ce4_8422_2325, execution::jobs_ended());
-    let mut is_idle = true;
-    for core in this_core::all() {
-        let instance = execution::running(core);
-        is_idle &= instance.is_none();
-        mark = fold(mark, instance.map_or(u64::MAX, |of| of.dag.0.into()));
-        mark = fold(mark, instance.map_or(u64::MAX, |of| of.subtask.0.into()));
-        mark = fold(mark, instance.map_or(u64::MAX, |of| of.job));
-    }
-    (!is_idle).then_some(mark)
+/// Returns the WCET of an instance, 0 if it is not known.
+fn wcet_ns(instance: Instance) -> u64 {
+    let task_set = execution::task_set();
+    let wcet_ns = task_set.and_then(|task_set| {
+        let dag = task_set.dag(instance.dag);
+        dag.subtask(instance.subtask).wcet_ns()
+    });
+    wcet_ns.unwrap_or(0)
 }
 
-/// Says which instances run.
-fn report(still_ns: u64) {
+/// Says which instance keeps a core.
+fn report(core: u32, instance: Instance, still_ns: u64) {
     let Some(task_set) = execution::task_set() else {
         return;
     };
-    let running = this_core::all()
-        .iter()
-        .filter_map(|core| Some((core.index, execution::running(core)?)));
-    for (core, instance) in running.take(MOST_NAMED) {
-        let dag = task_set.dag(instance.dag);
-        let subtask = dag.subtask(instance.subtask).name();
-        crate::println!(
-            "stalled: no job has ended for {} s; core {core} still runs subtask `{subtask}` of \
-             DAG `{}`, job {}",
-            still_ns / 1_000_000_000,
-            dag.name(),
-            instance.job
-        );
-        json::emit("stalled", |line| {
-            line.number("dag", instance.dag.0)
-                .text("dag_name", dag.name())
-                .number("subtask", instance.subtask.0)
-                .text("subtask_name", subtask)
-                .number("job", instance.job)
-                .number("cpu", core)
-                .number("still_ns", still_ns);
-        });
-        console::send_what_goes_at_once();
-    }
+    let dag = task_set.dag(instance.dag);
+    let subtask = dag.subtask(instance.subtask).name();
+    crate::println!(
+        "stalled: subtask `{subtask}` of DAG `{}`, job {}, has kept core {core} for {} ms, \
+         and goes on",
+        dag.name(),
+        instance.job,
+        still_ns / 1_000_000
+    );
+    json::emit("stalled", |line| {
+        line.number("dag", instance.dag.0)
+            .text("dag_name", dag.name())
+            .number("subtask", instance.subtask.0)
+            .text("subtask_name", subtask)
+            .number("job", instance.job)
+            .number("cpu", core)
+            .number("still_ns", still_ns);
+    });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sched_dag::{DagId, SubtaskId};
 
-    /// Looks once a second at these marks; returns when a stall was reported.
-    fn reports(marks: &[Option<u64>]) -> Vec<u64> {
-        let mut watch = Watch::from(0);
-        let looks = (0..).zip(marks);
-        let stalled = looks.filter(|(look, mark)| watch.look(look * LOOK_NS, **mark).is_some());
-        stalled.map(|(look, _)| look).collect()
+    /// Looks at a core that runs instances of these jobs; returns at which looks one
+    /// was named.
+    fn named(jobs: &[Option<u64>], wcet_ns: u64) -> Vec<usize> {
+        let mut seen = Seen::NOTHING;
+        let looks = (0..).zip(jobs).filter(|&(look, &job)| {
+            let running = job.map(|job| Instance {
+                dag: DagId(0),
+                job,
+                subtask: SubtaskId(0),
+            });
+            seen.look(look * LOOK_NS, running, |_| wcet_ns).is_some()
+        });
+        looks
+            .map(|(look, _)| usize::try_from(look).expect("few"))
+            .collect()
     }
 
     #[test]
-    fn what_has_not_changed_for_two_seconds_is_reported_once() {
-        assert_eq!(reports(&[Some(1); 20]), [2]);
-        let moves = [1, 2, 2, 3, 3, 1, 1, 1].map(Some);
-        assert_eq!(reports(&moves), [7]);
-        assert_eq!(reports(&moves[..7]), []);
+    fn what_runs_on_and_on_is_named_once() {
+        assert_eq!(named(&[Some(1); 20], 0), [2]);
+        let moves = [1, 2, 2, 3, 3, 1, 1, 1, 1].map(Some);
+        assert_eq!(named(&moves, 0), [7]);
+        assert_eq!(named(&moves[..7], 0), []);
     }
 
     #[test]
-    fn who_waits_for_a_signal_has_not_stalled() {
-        assert_eq!(reports(&[None; 20]), []);
-        let marks = [Some(1), Some(1), None, None, None, Some(1), Some(1), None];
-        assert_eq!(reports(&marks), []);
+    fn a_core_that_waits_is_not_stalled() {
+        assert_eq!(named(&[None; 20], 0), []);
+        let jobs = [Some(1), Some(1), None, Some(1), Some(1), None, None, None];
+        assert_eq!(named(&jobs, 0), []);
+    }
+
+    #[test]
+    fn up_to_its_wcet_an_instance_may_run_without_a_word() {
+        assert_eq!(named(&[Some(1); 20], 5 * LOOK_NS), [5]);
     }
 }

@@ -6,7 +6,7 @@
 
 use sched_dag::DagId;
 
-use super::progress::is_quiet;
+use super::patience::Patience;
 use crate::machine::clock;
 use crate::{execution, json, trace};
 
@@ -20,6 +20,7 @@ pub(super) struct Status {
     total: u64,
     /// When the last line was printed.
     last_ns: u64,
+    patience: Patience,
 }
 
 impl Status {
@@ -29,15 +30,15 @@ impl Status {
             period_ns,
             total,
             last_ns: clock::now_ns(),
+            patience: Patience::new(),
         }
     }
 
-    /// Prints a line if one is due and the next event leaves time for it, or it is
-    /// not to be waited for.
+    /// Prints a line if one is due and need not wait.
     pub(super) fn print_when_due(&mut self, is_starved: bool) {
         let now_ns = clock::now_ns();
         let is_due = now_ns >= self.last_ns.saturating_add(self.period_ns);
-        if !is_due || !(is_starved || is_quiet()) {
+        if !is_due || !(is_starved || self.patience.is_over()) {
             return;
         }
         let [from_ns, to_ns] = [self.last_ns, now_ns].map(execution::since_epoch);

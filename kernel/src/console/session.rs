@@ -103,9 +103,7 @@ impl Listing {
     fn print_one(self, task_set: &TaskSet) -> Option<Listing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
         if let Some(snapshot) = execution::snapshot(dag) {
-            crate::print!("  dag {} ", dag.0);
-            (self.print)(model, &snapshot);
-            emit(dag, model.name(), &snapshot);
+            show(dag, model, &snapshot, self.print);
         }
         let next = DagId(dag.0 + 1);
         (next < self.end).then_some(Listing { next, ..self })
@@ -231,12 +229,20 @@ fn count(dag: &Dag, snapshot: &Snapshot) {
     );
 }
 
-/// Prints the machine line of a DAG.
-pub(crate) fn emit(dag: DagId, name: &str, snapshot: &Snapshot) {
+/// Prints the lines of a DAG with its counts.
+pub(crate) fn show_counts(dag: DagId, model: &Dag, snapshot: &Snapshot) {
+    show(dag, model, snapshot, count);
+}
+
+/// Prints the line of a DAG for people, of which `print` makes the rest, and its
+/// machine line.
+fn show(dag: DagId, model: &Dag, snapshot: &Snapshot, print: fn(&Dag, &Snapshot)) {
+    crate::print!("  dag {} ", dag.0);
+    print(model, snapshot);
     let of = snapshot.statistics;
     json::emit("dag_status", |line| {
         line.number("dag", dag.0)
-            .text("name", name)
+            .text("name", model.name())
             .text("state", word(snapshot.state))
             .number("released", of.released)
             .number("completed", of.completed)

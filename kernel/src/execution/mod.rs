@@ -96,7 +96,7 @@ static NEXT_EVENT_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 /// Whether all jobs of the run have ended.
 static FINISHED: AtomicBool = AtomicBool::new(false);
 
-/// Jobs that have ended in this run.
+/// Jobs of DAGs with a limit that have ended in this run.
 static JOBS_ENDED: AtomicU64 = AtomicU64::new(0);
 
 /// Prepares a plan to be run. Takes all memory that the run will need.

@@ -15,7 +15,7 @@ pub(crate) fn is_finished() -> bool {
     FINISHED.load(Ordering::Acquire)
 }
 
-/// Returns how many jobs have ended in this run.
+/// Returns how many jobs have ended in this run, of DAGs with a limit of jobs.
 pub(crate) fn jobs_ended() -> u64 {
     JOBS_ENDED.load(Ordering::Relaxed)
 }

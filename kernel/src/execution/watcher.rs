@@ -107,7 +107,8 @@ impl Observer for Watcher<'_> {
         if let Some(record) = self.books.record.job_mut(dag, job) {
             record.ended_ns = Some(now_ns);
             record.outcome = Some(outcome);
+            // A DAG without end has no record, and its jobs are no progress.
+            JOBS_ENDED.fetch_add(1, Ordering::Relaxed);
         }
-        JOBS_ENDED.fetch_add(1, Ordering::Relaxed);
     }
 }

@@ -14,10 +14,13 @@ mod ring;
 mod subject;
 
 use alloc::boxed::Box;
+use alloc::format;
 
 use sched_dag::CoreId;
 
 use crate::machine::once::Once;
+use crate::memory::heap;
+use crate::options::UsageError;
 pub(crate) use dump::{dump, latest};
 pub(crate) use load::loads_permille;
 use ring::Ring;
@@ -93,15 +96,28 @@ pub(crate) struct Event {
 static RINGS: Once<Box<[Ring]>> = Once::new();
 
 /// Makes a ring of `events` events, or up to the next power of two, for each core.
-/// With 0 nothing is recorded.
-pub(crate) fn create(cores: usize, events: usize) {
+/// With 0 nothing is recorded. Refuses what does not fit into the memory that is free.
+pub(crate) fn create(cores: usize, events: usize) -> Result<(), UsageError> {
     let capacity = match events {
         0 => 0,
         _ => events.checked_next_power_of_two().unwrap_or(events),
     };
+    let usage = heap::usage();
+    let free_kib = (usage.capacity_bytes - usage.in_use_bytes) / 1024;
+    let needed_kib = (capacity.saturating_mul(Ring::EVENT_BYTES))
+        .saturating_mul(cores)
+        .div_ceil(1024);
+    // The heap's fit wastes a little, and a run needs memory, too.
+    if needed_kib > free_kib - free_kib / 8 {
+        return Err(UsageError::new(format!(
+            "`trace_events={events}` takes {needed_kib} KiB on {cores} cores, and {free_kib} KiB \
+             of memory are free; ask for fewer events, or give the machine more memory"
+        )));
+    }
     let rings = (0..).map(CoreId).take(cores);
     // A second call would come from a second boot, which there is not.
     let _ = RINGS.set(rings.map(|core| Ring::new(core, capacity)).collect());
+    Ok(())
 }
 
 /// Where the events of all cores go.

@@ -50,6 +50,9 @@ const WHATS: [What; 16] = [
 ];
 
 impl Ring {
+    /// What an event takes.
+    pub(super) const EVENT_BYTES: usize = size_of::<[AtomicU64; 4]>();
+
     /// Makes the ring of a core, with room for `capacity` events, a power of two or 0.
     pub(super) fn new(core: CoreId, capacity: usize) -> Self {
         debug_assert!(capacity == 0 || capacity.is_power_of_two());

@@ -5,6 +5,7 @@
 
 extern crate alloc;
 
+mod busy;
 mod checksum;
 mod endless;
 #[allow(unsafe_code, reason = "what the kernel must report")]
@@ -27,7 +28,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 22] = [
+const TESTS: [(&str, Test); 23] = [
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -45,6 +46,7 @@ const TESTS: [(&str, Test); 22] = [
     ),
     ("preemption", preemption::run),
     ("occupation", occupation::run),
+    ("busy", busy::run),
     ("endless", endless::run),
     ("flood", limits::flood),
     ("large", large::run),
