@@ -1,15 +1,24 @@
 //! Text on the serial line, without disturbing what is being measured.
 //!
-//! Text goes through a bounded buffer. Outside a run it is sent at once. During
-//! a run it stays in the buffer until an idle core sends it, byte by byte, so
-//! that no subtask ever waits for a serial port; what no longer fits is dropped
-//! and counted, never silently.
+//! What is printed is made into text by the context that prints it, outside every
+//! lock (`piece`), and goes into a bounded buffer in pieces (`buffer`); the lock is
+//! held for the copy of one piece. Outside a run it is sent at once. During a run it
+//! stays in the buffer until an idle core sends it, byte by byte, so that no subtask
+//! ever waits for a serial port; what no longer fits is dropped and counted, never
+//! silently. A part of the buffer is left to the kernel's own machine lines, so that
+//! an app that floods the port cannot hide a fault.
+//!
+//! Text and machine lines are told apart: only [`json`](crate::json) can print a line
+//! that begins with `{`.
 //!
 //! With `console=on` on the command line a person can talk to the kernel during a
 //! run; that is the module `session`.
 
+mod buffer;
 mod command;
+mod emergency;
 mod input;
+mod piece;
 pub(crate) mod session;
 
 use core::fmt::{self, Write};
@@ -17,72 +26,67 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::machine::serial;
 use crate::machine::spinlock::SpinLock;
+use buffer::Buffer;
+pub(crate) use emergency::{write_in_emergency, write_line_in_emergency};
+use piece::{Kind, Pieces};
 
-const CAPACITY: usize = 16 * 1024;
-
-/// Bytes that wait to be sent, the oldest at `start`.
-struct Buffer {
-    bytes: [u8; CAPACITY],
-    start: usize,
-    length: usize,
-    dropped: u64,
-}
-
-static BUFFER: SpinLock<Buffer> = SpinLock::new(Buffer {
-    bytes: [0; CAPACITY],
-    start: 0,
-    length: 0,
-    dropped: 0,
-});
+static BUFFER: SpinLock<Buffer<{ 16 * 1024 }>> = SpinLock::new(Buffer::new());
 
 /// Whether text waits for idle cores.
 static DEFERRED: AtomicBool = AtomicBool::new(false);
 /// Whether the buffer holds anything, readable without the lock.
 static PENDING: AtomicBool = AtomicBool::new(false);
 
-impl Buffer {
-    fn push(&mut self, byte: u8) {
-        if self.length == CAPACITY {
-            if DEFERRED.load(Ordering::Relaxed) {
-                self.dropped += 1;
-                return;
-            }
-            self.send_one();
-        }
-        self.bytes[(self.start + self.length) % CAPACITY] = byte;
-        self.length += 1;
-    }
-
-    fn send_one(&mut self) {
-        if self.length > 0 {
-            serial::send(self.bytes[self.start]);
-            self.start = (self.start + 1) % CAPACITY;
-            self.length -= 1;
-        }
-    }
-}
-
-impl Write for Buffer {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        text.bytes().for_each(|byte| self.push(byte));
-        Ok(())
-    }
-}
-
-/// Writes text; what one call writes stays together. For [`print!`](crate::print).
+/// Writes text. What one call writes stays together, up to 1 KiB of it. A line that
+/// begins with `{` gets a blank before it. For [`print!`](crate::print).
 ///
 /// ```no_run
 /// kernel::println!("{} jobs", 3); // calls it
 /// ```
 pub fn write(text: fmt::Arguments<'_>) {
-    let mut buffer = BUFFER.lock();
+    write_as(Kind::Text, text);
+}
+
+/// Writes a machine line and its end, on a line of its own.
+pub(crate) fn write_line(is_kernels: bool, line: &dyn fmt::Display) {
+    let kind = if is_kernels {
+        Kind::KernelLine
+    } else {
+        Kind::Line
+    };
+    write_as(kind, format_args!("{line}"));
+}
+
+fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
+    let mut fits = true;
+    let mut pieces = Pieces::new(kind, |piece, begins| {
+        // What comes after a gap would only look like something else.
+        fits = hand_over(piece, kind, begins, fits);
+    });
     // Only a `Display` that fails of its own accord can fail here; its text up
     // to there is then all there is to show.
-    let _ = buffer.write_fmt(text);
-    PENDING.store(buffer.length > 0, Ordering::Release);
-    drop(buffer);
+    let _ = pieces.write_fmt(text);
+    pieces.end();
     if !DEFERRED.load(Ordering::Relaxed) {
         while send_pending_byte() {}
+    }
+}
+
+/// Puts a piece into the buffer, or counts it as dropped: if it does not fit, or is not
+/// `wanted`. Reports whether it is in the buffer.
+fn hand_over(piece: &[u8], kind: Kind, begins: bool, wanted: bool) -> bool {
+    loop {
+        let mut buffer = BUFFER.lock();
+        if wanted && buffer.take(piece, kind, begins) {
+            PENDING.store(true, Ordering::Release);
+            return true;
+        }
+        if !wanted || DEFERRED.load(Ordering::Relaxed) || buffer.is_empty() {
+            buffer.dropped += piece.len() as u64;
+            return false;
+        }
+        drop(buffer);
+        send_pending_byte();
     }
 }
 
@@ -91,16 +95,24 @@ pub(crate) fn has_pending() -> bool {
     PENDING.load(Ordering::Acquire)
 }
 
-/// Sends one byte that waits, if any, and reports whether it did.
+/// Sends one byte that waits, if any, and reports whether there was one. It waits for
+/// the port, with interrupts and locks as they are.
 pub(crate) fn send_pending_byte() -> bool {
     if !has_pending() {
         return false;
     }
+    let was_ready = serial::wait_until_ready();
     let mut buffer = BUFFER.lock();
-    let any = buffer.length > 0;
-    buffer.send_one();
-    PENDING.store(buffer.length > 0, Ordering::Release);
-    any
+    if was_ready && !serial::is_ready() {
+        // Another core was faster. It is not waited for with the lock held.
+        return true;
+    }
+    let byte = buffer.pop();
+    if let Some(byte) = byte {
+        serial::write(byte);
+    }
+    PENDING.store(!buffer.is_empty(), Ordering::Release);
+    byte.is_some()
 }
 
 /// Sends bytes that wait for as long as the port takes them without a wait; not
@@ -127,33 +139,16 @@ pub(crate) fn resume() -> u64 {
     core::mem::take(&mut BUFFER.lock().dropped)
 }
 
-/// Writes straight to the port when nothing else may be relied on.
-///
-/// To be used only when all other cores are stopped: one of them, or the caller
-/// itself, may hold the buffer's lock forever.
-pub(crate) fn write_in_emergency(text: fmt::Arguments<'_>) {
-    struct Port;
-    impl Write for Port {
-        fn write_str(&mut self, text: &str) -> fmt::Result {
-            text.bytes().for_each(serial::send);
-            Ok(())
-        }
-    }
-    if let Some(mut buffer) = BUFFER.try_lock() {
-        while buffer.length > 0 {
-            buffer.send_one();
-        }
-    }
-    let _ = Port.write_fmt(text);
-}
-
 /// Prints text on the serial line.
+///
+/// What is printed is made into text by the caller's context, so a `Display` that
+/// panics or takes long is the caller's own affair.
 #[macro_export]
 macro_rules! print {
     ($($text:tt)*) => { $crate::console::write(format_args!($($text)*)) };
 }
 
-/// Prints a line of text on the serial line.
+/// Prints a line of text on the serial line, as [`print!`](crate::print) does.
 #[macro_export]
 macro_rules! println {
     () => { $crate::print!("\n") };

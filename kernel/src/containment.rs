@@ -14,15 +14,19 @@ use core::fmt::{self, Display};
 use core::panic::PanicInfo;
 use core::time::Duration;
 
-use alloc::string::ToString;
-
 use sched_dag::Instance;
 
+use crate::excerpt::Excerpt;
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu, this_core};
 use crate::{contexts, execution, json, worker};
+
+/// How much of a panic's message is shown, and of a name, in bytes. With these a
+/// report's machine line stays together, see `console`.
+const MESSAGE_BYTES: usize = 400;
+const NAME_BYTES: usize = 60;
 
 /// What happened, as the report says it.
 struct Fault<'a> {
@@ -46,10 +50,11 @@ pub(crate) fn end_panicked(info: &PanicInfo<'_>) {
     };
     cpu::enable_interrupts();
     // The message is made into text before any lock is taken, as that is the
-    // app's code once more. A panic in it comes here a second time.
-    let message = match context.note_fault() {
-        false => info.message().to_string(),
-        true => "it panicked again while its message was made".into(),
+    // app's code once more. A panic in it comes here a second time. There may be no
+    // memory left, so none is taken from here on.
+    let message: Excerpt<MESSAGE_BYTES> = match context.note_fault() {
+        false => Excerpt::of(info.message()),
+        true => Excerpt::of("it panicked again while its message was made"),
     };
     report(
         instance,
@@ -118,6 +123,8 @@ pub(crate) fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
 
 /// Ends this core's instance, whose context a handler has interrupted.
 fn end_interrupted(interrupted: &mut Interrupted, now_ns: u64) {
+    // From here on the locks that it holds are lost.
+    this_core::get().context().note_fault();
     execution::fail(now_ns);
     contexts::lose();
     // The context is leaked: what lies on its stack stays valid for ever.
@@ -142,13 +149,17 @@ fn report(instance: Instance, fault: &Fault<'_>) {
     } = fault;
     let core = this_core::get().index;
     // No lock is held by code that has interrupts enabled.
-    let (dag, subtask) = execution::names(instance);
+    let task_set = execution::task_set();
+    let dag = task_set.as_ref().map(|model| model.dag(instance.dag));
+    let subtask = dag.map(|dag| dag.subtask(instance.subtask));
+    let dag = Excerpt::<NAME_BYTES>::of(dag.map_or("", |dag| dag.name()));
+    let subtask = Excerpt::<NAME_BYTES>::of(subtask.map_or("", |subtask| subtask.name()));
     crate::println!(
         "fault: {cause} in subtask `{subtask}` of DAG `{dag}`, job {}, on core {core}: {message}; \
          at {place}; the DAG is ended",
         instance.job
     );
-    json::emit("fault", |line| {
+    json::report("fault", |line| {
         line.text("cause", cause)
             .number("dag", instance.dag.0)
             .text("dag_name", &dag)

@@ -15,6 +15,10 @@ use crate::memory::{self, OutOfMemory};
 /// The stack of each context, in bytes.
 pub(crate) const STACK_BYTES: u64 = 64 * 1024;
 
+/// The stack of the context that runs the app's main function, in bytes. That evaluates
+/// whole runs, also in builds without optimization.
+const MAIN_STACK_BYTES: u64 = 256 * 1024;
+
 #[derive(Debug)]
 struct Stock {
     free: Vec<Parked>,
@@ -29,7 +33,11 @@ static STOCK: SpinLock<Stock> = SpinLock::new(Stock {
 
 /// Makes a context with a stack of its own.
 pub(crate) fn create(is_background: bool) -> Result<Parked, OutOfMemory> {
-    Ok(Parked::new(memory::new_stack(STACK_BYTES)?, is_background))
+    let bytes = match is_background {
+        true => MAIN_STACK_BYTES,
+        false => STACK_BYTES,
+    };
+    Ok(Parked::new(memory::new_stack(bytes)?, bytes, is_background))
 }
 
 /// Makes sure that there are `total` contexts in the stock or in use from it.

@@ -2,8 +2,13 @@
 //!
 //! `docs/serial-protocol.md` lists the kinds. An object is described by a
 //! closure that names its fields, so printing one allocates nothing.
+//!
+//! A run is judged by some of the kinds ([`KERNELS`]). Those are the kernel's to print:
+//! it [`report`]s, apps [`emit`].
 
 use core::fmt::{self, Display, Formatter};
+
+use crate::console;
 
 /// Writes the fields of one object.
 ///
@@ -82,7 +87,7 @@ impl Object<'_, '_> {
         self.first = false;
         self.result = self
             .result
-            .and_then(|()| write!(self.out, "{separator}\"{name}\":"))
+            .and_then(|()| write!(self.out, "{separator}{}:", quoted(name)))
             .and_then(|()| value(self.out));
         self
     }
@@ -143,15 +148,41 @@ pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
     })
 }
 
+/// The kinds by which a run is judged.
+const KERNELS: [&str; 7] = [
+    "boot",
+    "commit_fault",
+    "exception",
+    "fault",
+    "panic",
+    "stalled",
+    "verdict",
+];
+
 /// Prints a machine line of kind `kind`.
+///
+/// # Panics
+///
+/// If the kind is the kernel's: `boot`, `commit_fault`, `exception`, `fault`, `panic`,
+/// `stalled` or `verdict`.
 ///
 /// ```no_run
 /// kernel::json::emit("run", |line| {
 ///     line.number("jobs", 3_u64);
 /// });
 /// ```
+#[track_caller]
 pub fn emit(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
-    crate::println!("{}", line(kind, fields));
+    assert!(
+        !KERNELS.contains(&kind),
+        "a machine line of kind `{kind}` is the kernel's to print; choose another kind"
+    );
+    console::write_line(false, &line(kind, fields));
+}
+
+/// Prints a machine line of the kernel's own, of any kind.
+pub(crate) fn report(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
+    console::write_line(true, &line(kind, fields));
 }
 
 #[cfg(test)]
@@ -180,6 +211,12 @@ mod tests {
             line.to_string(),
             r#"{"kind":"trace","events":[[1,2],[3]],"none":[]}"#
         );
+    }
+
+    #[test]
+    #[should_panic = "a machine line of kind `verdict` is the kernel's to print"]
+    fn refuses_an_app_what_the_run_is_judged_by() {
+        emit("verdict", |_| ());
     }
 
     #[test]

@@ -58,6 +58,7 @@ mod ending;
 #[doc(hidden)]
 pub mod entry;
 mod event;
+mod excerpt;
 mod execution;
 mod fault_verdict;
 mod graph;

@@ -4,16 +4,16 @@
 //! such as the publish/subscribe baseline that DAGs are compared with, where
 //! several cores change one state.
 //!
-//! The holder runs with interrupts off, as with the kernel's own locks, because a
-//! holder that were preempted would block every core that wants the lock. So a
-//! section delays whatever its core should do next: keep it short and bounded. A
-//! panic in a section is the kernel's, not the subtask's: nothing contains it.
+//! The holder is not preempted, or else it would block every core that wants the lock.
+//! So a section delays whatever its core should do next: keep it short. One that takes
+//! longer than 1 ms is preempted all the same.
+//!
+//! A fault in a section ends the holder's DAG, as anywhere, and the lock is lost with
+//! it: the data may be half changed. An instance that waits for it, or takes it later, panics.
 
-use crate::machine::spinlock::SpinLock;
+use crate::machine::section::{Guarded, Refusal};
 
-/// Data that one core at a time may use.
-///
-/// Waiting cores get their turn in the order in which they came.
+/// Data that one instance at a time may use.
 ///
 /// ```no_run
 /// use kernel::Lock;
@@ -28,7 +28,7 @@ use crate::machine::spinlock::SpinLock;
 /// }
 /// ```
 #[derive(Debug)]
-pub struct Lock<T>(SpinLock<T>);
+pub struct Lock<T>(Guarded<T>);
 
 impl<T> Lock<T> {
     /// Makes a lock that is free.
@@ -36,16 +36,29 @@ impl<T> Lock<T> {
     /// See [`Lock`].
     #[must_use]
     pub const fn new(data: T) -> Self {
-        Self(SpinLock::new(data))
+        Self(Guarded::new(data))
     }
 
-    /// Waits for the data's turn and lends it to `section`.
+    /// Waits until nobody uses the data and lends it to `section`.
     ///
-    /// A section that takes the same lock again waits forever.
+    /// # Panics
+    ///
+    /// If the caller is in a section of this lock already, or a fault has ended an
+    /// instance that was.
     ///
     /// See [`Lock`].
     #[track_caller]
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
-        section(&mut self.0.lock())
+        match self.0.with(section) {
+            Ok(result) => result,
+            Err(Refusal::HeldByCaller) => {
+                panic!(
+                    "a lock is taken by its holder, which would wait for ever; end the section first"
+                )
+            }
+            Err(Refusal::HolderEnded) => {
+                panic!("a fault has ended a section of this lock; its data may be half changed")
+            }
+        }
     }
 }

@@ -7,10 +7,11 @@
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 
-use crate::console::write_in_emergency;
+use crate::console::{write_in_emergency, write_line_in_emergency};
 use crate::containment;
+use crate::excerpt::Excerpt;
 use crate::machine::context::Registers;
 use crate::machine::fault::{self, Exception};
 use crate::machine::interrupt::Interrupted;
@@ -20,7 +21,14 @@ use crate::{execution, json, trace};
 /// The most recent events of this core that a report shows.
 const EVENTS_SHOWN: usize = 16;
 
-static PANICKING: AtomicBool = AtomicBool::new(false);
+/// How much of the message is shown, in bytes.
+const MESSAGE_BYTES: usize = 2048;
+
+/// The core whose report this is, `NOBODY` before there is one.
+static REPORTING: AtomicU32 = AtomicU32::new(NOBODY);
+const NOBODY: u32 = u32::MAX;
+/// Stands for a core whose report has failed.
+const FAILED: u32 = NOBODY - 1;
 
 /// Ends the subtask that panics, or else the run.
 pub(crate) fn panic(info: &PanicInfo<'_>) -> ! {
@@ -39,20 +47,32 @@ pub(crate) fn exception(exception: &Exception<'_>, interrupted: &mut Interrupted
 
 fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option<&Registers>) -> ! {
     cpu::disable_interrupts();
-    if PANICKING.swap(true, Ordering::AcqRel) {
-        // Either another core reports already and is about to stop this one, or
-        // this core's own report has failed.
-        exit::exit(exit::Status::Failure);
-    }
     let core = this_core::is_ready().then(this_core::get);
+    let index = core.map_or(0, |core| core.index);
+    let mine = REPORTING.compare_exchange(NOBODY, index, Ordering::AcqRel, Ordering::Acquire);
+    match mine {
+        Ok(_) => {}
+        // What the message is made of panics itself.
+        Err(reporting) if reporting == index => {
+            REPORTING.store(FAILED, Ordering::Release);
+            write_in_emergency(format_args!(
+                "(a second {what} in the report)\n  at {place}\n"
+            ));
+            give_verdict(what)
+        }
+        Err(FAILED) => exit::exit(exit::Status::Failure),
+        // Another core reports, and is about to stop this one.
+        Err(_) => cpu::halt_forever(),
+    }
     if core.is_some() {
         fault::stop_others();
     }
-    let index = core.map_or(0, |core| core.index);
     let instance = core.and_then(execution::running);
     write_in_emergency(format_args!(
-        "\nkernel {what} on core {index}: {message}\n  at {place}\n"
+        "\nkernel {what} on core {index}\n  at {place}\n"
     ));
+    let message = Excerpt::<MESSAGE_BYTES>::of(message);
+    write_in_emergency(format_args!("  {message}\n"));
     if let Some(instance) = instance {
         write_in_emergency(format_args!("  in {instance}\n"));
         execution::try_names(instance, |dag, subtask| {
@@ -74,12 +94,17 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
                 .number("subtask", instance.subtask.0)
                 .number("job", instance.job);
         }
-        line.text("place", place).text("message", message);
+        line.text("place", place).text("message", &message);
     });
-    write_in_emergency(format_args!("{line}\n"));
+    write_line_in_emergency(&line);
+    give_verdict(what)
+}
+
+/// Says that the run has failed, and ends it.
+fn give_verdict(what: &str) -> ! {
     let verdict = json::line("verdict", |line| {
         line.text("status", "failure").text("reason", what);
     });
-    write_in_emergency(format_args!("{verdict}\n"));
+    write_line_in_emergency(&verdict);
     exit::exit(exit::Status::Failure)
 }

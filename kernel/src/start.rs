@@ -123,7 +123,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
     // A second installation would come from a second boot, which there is not.
     let _ = fass::install(&KERNEL);
     let command_line = info.command_line().unwrap_or("(not UTF-8)");
-    json::emit("boot", |line| {
+    json::report("boot", |line| {
         line.text("version", env!("CARGO_PKG_VERSION"))
             .text("app", name)
             .number("cpus", cores as u64)
@@ -161,7 +161,7 @@ fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u8, Stacks
         let stacks = stacks(index == 0);
         (
             id,
-            stacks.expect("each core needs 144 KiB of memory for stacks"),
+            stacks.expect("each core needs 144 KiB of memory for stacks, the first one 336 KiB"),
         )
     })
 }
@@ -219,7 +219,7 @@ fn end(result: Result<(), Ending>) -> ! {
     };
     if let Err(Ending::Commit(error)) = &result {
         for fault in error.faults() {
-            json::emit("commit_fault", |line| {
+            json::report("commit_fault", |line| {
                 line.text("fault", fault.code()).text("message", fault);
             });
         }
@@ -227,7 +227,7 @@ fn end(result: Result<(), Ending>) -> ! {
     if let Err(ending) = &result {
         println!("{ending}");
     }
-    json::emit("verdict", |line| {
+    json::report("verdict", |line| {
         line.text("status", word);
         if let Err(ending) = &result
             && status != exit::Status::Success

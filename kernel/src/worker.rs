@@ -9,7 +9,7 @@ use crate::machine::context::{Context, Parked};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu};
+use crate::machine::{clock, cpu, section};
 use crate::{background, console, containment, contexts};
 
 /// The time between two signs of life of core 0. Without any alarm anywhere a
@@ -127,6 +127,9 @@ pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {
     }
     if timer::take_due(Alarm::Budget, now_ns) {
         containment::end_overrun(interrupted, now_ns);
+    }
+    if section::has_put_off(core) {
+        execution::interrupt(interrupted, now_ns, false);
     }
     timer::arm_earliest();
 }

@@ -109,6 +109,16 @@ impl Outcome {
             status: Status::Failure,
             reason,
         };
+        // A kernel that ends says so. Its status alone is one that the app has made.
+        let is_odd = matches!(self.ending, Ending::Status(status) if status > 1 && status % 2 == 1);
+        if (is_odd || matches!(self.ending, Ending::Guest(_)))
+            && self.transcript.of_kind("verdict").next().is_none()
+        {
+            return Err(failure(format!(
+                "{}, but the kernel gave no verdict: the app has written to QEMU's exit port itself",
+                self.ending
+            )));
+        }
         let Ending::Guest(by_exit) = self.ending else {
             // QEMU obeys such a signal and ends with the status of a shutdown.
             let mut reason = match self.complaints.contains("terminating on signal") {
@@ -208,10 +218,17 @@ mod tests {
     fn a_run_is_good_only_if_both_witnesses_say_so() {
         let success = Ending::Guest(Status::Success);
         assert_eq!(outcome(success.clone(), SUCCESS).judge(), Ok(()));
+        let by_itself =
+            "but the kernel gave no verdict: the app has written to QEMU's exit port itself";
         assert_eq!(
             reason(success.clone(), ""),
-            "the guest printed no verdict line"
+            format!("the guest ended in success, {by_itself}")
         );
+        assert_eq!(
+            reason(Ending::Status(5), "text\n"),
+            format!("QEMU ended with status 5, {by_itself}")
+        );
+        assert_eq!(reason(Ending::Status(1), ""), "QEMU ended with status 1");
         assert_eq!(
             reason(success, USAGE),
             "the verdict line says Usage, QEMU's exit status Success"

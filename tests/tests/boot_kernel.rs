@@ -190,7 +190,7 @@ fn a_budget_does_not_count_the_time_in_which_an_instance_is_suspended() {
 #[test]
 fn every_commit_fault_is_printed_as_documented() {
     let outcome = guest("commit_faults").succeed();
-    let lines = outcome.transcript.of_kind("commit_fault");
+    let lines = outcome.transcript.of_kind("provoked");
     let printed: BTreeMap<String, String> = lines
         .map(|line| {
             let text = |name| line.text_at(name).unwrap_or_default().to_string();

@@ -38,17 +38,23 @@ pub const JOBS: u64 = 30;
 /// Builds the DAG that must not notice anything.
 #[must_use]
 pub fn healthy() -> Dag {
-    pipeline("healthy", 0, None)
+    pipeline("healthy", 0, None, Some(BUDGET))
 }
 
 /// Builds the DAG that commits `crime` in its job [`FATAL_JOB`].
 #[must_use]
 pub fn doomed(crime: Crime) -> Dag {
-    pipeline("doomed", 1, Some(crime))
+    pipeline("doomed", 1, Some(crime), Some(BUDGET))
 }
 
-/// Builds source -> middle -> sink.
-fn pipeline(name: &str, priority: u32, crime: Option<Crime>) -> Dag {
+/// Builds the same DAG, with all the time it wants for its crime.
+#[must_use]
+pub fn doomed_at_leisure(crime: Crime) -> Dag {
+    pipeline("doomed", 1, Some(crime), None)
+}
+
+/// Builds source -> middle -> sink; the middle has a WCET if it has a budget.
+fn pipeline(name: &str, priority: u32, crime: Option<Crime>, budget: Option<Duration>) -> Dag {
     let dag = create_dag();
     dag.name(name).jobs(JOBS);
     let attributes = |part: &str| SubtaskAttributes::named(part).priority(priority);
@@ -69,7 +75,10 @@ fn pipeline(name: &str, priority: u32, crime: Option<Crime>) -> Dag {
         }
         (job,)
     };
-    let middle = attributes("process").wcet(EXECUTION).budget(BUDGET);
+    let middle = match budget {
+        Some(budget) => attributes("process").wcet(EXECUTION).budget(budget),
+        None => attributes("process"),
+    };
     dag.register_subtask(process, vec![&input], vec![&output], middle);
     dag.register_sink_subtask(
         |(_,): (u64,)| (),
@@ -88,7 +97,7 @@ mod tests {
     #[test]
     fn both_meet_every_deadline_without_a_crime() {
         let machine = VirtualTime::new().cores(1);
-        fass::finish_create_dags(&[healthy(), pipeline("doomed", 1, None)]).unwrap();
+        fass::finish_create_dags(&[healthy(), pipeline("doomed", 1, None, None)]).unwrap();
         let report = machine.run();
         let misses: u64 = report.statistics.iter().map(|of_dag| of_dag.misses).sum();
         assert_eq!((report.jobs.len(), misses), (60, 0));

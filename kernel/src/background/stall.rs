@@ -151,7 +151,7 @@ fn report(core: u32, instance: Instance, still_ns: u64) {
         instance.job,
         still_ns / 1_000_000
     );
-    json::emit("stalled", |line| {
+    json::report("stalled", |line| {
         line.number("dag", instance.dag.0)
             .text("dag_name", dag.name())
             .number("subtask", instance.subtask.0)

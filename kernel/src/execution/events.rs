@@ -19,7 +19,7 @@ use super::{EPOCH_NS, EXECUTION, Event, NEXT_EVENT_NS, Work};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, this_core};
+use crate::machine::{clock, section, this_core};
 use crate::trace::{Recorder, Subject, What};
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
@@ -150,7 +150,9 @@ pub(crate) fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bo
     if is_event {
         woken = execution.step(now_ns, Event::Time);
     }
-    if let Some(waiting) = execution.follow(interrupted, now_ns) {
+    if !section::puts_off(this_core::get(), now_ns)
+        && let Some(waiting) = execution.follow(interrupted, now_ns)
+    {
         woken.insert(waiting.0);
     }
     drop(place);

@@ -40,7 +40,7 @@ pub(crate) use runner::Runner;
 use signals::Signals;
 pub(crate) use signals::raise;
 pub(crate) use status::{
-    budget_ns, is_finished, jobs_ended, lock_acquisitions, names, next_event_ns, running, try_names,
+    budget_ns, is_finished, jobs_ended, lock_acquisitions, next_event_ns, running, try_names,
 };
 
 /// What a core is to do next.

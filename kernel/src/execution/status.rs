@@ -2,8 +2,6 @@
 
 use core::sync::atomic::Ordering;
 
-use alloc::string::String;
-
 use sched_dag::Instance;
 
 use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS, books};
@@ -42,20 +40,6 @@ pub(crate) fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
     if let (Some(dag), Some(subtask)) = (dag, subtask) {
         with(dag.name(), subtask.name());
     }
-}
-
-/// Returns copies of the names of an instance's DAG and subtask.
-pub(crate) fn names(instance: Instance) -> (String, String) {
-    let place = EXECUTION.lock();
-    let dag = place
-        .as_ref()
-        .map(|execution| execution.task_set().dag(instance.dag));
-    dag.map_or_else(Default::default, |dag| {
-        (
-            dag.name().into(),
-            dag.subtask(instance.subtask).name().into(),
-        )
-    })
 }
 
 /// Returns the instance that a core runs, without the lock.

@@ -15,6 +15,8 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
+use super::section::Sections;
+
 /// The general registers as `interrupt.s` and the processor push them.
 #[derive(Debug, Default)]
 #[repr(C)]
@@ -107,6 +109,7 @@ const _: () = {
 pub(crate) struct Context {
     save_area: UnsafeCell<SaveArea>,
     stack_top: u64,
+    stack_bytes: u64,
     is_background: bool,
     /// When it was last suspended, and for how long it has been in all before.
     suspended_at_ns: AtomicU64,
@@ -116,6 +119,7 @@ pub(crate) struct Context {
     budget_end_ns: AtomicU64,
     /// Whether what it runs has been found at fault.
     is_at_fault: AtomicBool,
+    sections: Sections,
 }
 
 // SAFETY: everything but the save area is constant or atomic, and the save area
@@ -136,6 +140,13 @@ impl Context {
     /// Returns the upper end of the context's stack.
     pub(crate) const fn stack_top(&self) -> u64 {
         self.stack_top
+    }
+
+    /// Returns the size of the context's stack if `address` lies in it, or in the guard
+    /// page below.
+    pub(super) fn stack_bytes_at(&self, address: u64) -> Option<u64> {
+        let below = self.stack_top.checked_sub(address)?;
+        (below <= self.stack_bytes + super::paging::PAGE).then_some(self.stack_bytes)
     }
 
     /// Reports whether this is what its core does when nothing is assigned to it.
@@ -159,6 +170,16 @@ impl Context {
         self.is_at_fault.swap(true, Ordering::Relaxed)
     }
 
+    /// Reports whether what the context runs has been found at fault.
+    pub(super) fn is_at_fault(&self) -> bool {
+        self.is_at_fault.load(Ordering::Relaxed)
+    }
+
+    /// Returns what the context notes of its sections.
+    pub(super) const fn sections(&self) -> &Sections {
+        &self.sections
+    }
+
     /// Returns for how long the context has been suspended since it was made.
     pub(crate) fn suspended_ns(&self) -> u64 {
         self.suspended_ns.load(Ordering::Relaxed)
@@ -170,9 +191,9 @@ impl Context {
 pub(crate) struct Parked(&'static Context);
 
 impl Parked {
-    /// Makes a context with the stack that grows down from `stack_top`, which
-    /// must be a multiple of 16. It has nothing to do yet.
-    pub(crate) fn new(stack_top: u64, is_background: bool) -> Self {
+    /// Makes a context with the stack of `stack_bytes` that grows down from `stack_top`,
+    /// which must be a multiple of 16. It has nothing to do yet.
+    pub(crate) fn new(stack_top: u64, stack_bytes: u64, is_background: bool) -> Self {
         /// The state after FNINIT, and MXCSR's state after reset (Intel SDM 1,
         /// 8.1.5 and 10.2.3): every exception masked, full precision.
         const CONTROL: [(usize, [u8; 2]); 2] = [(0, [0x7f, 0x03]), (24, [0x80, 0x1f])];
@@ -187,11 +208,13 @@ impl Parked {
         Self(Box::leak(Box::new(Context {
             save_area: UnsafeCell::new(save_area),
             stack_top,
+            stack_bytes,
             is_background,
             suspended_at_ns: AtomicU64::new(0),
             suspended_ns: AtomicU64::new(0),
             budget_end_ns: AtomicU64::new(u64::MAX),
             is_at_fault: AtomicBool::new(false),
+            sections: Sections::new(),
         })))
     }
 

@@ -23,6 +23,16 @@ pub(crate) fn disable_interrupts() -> bool {
     were_enabled
 }
 
+/// Touches the stack where what comes next will not reach beyond: if it is too short for
+/// that, it overflows here and not there.
+pub(crate) fn probe_stack() {
+    // SAFETY: reads a byte below the stack, which is the stack's own or its guard page's.
+    unsafe { asm!("test byte ptr [rsp - {}], 0", const STACK_FOR_A_SECTION, options(nostack)) };
+}
+
+/// More than any section under a lock takes, in bytes; less than a page.
+const STACK_FOR_A_SECTION: usize = 2048;
+
 /// Disables interrupts where they are known to be enabled.
 #[track_caller]
 pub(crate) fn disable_enabled_interrupts() {

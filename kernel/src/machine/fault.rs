@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::context::Registers;
 use super::interrupt::{Handlers, Interrupted};
-use super::{cpu, local_apic};
+use super::{cpu, local_apic, this_core};
 
 /// The non-maskable interrupt: another core stops this one, or the board has
 /// something terrible to say.
@@ -91,6 +91,12 @@ impl fmt::Display for Exception<'_> {
         }
         if self.is_stack_overflow() {
             f.write_str(", a stack overflow")?;
+            let bytes = this_core::get()
+                .context()
+                .stack_bytes_at(self.registers.rsp);
+            if let Some(bytes) = bytes {
+                write!(f, " (the stack has {} KiB)", bytes / 1024)?;
+            }
         }
         let Registers {
             error_code, rsp, ..

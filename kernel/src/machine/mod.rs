@@ -20,6 +20,7 @@ pub(crate) mod once;
 pub(crate) mod paging;
 pub(crate) mod port;
 pub(crate) mod processors;
+pub(crate) mod section;
 pub(crate) mod serial;
 pub(crate) mod spinlock;
 pub(crate) mod this_core;

@@ -28,18 +28,29 @@ pub(crate) fn initialize() {
 }
 
 /// Sends one byte, waiting until there is room for it.
+pub(crate) fn send(byte: u8) {
+    wait_until_ready();
+    write(byte);
+}
+
+/// Waits until a byte can be sent, and reports whether it can.
 ///
 /// The wait is bounded: a port that never gets ready (because there is none)
 /// costs its bytes, not the kernel.
-pub(crate) fn send(byte: u8) {
+pub(crate) fn wait_until_ready() -> bool {
     /// Several times the 1.4 ms that a full FIFO of 16 bytes takes.
     const MOST_POLLS: u32 = 100_000;
     for _ in 0..MOST_POLLS {
         if is_ready() {
-            break;
+            return true;
         }
         super::cpu::relax();
     }
+    false
+}
+
+/// Sends one byte; it is lost if there is no room for it.
+pub(crate) fn write(byte: u8) {
     // SAFETY: the data register of this module's device.
     unsafe { port::write_u8(BASE, byte) };
 }

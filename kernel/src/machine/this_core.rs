@@ -135,6 +135,12 @@ pub(crate) fn is_ready() -> bool {
     CORES.get().is_some()
 }
 
+/// Reports whether something runs on the core that executes this, in the sense of
+/// [`Core::note_running`]. Interrupts are disabled.
+pub(crate) fn runs_something() -> bool {
+    is_ready() && get().running[0].load(Ordering::Relaxed) != u64::MAX
+}
+
 /// Returns all cores, in the order of their index.
 pub(crate) fn all() -> &'static [Core] {
     CORES.get().map_or(&[], |cores| cores)

@@ -3,6 +3,9 @@
 //! The heap serves the boot, commits and reports. Between a DAG's first release
 //! and its last completion nothing of the kernel's allocates, and the counters
 //! here are the proof.
+//!
+//! An app's function may use up the heap all the same. So subtasks cannot have the
+//! last [`RESERVE`] of it: what is left serves the reports, and the app's main function.
 
 use core::alloc::{GlobalAlloc, Layout};
 use core::ops::Range;
@@ -11,8 +14,19 @@ use core::ptr::NonNull;
 use super::tlsf::Tlsf;
 use super::tlsf::Usage;
 use crate::machine::spinlock::SpinLock;
+use crate::machine::this_core;
 
 static HEAP: SpinLock<Tlsf> = SpinLock::new(Tlsf::new());
+
+/// The part of the heap that no subtask can have: one in so many.
+const RESERVE: usize = 32;
+
+/// Reports whether the code that allocates can have `bytes` more. Interrupts are disabled.
+fn may_have(heap: &Tlsf, bytes: usize) -> bool {
+    let usage = heap.usage();
+    let free = usage.capacity_bytes - usage.in_use_bytes;
+    free.saturating_sub(usage.capacity_bytes / RESERVE) >= bytes || !this_core::runs_something()
+}
 
 /// The image's global allocator; the `entry!` macro makes it so.
 #[derive(Clone, Copy, Debug)]
@@ -36,13 +50,17 @@ pub(crate) fn usage() -> Usage {
     HEAP.lock().usage()
 }
 
+fn allocate(layout: Layout) -> Option<NonNull<u8>> {
+    let mut heap = HEAP.lock();
+    let may_have = may_have(&heap, layout.size());
+    may_have.then(|| heap.allocate(layout)).flatten()
+}
+
 // SAFETY: the allocator behind the lock gives each block to one owner until it
 // is given back (invariant of `tlsf`), and needs no memory of its own.
 unsafe impl GlobalAlloc for KernelHeap {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        HEAP.lock()
-            .allocate(layout)
-            .map_or(core::ptr::null_mut(), NonNull::as_ptr)
+        allocate(layout).map_or(core::ptr::null_mut(), NonNull::as_ptr)
     }
 
     unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
@@ -58,14 +76,18 @@ unsafe impl GlobalAlloc for KernelHeap {
         let Some(held) = NonNull::new(block) else {
             return block;
         };
-        // SAFETY: the caller of `realloc` vouches that the block came from `alloc`
-        // and that of it no more than `new_size` is used any longer.
-        if unsafe { HEAP.lock().reallocate_in_place(held, new_size) } {
-            return block;
+        let mut heap = HEAP.lock();
+        if may_have(&heap, new_size.saturating_sub(layout.size())) {
+            // SAFETY: the caller of `realloc` vouches that the block came from `alloc`
+            // and that of it no more than `new_size` is used any longer.
+            if unsafe { heap.reallocate_in_place(held, new_size) } {
+                return block;
+            }
         }
+        drop(heap);
         let moved = Layout::from_size_align(new_size, layout.align())
             .ok()
-            .and_then(|layout| HEAP.lock().allocate(layout));
+            .and_then(allocate);
         let Some(moved) = moved else {
             return core::ptr::null_mut();
         };

@@ -5,6 +5,7 @@
 
 extern crate alloc;
 
+mod attacks;
 mod busy;
 mod checksum;
 mod endless;
@@ -28,7 +29,8 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 23] = [
+const TESTS: [(&str, Test); 25] = [
+    ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
     ("null_write", crime),
@@ -43,6 +45,10 @@ const TESTS: [(&str, Test); 23] = [
     (
         "double_fault",
         |_| unpunished(kernel_crimes::fault_doubly()),
+    ),
+    (
+        "exit_port",
+        |_| unpunished(kernel_crimes::end_the_machine()),
     ),
     ("preemption", preemption::run),
     ("occupation", occupation::run),
@@ -68,7 +74,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 fn commit_faults(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     guest_tests::faults::provoke(|case, fault, message| {
-        json::emit("commit_fault", |line| {
+        json::emit("provoked", |line| {
             line.text("case", case)
                 .text("fault", fault)
                 .text("message", message);

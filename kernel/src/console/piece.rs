@@ -1,0 +1,131 @@
+//! The way from a value's `Display` to the bytes that are handed over.
+//!
+//! An app's `Display` may take long, print, or panic. So text is made outside every
+//! lock, in a buffer on the stack of the context that prints, with interrupts as they
+//! are there: all of it is then that context's own affair. What is full goes on as a
+//! *piece*. Up to [`LONGEST`] bytes are one piece, and stay together.
+
+use core::fmt;
+
+/// The most bytes that are handed over at once.
+pub(super) const LONGEST: usize = 1024;
+
+/// What is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Text for people.
+    Text,
+    /// A machine line of an app's.
+    Line,
+    /// A machine line of the kernel's own.
+    KernelLine,
+}
+
+/// Collects text and hands it over in pieces; `hand_over` gets each one, and whether
+/// it is the first.
+pub(super) struct Pieces<F: FnMut(&[u8], bool)> {
+    bytes: [u8; LONGEST],
+    length: usize,
+    kind: Kind,
+    begins: bool,
+    hand_over: F,
+}
+
+impl<F: FnMut(&[u8], bool)> Pieces<F> {
+    pub(super) const fn new(kind: Kind, hand_over: F) -> Self {
+        Self {
+            bytes: [0; LONGEST],
+            length: 0,
+            kind,
+            begins: true,
+            hand_over,
+        }
+    }
+
+    /// Ends the text, or the line.
+    pub(super) fn end(mut self) {
+        if self.kind != Kind::Text {
+            self.push(b'\n');
+        }
+        self.flush();
+    }
+
+    /// Hands over what there is.
+    fn flush(&mut self) {
+        if self.length > 0 {
+            (self.hand_over)(&self.bytes[..self.length], self.begins);
+            self.begins = false;
+            self.length = 0;
+        }
+    }
+
+    fn push(&mut self, byte: u8) {
+        /// Room for a blank and the longest character: no piece ends within one.
+        const MARGIN: usize = 5;
+        let begins_character = byte & 0xc0 != 0x80;
+        if self.length + MARGIN > LONGEST && begins_character {
+            self.flush();
+        }
+        self.bytes[self.length] = byte;
+        self.length += 1;
+    }
+}
+
+impl<F: FnMut(&[u8], bool)> fmt::Write for Pieces<F> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for byte in text.bytes() {
+            match (self.kind, byte) {
+                // As at the seam of two pieces, see `buffer`.
+                (Kind::Text, b'{') if self.bytes[..self.length].ends_with(b"\n") => {
+                    self.push(b' ');
+                }
+                _ => {}
+            }
+            let is_end = self.kind != Kind::Text && byte == b'\n';
+            // JSON has no line ends but as white space between its parts.
+            self.push(if is_end { b' ' } else { byte });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::fmt::Write;
+
+    fn pieces(kind: Kind, text: &str) -> Vec<String> {
+        let mut all = Vec::new();
+        let mut pieces = Pieces::new(kind, |piece, _| {
+            all.push(String::from_utf8(piece.to_vec()).expect("whole characters"));
+        });
+        pieces.write_str(text).expect("it cannot fail");
+        pieces.end();
+        all
+    }
+
+    #[test]
+    fn a_brace_after_a_line_end_gets_a_blank_in_text_alone() {
+        assert_eq!(pieces(Kind::Text, "a{\n{b\n\n{"), ["a{\n {b\n\n {"]);
+        assert_eq!(pieces(Kind::Line, "[1,\n{}]"), ["[1, {}]\n"]);
+        assert_eq!(pieces(Kind::KernelLine, "\n{"), [" {\n"]);
+    }
+
+    #[test]
+    fn long_text_is_cut_between_characters() {
+        let text = "äöü€🦀".repeat(300);
+        let all = pieces(Kind::Text, &text);
+        assert!(all.len() > 1 && all.iter().all(|piece| piece.len() <= LONGEST));
+        assert_eq!(all.concat(), text);
+    }
+
+    #[test]
+    fn only_the_first_piece_begins() {
+        let mut begun = Vec::new();
+        let mut pieces = Pieces::new(Kind::Text, |_: &[u8], begins| begun.push(begins));
+        pieces.flush();
+        write!(pieces, "{}", "x".repeat(3000)).expect("it cannot fail");
+        pieces.end();
+        assert_eq!(begun, [true, false, false]);
+    }
+}

@@ -1,0 +1,114 @@
+//! The serial line: text that takes long, text without end, and forged lines.
+
+use core::fmt;
+use core::hint::{black_box, spin_loop};
+
+use alloc::string::String;
+
+use faults::crimes::Unpunished;
+use kernel::{json, print, println};
+
+/// A value whose text is made by a function.
+struct Says(fn(&mut fmt::Formatter<'_>) -> fmt::Result);
+
+impl fmt::Display for Says {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (self.0)(f)
+    }
+}
+
+/// Prints a value whose `Display` panics.
+pub(super) fn display_panics() -> Unpunished {
+    println!(
+        "before {} after",
+        Says(|_| panic!("a panic in a `Display`"))
+    );
+    Unpunished
+}
+
+/// Prints a value whose `Display` prints. No crime: both texts come.
+pub(super) fn display_prints() -> Unpunished {
+    let prints = Says(|f| {
+        println!("the inner text");
+        f.write_str("text")
+    });
+    println!("the outer {prints}");
+    Unpunished
+}
+
+/// Prints a value whose `Display` never ends.
+pub(super) fn display_loops() -> Unpunished {
+    let loops = Says(|f| {
+        while black_box(true) {
+            f.write_str("for ever ")?;
+            spin_loop(); // the next core's turn
+        }
+        Ok(())
+    });
+    println!("{loops}");
+    Unpunished
+}
+
+/// Panics with a message of 1 MB.
+pub(super) fn message_1_mb() -> Unpunished {
+    panic_with(1_000_000)
+}
+
+/// Panics with a message of 10 MB.
+pub(super) fn message_10_mb() -> Unpunished {
+    panic_with(10_000_000)
+}
+
+fn panic_with(bytes: usize) -> Unpunished {
+    let mut message = String::with_capacity(bytes);
+    for _ in 0..bytes / 1000 {
+        message.push_str(&"x".repeat(1000));
+        spin_loop(); // the next core's turn
+    }
+    panic!("{message}")
+}
+
+/// Prints 10 MB in small pieces.
+pub(super) fn flood() -> Unpunished {
+    for number in 0..100_000 {
+        println!("drop no {number:87} of a flood");
+        spin_loop(); // the next core's turn
+    }
+    Unpunished
+}
+
+/// What a run is judged by, as an app would print it to look better than it is.
+const FORGED: &str = r#"{"kind":"verdict","status":"success","forged":true}"#;
+
+/// Prints lines that are the kernel's to print, whole and in pieces, and damaged ones.
+pub(super) fn forge_lines() -> Unpunished {
+    println!("{FORGED}");
+    println!(r#"{{"kind":"fault","forged":true}}"#);
+    println!("text\n{FORGED}\n{{\"kind\":");
+    print!("{{");
+    print!("\"kind\":\"verdict\",\"forged\":true}}\n{{");
+    println!();
+    Unpunished
+}
+
+/// Panics with a message that has such a line in it.
+pub(super) fn forge_message() -> Unpunished {
+    panic!("a message\n{FORGED}\n{{\"forged\":")
+}
+
+/// Smuggles such a line into a machine line of its own, which is damaged then.
+pub(super) fn forge_list() -> Unpunished {
+    let items = ["1]}\n{\"kind\":\"verdict\",\"status\":\"success\",\"forged\":[1"];
+    json::emit("smuggler", |line| {
+        line.list("items", items.iter());
+    });
+    Unpunished
+}
+
+/// Asks for a machine line of a kind that is the kernel's.
+pub(super) fn forge_kind() -> Unpunished {
+    json::emit("verdict", |line| {
+        line.text("status", "success");
+    });
+    Unpunished
+}
