@@ -19,6 +19,9 @@ use replay::shown::visible;
 /// The most bytes of an input: far more than a guest or a reader can use.
 const MOST_BYTES: u64 = 1 << 30;
 
+/// The most bytes of a text that is read whole.
+const MOST_TEXT_BYTES: usize = 64 << 20;
+
 /// A file of a command line.
 #[derive(Clone, Copy, Debug)]
 pub struct Named<'n> {
@@ -77,14 +80,32 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Reads an input that must be text, and does as [`read`] otherwise.
+/// Reads an input that must be text, of at most 64 MiB. The invisible mark by which some
+/// editors begin UTF-8 is left out.
 ///
 /// # Errors
 ///
-/// As [`read`], and that it is not UTF-8.
+/// In words that begin with the file, and with the line where it is no text: as [`read`],
+/// that it is not UTF-8, or that it is too long.
 pub fn read_text(path: &Path) -> Result<String, String> {
-    let text = String::from_utf8(read(path)?);
-    text.map_err(|_| "is not UTF-8 text".into())
+    let refused = |line: &dyn Display, why: &dyn Display| {
+        let place = place(path);
+        format!("{place}{line}: {why}; name another file")
+    };
+    let bytes = read(path).map_err(|why| refused(&"", &why))?;
+    if bytes.len() > MOST_TEXT_BYTES {
+        let why = format!("it is longer than {} MiB", MOST_TEXT_BYTES >> 20);
+        return Err(refused(&"", &why));
+    }
+    let mut text = String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        refused(&format_args!(":{line}"), &"this is not UTF-8 text")
+    })?;
+    if text.starts_with('\u{feff}') {
+        text.drain(..'\u{feff}'.len_utf8());
+    }
+    Ok(text)
 }
 
 /// Makes sure that outputs overwrite no input and no other output, and that each can be
@@ -212,7 +233,7 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST_BYTES, Named, check, check_folder, check_once, read};
+    use super::{MOST_BYTES, Named, check, check_folder, check_once, read, read_text};
     use std::fs::{self, File};
     use std::os::unix::fs::symlink;
     use std::path::{Path, PathBuf};
@@ -271,6 +292,28 @@ mod tests {
         );
         assert_eq!(check_folder(&named("out", &folder.join("to/come"))), Ok(()));
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn text_is_read_without_its_mark_and_refused_with_its_line() {
+        let folder = folder("text");
+        let file = folder.join("file");
+        fs::write(&file, "\u{feff}dag ä\n").unwrap();
+        assert_eq!(read_text(&file).as_deref(), Ok("dag ä\n"));
+        fs::write(&file, b"one\ntwo \xff\n").unwrap();
+        let said = read_text(&file).unwrap_err();
+        assert!(
+            said.ends_with("/file:2: this is not UTF-8 text; name another file"),
+            "{said}"
+        );
+        let opened = File::create(&file).unwrap();
+        opened.set_len((64 << 20) + 1).unwrap();
+        let said = read_text(&file).unwrap_err();
+        assert!(
+            said.ends_with("/file: it is longer than 64 MiB; name another file"),
+            "{said}"
+        );
         fs::remove_dir_all(folder).unwrap();
     }
 

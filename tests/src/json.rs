@@ -141,9 +141,22 @@ pub fn parse(text: &str) -> Result<Value, JsonError> {
     parser::Parser::new(text).whole()
 }
 
+/// Reads as [`parse`], and returns also at which bytes the elements begin of the list
+/// that is the member `name` of the outermost object.
+///
+/// # Errors
+///
+/// As [`parse`].
+pub fn parse_with_places<'t>(
+    text: &'t str,
+    name: &'t str,
+) -> Result<(Value, Vec<usize>), JsonError> {
+    parser::Parser::new(text).with_places(name)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{DEEPEST, Value, parse};
+    use super::{DEEPEST, Value, parse, parse_with_places};
 
     fn refused(text: &str) -> (usize, String) {
         let error = parse(text).expect_err(text);
@@ -241,6 +254,16 @@ mod tests {
             message.len() < 100 && message.contains("\\u{1b}"),
             "{message}"
         );
+    }
+
+    #[test]
+    fn tells_where_the_elements_of_a_member_begin() {
+        let text = r#"{"b":[1],"a":[ [2,[3]], {"a":[4]} ,5],"c":{"a":[6]}}"#;
+        let (value, places) = parse_with_places(text, "a").unwrap();
+        assert_eq!(value.get("a").unwrap().elements().len(), 3);
+        let begins: Vec<&str> = places.iter().map(|&at| &text[at..=at]).collect();
+        assert_eq!(begins, ["[", "{", "5"]);
+        assert_eq!(parse_with_places("[[1]]", "a").unwrap().1, []);
     }
 
     #[test]

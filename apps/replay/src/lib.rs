@@ -8,6 +8,8 @@
 //!
 //! - [`lines`]: words and numbers of a reference file, with line numbers;
 //! - [`shown`]: words of a file, or of a person, in messages;
+//! - [`of_file`]: what a commit would refuse, in the words of a file;
+//! - [`repeated`]: what stands twice;
 //! - [`Case`], [`parse()`]: what a case says, read strictly;
 //! - [`build`]: DAGs that execute for its times.
 //!
@@ -20,10 +22,14 @@ extern crate alloc;
 
 mod case;
 mod dags;
+mod faults;
 pub mod lines;
 mod parse;
+mod repeated;
 pub mod shown;
 
 pub use case::{Case, CaseDag, InstanceTimes, JobTimes};
 pub use dags::{Epoch, Scale, build};
+pub use faults::of_file;
 pub use parse::parse;
+pub use repeated::repeated;

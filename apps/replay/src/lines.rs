@@ -5,6 +5,7 @@
 //! [`Malformed`] with the number of its line, so that a broken file is never
 //! taken for a failing implementation.
 
+use alloc::collections::BTreeMap;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -12,7 +13,11 @@ use core::fmt;
 use core::num::IntErrorKind;
 use core::str::FromStr;
 
+use crate::shown::is_seen;
 pub use crate::shown::quoted;
+
+/// The most cores that a machine has here.
+pub const MOST_CORES: u32 = 64;
 
 /// What is wrong with a reference file, and on which line, counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,19 +102,33 @@ impl<'a> Lines<'a> {
 ///
 /// # Errors
 ///
-/// [`Malformed`] for another record, for what `read` finds, and for a file without a case.
+/// [`Malformed`] for another record, for what `read` finds, for a name that stands twice,
+/// and for a file without a case.
 pub fn cases<'a, Case>(
     text: &'a str,
     read: impl Fn(&Line<'a>, &mut Lines<'a>) -> Result<Case, Malformed>,
 ) -> Result<Vec<Case>, Malformed> {
     let mut lines = Lines::new(text);
     let mut cases = Vec::new();
+    let mut names: BTreeMap<&str, usize> = BTreeMap::new();
     while let Some(line) = lines.next_line() {
         if line.kind != "case" {
             let found = quoted(line.kind);
             return Err(line.malformed(format!("expected a `case` record, found {found}")));
         }
         cases.push(read(&line, &mut lines)?);
+        // Every kind of case has its name first.
+        let name = line.words.first().copied().unwrap_or_default();
+        if !name.chars().all(is_seen) {
+            let reason = format!("case {}: a name must be seen; rename it", quoted(name));
+            return Err(line.malformed(reason));
+        }
+        if let Some(first) = names.insert(name, line.number) {
+            let name = quoted(name);
+            let reason =
+                format!("case {name} stands here twice, first on line {first}; rename one");
+            return Err(line.malformed(reason));
+        }
     }
     if cases.is_empty() {
         return Err(lines.ended("a `case` record"));
@@ -162,6 +181,21 @@ impl Line<'_> {
                 _ => format!("{} is not a whole number", quoted(word)),
             })
         })
+    }
+
+    /// Reads a number of cores.
+    ///
+    /// # Errors
+    ///
+    /// As [`number`](Self::number), and if no machine has that many.
+    pub fn cores(&self, word: &str) -> Result<u32, Malformed> {
+        let cores = self.number(word)?;
+        match (1..=MOST_CORES).contains(&cores) {
+            true => Ok(cores),
+            false => {
+                Err(self.malformed(format!("expected 1 to {MOST_CORES} cores, found {cores}")))
+            }
+        }
     }
 
     /// Reads all words as numbers, of which there must be so many.

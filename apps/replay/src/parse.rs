@@ -3,7 +3,7 @@
 
 use alloc::borrow::ToOwned;
 use alloc::format;
-use alloc::string::ToString;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,6 +14,7 @@ use sched_dag::{
 };
 
 use crate::case::{Case, CaseDag, InstanceTimes, JobTimes};
+use crate::faults::of_file;
 use crate::lines::{Line, Lines, Malformed, cases, quoted};
 
 /// Reads all cases of a file.
@@ -30,7 +31,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     let &[name, cores, edf, preemptive, count] = header.exactly(5)? else {
         return Err(header.malformed("expected 5 words"));
     };
-    let cores = at_least_one(header, cores)?;
+    let cores = header.cores(cores)?;
     let policy = if yes(header, edf)? {
         Policy::Edf
     } else {
@@ -154,7 +155,10 @@ fn commit(
 ) -> Result<TaskSet, Malformed> {
     match verify(specs, options) {
         Ok(verified) => Ok(verified.task_set),
-        Err(rejected) => Err(line.malformed(rejected.to_string().replace('\n', "; "))),
+        Err(rejected) => {
+            let reasons: Vec<String> = of_file(&rejected).map(|(_, reason)| reason).collect();
+            Err(line.malformed(reasons.join("; ")))
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! It walks over the bytes once. `position` is always the byte to be read
 //! next, and stands on a character's first byte whenever a message is made.
 
+use replay::repeated;
 use replay::shown::quoted;
 
 use super::{DEEPEST, JsonError, Value};
@@ -11,6 +12,11 @@ pub(super) struct Parser<'t> {
     text: &'t str,
     position: usize,
     depth: usize,
+    /// The member of the outermost object whose elements' places are noted.
+    watched: Option<&'t str>,
+    /// Whether that member's value is being read.
+    is_watched: bool,
+    places: Vec<usize>,
 }
 
 impl<'t> Parser<'t> {
@@ -19,11 +25,21 @@ impl<'t> Parser<'t> {
             text,
             position: 0,
             depth: 0,
+            watched: None,
+            is_watched: false,
+            places: Vec::new(),
         }
     }
 
+    /// Reads as [`whole`](Self::whole), and notes where the elements of a member begin.
+    pub(super) fn with_places(mut self, of: &'t str) -> Result<(Value, Vec<usize>), JsonError> {
+        self.watched = Some(of);
+        let value = self.whole()?;
+        Ok((value, self.places))
+    }
+
     /// Reads one value and makes sure that nothing follows it.
-    pub(super) fn whole(mut self) -> Result<Value, JsonError> {
+    pub(super) fn whole(&mut self) -> Result<Value, JsonError> {
         let value = self.value()?;
         self.skip_blanks();
         match self.peek() {
@@ -78,6 +94,7 @@ impl<'t> Parser<'t> {
             if !self.take(b':') {
                 return Err(self.unexpected("`:`"));
             }
+            self.is_watched = self.depth == 1 && self.watched == Some(key.as_str());
             let value = self.value()?;
             members.push((key, value));
             self.skip_blanks();
@@ -88,9 +105,9 @@ impl<'t> Parser<'t> {
                 return Err(self.unexpected("`,` or `}`"));
             }
         }
-        match repeated(&members) {
+        match repeated(members.iter().map(|(key, _)| key)) {
             None => Ok(Value::Object(members)),
-            Some(second) => {
+            Some((_, second)) => {
                 self.position = starts[second];
                 let key = quoted(&members[second].0);
                 Err(self.error(format!("key {key} stands twice in one object")))
@@ -104,7 +121,12 @@ impl<'t> Parser<'t> {
         if self.take(b']') {
             return Ok(Value::Array(elements));
         }
+        let is_watched = self.is_watched && self.depth == 2;
         loop {
+            self.skip_blanks();
+            if is_watched {
+                self.places.push(self.position);
+            }
             elements.push(self.value()?);
             self.skip_blanks();
             if self.take(b']') {
@@ -271,14 +293,4 @@ impl<'t> Parser<'t> {
             message,
         }
     }
-}
-
-/// Returns the first member whose key stands before it, too.
-fn repeated(members: &[(String, Value)]) -> Option<usize> {
-    let mut order: Vec<usize> = (0..members.len()).collect();
-    // Stable: of equal keys the first stands first.
-    order.sort_by(|&one, &other| members[one].0.cmp(&members[other].0));
-    let pairs = order.windows(2);
-    let repeated = pairs.filter(|pair| members[pair[0]].0 == members[pair[1]].0);
-    repeated.map(|pair| pair[1]).min()
 }

@@ -21,7 +21,8 @@ use sched_dag::analysis::{
     melani_fp, melani_fp_width, np_safe_fp, width,
 };
 
-use replay::lines::{Line, Lines, Malformed, cases};
+use replay::lines::{Line, Lines, Malformed, cases, quoted};
+use replay::repeated;
 
 /// One task set with the values expected of it.
 #[derive(Debug)]
@@ -154,7 +155,7 @@ fn compare<T: PartialEq + std::fmt::Display>(
 
 fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
     let words = header.exactly(3)?;
-    let cores = at_least_one(header, words[1])?;
+    let cores = header.cores(words[1])?;
     let count: u32 = at_least_one(header, words[2])?;
     let mut dags = Vec::new();
     let mut line = lines.expect("dag")?;
@@ -171,7 +172,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     line = following;
     while line.kind != "end" {
         let Some(name) = QUANTITIES.iter().find(|name| **name == line.kind) else {
-            let reason = format!("a set of DAGs has no quantity `{}`", line.kind);
+            let reason = format!("a set of DAGs has no quantity {}", quoted(line.kind));
             return Err(line.malformed(reason));
         };
         if quantities.iter().any(|(known, _)| known == name) {
@@ -220,11 +221,18 @@ fn parse_dag<'a>(
     let length_ns = lines.expect("len")?.numbers(1)?[0];
     let volume_ns = lines.expect("vol")?.numbers(1)?[0];
     let bottom_levels_ns = lines.expect("bottom_level")?.numbers(subtasks)?;
-    let mut singles = Vec::new();
+    let mut singles: Vec<(u32, u64, u64)> = Vec::new();
     loop {
         let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
         if line.kind == "single" {
-            singles.push(parse_single(&line)?);
+            let single = parse_single(&line)?;
+            if singles.iter().any(|&(cores, ..)| cores == single.0) {
+                let reason = format!("`single {}` stands here twice", single.0);
+                return Err(line.malformed(reason));
+            }
+            singles.push(single);
+        } else if singles.is_empty() {
+            return Err(line.malformed("the dag before this has no `single` record"));
         } else {
             dags.push(ExpectedDag {
                 task,
@@ -243,7 +251,7 @@ fn parse_single(line: &Line<'_>) -> Result<(u32, u64, u64), Malformed> {
     if words[1] != "graham" || words[3] != "long_paths" {
         return Err(line.malformed("expected `single M graham R long_paths R`"));
     }
-    let cores = at_least_one(line, words[0])?;
+    let cores = line.cores(words[0])?;
     Ok((cores, line.number(words[2])?, line.number(words[4])?))
 }
 
@@ -256,7 +264,7 @@ fn parse_quantity(line: &Line<'_>, dags: usize) -> Result<Vec<String>, Malformed
     match line.kind {
         "gedf_capacity" | "bonifaci_gedf" => match line.exactly(1)?[0] {
             verdict @ ("0" | "1") => Ok(vec![verdict.to_owned()]),
-            other => Err(line.malformed(format!("expected 0, 1 or -, found `{other}`"))),
+            other => Err(line.malformed(format!("expected 0, 1 or -, found {}", quoted(other)))),
         },
         "federated" => {
             let mut words = line.words.iter();
@@ -265,9 +273,18 @@ fn parse_quantity(line: &Line<'_>, dags: usize) -> Result<Vec<String>, Malformed
                 .ok_or_else(|| line.malformed("expected the cores left"))?;
             let heavy = words.map(|word| match word.split_once(':') {
                 Some((dag, cores)) => Ok(format!("{}:{}", plain(dag)?, plain(cores)?)),
-                None => Err(line.malformed(format!("expected dag:cores, found `{word}`"))),
+                None => Err(line.malformed(format!("expected dag:cores, found {}", quoted(word)))),
             });
             std::iter::once(plain(left)).chain(heavy).collect()
+        }
+        "dm_order" => {
+            let order: Vec<usize> = line.numbers(dags)?;
+            let all = 0..dags;
+            if repeated(&order).is_some() || !order.iter().all(|dag| all.contains(dag)) {
+                let reason = format!("expected each DAG from 0 to {} once", dags - 1);
+                return Err(line.malformed(reason));
+            }
+            Ok(order.iter().map(usize::to_string).collect())
         }
         _ => line.exactly(dags)?.iter().map(|word| plain(word)).collect(),
     }

@@ -123,9 +123,7 @@ fn read<'f, Case>(
     let mut cases = Vec::new();
     for file in names {
         let place = files::place(file);
-        let text =
-            files::read_text(file).map_err(|why| format!("{place}: {why}; name another file"))?;
-        let parsed = parse(&text)
+        let parsed = parse(&files::read_text(file)?)
             .map_err(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))?;
         cases.extend(parsed);
     }

@@ -117,9 +117,7 @@ fn graphs(options: &Parsed, cores: &[u64]) -> Result<Vec<TaskGraph>, String> {
     let usual = || system::workspace().join("tests/data/stg50.json");
     let path = options.path("file").map_or_else(usual, PathBuf::from);
     let place = files::place(&path);
-    let text =
-        files::read_text(&path).map_err(|why| format!("{place}: {why}; name another file"))?;
-    let graphs = read_graphs(&text)
+    let graphs = read_graphs(&files::read_text(&path)?)
         .map_err(|malformed| format!("{place}:{}: {}", malformed.line, malformed.reason))?;
     let wanted: Option<Vec<&str>> = options
         .text("graphs")

@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 use pub_sub::{AgePenalty, Parameters};
 
 use super::{Arrival, Case, Departures, Policy};
-use ::replay::lines::{Line, Lines, Malformed, cases};
+use ::replay::lines::{Line, Lines, Malformed, cases, quoted};
 
 /// Reserved storage grows with the topics whatever the arrivals are, so a number
 /// that no trace can need is refused before it is reserved.
@@ -53,7 +53,7 @@ fn parse_case(line: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed>
                 break;
             }
             other => {
-                let reason = format!("expected `a`, `s`, `r` or `end`, found `{other}`");
+                let reason = format!("expected `a`, `s`, `r` or `end`, found {}", quoted(other));
                 return Err(line.malformed(reason));
             }
         }
@@ -81,7 +81,7 @@ fn parse_header(line: &Line<'_>, lines: &mut Lines<'_>) -> Result<Header, Malfor
         }
         "approximate" => Some(parse_approximate(&lines.expect("approximate")?, topics)?),
         other => {
-            let reason = format!("expected `exact` or `approximate`, found `{other}`");
+            let reason = format!("expected `exact` or `approximate`, found {}", quoted(other));
             return Err(line.malformed(reason));
         }
     };
