@@ -143,6 +143,76 @@ fn a_broken_file_is_2_and_named_with_its_line() {
 }
 
 #[test]
+fn nonsense_is_2_and_named_with_its_line() {
+    let dag = "dag x period 10ms\nsubtask a wcet 1ms\n";
+    let graph = |graph: &str| format!("{{\"graphs\":[\n{graph}]}}");
+    for (name, text, words) in [
+        (
+            "both.yaml",
+            "nodes:\n- id: a\n  execution_time: 5\n  period: 100\nlinks:\n- source: a\n  target: a\n\
+             edges: []\n"
+                .into(),
+            "both.yaml:8: `links` and `edges` both list the edges; keep one",
+        ),
+        (
+            "amid.json",
+            graph(r#"{"name":"a","c":[3,0,4],"edges":[[0,1],[1,2]]}"#),
+            "amid.json:2: graph `a`: vertex 1 has cost 0 and stands between others",
+        ),
+        (
+            "same.json",
+            graph("{\"name\":\"a\",\"c\":[1]},\n{\"name\":\"a\",\"c\":[1]}"),
+            "same.json:3: graph `a` stands here twice, first on line 2; rename one",
+        ),
+        (
+            "other.json",
+            "{\"apps\":[]}".into(),
+            "other.json:1: the file has no `graphs`; of JSON a task graph set is read",
+        ),
+        (
+            "brace.dag",
+            dag.replace("dag x", "dag {x") + "end",
+            "brace.dag:1: `{x` is no name",
+        ),
+        (
+            "zero.dag",
+            dag.replace("1ms", "0ns") + "end",
+            "zero.dag:2: wcet: it is 0",
+        ),
+        (
+            "escape.dag",
+            "\u{1b}[2J\u{202e}\n".into(),
+            "escape.dag:1: expected `set`, `dag`, `subtask`, `edge` or `end`, found \
+             `\\u{1b}[2J\\u{202e}`",
+        ),
+        (
+            "graph.txt",
+            "nodes:\n".into(),
+            "(read as our format; a name in .yaml or .yml tells RD-Gen's",
+        ),
+    ] {
+        let path = file(name, &text);
+        let said = refusal(&["--dag", path.to_str().expect("UTF-8")]);
+        assert!(said.contains(words), "{said}  not: {words}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+#[test]
+fn many_faults_are_told_in_part() {
+    let subtasks: String = (0..1000)
+        .map(|n| format!("subtask s{n} wcet 2s\n"))
+        .collect();
+    let path = file("faults.dag", &format!("dag x period 1s\n{subtasks}end\n"));
+    let said = refusal(&["--dag", path.to_str().expect("UTF-8")]);
+    assert_eq!(said.lines().count(), 21, "{said}");
+    assert!(
+        said.ends_with("faults.dag:22: and 980 more faults from this line on\n"),
+        "{said}"
+    );
+}
+
+#[test]
 fn options_that_do_not_fit_are_2() {
     let good = file("good.dag", "dag x period 1ms\nsubtask a wcet 1us\nend\n");
     let good = good.to_str().expect("UTF-8");
@@ -219,8 +289,14 @@ fn ten_thousand_subtasks_are_read_and_more_than_any_guest_holds_are_2() {
 fn every_format_is_printed_as_ours() {
     let data = workspace().join("tests/data");
     let (yaml, json) = (data.join("rd-gen/gnp_01.yaml"), data.join("stg50.json"));
+    // A name that no DAG may have, an ending in capitals, and a byte-order mark.
+    let odd = file(
+        "#h.YAML",
+        "\u{feff}nodes:\n- id: a\n  execution_time: 5\n  end_to_end_deadline: 9\n",
+    );
     for words in [
         vec!["--print-dag", "--dag", yaml.to_str().expect("UTF-8")],
+        vec!["--print-dag", "--dag", odd.to_str().expect("UTF-8")],
         vec![
             "--print-dag",
             "--graph",

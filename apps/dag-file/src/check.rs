@@ -3,10 +3,11 @@
 //! The commit names DAGs and subtasks. Who wrote a file looks for a line, so each
 //! fault is given that of the edge, subtask or DAG that it is about.
 
-use alloc::string::ToString;
+use alloc::format;
 use alloc::vec::Vec;
 
 use replay::lines::Malformed;
+use replay::of_file;
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Fault, Policy, SubtaskId, SubtaskLabel, verify,
 };
@@ -14,11 +15,14 @@ use sched_dag::{
 use crate::build::Length;
 use crate::file::{FileDag, Set};
 
+/// The most faults that are told: who has mended these looks again.
+const MOST_FAULTS: usize = 20;
+
 /// Verifies a set as its commit will, with any shape of graph allowed.
 ///
 /// # Errors
 ///
-/// Every fault, with its line.
+/// Every fault, with its line; of very many the first, and their number.
 pub fn check(set: &Set, policy: Policy, cores: u32, length: Length) -> Result<(), Vec<Malformed>> {
     let specs = set.dags.iter().map(|dag| DagSpec {
         jobs: Some(length.jobs(&dag.spec)),
@@ -30,19 +34,19 @@ pub fn check(set: &Set, policy: Policy, cores: u32, length: Length) -> Result<()
     let Err(rejected) = verify(&specs, &options) else {
         return Ok(());
     };
-    let malformed = |fault: &Fault| Malformed {
-        line: line_of(set, fault),
-        reason: fault.to_string(),
-    };
-    let faults = rejected.faults();
-    let is_cycle = |fault: &Fault| matches!(fault, Fault::Cycle { .. } | Fault::SelfEdge { .. });
-    let has_cycle = faults.iter().any(is_cycle);
-    // A graph that is one cycle has no ends either; the cycle says all.
-    let follows =
-        |fault: &Fault| has_cycle && matches!(fault, Fault::NoSource { .. } | Fault::NoSink { .. });
-    let news = faults.iter().filter(|fault| !follows(fault));
-    let mut found: Vec<Malformed> = news.map(malformed).collect();
+    let faults = of_file(&rejected);
+    let mut found: Vec<Malformed> = faults
+        .map(|(fault, reason)| Malformed {
+            line: line_of(set, fault),
+            reason,
+        })
+        .collect();
     found.sort_by_key(|malformed| malformed.line);
+    let more = found.len().saturating_sub(MOST_FAULTS);
+    if more > 0 {
+        found.truncate(MOST_FAULTS + 1);
+        found[MOST_FAULTS].reason = format!("and {more} more faults from this line on");
+    }
     Err(found)
 }
 
@@ -129,6 +133,34 @@ mod tests {
             lines,
             ["line 1:", "line 1:", "line 3:", "line 4:"],
             "{found:#?}"
+        );
+    }
+
+    #[test]
+    fn of_very_many_faults_the_first_are_told() {
+        let subtasks: Vec<String> = (0..10_000)
+            .map(|n| format!("subtask s{n} wcet 2s\n"))
+            .collect();
+        let text = format!("dag x period 1s\n{}end", subtasks.concat());
+        let found = faults(&text, Length::Jobs(1));
+        assert_eq!(found.len(), 21);
+        assert!(
+            found[19].starts_with("line 21: subtask `s19` of dag `x`"),
+            "{}",
+            found[19]
+        );
+        assert_eq!(found[20], "line 22: and 9980 more faults from this line on");
+    }
+
+    #[test]
+    fn the_remedy_is_in_the_words_of_the_file() {
+        let text =
+            "dag x period 1s in-flight 4294967295\nsubtask a wcet 1ms\nsubtask b wcet 1ms\nend";
+        let found = faults(text, Length::Jobs(u64::MAX));
+        assert!(
+            found[0].ends_with("needs most; lower its in-flight"),
+            "{}",
+            found[0]
         );
     }
 

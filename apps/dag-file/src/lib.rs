@@ -34,5 +34,6 @@ pub use build::{Length, Settings, build};
 pub use check::check;
 pub use execution::Execution;
 pub use file::{DagFile, FileDag, FileSubtask, Set};
-pub use parse::{is_name, parse};
+pub use parse::{is_name, no_name, parse, refuse_repeated_edge};
 pub use replay::lines::{Malformed, quoted};
+pub use replay::repeated;

@@ -9,10 +9,13 @@ mod keys;
 
 use alloc::collections::BTreeMap;
 use alloc::format;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use replay::lines::{Line, Lines, Malformed, quoted};
+use replay::repeated;
+use replay::shown::is_seen;
 use sched_dag::{DagSpec, OverrunPolicy, Priority, SubtaskSpec};
 
 use keys::Keys;
@@ -63,12 +66,28 @@ pub fn parse(text: &str) -> Result<DagFile, Malformed> {
     }
 }
 
-/// Reports whether a name can stand in a file: one word that begins neither a
-/// comment nor an arrow.
+/// The most bytes of a name.
+const MOST_OF_NAME: usize = 255;
+
+/// Reports whether a name can stand in a file: one word of characters that are seen,
+/// not too long, that begins neither a comment nor a machine line and is no arrow.
 #[must_use]
 pub fn is_name(word: &str) -> bool {
-    let is_plain = |character: char| !character.is_whitespace() && !character.is_control();
-    !word.is_empty() && !word.starts_with('#') && word != "->" && word.chars().all(is_plain)
+    let is_plain = |character: char| !character.is_whitespace() && is_seen(character);
+    (1..=MOST_OF_NAME).contains(&word.len())
+        && !word.starts_with(['#', '{'])
+        && word != "->"
+        && word.chars().all(is_plain)
+}
+
+/// Says why a word is refused as a name.
+#[must_use]
+pub fn no_name(word: &str) -> String {
+    format!(
+        "{} is no name; give a word of at most {MOST_OF_NAME} bytes that begins with neither `#` \
+         nor `{{`",
+        quoted(word)
+    )
 }
 
 /// Returns the next line that is not only a comment, without its comment.
@@ -88,6 +107,10 @@ fn next_record<'a>(lines: &mut Lines<'a>) -> Option<Line<'a>> {
 #[derive(Default)]
 struct Reader<'a> {
     file: DagFile,
+    /// Names and lines of the sets.
+    sets: BTreeMap<&'a str, usize>,
+    /// Names and lines of the DAGs of the latest set.
+    dags: BTreeMap<&'a str, usize>,
     /// Names and positions of the subtasks of the latest DAG.
     subtasks: BTreeMap<&'a str, usize>,
 }
@@ -107,14 +130,16 @@ impl<'a> Reader<'a> {
     }
 
     fn take_set(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
-        let name = line.exactly(1)?[0];
-        self.close(line)?;
-        if self.file.sets.iter().any(|set| set.name == name) {
-            return Err(line.malformed(format!(
-                "set {} stands here twice; rename one",
-                quoted(name)
-            )));
+        line.exactly(1)?;
+        let name = line.words[0];
+        if !is_name(name) {
+            return Err(line.malformed(no_name(name)));
         }
+        self.close(line)?;
+        if let Some(first) = self.sets.insert(name, line.number) {
+            return Err(twice(line, name, first));
+        }
+        self.dags.clear();
         self.file.sets.push(Set {
             name: name.into(),
             dags: Vec::new(),
@@ -131,14 +156,10 @@ impl<'a> Reader<'a> {
         let dag = read_dag(line)?;
         let set = self.file.sets.last_mut();
         let dags = &mut set.ok_or_else(|| line.malformed("no set"))?.dags;
-        if let Some(first) = dags.iter().find(|first| first.spec.name == dag.spec.name) {
-            return Err(line.malformed(format!(
-                "dag {} stands here twice, first on line {}; rename one",
-                quoted(&dag.spec.name),
-                first.line
-            )));
-        }
         dags.push(dag);
+        if let Some(first) = self.dags.insert(line.words[0], line.number) {
+            return Err(twice(line, line.words[0], first));
+        }
         self.subtasks.clear();
         Ok(())
     }
@@ -151,11 +172,10 @@ impl<'a> Reader<'a> {
         dag.subtasks.push(subtask);
         match self.subtasks.insert(line.words[0], position) {
             None => Ok(()),
-            Some(first) => Err(line.malformed(format!(
-                "subtask {} stands here twice, first on line {}; rename one",
-                quoted(line.words[0]),
-                self.open_dag(line)?.subtasks[first].line
-            ))),
+            Some(first) => {
+                let first = self.open_dag(line)?.subtasks[first].line;
+                Err(twice(line, line.words[0], first))
+            }
         }
     }
 
@@ -208,7 +228,7 @@ impl<'a> Reader<'a> {
                 quoted(&dag.spec.name),
                 dag.line
             ))),
-            Some(_) => Ok(()),
+            Some(dag) => refuse_repeated_edge(dag),
         }
     }
 
@@ -218,6 +238,36 @@ impl<'a> Reader<'a> {
         }
         self.close(end)
     }
+}
+
+/// Returns the error of a record whose name another one has.
+fn twice(line: &Line<'_>, name: &str, first: usize) -> Malformed {
+    let (kind, name) = (line.kind, quoted(name));
+    line.malformed(format!(
+        "{kind} {name} stands here twice, first on line {first}; rename one"
+    ))
+}
+
+/// Makes sure that no edge of a DAG stands twice.
+///
+/// # Errors
+///
+/// The first edge that is too many.
+pub fn refuse_repeated_edge(dag: &FileDag) -> Result<(), Malformed> {
+    let Some((first, second)) = repeated(&dag.spec.edges) else {
+        return Ok(());
+    };
+    let (earlier, later) = dag.spec.edges[second];
+    let name = |subtask: usize| quoted(&dag.spec.subtasks[subtask].name);
+    Err(Malformed {
+        line: dag.edge_lines[second],
+        reason: format!(
+            "the edge from {} to {} stands here twice, first on line {}; drop one",
+            name(earlier),
+            name(later),
+            dag.edge_lines[first]
+        ),
+    })
 }
 
 fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
@@ -296,6 +346,10 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
         let message = format!("subtask {} has no wcet; add `wcet 3ms`", quoted(&spec.name));
         return Err(line.malformed(message));
     };
+    if wcet_ns == 0 {
+        let message = "wcet: it is 0, and whatever executes takes time; give at least 1ns";
+        return Err(line.malformed(message));
+    }
     if let Some(sample) = samples_ns.iter().find(|&&sample_ns| sample_ns > wcet_ns) {
         return Err(line.malformed(format!(
             "the sample {} is longer than the wcet {}; raise the wcet, or drop the sample",

@@ -1,7 +1,7 @@
 //! Times in a DAG file: a whole number and its unit, such as `25ms`.
 //!
-//! Units are `ns`, `us`, `ms` and `s`. There is no default unit: a number alone
-//! is refused, for nobody can know what it meant.
+//! Units are `ns`, `us` (also `µs`, as durations print it), `ms` and `s`. There is no
+//! default unit: a number alone is refused, for nobody can know what it meant.
 
 use alloc::format;
 use alloc::string::String;
@@ -39,7 +39,12 @@ pub fn parse_ns(word: &str) -> Result<u64, String> {
             "{shown} has no unit; append one of ns, us, ms and s"
         ));
     }
-    let known = UNITS.iter().find(|(name, _)| *name == unit);
+    let name = match unit {
+        // The sign for micro, and the Greek letter that looks like it.
+        "\u{b5}s" | "\u{3bc}s" => "us",
+        other => other,
+    };
+    let known = UNITS.iter().find(|(known, _)| *known == name);
     let Some((_, unit_ns)) = known else {
         return Err(format!(
             "{shown} is no time: {} is no unit; write a whole number and one of ns, us, ms and s",
@@ -74,8 +79,10 @@ pub fn scale_ns(word: &str, unit_ns: u64) -> Result<u64, String> {
             "{shown} is no time; give a number such as 25 or 2.5"
         ));
     }
-    // Beyond 18 digits a fraction tells less than a part of a nanosecond.
-    let fraction = &fraction[..fraction.len().min(18)];
+    // Beyond 18 digits a fraction tells less than a part of a nanosecond; what is not
+    // 0 there rounds the rest up.
+    let (fraction, beyond) = fraction.split_at(fraction.len().min(18));
+    let beyond = u128::from(beyond.bytes().any(|digit| digit != b'0'));
     let scaled = || {
         let whole_ns = whole
             .parse::<u128>()
@@ -85,7 +92,8 @@ pub fn scale_ns(word: &str, unit_ns: u64) -> Result<u64, String> {
         let part = fraction
             .parse::<u128>()
             .ok()?
-            .checked_mul(u128::from(unit_ns))?;
+            .checked_mul(u128::from(unit_ns))?
+            .checked_add(beyond)?;
         u64::try_from(whole_ns.checked_add(part.div_ceil(divisor))?).ok()
     };
     scaled().ok_or_else(|| {
@@ -132,6 +140,8 @@ mod tests {
             assert_eq!(Time(ns).to_string(), text);
         }
         assert_eq!(Time(2_000_000).to_string(), "2ms");
+        assert_eq!(parse_ns("3\u{b5}s"), Ok(3000));
+        assert_eq!(parse_ns("3\u{3bc}s"), Ok(3000));
     }
 
     #[test]
@@ -156,6 +166,8 @@ mod tests {
         assert_eq!(scale_ns("73", 1_000_000), Ok(73_000_000));
         assert_eq!(scale_ns("2.5", 1000), Ok(2500));
         assert_eq!(scale_ns("0.0001", 1000), Ok(1));
+        assert_eq!(scale_ns("0.0000000000000000000000001", 1000), Ok(1));
+        assert_eq!(scale_ns("2.0000000000000000000000000", 1000), Ok(2000));
         for text in ["-2", "1e3", "", ".", "1.", "x"] {
             assert!(scale_ns(text, 1).unwrap_err().contains("give a"), "{text}");
         }

@@ -8,6 +8,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::load::Format;
 use crate::options::Parsed;
 use crate::outcome::Outcome;
 use crate::protocol::MachineLine;
@@ -28,10 +29,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let place = folder.display();
     let entries = fs::read_dir(folder).map_err(|error| format!("{place}: {error}"))?;
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|path| {
-        let extension = path.extension().and_then(|extension| extension.to_str());
-        matches!(extension, Some("dag" | "yaml" | "yml"))
-    });
+    files.retain(|path| matches!(Format::of(path), Some(Format::Ours | Format::RdGen)));
     if files.is_empty() {
         return Err(format!(
             "{place}: the folder has no file .dag, .yaml or .yml; name another"

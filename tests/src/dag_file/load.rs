@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use dag_file::{DagFile, Length, Malformed, check, parse};
+use dag_file::{DagFile, Length, Malformed, check, is_name, parse};
+use replay::shown::is_seen;
 use sched_dag::Policy;
 
 use super::{rd_gen, stg};
@@ -21,9 +22,48 @@ pub struct Import {
     pub length: Length,
 }
 
-/// Reads a file: RD-Gen's YAML if its name ends in `.yaml` or `.yml`, a set of
-/// task graphs if in `.json`, otherwise our own format. It is then checked as its
-/// commit will be.
+/// The formats that a file may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    /// Our own.
+    Ours,
+    /// RD-Gen's YAML.
+    RdGen,
+    /// A set of task graphs in JSON.
+    TaskGraphs,
+}
+
+impl Format {
+    /// Returns the format that a file's name tells, in small or in capital letters;
+    /// `None` if its ending is none of those that are known.
+    pub(super) fn of(path: &Path) -> Option<Format> {
+        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+        match ending.as_str() {
+            "dag" => Some(Format::Ours),
+            "yaml" | "yml" => Some(Format::RdGen),
+            "json" => Some(Format::TaskGraphs),
+            _ => None,
+        }
+    }
+}
+
+/// Returns a name for the DAGs of a file: its own without the ending, with `_` in place
+/// of what no name may have.
+fn name_of(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let plain = |character: char| match character.is_whitespace() || !is_seen(character) {
+        true => '_',
+        false => character,
+    };
+    let name: String = stem.chars().map(plain).collect();
+    match is_name(&name) {
+        true => name,
+        false => format!("_{name}"),
+    }
+}
+
+/// Reads a file of the format that its name tells, our own if it tells none. It is then
+/// checked as its commit will be.
 ///
 /// # Errors
 ///
@@ -36,29 +76,24 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
             .map(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))
             .collect()
     };
-    let bytes =
-        files::read(path).map_err(|why| vec![format!("{place}: {why}; name another file")])?;
-    let text = str::from_utf8(&bytes).map_err(|error| {
-        let before = bytes[..error.valid_up_to()].iter();
-        let line = 1 + before.filter(|byte| **byte == b'\n').count();
-        vec![format!(
-            "{place}:{line}: this is not UTF-8 text; is it a DAG file?"
-        )]
-    })?;
-    let extension = path.extension().and_then(|extension| extension.to_str());
-    let file = match extension {
-        Some("yaml" | "yml") => {
-            let stem = path.file_stem().map(|stem| stem.to_string_lossy());
-            let name = stem.unwrap_or_default().replace(char::is_whitespace, "_");
-            rd_gen::read(text, &name, import.unit_ns)
-        }
-        Some("json") => {
+    let text = files::read_text(path).map_err(|line| vec![line])?;
+    let text = text.as_str();
+    let format = Format::of(path);
+    let file = match format {
+        Some(Format::RdGen) => rd_gen::read(text, &name_of(path), import.unit_ns),
+        Some(Format::TaskGraphs) => {
             stg::read(text, import.graph.as_deref(), import.unit_ns).map_err(|one| vec![one])
         }
-        _ => parse(text).map_err(|one| vec![one]),
+        Some(Format::Ours) => parse(text).map_err(|one| vec![one]),
+        None => parse(text).map_err(|Malformed { line, reason }| {
+            let hint = "read as our format; a name in .yaml or .yml tells RD-Gen's, in .json a task \
+                        graph set";
+            let reason = format!("{reason} ({hint})");
+            vec![Malformed { line, reason }]
+        }),
     };
     let file = file.map_err(located)?;
-    if extension != Some("json")
+    if format != Some(Format::TaskGraphs)
         && let Some(graph) = &import.graph
     {
         return Err(vec![format!(
@@ -74,9 +109,35 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{parse, rd_gen, stg};
+    use super::{Format, name_of, parse, rd_gen, stg};
     use crate::system::workspace;
-    use dag_file::Malformed;
+    use dag_file::{Malformed, is_name};
+    use std::path::Path;
+
+    #[test]
+    fn every_file_name_becomes_a_name_and_its_ending_tells_the_format() {
+        for (file, name) in [
+            ("a/gnp_01.yaml", "gnp_01"),
+            ("a b.yaml", "a_b"),
+            ("#h.yaml", "_#h"),
+            ("->.yaml", "_->"),
+            ("{x.yaml", "_{x"),
+            ("a\u{1b}\u{202e}b.yaml", "a__b"),
+        ] {
+            assert_eq!(name_of(Path::new(file)), name);
+            assert!(is_name(name), "{name}");
+        }
+        for (file, format) in [
+            ("x.dag", Some(Format::Ours)),
+            ("G.YAML", Some(Format::RdGen)),
+            ("g.Yml", Some(Format::RdGen)),
+            ("S.JSON", Some(Format::TaskGraphs)),
+            ("x.txt", None),
+            ("yaml", None),
+        ] {
+            assert_eq!(Format::of(Path::new(file)), format, "{file}");
+        }
+    }
 
     /// Changes, drops or repeats a part of a text, differently for each number.
     fn damaged(text: &str, number: u64) -> String {

@@ -22,7 +22,7 @@
 
 use std::collections::BTreeMap;
 
-use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check, quoted};
+use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check, is_name, no_name, quoted};
 use sched_dag::{DagSpec, Policy, SubtaskSpec};
 
 /// A graph in which each subtask may have a timer.
@@ -112,7 +112,13 @@ pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> 
         let path_ns = part.iter().map(|&subtask| ends_ns[subtask]).max();
         let rate = rates[part[0]];
         let dag = dag(graph, part, edges, rate, named(part), path_ns.unwrap_or(0));
-        dags.push(dag.map_err(|malformed| vec![malformed])?);
+        let dag = dag.map_err(|malformed| vec![malformed])?;
+        if !is_name(&dag.spec.name) {
+            let reason = format!("{}; rename the file or the node", no_name(&dag.spec.name));
+            let line = dag.line;
+            return Err(vec![Malformed { line, reason }]);
+        }
+        dags.push(dag);
     }
     for &(earlier, later, line) in graph.edges.iter().filter(|edge| !is_kept(edge)) {
         let (from, to) = (&graph.subtasks[earlier].name, &graph.subtasks[later].name);

@@ -8,7 +8,7 @@
 //! There is no message that takes time here, so a link's `communication_time` is
 //! added to the execution time of its target, which reads the message.
 
-use dag_file::{DagFile, Malformed, Set, is_name, quoted, time};
+use dag_file::{DagFile, Malformed, Set, is_name, no_name, quoted, repeated, time};
 
 use super::rates::{Graph, Subtask, split};
 use super::yaml::{Node, Value, parse};
@@ -36,10 +36,17 @@ fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
     let document = parse(text)?;
     let mut nodes: &[Node] = &[];
     let mut links: &[Node] = &[];
+    let mut listed: Option<&str> = None;
     for (key, node) in members(&document, "the document")? {
         match key.as_str() {
             "nodes" => nodes = items(node, key)?,
-            "links" | "edges" => links = items(node, key)?,
+            "links" | "edges" => {
+                if let Some(other) = listed.replace(key) {
+                    let reason = format!("`{other}` and `{key}` both list the edges; keep one");
+                    return Err(malformed(node.line, reason));
+                }
+                links = items(node, key)?;
+            }
             "directed" => expect(node, key, "true", "an edge needs a direction")?,
             "multigraph" => expect(
                 node,
@@ -71,7 +78,34 @@ fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
     for link in links {
         read_link(link, &mut graph, unit_ns)?;
     }
+    check_whole(&graph)?;
     Ok(graph)
+}
+
+/// Refuses what only shows when all links are known.
+fn check_whole(graph: &Graph) -> Result<(), Malformed> {
+    let edges = &graph.edges;
+    let name = |subtask: usize| quoted(&graph.subtasks[subtask].name);
+    if let Some((first, second)) = repeated(edges.iter().map(|&(from, to, _)| (from, to))) {
+        let (source, target, line) = edges[second];
+        let (source, target, first) = (name(source), name(target), edges[first].2);
+        let reason = format!(
+            "the link from {source} to {target} stands here twice, first on line {first}; drop one"
+        );
+        return Err(malformed(line, reason));
+    }
+    for &(_, target, _) in edges {
+        let subtask = &graph.subtasks[target];
+        if subtask.offset_ns > 0 && subtask.period_ns.is_none() {
+            let reason = format!(
+                "node {} has an `offset` and no `period`, and starts after those before it; give \
+                 it a period, or drop the offset",
+                name(target)
+            );
+            return Err(malformed(subtask.line, reason));
+        }
+    }
+    Ok(())
 }
 
 fn read_node(node: &Node, unit_ns: u64) -> Result<Subtask, Malformed> {
@@ -85,12 +119,11 @@ fn read_node(node: &Node, unit_ns: u64) -> Result<Subtask, Malformed> {
             "id" => {
                 let id = text(value, key)?;
                 if !is_name(id) {
-                    let reason = format!("id {} is no single word; rename the node", quoted(id));
-                    return Err(malformed(value.line, reason));
+                    return Err(malformed(value.line, format!("id: {}", no_name(id))));
                 }
                 subtask.name = id.into();
             }
-            "execution_time" => wcet_ns = Some(time_ns(value, key, unit_ns)?),
+            "execution_time" => wcet_ns = Some(positive_ns(value, key, unit_ns)?),
             "period" => subtask.period_ns = Some(positive_ns(value, key, unit_ns)?),
             "offset" => subtask.offset_ns = time_ns(value, key, unit_ns)?,
             "end_to_end_deadline" => {

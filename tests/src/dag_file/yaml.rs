@@ -7,10 +7,15 @@
 //! keys that stand twice. Nothing is guessed: a scalar stays text, and who wants a
 //! number reads one.
 
+use std::collections::HashSet;
+
 use dag_file::{Malformed, quoted};
 
 /// The deepest nesting that is read.
 const DEEPEST: usize = 32;
+
+/// The most keys of a mapping that are compared one by one.
+const FEW: usize = 16;
 
 /// A value and where it begins.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,11 +74,11 @@ pub fn parse(text: &str) -> Result<Node, Malformed> {
 }
 
 /// A line with something on it.
-#[derive(Clone, Debug)]
-struct Line {
+#[derive(Clone, Copy, Debug)]
+struct Line<'t> {
     number: usize,
     indent: usize,
-    text: String,
+    text: &'t str,
 }
 
 fn malformed(line: usize, reason: impl Into<String>) -> Malformed {
@@ -82,8 +87,8 @@ fn malformed(line: usize, reason: impl Into<String>) -> Malformed {
 }
 
 /// Takes comments, blank lines and the document's marks away.
-fn lines(text: &str) -> Result<Vec<Line>, Malformed> {
-    let mut lines: Vec<Line> = Vec::new();
+fn lines(text: &str) -> Result<Vec<Line<'_>>, Malformed> {
+    let mut lines: Vec<Line<'_>> = Vec::new();
     let mut has_ended = false;
     for (index, text) in text.lines().enumerate() {
         let number = index + 1;
@@ -109,7 +114,7 @@ fn lines(text: &str) -> Result<Vec<Line>, Malformed> {
         lines.push(Line {
             number,
             indent,
-            text: content.into(),
+            text: content,
         });
     }
     Ok(lines)
@@ -117,6 +122,9 @@ fn lines(text: &str) -> Result<Vec<Line>, Malformed> {
 
 /// Cuts off a comment: a `#` at the beginning or after a blank, outside quotes.
 fn without_comment(text: &str) -> &str {
+    if !text.contains('#') {
+        return text;
+    }
     let mut quote = None;
     let mut before = ' ';
     for (at, character) in text.char_indices() {
@@ -135,19 +143,19 @@ fn without_comment(text: &str) -> &str {
     text
 }
 
-struct Reader {
-    lines: Vec<Line>,
+struct Reader<'t> {
+    lines: Vec<Line<'t>>,
     next: usize,
 }
 
-impl Reader {
-    fn peek(&self) -> Option<&Line> {
+impl<'t> Reader<'t> {
+    fn peek(&self) -> Option<&Line<'t>> {
         self.lines.get(self.next)
     }
 
     /// Returns the next line if it is indented so far.
-    fn sibling(&self, indent: usize) -> Option<Line> {
-        self.peek().filter(|line| line.indent == indent).cloned()
+    fn sibling(&self, indent: usize) -> Option<Line<'t>> {
+        self.peek().filter(|line| line.indent == indent).copied()
     }
 
     /// Reads the collection or scalar whose first line is the next one.
@@ -159,20 +167,20 @@ impl Reader {
             let reason = format!("this is nested more than {DEEPEST} levels deep");
             return Err(malformed(line.number, reason));
         }
-        if is_item(&line.text) {
+        if is_item(line.text) {
             return self.sequence(indent, depth);
         }
         if split_key(&line)?.is_some() {
             return self.mapping(indent, depth);
         }
         self.next += 1;
-        scalar(&line, &line.text)
+        scalar(&line, line.text)
     }
 
     fn sequence(&mut self, indent: usize, depth: usize) -> Result<Node, Malformed> {
         let mut items = Vec::new();
         let first = self.peek().map_or(1, |line| line.number);
-        while let Some(line) = self.sibling(indent).filter(|line| is_item(&line.text)) {
+        while let Some(line) = self.sibling(indent).filter(|line| is_item(line.text)) {
             let rest = line.text[1..].trim_start_matches(' ');
             if rest.is_empty() {
                 self.next += 1;
@@ -181,7 +189,6 @@ impl Reader {
             }
             // What follows the dash is a block of its own, further in.
             let inner = indent + line.text.len() - rest.len();
-            let rest = rest.to_string();
             self.lines[self.next].indent = inner;
             self.lines[self.next].text = rest;
             items.push(self.block(inner, depth + 1)?);
@@ -194,20 +201,29 @@ impl Reader {
 
     fn mapping(&mut self, indent: usize, depth: usize) -> Result<Node, Malformed> {
         let mut members: Vec<(String, Node)> = Vec::new();
+        // Of few keys each is compared with each: that takes no memory.
+        let mut known: HashSet<String> = HashSet::new();
         let first = self.peek().map_or(1, |line| line.number);
-        while let Some(line) = self.sibling(indent).filter(|line| !is_item(&line.text)) {
+        while let Some(line) = self.sibling(indent).filter(|line| !is_item(line.text)) {
             let Some((key, rest)) = split_key(&line)? else {
-                let reason = format!("{} is no `key: value`", quoted(&line.text));
+                let reason = format!("{} is no `key: value`", quoted(line.text));
                 return Err(malformed(line.number, reason));
             };
-            if members.iter().any(|(known, _)| *known == key) {
+            if members.len() == FEW {
+                known.extend(members.iter().map(|(key, _)| key.clone()));
+            }
+            let is_known = match members.len() < FEW {
+                true => members.iter().any(|(known, _)| *known == key),
+                false => !known.insert(key.clone()),
+            };
+            if is_known {
                 let reason = format!("key {} stands here twice; give it once", quoted(&key));
                 return Err(malformed(line.number, reason));
             }
             self.next += 1;
             let node = if rest.is_empty() {
                 // The items of a sequence may stand right below their key.
-                let is_at_key = self.sibling(indent).is_some_and(|next| is_item(&next.text));
+                let is_at_key = self.sibling(indent).is_some_and(|next| is_item(next.text));
                 self.below(&line, indent + usize::from(!is_at_key), depth)?
             } else {
                 scalar(&line, rest)?
@@ -221,7 +237,7 @@ impl Reader {
     }
 
     /// Reads what stands below `line`, at least so far in; nothing is empty.
-    fn below(&mut self, line: &Line, least: usize, depth: usize) -> Result<Node, Malformed> {
+    fn below(&mut self, line: &Line<'_>, least: usize, depth: usize) -> Result<Node, Malformed> {
         match self.peek().map(|next| next.indent) {
             Some(indent) if indent >= least => self.block(indent, depth + 1),
             _ => scalar(line, ""),
@@ -234,8 +250,8 @@ fn is_item(text: &str) -> bool {
 }
 
 /// Splits `key: value`; the value may be empty.
-fn split_key(line: &Line) -> Result<Option<(String, &str)>, Malformed> {
-    let text = &line.text;
+fn split_key<'t>(line: &Line<'t>) -> Result<Option<(String, &'t str)>, Malformed> {
+    let text = line.text;
     let end = if text.starts_with(['"', '\'']) {
         closing_quote(text).map(|end| end + 1)
     } else {
@@ -266,7 +282,7 @@ fn closing_quote(text: &str) -> Option<usize> {
 }
 
 /// Reads what stands on one line.
-fn scalar(line: &Line, text: &str) -> Result<Node, Malformed> {
+fn scalar(line: &Line<'_>, text: &str) -> Result<Node, Malformed> {
     let value = match text {
         "{}" => Value::Mapping(Vec::new()),
         "[]" => Value::Sequence(Vec::new()),

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use replay::lines::{Line, Malformed, quoted};
 
-use super::is_name;
+use super::{is_name, no_name};
 use crate::time::parse_ns;
 
 /// The words of a record after its name: keys, most with a value.
@@ -23,7 +23,7 @@ impl<'l, 'a> Keys<'l, 'a> {
             return Err(line.malformed(format!("`{}` lacks its name", line.kind)));
         };
         if !is_name(name) {
-            return Err(line.malformed(format!("{} is no name; give a word", quoted(name))));
+            return Err(line.malformed(no_name(name)));
         }
         let keys = Self {
             line,

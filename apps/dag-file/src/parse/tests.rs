@@ -30,7 +30,7 @@ fn a_file_is_read_and_written_back() {
         (3, 5, 6)
     );
     assert_eq!(&*camera.subtasks[0].samples_ns, [1_000_000, 2_000_000]);
-    assert_eq!(camera.spec.relative_deadline_ns, Some(100_000_000));
+    assert_eq!(camera.spec.relative_deadline_ns, Some(30_000_000));
     assert_eq!(camera.spec.in_flight, Some(4));
     // Without a deadline it is the period.
     let alone = &file.sets[1].dags[0];
@@ -133,6 +133,22 @@ fn a_refusal_names_line_offender_and_remedy() {
             "{dag}subtask a wcet 1ms\ndag x period 1ms",
             "line 3: dag `x` stands here twice, first on line 1",
         ),
+        (
+            "{dag}subtask a wcet 1ms\nsubtask b wcet 1ms\nedge a -> b\nedge b -> a\nedge a -> b\nend",
+            "line 6: the edge from `a` to `b` stands here twice, first on line 4; drop one",
+        ),
+        ("{dag}subtask a wcet 0ns", "line 2: wcet: it is 0, and"),
+        (
+            "set a\n{dag}subtask a wcet 1ms\nset a\n",
+            "line 4: set `a` stands here twice, first on line 1; rename one",
+        ),
+        ("dag {x period 1ms", "line 1: `{x` is no name; give a word"),
+        ("set {x", "line 1: `{x` is no name; give a word"),
+        (
+            "dag x\u{202e}y period 1ms",
+            "line 1: `x\\u{202e}y` is no name",
+        ),
+        ("\u{1b}[2J", "found `\\u{1b}[2J`"),
         ("set a\nset b", "line 2: set `a` ends here without a dag"),
         (
             "{dag}subtask a wcet 1ms\nend\n\nx",
@@ -158,4 +174,35 @@ fn the_example_of_the_documentation_is_read() {
     let file = parse(example.unwrap()).unwrap();
     let names = file.sets[0].dags.iter().map(|dag| dag.spec.name.as_str());
     assert_eq!(names.collect::<Vec<_>>(), ["camera", "control"]);
+}
+
+#[test]
+fn a_name_has_an_end() {
+    let text = |length: usize| {
+        format!(
+            "dag {} period 1ms\nsubtask a wcet 1us\nend",
+            "x".repeat(length)
+        )
+    };
+    assert!(parse(&text(255)).is_ok());
+    let message = refusal(&text(1_000_000));
+    assert!(
+        message.contains("of at most 255 bytes") && message.len() < 200,
+        "{message}"
+    );
+}
+
+#[test]
+fn very_many_dags_and_sets_are_read() {
+    // Comparing each name with each would take long.
+    let dag = |n: u32| format!("dag d{n} period 1ms\nsubtask a wcet 1us\n");
+    let dags: String = (0..30_000).map(dag).collect();
+    assert_eq!(
+        parse(&format!("{dags}end")).unwrap().sets[0].dags.len(),
+        30_000
+    );
+    let sets: String = (0..30_000)
+        .map(|n| format!("set s{n}\n{}", dag(0)))
+        .collect();
+    assert_eq!(parse(&format!("{sets}end")).unwrap().sets.len(), 30_000);
 }

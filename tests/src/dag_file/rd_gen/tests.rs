@@ -122,7 +122,7 @@ fn a_refusal_names_line_offender_and_remedy() {
         ),
         (
             "nodes:\n- id: a b\n  execution_time: 1\n",
-            "line 2: id `a b` is no single word",
+            "line 2: id: `a b` is no name; give a word",
         ),
         (
             "nodes:\n- id: 0\n  exec: 1\n",
@@ -131,6 +131,27 @@ fn a_refusal_names_line_offender_and_remedy() {
         (
             "{node}- id: 0\n  execution_time: 1\n",
             "line 5: node `0` stands here twice, first on line 2",
+        ),
+        (
+            "nodes:\n- id: 0\n  execution_time: 0\n",
+            "line 3: execution_time: it is 0; give more",
+        ),
+        (
+            "nodes:\n- id: '{x'\n  execution_time: 1\n",
+            "line 2: id: `{x` is no name; give a word",
+        ),
+        (
+            "{node}links:\n- source: 0\n  target: 0\nedges: []\n",
+            "line 8: `links` and `edges` both list the edges; keep one",
+        ),
+        (
+            "{node}- id: 1\n  execution_time: 1\nlinks:\n- source: 0\n  target: 1\n  \
+             communication_time: 3\n- source: 0\n  target: 1\n  communication_time: 3\n",
+            "line 11: the link from `0` to `1` stands here twice, first on line 8; drop one",
+        ),
+        (
+            "{node}- id: 1\n  execution_time: 1\n  offset: 2\nlinks:\n- source: 0\n  target: 1\n",
+            "line 5: node `1` has an `offset` and no `period`, and starts after",
         ),
         (
             "{node}links:\n- source: 0\n  target: 7\n",
@@ -156,4 +177,16 @@ fn a_refusal_names_line_offender_and_remedy() {
         let message = refusal(&text.replace("{node}", node));
         assert!(message.contains(words), "{message}\n  not: {words}");
     }
+}
+
+#[test]
+fn a_name_that_is_too_long_for_the_guest_is_refused_here() {
+    let text = "nodes:\n- id: 0\n  execution_time: 1\n  period: 9\n- id: 1\n  execution_time: 1\n  \
+                period: 7\n";
+    let message = read(text, &"x".repeat(254), MS).unwrap_err()[0].to_string();
+    assert!(message.starts_with("line 2: `xxx"), "{message}");
+    assert!(
+        message.ends_with("; rename the file or the node"),
+        "{message}"
+    );
 }

@@ -87,3 +87,15 @@ fn what_is_not_read_is_refused_with_its_line() {
     let deep = format!("{}x", "- ".repeat(100));
     assert!(parse(&deep).unwrap_err().reason.contains("levels deep"));
 }
+
+#[test]
+fn very_many_keys_and_very_deep_dashes_are_read_quickly() {
+    // Comparing each key with each, or copying the line at each dash, would take long.
+    let keys: String = (0..100_000).map(|n| format!("k{n}: 0\n")).collect();
+    let Value::Mapping(members) = parse(&keys).unwrap().value else {
+        panic!("it is a mapping");
+    };
+    assert_eq!(members.len(), 100_000);
+    let fault = parse(&"- ".repeat(1_000_000)).unwrap_err();
+    assert!(fault.reason.contains("levels deep"), "{fault}");
+}
