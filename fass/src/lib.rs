@@ -80,7 +80,7 @@
 //!
 //! - What functions share behind the scheduler's back (a mutex, a static) is
 //!   not in the model; time waited there is execution time.
-//! - A function that never returns holds its core for ever.
+//! - A function that never returns holds its core forever.
 //!
 //! # How it is built
 //!

@@ -214,7 +214,7 @@ fn what_drops_a_discarded_value_is_the_writers_fault() {
     assert_eq!(drops.load(Ordering::Relaxed), 2, "each once");
 }
 
-/// Whoever discards may have a small stack, as an interrupt's handler has.
+/// The caller of `discard` may have a small stack, as an interrupt's handler has.
 #[test]
 fn discarding_a_large_value_takes_little_stack() {
     const BYTES: usize = 1 << 20;

@@ -153,7 +153,7 @@ fn wrong_shapes_are_refused_in_our_words() {
             .iter()
             .for_each(|case| check(case, &library, &directory)),
         None => panic!(
-            "no library beside this test can be used by the `rustc` in the path; \
+            "no library next to this test can be used by the `rustc` in the path; \
              put the toolchain that built it there"
         ),
     }

@@ -1,4 +1,4 @@
-//! A platform that keeps no rule, and what subtasks use beside their inputs: states,
+//! A platform that keeps no rule, and what subtasks use besides their inputs: states,
 //! latest values and signals. It runs users of a state at once, and completes
 //! instances never, twice, or before they have run.
 
@@ -30,7 +30,7 @@ fn panic_message(action: impl FnOnce()) -> String {
         .expect("a message")
 }
 
-/// Where a subtask and the test wait for each other; who waits in vain panics.
+/// Where a subtask and the test wait for each other; to wait in vain is a panic.
 #[derive(Default)]
 struct Meeting(AtomicU64);
 

@@ -6,8 +6,8 @@
 //! happened in is never used again, and all other DAGs go on.
 //!
 //! That is possible because code that may be at fault is told apart by the
-//! interrupt flag: apps run with interrupts enabled, while whoever holds a lock
-//! of the kernel's, or handles an interrupt, has them disabled. A fault there, or
+//! interrupt flag: apps run with interrupts enabled, while code that holds a
+//! lock of the kernel's, or handles an interrupt, has them disabled. A fault there, or
 //! outside any subtask, is the kernel's and ends the run (see `panic`).
 
 use core::fmt::{self, Display};
@@ -127,7 +127,7 @@ fn end_interrupted(interrupted: &mut Interrupted, now_ns: u64) {
     this_core::get().context().note_fault();
     execution::fail(now_ns);
     contexts::lose();
-    // The context is leaked: what lies on its stack stays valid for ever.
+    // The context is leaked: what lies on its stack stays valid forever.
     let _ = interrupted.exchange(worker::new_context());
 }
 

@@ -84,7 +84,7 @@ pub(crate) fn count() -> (usize, usize) {
     (stock.total, stock.free.len())
 }
 
-/// Takes note that a context was abandoned with what it ran: it is lost.
+/// Counts a context as lost: it was abandoned with what it ran.
 pub(crate) fn lose() {
     STOCK.lock().total -= 1;
 }

@@ -1,7 +1,7 @@
 //! Waiting for what another core does, without computing meanwhile.
 //!
-//! An [`Event`] is a count that only goes up: its *version*. Whoever waits has read
-//! the version, then looked for what it wants in vain, and now waits until the
+//! An [`Event`] is a count that only goes up: its *version*. A waiter has read the
+//! version, then looked for what it wants in vain, and now waits until the
 //! version is another one. As it read the version before it looked, nothing that
 //! happens later is missed:
 //!
@@ -71,7 +71,7 @@ impl Event {
         self.version.load(Ordering::SeqCst)
     }
 
-    /// Lets the event happen: whoever waits goes on.
+    /// Raises the version: all that wait go on.
     ///
     /// See [`Event`].
     pub fn notify(&self) {

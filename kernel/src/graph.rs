@@ -18,7 +18,7 @@ static DUMPS: AtomicBool = AtomicBool::new(false);
 /// How many commits have.
 static COMMITS: AtomicU64 = AtomicU64::new(0);
 
-/// Lets the commits to come print their DAGs.
+/// Makes the commits to come print their DAGs.
 pub(crate) fn enable() {
     DUMPS.store(true, Ordering::Relaxed);
 }

@@ -134,7 +134,7 @@ impl Machine {
         KERNEL.set_preemption(preemption);
     }
 
-    /// Lets events that are less than `window` apart count as one instant in the
+    /// Makes events that are less than `window` apart count as one instant in the
     /// runs to come: the scheduler decides that long after the first of them,
     /// and has then seen them all. With 0, as at the start, it decides after
     /// each event at once.
@@ -202,7 +202,7 @@ impl Machine {
     /// As [`run`](Self::run).
     ///
     /// ```no_run
-    /// /// Lets the first release be a second from now.
+    /// /// Sets the first release to a second from now.
     /// fn later(machine: &kernel::Machine) -> Result<kernel::Run, kernel::Ending> {
     ///     machine.run_from(fass::now_ns() + 1_000_000_000)
     /// }
@@ -243,7 +243,7 @@ impl Machine {
         Ok(run)
     }
 
-    /// Lets each byte that the serial port receives during runs raise a signal, in
+    /// Makes each byte that the serial port receives during runs raise a signal, in
     /// place of the signal named before. With `console=on` bytes are the console's
     /// and raise nothing.
     ///
@@ -278,7 +278,7 @@ impl Machine {
         self.input.set(target);
     }
 
-    /// Interrupts every core each `period` from now on, beside what scheduling
+    /// Interrupts every core each `period` from now on, besides what scheduling
     /// needs; back to normal if 0. For tests of the kernel's own robustness.
     ///
     /// ```no_run

@@ -51,7 +51,7 @@ fn run(mut runner: Box<Runner>) -> Work {
     execution::complete(runner, finish_ns)
 }
 
-/// Lets the cores other than core 0 watch for work instead of halting when they
+/// Makes the cores other than core 0 watch for work instead of halting when they
 /// have none.
 pub(crate) fn watch_when_idle() {
     WATCHES.store(true, Ordering::Relaxed);
@@ -114,7 +114,7 @@ pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
     core.timer_interrupts.fetch_add(1, Ordering::Relaxed);
     let now_ns = clock::now_ns();
-    // Whoever holds the core watches the clock: waking it is all there is to do.
+    // The instance that holds the core watches the clock: waking it is enough.
     timer::take_due(Alarm::Hold, now_ns);
     if timer::take_due(Alarm::Heartbeat, now_ns) {
         beat(core, now_ns);

@@ -60,14 +60,14 @@
 //! 2. [`verify()`]: finds every fault at once, and makes the [`TaskSet`], which
 //!    has none.
 //! 3. [`analysis`]: bounds on response times, if WCETs are known.
-//! 4. [`Scheduler`]: the rules as a pure state machine. Whoever drives it tells
-//!    it what has happened and when, and carries its [`Decision`]s out: the
+//! 4. [`Scheduler`]: the rules as a pure state machine. A driver tells it
+//!    what has happened and when, and carries its [`Decision`]s out: the
 //!    kernel with timers and interrupts, or [`virtual_time`] on the host.
 //! 5. [`record`]: what happened in a run, held against the rules.
 //!
-//! # Who may rely on what
+//! # What each user may rely on
 //!
-//! - *Whoever holds a [`TaskSet`]*: acyclic graphs in the shapes that the
+//! - *Holders of a [`TaskSet`]*: acyclic graphs in the shapes that the
 //!   [`ConstructionPolicy`] allows, indices in range, no period or deadline of 0,
 //!   a number of jobs in flight of at least 1, and, for each job that will be
 //!   due, times that fit 64 bits.

@@ -33,7 +33,7 @@ pub struct DagSpec {
     /// The subtasks in the order of their registration.
     pub subtasks: Vec<SubtaskSpec>,
     /// Precedence edges `(predecessor, successor)` by position in `subtasks`,
-    /// beside those that follow from topics.
+    /// besides those that follow from topics.
     pub edges: Vec<(usize, usize)>,
     /// What subtasks share from job to job.
     pub states: Vec<StateSpec>,
@@ -45,12 +45,12 @@ pub struct DagSpec {
 ///
 /// Its users do not run at the same time unless all of them only read. The
 /// verification gives them an order and adds the precedence edges that keep it,
-/// and lets one job be in flight, so that jobs keep it, too.
+/// and allows one job in flight, so that jobs keep it, too.
 #[derive(Clone, Debug, Default)]
 pub struct StateSpec {
     /// The name that messages use.
     pub name: String,
-    /// Who uses it, each subtask once, in any order.
+    /// Its users, each subtask once, in any order.
     pub users: Vec<StateUser>,
 }
 

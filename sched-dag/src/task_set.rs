@@ -1,6 +1,6 @@
 //! The verified model: what remains true for as long as the scheduler runs.
 //!
-//! Only the verification makes a [`TaskSet`], so whoever holds one may rely on
+//! Only the verification makes a [`TaskSet`], so its holder may rely on
 //! acyclic graphs, non-zero periods and deadlines, and indices in range.
 
 use alloc::boxed::Box;

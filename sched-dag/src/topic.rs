@@ -1,7 +1,7 @@
 //! The topics of a verified DAG, for those who show the graph.
 //!
 //! Scheduling needs the edges alone, which are in [`Dag`](crate::Dag). What they
-//! carry is kept beside, as it was stated.
+//! carry is kept here, as it was stated.
 
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;

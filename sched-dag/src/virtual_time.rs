@@ -233,7 +233,7 @@ impl VirtualTime {
         &self.scheduler
     }
 
-    /// Lets one instant happen. An instance that cannot finish is the error.
+    /// Goes through one instant. An instance that cannot finish is the error.
     fn step(&mut self, now_ns: u64, workload: &mut impl Workload) -> Result<(), Instance> {
         workload.instant(now_ns);
         if let Some(done) = self.finish(now_ns, workload) {
@@ -253,7 +253,7 @@ impl VirtualTime {
         Ok(())
     }
 
-    /// Completes what finishes at `now_ns`, and takes note of what fails instead.
+    /// Completes what finishes at `now_ns`, and notes what fails instead.
     /// If it is one instance and nothing else happens, that may be the whole
     /// instant: then the result is the instant's.
     fn finish(

@@ -76,8 +76,8 @@ enum Next {
     Open,
 }
 
-/// Lets an instance that runs on core 0 finish, by one way and by the other, each with
-/// a scheduler of its own made by `make`.
+/// Finishes an instance that runs on core 0, by one way and by the other, each with a
+/// scheduler of its own made by `make`.
 fn finish(
     now_ns: u64,
     finished: Instance,

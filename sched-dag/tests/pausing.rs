@@ -64,7 +64,7 @@ impl Bench {
         }
     }
 
-    /// Lets an instant happen and returns what was reported.
+    /// Goes through an instant and returns what was reported.
     fn at(&mut self, now_ns: u64, what: impl FnOnce(&mut Moment<'_>, &mut Log)) -> String {
         let mut moment = self.scheduler.at(now_ns);
         what(&mut moment, &mut self.log);

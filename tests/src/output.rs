@@ -1,4 +1,4 @@
-//! What the tool prints, whoever reads it.
+//! What the tool prints, also where nobody reads it.
 //!
 //! The standard library's printing macros panic when a write fails, and a write fails
 //! as soon as the reader of a pipe has left (`./scripts/oracle ... | head -1`). That no

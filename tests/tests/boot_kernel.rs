@@ -206,7 +206,7 @@ fn every_commit_fault_is_printed_as_documented() {
     }
 }
 
-/// Lets `interrupts` timer interrupts, over all processors, hit computing cores.
+/// Makes `interrupts` timer interrupts, over all processors, hit computing cores.
 fn storm(mode: Mode, cores: u64, interrupts: u64) {
     let guest = guest("storm").mode(mode).cores(cores);
     let guest = guest.word(&format!("interrupts={interrupts}"));

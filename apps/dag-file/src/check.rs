@@ -1,7 +1,7 @@
 //! What the commit would refuse, told with the lines of the file.
 //!
-//! The commit names DAGs and subtasks. Who wrote a file looks for a line, so each
-//! fault is given that of the edge, subtask or DAG that it is about.
+//! The commit names DAGs and subtasks. The author of a file looks for a line, so
+//! each fault is given that of the edge, subtask or DAG that it is about.
 
 use alloc::format;
 use alloc::vec::Vec;

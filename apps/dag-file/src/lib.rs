@@ -4,7 +4,7 @@
 //! more *sets*; the DAGs of a set run together, the sets one after the other
 //! (`docs/dag-file.md`). The host tool hands such a file to the kernel, having
 //! made it from another format if need be, and the app reads it, commits the DAGs
-//! and lets every subtask execute for its time.
+//! and has every subtask execute for its time.
 //!
 //! - [`DagFile`]: what a file says; its `Display` is a file again;
 //! - [`parse()`]: reading it, strictly;
@@ -12,7 +12,7 @@
 //! - [`Execution`]: how long each instance executes;
 //! - [`build()`]: the DAGs as the app commits them.
 //!
-//! Whoever reads another format makes a [`DagFile`] of it too, with the line
+//! A reader of another format makes a [`DagFile`] of it, too, with the line
 //! numbers of *that* file, and so all formats share checks and messages.
 //!
 //! The code here knows no kernel: the tests run it in virtual time.

@@ -37,7 +37,7 @@ const WORDS: [&str; 8] = [
 /// Time for the cores to get ready.
 const LEAD_NS: u64 = 1_000_000;
 
-/// What the command line says beside how a set is run.
+/// What the command line says besides how a set is run.
 struct Wishes {
     settings: Settings,
     /// Whether a deadline miss makes the run a failure.

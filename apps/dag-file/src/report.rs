@@ -1,4 +1,4 @@
-//! What a set's run has shown, DAG by DAG, beside what its commit had promised.
+//! What a set's run has shown, DAG by DAG, next to what its commit had promised.
 
 use alloc::format;
 use alloc::string::{String, ToString};

@@ -1,7 +1,7 @@
 //! What no subtask may do, done on purpose: the machine must stop each.
 //!
 //! If one of these returned, the protection that it is a test of would be
-//! missing; whoever calls them can tell by [`Unpunished`].
+//! missing; the caller can tell by [`Unpunished`].
 
 use core::arch::asm;
 use core::hint::black_box;

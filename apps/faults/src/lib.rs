@@ -1,4 +1,4 @@
-//! Each fault that a subtask can commit, beside a DAG that must not notice.
+//! Each fault that a subtask can commit, next to a DAG that must not notice.
 //!
 //! Two DAGs run at once. The *healthy* one has a deadline that it meets with
 //! ease. The *doomed* one does the same work until its job [`FATAL_JOB`], in

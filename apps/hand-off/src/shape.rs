@@ -1,7 +1,7 @@
 //! The graphs that are measured, as lists of edges.
 //!
-//! Nothing here is of this project: whoever wants to time another scheduler on
-//! the same graphs needs these few lines and empty functions. Subtasks are
+//! Nothing here is of this project: to time another scheduler on the same graphs,
+//! these few lines and empty functions are enough. Subtasks are
 //! numbered from 0 in topological order; 0 is the one source, the last one is the
 //! one sink.
 
@@ -129,7 +129,7 @@ mod tests {
                 );
             }
         }
-        // The very graph: whoever builds it elsewhere can check.
+        // The very graph: a copy of it elsewhere can be checked.
         let subtasks = 1000;
         let edges = Shape::Layered { subtasks, seed: 1 }.edges();
         let sum: usize = edges.iter().map(|edge| edge.0 * 1000 + edge.1).sum();

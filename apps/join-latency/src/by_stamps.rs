@@ -150,8 +150,8 @@ impl Host<Message, Part> for Cores {
         let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
         self.event.wait(seen, until_ns.saturating_add(epoch_ns));
         self.has_keeper.store(false, Ordering::SeqCst);
-        // Whoever found the place taken had noted before what it has seen. If that is
-        // all that has happened, it sleeps now, and nobody would wake it.
+        // A worker that found the place taken had noted before what it has seen. If that
+        // is all that has happened, it sleeps now, and nobody would wake it.
         if self.latest_seen.load(Ordering::SeqCst) >= self.event.version() {
             self.event.notify();
         }

@@ -1,4 +1,4 @@
-//! The paper's workload in publish/subscribe form, to be run beside the DAG.
+//! The paper's workload in publish/subscribe form, to be compared with the DAG.
 //!
 //! One source, N parallel subtasks, one join, as in `fork-join`; but they are
 //! callbacks that publish on topics, and the join is made by a synchronizer that

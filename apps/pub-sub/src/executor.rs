@@ -22,11 +22,11 @@ pub trait Host<M, C>: Sync {
     /// Returns the number of notices given so far.
     fn version(&self) -> u64;
 
-    /// Waits until the version is not `seen`, or until a time, `u64::MAX` for ever.
+    /// Waits until the version is not `seen`, or until a time, `u64::MAX` forever.
     /// May return early.
     fn wait(&self, seen: u64, until_ns: u64);
 
-    /// Raises the version, and lets all workers that wait look again.
+    /// Raises the version, so that all workers that wait look again.
     fn notify(&self);
 }
 

@@ -5,7 +5,7 @@
 //! subscriptions, each of which queues up to its *depth* and then drops the oldest
 //! (`KEEP_LAST` in ROS 2). A *group* is callbacks that exclude each other (a mutually
 //! exclusive callback group; in ROS 2 all callbacks of one node by default). A
-//! *worker* is whoever executes callbacks; several share a graph.
+//! *worker* executes callbacks; several share a graph.
 //!
 //! Callbacks of a group never overlap, so they can own state in common: a group is
 //! one value of a type that implements [`Callbacks`]. A worker [takes](Graph::take)
@@ -79,7 +79,7 @@ pub trait Context<M> {
     /// Returns how many messages the graph's subscriptions have dropped.
     fn dropped(&self) -> u64;
 
-    /// Lets all workers end when they have executed what they are at.
+    /// Makes all workers end when they have executed what they are at.
     fn shut_down(&self);
 }
 
@@ -222,7 +222,7 @@ impl<M, C> Graph<M, C> {
                 return Next::Call(GroupId(subscription.group), callbacks, call);
             }
         }
-        // A timer that is due has a busy group: who gives that back will see it.
+        // A timer that is due has a busy group: the worker that gives that back sees it.
         let to_come = self.timers.iter().filter(|timer| !timer.is_due(now_ns));
         let next_ns = to_come.map(|timer| timer.next_ns).min();
         Next::WaitUntil(next_ns.unwrap_or(u64::MAX))
@@ -242,7 +242,7 @@ impl<M, C> Graph<M, C> {
             || subscriptions.any(|one| one.group == group.0 && !one.queue.is_empty())
     }
 
-    /// Lets nothing be taken any more.
+    /// Ends the taking of callbacks for good.
     pub fn shut_down(&mut self) {
         self.is_shut_down = true;
     }

@@ -6,14 +6,14 @@
 //! messages have one index, else *cross-index*. A set *covers* index i if all its
 //! messages have index i or a later one.
 //!
-//! A [`Record`] is plain times, whoever took them: [`workload`](crate::workload) in
-//! virtual time, or a machine. What is computed from it is exact.
+//! A [`Record`] is plain times, taken by [`workload`](crate::workload) in virtual time
+//! or by a machine. What is computed from it is exact.
 //!
 //! The join latency as the paper defines it compares the i-th set with the last
 //! publication of index i. If sets are skipped, all later ones are compared with
 //! indices that they have nothing to do with, so that it grows with the length of
 //! the run and never converges. [`Record::cover_delays_ns`] has no such trouble. Either
-//! says nothing of joins that never happened: state [`Record::missing_joins`] beside.
+//! says nothing of joins that never happened: state [`Record::missing_joins`], too.
 
 use alloc::vec::Vec;
 

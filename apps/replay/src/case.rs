@@ -12,8 +12,8 @@
 //! end
 //! ```
 //!
-//! One unit of the file's time counts as a nanosecond here; whoever runs a case
-//! chooses how long a unit is. WCETs play no part in a schedule; they are only
+//! One unit of the file's time counts as a nanosecond here; the one that runs
+//! a case chooses how long a unit is. WCETs play no part in a schedule; they are only
 //! checked against the execution times.
 
 use alloc::string::String;
@@ -33,7 +33,7 @@ pub struct Case {
     pub policy: Policy,
     /// Whether a started instance may lose its core.
     pub preemption: Preemption,
-    /// What the case says about each DAG beside its graph.
+    /// What the case says about each DAG besides its graph.
     pub dags: Vec<CaseDag>,
     /// The verified DAGs.
     pub task_set: Arc<TaskSet>,
@@ -43,7 +43,7 @@ pub struct Case {
     pub jobs: Vec<Vec<JobTimes>>,
 }
 
-/// What a case says about one DAG beside its graph.
+/// What a case says about one DAG besides its graph.
 #[derive(Debug)]
 pub struct CaseDag {
     /// The number of its jobs.

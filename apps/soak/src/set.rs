@@ -5,7 +5,7 @@
 //! the subtask's WCET and the WCET, so WCETs are drawn for a load that is higher
 //! by the ratio of WCET and mean.
 //!
-//! Every DAG by itself could be served for ever: no subtask's WCET exceeds
+//! Every DAG by itself could be served forever: no subtask's WCET exceeds
 //! [`MOST_OF_PERIOD`] percent of the period (its instances run one after the
 //! other), and the relative deadline is at least the period and longer than the
 //! longest path. So at a load below 100 percent what is late is due to other

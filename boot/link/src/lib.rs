@@ -21,7 +21,7 @@ const ARGUMENTS: [&str; 6] = [
     "-Wl,-z,max-page-size=4096",
 ];
 
-/// The linker script, beside the boot code that its symbols serve.
+/// The linker script, which lies with the boot code that its symbols serve.
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../entry/src/image.ld");
 
 /// Tells cargo to link the binaries of the package being built as images.

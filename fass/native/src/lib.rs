@@ -3,7 +3,7 @@
 //! For our purposes a *worker* is a thread that is pinned to one processor and
 //! stands for one core of the model. The workers run the very functions of an app
 //! under the very scheduler of the kernel, on real silicon: so the scheduler can
-//! stand beside libraries that run task graphs on threads. It is meant for
+//! be compared with libraries that run task graphs on threads. It is meant for
 //! measuring, and for looking for races between functions.
 //!
 //! # Time

@@ -1,8 +1,8 @@
-//! What a worker and whoever has the scheduler tell each other.
+//! What a worker and the owner of the scheduler's lock tell each other.
 //!
-//! A worker *posts* that it has finished an instance; whoever has the scheduler
-//! *assigns* it the next one. Both are one word, in cache lines of their own, with a
-//! single writer: the worker, and whoever has the lock. Each message is one store and
+//! A worker *posts* that it has finished an instance; the lock's owner *assigns* it the
+//! next one. Both are one word, in cache lines of their own, with a single writer: the
+//! worker, and the lock's owner. Each message is one store and
 //! costs one transfer. Nobody clears a message: each has a *turn* in it, a number that
 //! differs from the turn before, so one is told from the next.
 //!
@@ -83,7 +83,7 @@ impl Mailbox {
         let turn = next_turn(place.load(Ordering::Relaxed));
         let signals = if has_signals { SIGNALS } else { 0 };
         let word = u64::from(turn) << TURN | signals | u64::from(vertex.0);
-        // Release: whoever reads it may let successors see what the body has done.
+        // Release: a reader of it may pass on to successors what the body has done.
         place.store(word, Ordering::Release);
         turn
     }
@@ -99,7 +99,7 @@ impl Mailbox {
         }
     }
 
-    /// Assigns an instance to the worker; by whoever has the lock.
+    /// Assigns an instance to the worker; by the lock's owner.
     #[inline]
     pub(crate) fn assign(&self, assignment: Assignment) {
         let place = &self.incoming.assignment;

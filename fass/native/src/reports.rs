@@ -8,8 +8,8 @@
 //! # The body is at rest
 //!
 //! A cancelled instance has not started. Its predecessors, and the instances of its
-//! subtask in the jobs before, have ended in the scheduler's eyes; a worker lets a body
-//! go before it posts that. So nobody has the body, and all that was sent has arrived.
+//! subtask in the jobs before, have ended in the scheduler's eyes; a worker gives a body
+//! back before it posts that. So nobody has the body, and all that was sent has arrived.
 //!
 //! # Where it happens
 //!
@@ -23,7 +23,7 @@ use sched_dag::{DagId, Instance, JobOutcome, Observer, TaskSet};
 
 use crate::execute::Execute;
 
-/// Passes all on to `watch`, and lets bodies discard what cancelled instances got.
+/// Passes all on to `watch`, and has bodies discard what cancelled instances got.
 pub(crate) struct Reports<W, B> {
     pub(crate) watch: W,
     pub(crate) bodies: B,
@@ -33,7 +33,7 @@ pub(crate) struct Reports<W, B> {
 
 /// Bodies at rest can be found among them, by vertex.
 pub(crate) trait Bodies {
-    /// Lets a body that is at rest drop what has arrived for a job.
+    /// Has a body that is at rest drop what has arrived for a job.
     fn discard(&mut self, vertex: usize, job: u64);
 }
 
@@ -41,8 +41,9 @@ pub(crate) trait Bodies {
 #[repr(align(64))]
 pub(crate) struct Line<T>(pub(crate) T);
 
-/// All bodies, by vertex, where several workers run them. Who was assigned a vertex
-/// locks its body; who steps the scheduler, one that is at rest. So nobody ever waits.
+/// All bodies, by vertex, where several workers run them. A worker that was
+/// assigned a vertex locks its body; the one that steps the scheduler, a body at rest. So
+/// nobody ever waits.
 pub(crate) type Shared<B> = Arc<[Line<Mutex<B>>]>;
 
 impl<B: Execute> Bodies for &mut [B] {

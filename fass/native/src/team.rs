@@ -1,6 +1,6 @@
 //! Several workers, and one scheduler under a lock.
 //!
-//! Whoever has finished an instance *posts* that in its mailbox, takes the lock, steps
+//! A worker that has finished an instance *posts* that in its mailbox, takes the lock, steps
 //! the scheduler, and mostly leaves with the next instance for itself. What other cores
 //! are to run it puts into their mailboxes. A worker without an instance polls its
 //! mailbox; it does not look at the lock, so it disturbs nobody.
@@ -15,8 +15,8 @@
 //! across cores costs little more than one transfer. In a chain nobody serves: the
 //! worker that runs it has stepped the scheduler last.
 //!
-//! A post is taken note of exactly once, by whoever has the lock: a server, or the
-//! worker itself, which tries the lock as long as nobody serves.
+//! A post is taken exactly once, by the owner of the lock: a server, or the worker
+//! itself, which tries the lock as long as nobody serves.
 //!
 //! # The order of a server's last steps
 //!
@@ -41,7 +41,7 @@ pub(crate) struct Team<B, W> {
     state: Pair<Mutex<State<B, W>>>,
     bodies: Shared<B>,
     mailboxes: Box<[Mailbox]>,
-    /// Whether whoever has the lock looks into mailboxes.
+    /// Whether the lock's owner looks into mailboxes.
     is_serving: Pair<AtomicBool>,
     /// Set at the end, or by a worker that panics.
     is_over: Pair<AtomicBool>,
@@ -159,7 +159,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
         })
     }
 
-    /// Takes note of the worker's own post, if nobody has done so meanwhile, and then
+    /// Takes the worker's own post, if nobody has done so meanwhile, and then
     /// serves, if it has nothing else to do. Returns what it runs next.
     #[inline]
     fn step<'a>(
@@ -179,7 +179,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
         }
     }
 
-    /// Takes note of the others' posts until this worker has something to run, or
+    /// Takes the others' posts until this worker has something to run, or
     /// nobody else has.
     fn serve<'a>(
         &'a self,
@@ -212,7 +212,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
         own
     }
 
-    /// Takes note that a worker has finished an instance. Returns what `here`, which
+    /// Takes the post of a worker that has finished an instance. Returns what `here`, which
     /// has nothing to do, runs next.
     #[inline]
     fn take_note(
@@ -299,7 +299,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
     fn try_lock(&self) -> Option<MutexGuard<'_, State<B, W>>> {
         match self.state.0.try_lock() {
             Ok(guard) => Some(guard),
-            // Whoever panicked in there has set `is_over`; the run ends with its panic.
+            // The worker that panicked in there has set `is_over`; the run ends with its panic.
             Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
             Err(TryLockError::WouldBlock) => None,
         }

@@ -1,4 +1,4 @@
-//! Who looks on at a run: nobody, or a recorder.
+//! The observer of a run: none, or a recorder.
 
 use sched_dag::{CoreId, Instance, Observer};
 

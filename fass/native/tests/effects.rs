@@ -1,4 +1,4 @@
-//! What instances share beside their edges, on threads: signals, latest values, states.
+//! What instances share besides their edges, on threads: signals, latest values, states.
 //!
 //! Signals and latest values take effect when the instance is complete, neither earlier
 //! nor later: so a sporadic DAG that a signal releases finds the value of the very job

@@ -8,7 +8,7 @@
 //! # What is guaranteed
 //!
 //! - *Wait-free, both ways.* A sampling subtask never waits for the writer, nor the
-//!   writer for it, whatever cores they run on and whoever is preempted. Nothing is
+//!   writer for it, whatever cores they run on and whichever is preempted. Nothing is
 //!   allocated after the commit (a message's `clone` is its own affair).
 //! - *Completion boundary.* A value shows when its writer's instance is complete, not
 //!   before, and then whole.

@@ -1,4 +1,4 @@
-//! What a subtask uses beside its inputs, stated at registration.
+//! What a subtask uses besides its inputs, stated at registration.
 //!
 //! Values of the same job come along edges, as arguments. What comes from elsewhere
 //! is stated with [`Dag::using`]: a [`State`](crate::State) that subtasks of the DAG

@@ -27,7 +27,7 @@ pub struct Using<'d, U> {
 }
 
 impl Dag {
-    /// Begins the registration of a subtask that uses something beside its inputs.
+    /// Begins the registration of a subtask that uses something besides its inputs.
     ///
     /// See [`Uses`] for what there is, and [`State`](crate::State),
     /// [`Latest`](crate::Latest) and [`Signal`] for examples.

@@ -1,4 +1,4 @@
-//! The attributes of a subtask: what the scheduler may need beside its edges.
+//! The attributes of a subtask: what the scheduler may need besides its edges.
 
 use alloc::string::String;
 use core::time::Duration;
@@ -89,7 +89,7 @@ impl SubtaskAttributes {
         self
     }
 
-    /// Lets a started instance keep its core until it finishes, although the
+    /// States that a started instance keeps its core until it finishes, although the
     /// platform preempts others.
     ///
     /// ```

@@ -57,10 +57,10 @@
 //!
 //! # The set-once
 //!
-//! [`SetOnce`] holds the installed platform: empty, then set for ever.
+//! [`SetOnce`] holds the installed platform: empty, then set for good.
 //!
-//! > **Set-once invariant.** Whoever moves the state from `EMPTY` to `WRITING`
-//! > is the only one that ever writes the value, and does so before it stores
+//! > **Set-once invariant.** The caller that moves the state from `EMPTY` to
+//! > `WRITING` is the only one that ever writes the value, and does so before it stores
 //! > `SET` with `Release`. After `SET` nobody writes. Readers read only after
 //! > an `Acquire` load gave `SET`.
 

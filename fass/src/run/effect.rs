@@ -3,7 +3,7 @@
 //! Values on edges need no holding back: their readers are started by the
 //! scheduler, and only after the completion. A latest value and a signal have
 //! readers that ask nobody. So the function only *prepares* them, and the platform
-//! lets them happen when it reports the completion
+//! publishes them when it reports the completion
 //! ([`Body::complete`](crate::Body::complete)): the completion boundary (R3) holds
 //! for them as it does for edges, also in virtual time, where a function has run
 //! long before its instance is complete.
@@ -12,7 +12,7 @@ use sched_dag::DagId;
 
 /// Something that a function has prepared, perhaps.
 pub(crate) trait Effect: Send {
-    /// Lets it happen if it was prepared since the last time. `raise` takes the
+    /// Publishes it if it was prepared since the last time. `raise` takes the
     /// DAG that gets a signal.
     fn happen(&mut self, completed_ns: u64, raise: &mut dyn FnMut(DagId));
 }

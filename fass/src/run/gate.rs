@@ -1,4 +1,4 @@
-//! The gate through which the platform lets a subtask's future proceed.
+//! The gate that the platform opens for a subtask's future, once for each job.
 //!
 //! A subtask's future waits in one place only: at the gate in front of
 //! `recv_all`. The *grant* that opens it names a job, and the platform gives
@@ -47,8 +47,8 @@ impl Gate {
         self.0.phase.store(OPEN, Ordering::Relaxed);
     }
 
-    /// Passes the gate if it is open, and returns the job. If it is not, whoever polls
-    /// again has opened it before, so no waker needs to be kept.
+    /// Passes the gate if it is open, and returns the job. If it is not, the
+    /// next poll comes after it was opened, so no waker needs to be kept.
     #[inline]
     pub(crate) fn pass(&self) -> Option<u64> {
         if self.0.phase.load(Ordering::Relaxed) != OPEN {

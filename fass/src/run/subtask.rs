@@ -8,7 +8,7 @@
 //! The figure generates subscribers and publishers in the future's first poll.
 //! Here they are generated before the future is made, since a source may
 //! otherwise publish before a later subtask listens, and that subtask's topics
-//! would be one job behind for ever.
+//! would be one job behind forever.
 
 use alloc::boxed::Box;
 use core::convert::Infallible;

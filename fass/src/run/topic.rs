@@ -4,8 +4,8 @@
 //! edge that leaves it, one a reading port, and one of every subtask that samples
 //! the topic's latest value; a [`Subscriber`] is one reading
 //! port. At commit [`Wiring`] hands out the ends: whichever end of an edge is
-//! asked for first makes the ring and leaves the other end for whoever asks
-//! second. All rings exist before the first release, so no job can be missed
+//! asked for first makes the ring and leaves the other end for the one
+//! that asks second. All rings exist before the first release, so no job can be missed
 //! because a reader was not there yet.
 //!
 //! The verification has already compared the types of both ends; the downcast

@@ -234,7 +234,7 @@ pub struct Publishers<Ends> {
 }
 
 /// The future that waits at the gate. It is `core::future::PollFn` but for being
-/// compiled into whoever polls it, also where that is compiled for size.
+/// compiled into its caller, also where that is compiled for size.
 struct AtTheGate<F>(F);
 
 impl<T, F: FnMut() -> Poll<T> + Unpin> Future for AtTheGate<F> {

@@ -32,7 +32,7 @@ pub enum EventKind {
     Queued { dag: DagId, job: u64 },
     /// A release did not happen.
     Skipped { dag: DagId, job: u64 },
-    /// A sporadic DAG got a signal, which lets a job be released at `release_ns`;
+    /// A sporadic DAG got a signal, for a job that is to be released at `release_ns`;
     /// `None`: the signal was dropped.
     Signalled { dag: DagId, release_ns: Option<u64> },
     /// All that an instance waits for has happened.

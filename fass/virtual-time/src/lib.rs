@@ -164,7 +164,7 @@ impl VirtualTime {
         self
     }
 
-    /// Lets a panic in a function end its DAG only, as a fault does on the
+    /// Contains panics: one in a function ends its DAG only, as a fault does on the
     /// kernel's machine, instead of failing the run.
     ///
     /// The instance fails when it has executed what it had executed up to the

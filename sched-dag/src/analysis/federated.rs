@@ -23,7 +23,7 @@ use super::ratio::Ratio;
 use super::task::Task;
 use crate::order::sort;
 
-/// Who gets which cores.
+/// Which DAG gets which cores.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Federation {
     /// The heavy DAGs by position, each with its number of dedicated cores.

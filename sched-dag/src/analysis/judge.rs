@@ -2,8 +2,8 @@
 //!
 //! [`answer`] looks at what is certain (missing WCETs, a path longer than the
 //! deadline, a subtask longer than the period, more work than cores), then
-//! solves the response-time equations of the set, and finally lets the
-//! capacity tests vouch for what those leave open; these give only the
+//! solves the response-time equations of the set, and finally asks the
+//! capacity tests about what those leave open; these give only the
 //! deadline as the bound, so they come last although they are the cheapest.
 //!
 //! What interferes with DAG `k` is decided for each pair of DAGs:

@@ -10,7 +10,7 @@
 //! lower-ranked work it finds was started before it became ready: on at most
 //! `m` cores for the chain's first subtask, on at most `m - 1` for a later one,
 //! because the core of its predecessor has just become free. A subtask never
-//! runs beside itself, so the `x` running ones are different subtasks.
+//! overlaps with itself, so the `x` running ones are different subtasks.
 //!
 //! Trap: the published LP-max bound (M. A. Serrano et al., "Response-Time
 //! Analysis of DAG Tasks under Fixed Priority Scheduling with Limited

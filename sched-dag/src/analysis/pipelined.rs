@@ -17,7 +17,7 @@
 //!
 //! 1. To follow the chain back only over the jobs that the job itself can meet
 //!    (`j T < R`). But each job may delay only the next, and a delay still be
-//!    handed on for ever: a subtask with a WCET of one period never catches up.
+//!    handed on forever: a subtask with a WCET of one period never catches up.
 //!    In the test `delays_handed_on_are_counted` that would claim 18 where
 //!    observed response times grow without end.
 //! 2. To take another DAG to use no more cores than one of its jobs can, also

@@ -1,4 +1,4 @@
-//! Workload: how much one DAG can execute in a window, whoever else runs.
+//! Workload: how much one DAG can execute in a window, whatever else runs.
 //!
 //! A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo,
 //! "Schedulability Analysis of Conditional Parallel Task Graphs in Multicore
@@ -27,7 +27,7 @@
 
 use super::task::Task;
 
-/// A DAG that may execute beside the one under analysis.
+/// A DAG that may execute next to the one under analysis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Workload {
     volume: u128,

@@ -44,8 +44,8 @@ pub(super) fn check(specs: &[DagSpec], options: &CommitOptions, findings: &mut F
 /// Returns the most jobs in flight of a DAG, given or enough for its deadline.
 ///
 /// A job that meets its deadline is in flight for at most D, so at most
-/// ceil(D / T) of them are at any time; one more lets a late job end while the
-/// next one is released. Where subtasks share a state, jobs take turns.
+/// ceil(D / T) of them are at any time; with one more a late job can end while
+/// the next one is released. Where subtasks share a state, jobs take turns.
 pub(super) fn in_flight(spec: &DagSpec) -> u64 {
     if let Some(given) = spec.in_flight {
         return u64::from(given);
@@ -109,7 +109,7 @@ fn check_counts(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
 fn check_times(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
-    // Who registers subtasks states both with them.
+    // An app that registers subtasks states both with them.
     let has_subtasks = !spec.subtasks.is_empty();
     match spec.period_ns {
         None if has_subtasks => findings.fault(dag, Fault::MissingPeriod { dag: label() }),

@@ -2,7 +2,7 @@
 //!
 //! Such a reader may belong to any DAG and makes no edge. For the topic it is one
 //! reader more: the topic is not unread, the types must agree, and a message that
-//! can only be moved can have no other reader beside it.
+//! can only be moved can have no other reader.
 
 use alloc::vec::Vec;
 

@@ -1,6 +1,6 @@
 //! The verification of DAGs at commit.
 //!
-//! After it nothing can be added, and whoever holds the [`TaskSet`] may rely on
+//! After it nothing can be added, and the holder of the [`TaskSet`] may rely on
 //! what it says. All faults of all DAGs are reported at once, so an app's
 //! author needs one run to see them; warnings stand apart and prevent nothing.
 //!

@@ -6,7 +6,7 @@
 
 use crate::policy::Policy;
 
-/// What the verification is told beside the DAGs.
+/// What the verification is told besides the DAGs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CommitOptions {

@@ -13,7 +13,7 @@
 //! updates stay parallel. All edges follow one order that all paths follow, so
 //! they close no cycle.
 //!
-//! Jobs take turns as well: the commit lets one be in flight. Job k + 1 finds the
+//! Jobs take turns as well: the commit allows one in flight. Job k + 1 finds the
 //! states as job k left them.
 //!
 //! The analysis sees nothing but a DAG with some more edges. There is no lock, so

@@ -34,7 +34,7 @@ pub enum Warning {
     DuplicateDagName { first: DagLabel, second: DagLabel },
     /// The analysis is certain that the DAG cannot keep its deadlines when
     /// every instance takes its WCET. Not from [`verify`](crate::verify()), which
-    /// does not analyse, but from whoever does.
+    /// does not analyse, but from a caller that does.
     CertainMiss {
         dag: DagLabel,
         /// Why, in words, with the remedy.

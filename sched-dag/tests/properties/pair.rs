@@ -1,4 +1,4 @@
-//! The short ways beside the long one, step by step.
+//! The short ways compared with the long one, step by step.
 //!
 //! Two schedulers of one set are told the same, a random walk: one learns of an
 //! instance's end by [`Scheduler::hand_off`] or [`Scheduler::hand_over`], the other by a

@@ -1,5 +1,5 @@
 //! Values that a cancelled instance leaves behind, large ones and some that cannot be
-//! dropped, beside a DAG that must not notice.
+//! dropped, next to a DAG that must not notice.
 //!
 //! To give a value up must neither need its size on a handler's stack nor run its
 //! `drop` there. A value too large for a subtask's own stack is a fault like others.
@@ -18,7 +18,7 @@ use sched_dag::DagId;
 
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// Runs each DAG that ends by a fault beside the healthy one.
+/// Runs each DAG that ends by a fault, next to the healthy one.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();

@@ -30,7 +30,7 @@ pub(crate) fn flood(machine: &Machine) -> Result<(), Ending> {
     machine.run().map(drop)
 }
 
-/// Lets one DAG after the other panic, until a commit finds no memory for stacks.
+/// Makes one DAG after the other panic, until a commit finds no memory for stacks.
 pub(crate) fn spend_stacks(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();
@@ -43,7 +43,7 @@ pub(crate) fn spend_stacks(machine: &Machine) -> Result<(), Ending> {
     Err(Ending::Failure("no commit was refused".to_string()))
 }
 
-/// Lets an instance be suspended for longer than its budget.
+/// Keeps an instance suspended for longer than its budget.
 pub(crate) fn suspend(machine: &Machine) -> Result<(), Ending> {
     const URGENT: Duration = Duration::from_millis(4);
     const LONG: Duration = Duration::from_millis(2);

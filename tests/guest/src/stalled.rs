@@ -1,4 +1,4 @@
-//! A subtask that does not return, beside a DAG that ends well.
+//! A subtask that does not return, next to a DAG that ends well.
 
 use alloc::vec;
 use core::time::Duration;

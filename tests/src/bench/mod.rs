@@ -9,7 +9,7 @@
 //! - [`scheduler`]: the commit, and the cost of a dispatched instance;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
-//! - [`makespan`]: task graphs on the machine, beside their published optima;
+//! - [`makespan`]: task graphs on the machine, next to their published optima;
 //! - [`native`]: the scheduler on this host's own processors.
 
 pub mod hand_off;

@@ -1,7 +1,7 @@
 //! The kinds of machine lines that are known, and what each must say.
 //!
-//! `docs/serial-protocol.md` and its two companions describe the same kinds for people; a test beside
-//! the reader makes sure that it leaves none out.
+//! `docs/serial-protocol.md` and its two companions describe the same kinds for people; a
+//! test next to the reader makes sure that they leave none out.
 
 /// Each known kind and the members that its lines must have; a dot leads into
 /// an object. Members beyond these are allowed.

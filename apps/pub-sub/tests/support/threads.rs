@@ -15,7 +15,7 @@ struct Threads<M, C> {
     start: Instant,
 }
 
-/// Lets so many workers run a graph until it is shut down, and returns it.
+/// Runs a graph by `workers` workers until it is shut down, and returns it.
 pub(crate) fn run<M, C>(graph: Graph<M, C>, workers: usize) -> Graph<M, C>
 where
     M: Clone + Send,

@@ -18,7 +18,7 @@ impl Reference<'_> {
         }
     }
 
-    /// Lets the next job of a sporadic DAG be due, unless a signal is still kept.
+    /// Makes the next job of a sporadic DAG due, unless a signal is still kept.
     pub(super) fn take_signals(&mut self) {
         for (dag, model) in self.set.dags.iter().enumerate() {
             let signals_ns = model.signals_ns.iter().flatten();

@@ -10,7 +10,7 @@ use crate::outcome::{Outcome, boot};
 use crate::qemu::{Mode, Qemu};
 use crate::{image, install, system};
 
-/// The length of a unit of time: long beside what the kernel takes, as virtual time
+/// The length of a unit of time: long compared with what the kernel takes, as virtual time
 /// costs nothing.
 const UNIT_NS: u64 = 10_000_000;
 

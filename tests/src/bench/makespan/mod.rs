@@ -1,4 +1,4 @@
-//! Makespans of task graphs beside the shortest that are possible.
+//! Makespans of task graphs, compared with the shortest that are possible.
 //!
 //! A *makespan* is the time from a job's release to its completion. For the graphs
 //! of Kasahara's Standard Task Graph Set the shortest makespans without preemption

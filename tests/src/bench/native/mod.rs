@@ -2,7 +2,7 @@
 //!
 //! The same scheduler that the kernel runs, driven by threads (crate `native`), on the
 //! graphs of `bench hand-off` with empty bodies. Nothing here is emulated, so the
-//! figures can stand beside those of libraries that run task graphs on threads.
+//! figures can be compared with those of libraries that run task graphs on threads.
 //!
 //! Other work on the host shows in them. Therefore each figure is measured in many
 //! short *rounds*, spread over several passes, and given as minimum, median and 99th
