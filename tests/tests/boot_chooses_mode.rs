@@ -1,7 +1,7 @@
 //! The mode that a command takes: by the probe where KVM comes into question, with one
 //! sentence where KVM is of no use.
 //!
-//! What KVM does is played by a script in QEMU's place, which hands every other mode on
+//! A script in QEMU's place plays a KVM that is of no use, and hands every other mode on
 //! to QEMU; so the tests run on any host. The last one takes the host as it is.
 
 use std::fs;
