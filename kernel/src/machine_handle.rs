@@ -194,7 +194,7 @@ impl Machine {
         self.run_from(machine::clock::now_ns() + LEAD_NS)
     }
 
-    /// Does as [`run`](Self::run), with the releases counted from `epoch_ns` on
+    /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on
     /// the clock of [`fass::now_ns`]. If that is past, releases are late.
     ///
     /// # Errors

@@ -65,7 +65,7 @@ pub fn boot(
     boot_with_input(qemu, image, log, limit, drop, show)
 }
 
-/// Does as [`boot`], and hands `talk` the way to the guest's serial port, if the
+/// Works like [`boot`], and hands `talk` the way to the guest's serial port, if the
 /// guest has one, as soon as it runs.
 ///
 /// # Errors

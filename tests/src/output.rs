@@ -47,7 +47,7 @@ pub fn put(stream: &mut impl Write, what: Arguments<'_>) {
     let _ = stream.write_fmt(what);
 }
 
-/// Does as [`put`] and ends the line.
+/// Works like [`put`] and ends the line.
 pub fn put_line(stream: &mut impl Write, what: Arguments<'_>) {
     let _ = stream.write_fmt(format_args!("{what}\n"));
 }

@@ -255,7 +255,7 @@ fn options_that_do_not_fit_are_2() {
     }
 }
 
-/// Writes files of so many subtasks, one in each format.
+/// Writes files of `subtasks` subtasks, one in each format.
 fn many(subtasks: usize) -> [String; 2] {
     let lines = |line: &dyn Fn(usize) -> String| (0..subtasks).map(line).collect::<String>();
     let ours = lines(&|number| format!("subtask s{number} wcet 1us\n"));

@@ -19,9 +19,9 @@ use crate::file::{FileDag, Set};
 /// How long a set runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Length {
-    /// Each DAG releases so many jobs.
+    /// Each DAG releases this number of jobs.
     Jobs(u64),
-    /// Each DAG releases the jobs of so many nanoseconds, at least one.
+    /// Each DAG releases the jobs of this time in nanoseconds, at least one.
     Span(u64),
 }
 

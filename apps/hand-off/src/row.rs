@@ -29,7 +29,7 @@ impl Row {
         }
     }
 
-    /// States that a sample is of so many equal steps.
+    /// States that a sample is of `per` equal steps.
     pub(crate) fn per(self, per: u64) -> Self {
         Self { per, ..self }
     }

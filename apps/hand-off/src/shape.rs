@@ -15,7 +15,7 @@ pub const LAYER: usize = 32;
 pub enum Shape {
     /// So many subtasks, one after the other; at least 2.
     Chain(usize),
-    /// A source, so many subtasks side by side, a sink.
+    /// A source, this number of subtasks side by side, a sink.
     ForkJoin(usize),
     /// A random graph in layers.
     ///

@@ -20,7 +20,7 @@ pub struct Pen {
 }
 
 impl Pen {
-    /// Makes a pen by itself with room for so many times.
+    /// Makes a pen by itself with room for a given number of times.
     #[must_use]
     pub fn new(times: usize) -> Self {
         Self {

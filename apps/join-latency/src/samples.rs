@@ -70,7 +70,7 @@ impl Samples {
         }
     }
 
-    /// Makes room for so many jobs, with joins of `parallel` values.
+    /// Makes room for `jobs` jobs, with joins of `parallel` values.
     pub(crate) fn room_for_joins(parallel: usize, jobs: usize) -> (Vec<Joined>, Vec<u64>) {
         (
             Vec::with_capacity(jobs),

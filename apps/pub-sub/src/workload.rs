@@ -31,7 +31,7 @@ pub enum Stamping {
     Publication,
 }
 
-/// Runs so many jobs through a synchronizer that holds nothing yet, which joins as
+/// Runs `jobs` jobs through a synchronizer that holds nothing yet, which joins as
 /// many parallel subtasks as it has topics. `execution_ns` is asked for the
 /// execution time of each (parallel subtask, job) once: the parallel subtasks one
 /// after the other, and for each the jobs in order.

@@ -63,7 +63,7 @@ impl Scale {
             .saturating_sub(start_ns)
     }
 
-    /// Executes for so many units, inside a subtask. The core is held meanwhile.
+    /// Executes for `units` units, inside a subtask. The core is held meanwhile.
     pub fn execute(self, units: u64, epoch: &Epoch) {
         for _ in 0..units {
             let ns = self.unit_from(epoch.elapsed_ns());

@@ -146,7 +146,7 @@ impl Line<'_> {
         }
     }
 
-    /// Returns the words, of which there must be so many.
+    /// Returns the words, whose number must be `count`.
     ///
     /// # Errors
     ///
@@ -198,7 +198,7 @@ impl Line<'_> {
         }
     }
 
-    /// Reads all words as numbers, of which there must be so many.
+    /// Reads all words as numbers; there must be `count`.
     ///
     /// # Errors
     ///

@@ -46,7 +46,7 @@ impl Dag {
 }
 
 impl<U: Uses> Using<'_, U> {
-    /// Does as [`Dag::register_periodic_subtask`].
+    /// Works like [`Dag::register_periodic_subtask`].
     ///
     /// ```
     /// # use core::time::Duration;
@@ -79,7 +79,7 @@ impl<U: Uses> Using<'_, U> {
         dag.register_periodic_subtask(f, output_topics, period, attributes);
     }
 
-    /// Does as [`Dag::register_sporadic_subtask`].
+    /// Works like [`Dag::register_sporadic_subtask`].
     ///
     /// ```
     /// # use core::time::Duration;
@@ -113,7 +113,7 @@ impl<U: Uses> Using<'_, U> {
         dag.register_sporadic_subtask(f, output_topics, min_inter_arrival, attributes)
     }
 
-    /// Does as [`Dag::register_subtask`]. See [`State`](crate::State).
+    /// Works like [`Dag::register_subtask`]. See [`State`](crate::State).
     #[track_caller]
     pub fn register_subtask<F, Args, Ret>(
         self,
@@ -131,7 +131,7 @@ impl<U: Uses> Using<'_, U> {
         dag.register_subtask(f, input_topics, output_topics, attributes);
     }
 
-    /// Does as [`Dag::register_sink_subtask`]. See [`State`](crate::State).
+    /// Works like [`Dag::register_sink_subtask`]. See [`State`](crate::State).
     #[track_caller]
     pub fn register_sink_subtask<F, Args>(
         self,
@@ -148,7 +148,7 @@ impl<U: Uses> Using<'_, U> {
         dag.register_sink_subtask(f, input_topics, relative_deadline, attributes);
     }
 
-    /// Does as [`Dag::register_untyped_subtask`].
+    /// Works like [`Dag::register_untyped_subtask`].
     ///
     /// ```
     /// # use fass::{SubtaskAttributes, create_dag};

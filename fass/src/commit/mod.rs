@@ -74,7 +74,7 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
     finish_create_dags_with(dags, ConstructionPolicy::paper())
 }
 
-/// Does as [`finish_create_dags`] for other shapes of graph: with several
+/// Works like [`finish_create_dags`] for other shapes of graph: with several
 /// sources or sinks, or of several parts. Nothing else changes.
 ///
 /// A topic has one writer whatever `construction` says: an input is one value a job,

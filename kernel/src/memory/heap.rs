@@ -18,7 +18,7 @@ use crate::machine::this_core;
 
 static HEAP: SpinLock<Tlsf> = SpinLock::new(Tlsf::new());
 
-/// The part of the heap that no subtask can have: one in so many.
+/// Subtasks leave the heap its capacity divided by this.
 const RESERVE: usize = 32;
 
 /// Reports whether the code that allocates can have `bytes` more. Interrupts are disabled.

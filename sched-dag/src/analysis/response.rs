@@ -92,7 +92,7 @@ impl Figures {
         }
     }
 
-    /// Accepts no response time beyond so many periods: one more job would meet
+    /// Accepts no response time beyond this number of periods: one more job would meet
     /// the overrun policy.
     pub(super) fn allow_in_flight(&mut self, jobs: u32) {
         self.deadline = self.deadline.min(u128::from(jobs) * self.period);

@@ -164,7 +164,7 @@ impl Piece {
         Self { span, ..self }.or_one_flat_step()
     }
 
-    /// Returns the sum of so many equal pieces.
+    /// Returns the sum of `count` equal pieces.
     fn times(self, count: u128) -> Self {
         Self {
             value: self.value.saturating_mul(count),

@@ -21,7 +21,7 @@ const OFFSET: Duration = Duration::from_millis(1);
 /// How long the low subtasks compute.
 const WORK_NS: u64 = 2_000_000;
 
-/// Preempts one of so many low subtasks, one for each core.
+/// Preempts one of the low subtasks, of which each core has one.
 pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), Ending> {
     let mut stamps = Stamps::default();
     let mut dags = alloc::vec![preemptor(jobs, stamps.pen(jobs))];

@@ -18,7 +18,7 @@ pub(super) struct Ring<M> {
 }
 
 impl<M> Ring<M> {
-    /// Makes an empty ring with room for so many entries.
+    /// Makes an empty ring with room for `entries` entries.
     pub(super) fn with_capacity(entries: usize) -> Self {
         Self {
             entries: VecDeque::with_capacity(entries),

@@ -17,8 +17,8 @@ pub(super) const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3
      instructions, the jitter by 20; a commit by more than 10 %; on several cores the median \
      by more than 10 % and 40";
 
-/// Returns by how much a figure may be larger: so many per cent, and in any case so
-/// many instructions a step, for of a few instructions one is many per cent.
+/// Returns by how much a figure may be larger: in per cent, and in any case in
+/// instructions a step, since one of a few instructions is many per cent.
 fn margin(figure: &Figure) -> (u128, u128) {
     match &*figure.figure {
         // One more in each step is a change.

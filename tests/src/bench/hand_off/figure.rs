@@ -4,7 +4,7 @@ use crate::json::Value;
 use crate::protocol::{MachineLine, Transcript};
 use crate::qemu::Mode;
 
-/// One measured quantity of one workload on so many cores.
+/// One measured quantity of one workload on a number of cores.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Figure {
     pub(super) cores: u64,

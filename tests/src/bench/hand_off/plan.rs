@@ -12,7 +12,7 @@ use crate::system;
 /// The options of a baseline: it is of the defaults of these.
 const SIZES: &[&str] = &["jobs", "chain", "branches", "layered", "seed", "append"];
 
-/// Returns the memory, in MiB, for DAGs of so many subtasks: each needs a stack, each
+/// Returns the memory, in MiB, for DAGs of `subtasks` subtasks: each needs a stack, each
 /// core two, and the kernel leaves a quarter of the memory for stacks.
 fn memory_mib(subtasks: u64, cores: u64) -> u64 {
     256.max((subtasks + 2 * cores) * 3 / 10)

@@ -34,7 +34,7 @@ const BY_SUBTASKS: &[Column] = &[
     ("layered", "commit", "commit/subtask"),
 ];
 
-/// Returns the sizes of the workloads for so many subtasks of a layered graph.
+/// Returns the sizes of the workloads for a layered graph of `subtasks` subtasks.
 pub(super) fn sizes(subtasks: u64) -> String {
     format!("chain=2 branches=2 layered={subtasks}")
 }

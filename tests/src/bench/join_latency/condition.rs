@@ -9,7 +9,7 @@ pub(super) enum Policy {
     Fass,
     /// Equal stamps.
     Exact,
-    /// Stamps at most so many milliseconds apart.
+    /// Stamps at most this number of milliseconds apart.
     Approximate(u64),
 }
 

@@ -57,7 +57,7 @@ impl Stamps {
     }
 }
 
-/// Measures so many jobs, and reading the clock.
+/// Measures `jobs` jobs, and reading the clock.
 pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
     let count = usize::try_from(jobs).map_err(|_| "too many jobs".to_owned())?;
     let epoch = Instant::now();

@@ -82,7 +82,7 @@ fn as_f64(count: u64) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX))
 }
 
-/// Runs so many rounds and some to warm up.
+/// Runs the rounds, and some before to warm up.
 fn pass(
     graph: Graph,
     runner: Runner,

@@ -74,7 +74,7 @@ impl Rounds {
         durations.skip(times.len() / 10).collect()
     }
 
-    /// Returns what a source does: it reads the clock once in so many jobs.
+    /// Returns what a source does: it reads the clock once in `jobs_a_round` jobs.
     pub(super) fn source(&self, jobs_a_round: u64) -> impl FnMut() + Send + 'static {
         let rounds = self.clone();
         let mut left = 1;
@@ -100,7 +100,7 @@ pub(super) fn closures(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<
     bodies
 }
 
-/// Verifies the graph as a DAG of so many jobs.
+/// Verifies the graph as a DAG of `jobs` jobs.
 pub(super) fn task_set(shape: Shape, jobs: u64, policy: Policy, workers: u32) -> TaskSet {
     let period_ns = u64::try_from(PERIOD.as_nanos()).ok();
     let spec = DagSpec {

@@ -1,6 +1,6 @@
 //! The cost of a dispatched instance, by how many are ready.
 //!
-//! One DAG of so many subtasks without edges has many jobs in flight. When an
+//! One DAG of many subtasks without edges has many jobs in flight. When an
 //! instance completes, the same subtask's next job is ready at once, so the
 //! number of ready instances stays what it is. What is measured is one instant
 //! of the scheduler: the completion, the releases (none are due), the dispatch
@@ -27,7 +27,7 @@ const INSTANCES: usize = 200_000;
 
 const ROUNDS: usize = 9;
 
-/// What an instance costs with so many ready.
+/// What an instance costs with a number of others ready.
 pub(super) struct Figure {
     pub(super) ready: usize,
     pub(super) nanoseconds: f64,
@@ -63,7 +63,7 @@ pub(super) fn measure() -> Vec<Figure> {
     READY.iter().zip(&per_instance).map(figure).collect()
 }
 
-/// Dispatches [`INSTANCES`] instances while so many are ready, and returns how
+/// Dispatches [`INSTANCES`] instances while `ready` are ready, and returns how
 /// long that takes.
 fn round(ready: usize) -> std::time::Duration {
     // One more job than needed keeps the line full to the end.

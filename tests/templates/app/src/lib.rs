@@ -62,7 +62,7 @@ fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
     SubtaskAttributes::named(name).wcet(Duration::from_millis(wcet_ms))
 }
 
-/// Stands for a computation that takes so many microseconds.
+/// Stands for a computation that takes `us` microseconds.
 fn work(us: u64) {
     execute_for(Duration::from_micros(us), Occupation::Hold);
 }
