@@ -5,8 +5,9 @@
 //! name. Images are always built in release. Cargo itself is asked where the
 //! file lies, so no setting of cargo's can make us boot a stale one.
 
+use std::env;
 use std::fmt;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -132,6 +133,7 @@ pub fn build(package: &str) -> Result<Image, ImageError> {
     ]);
     command.arg("--message-format=json-render-diagnostics");
     command.stdin(Stdio::null()).stdout(Stdio::piped());
+    say_if_cargo_waits();
     let mut cargo = command
         .spawn()
         .map_err(|error| failed(format!("cargo: {error}")))?;
@@ -155,6 +157,22 @@ pub fn build(package: &str) -> Result<Image, ImageError> {
         }),
         None => Err(failed("cargo built no binary of that name".into())),
     }
+}
+
+/// Says so if another command builds images: cargo would wait for it without a word.
+fn say_if_cargo_waits() {
+    let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
+    let folder = system::workspace().join(target).join("release");
+    if is_locked(&folder.join(".cargo-lock")) {
+        let folder = folder.display();
+        eprintln!("waiting for another command, which builds in {folder}");
+    }
+}
+
+fn is_locked(file: &Path) -> bool {
+    // Where there is no such file, there is no one to wait for.
+    let locked = File::open(file).map(|file| file.try_lock_shared());
+    matches!(locked, Ok(Err(TryLockError::WouldBlock)))
 }
 
 /// Reads one of cargo's messages: the executable, if it announces ours.
@@ -181,7 +199,8 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::{ImageError, apps, check_app, executable};
+    use super::{ImageError, apps, check_app, executable, is_locked};
+    use std::fs::File;
     use std::path::PathBuf;
 
     #[test]
@@ -200,6 +219,19 @@ mod tests {
             "{text}"
         );
         assert!(text.ends_with("; did you mean `fork-join`?"), "{text}");
+    }
+
+    #[test]
+    fn a_build_by_others_is_seen_by_its_lock() {
+        let path = crate::system::new_log("lock").unwrap();
+        assert!(!is_locked(&path));
+        let file = File::create(&path).unwrap();
+        assert!(!is_locked(&path));
+        file.lock().unwrap();
+        assert!(is_locked(&path));
+        drop(file);
+        assert!(!is_locked(&path));
+        std::fs::remove_file(path).unwrap();
     }
 
     #[test]

@@ -15,7 +15,7 @@
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
-//!   [`output`]: printing without a panic;
+//!   [`output`], [`progress`]: printing without a panic, and while it takes long;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`guest`]: all that for a test;
 //! - [`fault_page`], [`guide`], [`promises`]: pages that tests hold to their word;
@@ -54,6 +54,7 @@ pub mod oracle;
 pub mod outcome;
 pub mod places;
 pub mod probe;
+pub mod progress;
 pub mod promises;
 pub mod protocol;
 pub mod qemu;

@@ -66,5 +66,5 @@ fn main() -> ExitCode {
         let _ = env::set_current_dir(folder);
     }
     let words: Vec<OsString> = env::args_os().skip(1).collect();
-    TOOL.run(&words)
+    harness::output::conclude(TOOL.run(&words))
 }

@@ -16,6 +16,7 @@ mod table;
 
 use std::ffi::OsString;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -75,7 +76,15 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
 /// The name is refused, or a file cannot be written; nothing is left then.
 pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, NewAppError> {
     check(workspace, name).map_err(NewAppError::Name)?;
-    let folder = workspace.join("apps").join(name);
+    let apps = workspace.join("apps");
+    let folder = apps.join(name);
+    let failed = |error| format!("cannot write `{}`: {error}", folder.display());
+    fs::create_dir_all(&apps).map_err(|error| NewAppError::Files(failed(error)))?;
+    fs::create_dir(&folder).map_err(|error| match error.kind() {
+        // Another command has been as quick.
+        ErrorKind::AlreadyExists => NewAppError::Name(name::taken(name)),
+        _ => NewAppError::Files(failed(error)),
+    })?;
     write_all(&folder, name).map_err(|line| {
         // What cannot be written can perhaps not be removed either; the line
         // names the place.
@@ -148,6 +157,24 @@ mod tests {
     }
 
     #[test]
+    fn of_two_at_once_one_makes_the_app() {
+        let workspace = std::env::temp_dir().join(format!("two-apps-{}", std::process::id()));
+        for number in 0..50 {
+            let name = format!("app-{number}");
+            let barrier = std::sync::Barrier::new(2);
+            let make = || {
+                barrier.wait();
+                create(&workspace, &name).is_ok()
+            };
+            let made = std::thread::scope(|scope| {
+                [scope.spawn(make), scope.spawn(make)].map(|thread| thread.join().unwrap())
+            });
+            assert!(made[0] != made[1], "{name}: {made:?}");
+        }
+        fs::remove_dir_all(workspace).unwrap();
+    }
+
+    #[test]
     fn what_cannot_be_written_is_said_and_leaves_nothing() {
         let workspace = std::env::temp_dir().join(format!("no-app-{}", std::process::id()));
         fs::create_dir_all(&workspace).unwrap();
@@ -157,7 +184,7 @@ mod tests {
             panic!("a file has become a folder");
         };
         assert!(line.starts_with("cannot write `"), "{line}");
-        assert!(line.contains("brake-assist/Cargo.toml`: "), "{line}");
+        assert!(line.contains("apps/brake-assist`: "), "{line}");
         fs::remove_dir_all(workspace).unwrap();
     }
 }

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
 use std::time::Duration;
 
+use crate::files;
 use crate::places::Places;
 use crate::protocol::{Status, Transcript};
 use crate::qemu::{Ending, Qemu};
@@ -87,7 +88,7 @@ pub fn boot_with_input(
     let bytes = fs::read(log)
         .map_err(|error| format!("cannot read the serial log `{}`: {error}", log.display()))?;
     let serial = String::from_utf8_lossy(&bytes).into_owned();
-    Ok(Outcome {
+    let outcome = Outcome {
         ending,
         transcript: Transcript::read(&serial),
         serial,
@@ -95,7 +96,12 @@ pub fn boot_with_input(
         image: image.to_path_buf(),
         elapsed: running.elapsed(),
         complaints: running.complaints(),
-    })
+    };
+    if outcome.transcript.verdict().is_err() {
+        // QEMU does not say that it could not write.
+        files::check_room(log).map_err(|why| format!("the serial log {why}"))?;
+    }
+    Ok(outcome)
 }
 
 impl Outcome {
@@ -121,9 +127,15 @@ impl Outcome {
         }
         let Ending::Guest(by_exit) = self.ending else {
             // QEMU obeys such a signal and ends with the status of a shutdown.
-            let mut reason = match self.complaints.contains("terminating on signal") {
-                true => Ending::Signal.to_string(),
-                false => self.ending.to_string(),
+            let mut reason = match self.ending {
+                _ if self.complaints.contains("terminating on signal") => {
+                    Ending::Signal.to_string()
+                }
+                Ending::Status(0) if self.serial.is_empty() => "it ended without an exit status, \
+                    and nothing was printed: a triple fault before the first line, or a program \
+                    that is not QEMU"
+                    .into(),
+                _ => self.ending.to_string(),
             };
             if !self.complaints.is_empty() {
                 // Writing into a `String` cannot fail.
@@ -242,6 +254,7 @@ mod tests {
             "no end within 1.5 s, QEMU was killed; the load"
         );
         assert!(reason(Ending::Status(0), SUCCESS).contains("triple fault"));
+        assert!(reason(Ending::Status(0), "").contains("a program that is not QEMU"));
         let ended = Outcome {
             complaints: "terminating on signal 15 from pid 7".into(),
             ..outcome(Ending::Status(0), SUCCESS)

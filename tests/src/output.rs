@@ -3,6 +3,8 @@
 //! The standard library's printing macros panic when a write fails, and a write fails
 //! as soon as the reader of a pipe has left (`./scripts/oracle ... | head -1`). That no
 //! one reads on is no failure: the work goes on, and its exit code says how it ended.
+//! Any other reason why standard output takes nothing, such as a full disk, is one: it is
+//! said at the end, by [`conclude`].
 //!
 //! So this library has macros of the same names, which hide those of the standard
 //! library in all its modules; nobody has to think of it where something is printed.
@@ -11,7 +13,7 @@
 #[macro_export]
 macro_rules! print {
     ($($what:tt)*) => {
-        $crate::output::put(&mut ::std::io::stdout(), ::std::format_args!($($what)*))
+        $crate::output::put(::std::format_args!($($what)*))
     };
 }
 
@@ -19,7 +21,7 @@ macro_rules! print {
 #[macro_export]
 macro_rules! println {
     ($($what:tt)*) => {
-        $crate::output::put_line(&mut ::std::io::stdout(), ::std::format_args!($($what)*))
+        $crate::output::put(::std::format_args!("{}\n", ::std::format_args!($($what)*)))
     };
 }
 
@@ -27,7 +29,7 @@ macro_rules! println {
 #[macro_export]
 macro_rules! eprint {
     ($($what:tt)*) => {
-        $crate::output::put(&mut ::std::io::stderr(), ::std::format_args!($($what)*))
+        $crate::output::complain(::std::format_args!($($what)*))
     };
 }
 
@@ -35,19 +37,48 @@ macro_rules! eprint {
 #[macro_export]
 macro_rules! eprintln {
     ($($what:tt)*) => {
-        $crate::output::put_line(&mut ::std::io::stderr(), ::std::format_args!($($what)*))
+        $crate::output::complain(::std::format_args!("{}\n", ::std::format_args!($($what)*)))
     };
 }
 
 use std::fmt::Arguments;
-use std::io::Write;
+use std::io::{self, ErrorKind, Write, stderr, stdout};
+use std::process::ExitCode;
+use std::sync::OnceLock;
 
-/// Writes what a macro was given; that it cannot be written is not said.
-pub fn put(stream: &mut impl Write, what: Arguments<'_>) {
-    let _ = stream.write_fmt(what);
+/// Why standard output did not take everything, if it did not.
+static LOST: OnceLock<io::Error> = OnceLock::new();
+
+/// Writes to standard output; for the macros.
+pub fn put(what: Arguments<'_>) {
+    note(stdout().write_fmt(what));
 }
 
-/// Works like [`put`] and ends the line.
-pub fn put_line(stream: &mut impl Write, what: Arguments<'_>) {
-    let _ = stream.write_fmt(format_args!("{what}\n"));
+/// Writes to standard error; for the macros. That it cannot be written can be said nowhere.
+pub fn complain(what: Arguments<'_>) {
+    let _ = stderr().write_fmt(what);
+}
+
+fn note(written: io::Result<()>) {
+    if let Err(error) = written
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        // The first reason is the one that is said.
+        let _ = LOST.set(error);
+    }
+}
+
+/// Returns the exit code of the tool, whose work has ended with `code`: a failure, which
+/// is said here, if not all output could be written.
+#[must_use]
+pub fn conclude(code: ExitCode) -> ExitCode {
+    note(stdout().flush());
+    let Some(error) = LOST.get() else {
+        return code;
+    };
+    eprintln!("harness: standard output could not be written: {error}");
+    if code == ExitCode::SUCCESS {
+        return ExitCode::FAILURE;
+    }
+    code
 }

@@ -145,7 +145,7 @@ fn boot_app(
             screen.show(translated.as_deref().unwrap_or(line));
         }
     };
-    let talk = seeing::relay;
+    let talk = seeing::relay(options);
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
@@ -176,6 +176,10 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
         true => "dag-file",
         false => options.text("app").unwrap_or_default(),
     };
+    if app == "dag-file" && !is_dag_file {
+        let line = "app `dag-file` runs the DAGs of a file; name one by `--dag FILE`";
+        return Err(Refusal::Usage(line.into()));
+    }
     let Some(path) = options.path("image") else {
         image::check_app(app).map_err(|error| Refusal::Usage(error.to_string()))?;
         return Ok(app.into());

@@ -4,16 +4,36 @@
 use std::env;
 use std::ffi::OsStr;
 use std::fs;
+use std::io::{self, IsTerminal};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Returns the root of the workspace that this tool was built from.
+/// Returns the root of the workspace: as `scripts/harness` says, or else where this tool
+/// was built, which is another place once the workspace has been moved.
 #[must_use]
 pub fn workspace() -> &'static Path {
-    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    package.parent().unwrap_or(package)
+    static ROOT: OnceLock<PathBuf> = OnceLock::new();
+    ROOT.get_or_init(|| match env::var_os("HARNESS_WORKSPACE") {
+        Some(root) => root.into(),
+        None => {
+            let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+            package.parent().unwrap_or(package).into()
+        }
+    })
+}
+
+/// Reports whether standard error is a terminal on which a line can renew itself.
+#[must_use]
+pub fn stderr_moves() -> bool {
+    io::stderr().is_terminal() && can_move(env::var_os("TERM").as_deref())
+}
+
+/// Reports whether a terminal of this type can erase a line.
+fn can_move(term: Option<&OsStr>) -> bool {
+    term.is_some_and(|term| !term.is_empty() && term != "dumb")
 }
 
 /// Returns a command for the cargo that built us, or else the one on `PATH`,
@@ -67,5 +87,72 @@ pub fn new_log(name: &str) -> Result<PathBuf, String> {
     fs::create_dir_all(&folder)
         .map_err(|error| format!("cannot make the folder `{}`: {error}", folder.display()))?;
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    if number == 0 {
+        clear(&folder);
+    }
     Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
+}
+
+/// Removes what processes that were ended from outside have left: boot modules, contents
+/// of logs from before, and logs of guests that were running. The log of a guest that
+/// failed stays, for it was shown to a person.
+fn clear(folder: &Path) {
+    let is_alive = |process: &str| Path::new("/proc").join(process).exists();
+    if !is_alive("self") {
+        return;
+    }
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
+        let process = stem.rsplit('-').nth(1).unwrap_or("self");
+        let is_process = process.bytes().all(|byte| byte.is_ascii_digit());
+        if !is_process || is_alive(process) || !["dag", "before", "log.qemu"].contains(&ending) {
+            continue;
+        }
+        // It is ours, and in the way of no one if it cannot be removed.
+        let _ = fs::remove_file(&path);
+        if ending == "log.qemu" {
+            let _ = fs::remove_file(path.with_extension(""));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{can_move, clear};
+    use std::ffi::OsStr;
+    use std::fs;
+    use std::process::{Command, id};
+
+    #[test]
+    fn a_dumb_terminal_renews_no_line() {
+        assert!(can_move(Some(OsStr::new("xterm"))));
+        assert!(!can_move(Some(OsStr::new("dumb"))));
+        assert!(!can_move(Some(OsStr::new(""))));
+        assert!(!can_move(None));
+    }
+
+    #[test]
+    fn what_killed_processes_left_is_removed() {
+        let folder = std::env::temp_dir().join(format!("leavings-{}", id()));
+        fs::create_dir_all(&folder).unwrap();
+        let mut gone = Command::new("true").spawn().unwrap();
+        let (dead, alive) = (gone.id(), id());
+        gone.wait().unwrap();
+        let endings = ["dag", "before", "log", "log.qemu"];
+        let names = |process| endings.map(|ending| format!("dag-file-{process}-3.{ending}"));
+        let shown = format!("soak-{dead}-7.log");
+        let mut all = [names(dead), names(alive)].concat();
+        all.extend([shown.clone(), "notes.dag".into(), "a-b-c.dag".into()]);
+        all.iter()
+            .for_each(|name| fs::write(folder.join(name), "").unwrap());
+        clear(&folder);
+        all.retain(|name| folder.join(name).exists());
+        let mut expected = names(alive).to_vec();
+        expected.extend([shown, "notes.dag".into(), "a-b-c.dag".into()]);
+        assert_eq!(all, expected);
+        fs::remove_dir_all(folder).unwrap();
+    }
 }

@@ -17,6 +17,7 @@ mod imports;
 mod layers;
 mod libtest;
 mod lint;
+mod own;
 mod table;
 mod tally;
 

@@ -22,7 +22,7 @@ fn an_image_of_another_app_is_2_before_it_boots() {
     let fork_join = built("fork-join");
     let demo = harness::system::workspace().join("tests/data/demo.dag");
     let dag = format!("--dag {}", demo.display());
-    for (words, wanted) in [(&*dag, "dag-file"), ("--app dag-file", "dag-file")] {
+    for (words, wanted) in [(&*dag, "dag-file"), ("--app replay", "replay")] {
         let output = run(&fork_join, words);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{said}");

@@ -2,7 +2,7 @@
 //! and that it does not mind who reads.
 
 use std::fs;
-use std::io;
+use std::io::{self, BufRead};
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
@@ -134,6 +134,61 @@ fn the_promises_are_listed_with_their_tests() {
     let of_a_fault =
         "docs/errors.md: the commit has no dag; create one and register its subtasks\n";
     assert!(listed.contains(of_a_fault), "{listed}");
+}
+
+#[test]
+fn that_another_command_builds_is_said() {
+    let target = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("locked");
+    let folder = target.join("tool");
+    fs::create_dir_all(&folder).expect("the test's folder takes one");
+    let lock = fs::File::create(folder.join(".cargo-lock")).expect("a file in it");
+    lock.lock().expect("nobody else has it");
+    let mut command = Command::new(workspace().join("scripts/run"));
+    command.arg("--help").env("CARGO_TARGET_DIR", &target);
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the script can be started");
+    let said = child.stderr.take().map(io::BufReader::new);
+    let line = said
+        .and_then(|said| said.lines().next())
+        .expect("it says something");
+    // It waits for us now; it is cargo by then, by the same process id.
+    child.kill().expect("it runs");
+    child.wait().expect("it was killed");
+    let expected = format!(
+        "waiting for another command, which builds in {}",
+        folder.display()
+    );
+    assert_eq!(line.expect("UTF-8"), expected);
+}
+
+#[test]
+fn what_cannot_be_written_is_1_and_said() {
+    let demo = workspace().join("tests/data/demo.dag");
+    let cases = workspace().join("tests/oracle/synchronizer.txt");
+    for words in [
+        "run --help".into(),
+        format!("run --print-dag --dag {}", demo.display()),
+        format!("oracle synchronizer {}", cases.display()),
+    ] {
+        let full = fs::File::create("/dev/full").expect("the device is there");
+        let output = tool(&words).stdout(full).output().expect("it starts");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(1), "{words}: {said}");
+        let words = "harness: standard output could not be written: No space left on device";
+        assert!(said.starts_with(words), "{said}");
+    }
+}
+
+#[test]
+fn a_dag_files_app_is_refused_without_a_file() {
+    let output = output("run --app dag-file --mode deterministic");
+    let said = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    let words = "run: app `dag-file` runs the DAGs of a file; name one by `--dag FILE`\n";
+    assert_eq!(said, words);
 }
 
 #[test]

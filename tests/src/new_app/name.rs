@@ -110,10 +110,7 @@ pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
     }
     let folder = Path::new("apps").join(name);
     if workspace.join(&folder).exists() {
-        return Err(format!(
-            "there is an app `{name}` already; choose another name, or edit {}",
-            folder.display()
-        ));
+        return Err(taken(name));
     }
     match package_folder(workspace, name) {
         Some(taken) => refuse(&format!(
@@ -122,6 +119,11 @@ pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
         )),
         None => Ok(()),
     }
+}
+
+/// Says that there is an app of the name.
+pub(super) fn taken(name: &str) -> String {
+    format!("there is an app `{name}` already; choose another name, or edit apps/{name}")
 }
 
 fn is_allowed(c: char) -> bool {

@@ -47,6 +47,7 @@ impl Log {
                 before: None,
             });
         };
+        let own = own.with_extension("before");
         let has_content = fs::metadata(named.path).is_ok_and(|data| data.len() > 0);
         if has_content {
             fs::copy(named.path, &own)

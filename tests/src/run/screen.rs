@@ -7,12 +7,12 @@
 //! take its place on a terminal. A fault at an address gets a line of our own that
 //! names the function.
 
-use std::io::{IsTerminal, stderr};
 use std::path::Path;
 
 use crate::options::Parsed;
 use crate::places::Places;
 use crate::protocol::{MachineLine, read_line};
+use crate::system;
 
 use super::status::StatusLine;
 
@@ -43,7 +43,7 @@ impl Screen {
             // Who wants these in a file does not want megabytes of them here.
             traces: !options.is_given("trace"),
             graphs: !options.is_given("dot"),
-            on_terminal: stderr().is_terminal(),
+            on_terminal: system::stderr_moves(),
             bar_is_shown: false,
             status: StatusLine::default(),
             tenths_shown: 0,

@@ -6,7 +6,7 @@
 //! file or a pipe must not depend on who started it.
 
 use std::fs;
-use std::io::{ErrorKind, IsTerminal, Read, Write, stderr, stdin, stdout};
+use std::io::{ErrorKind, IsTerminal, Read, Write, stdin, stdout};
 use std::process::ChildStdin;
 use std::thread;
 
@@ -14,6 +14,7 @@ use crate::dot;
 use crate::files;
 use crate::options::Parsed;
 use crate::outcome::Outcome;
+use crate::system;
 
 /// Returns the guest's words for what the options ask for.
 pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
@@ -31,7 +32,7 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
 fn is_watched(options: &Parsed) -> bool {
     let silent = ["quiet", "json", "gdb"];
     stdout().is_terminal()
-        && stderr().is_terminal()
+        && system::stderr_moves()
         && !silent.into_iter().any(|name| options.is_given(name))
 }
 
@@ -53,18 +54,34 @@ pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<Option<St
     )))
 }
 
-/// Hands standard input on to the guest's serial port, until either ends.
-pub(super) fn relay(input: Option<ChildStdin>) {
-    let Some(mut input) = input else {
-        return;
+/// Hands standard input on to the guest's serial port, until either ends. At its end the
+/// last line is ended, too; a run without end is shut down then, for nobody can do so
+/// any more.
+pub(super) fn relay(options: &Parsed) -> impl FnOnce(Option<ChildStdin>) + use<> {
+    let farewell = match options.number("jobs") {
+        Some(0) => "\nshutdown\n",
+        _ => "\n",
     };
+    move |input| {
+        if let Some(input) = input {
+            hand_on(input, farewell);
+        }
+    }
+}
+
+fn hand_on(mut input: ChildStdin, farewell: &'static str) {
     // The thread is not waited for: it may stand in a read for ever, and ends with
     // the tool.
     thread::spawn(move || {
         let mut bytes = [0; 256];
         loop {
             match stdin().read(&mut bytes) {
-                Ok(0) => break,
+                Ok(0) => {
+                    // The guest may have ended before.
+                    let _ = input.write_all(farewell.as_bytes());
+                    let _ = input.flush();
+                    break;
+                }
                 Ok(count) => {
                     let sent = input.write_all(&bytes[..count]);
                     if sent.and_then(|()| input.flush()).is_err() {

@@ -8,9 +8,9 @@ use replay::shown::shown;
 
 use super::figures::Figures;
 use super::plan::{Length, Part, Plan, usual_bound_ns};
-use super::progress::Progress;
 use super::{Report, run};
 use crate::options::{Command, Opt, Parsed, Takes};
+use crate::progress::Progress;
 use crate::qemu::{MOST_CORES, Mode};
 
 /// The most that a load may be, in percent.
@@ -135,7 +135,7 @@ pub fn soak(words: &[OsString]) -> ExitCode {
         plan.seed,
         plan.mode
     );
-    let mut progress = Progress::new(plan.rounds());
+    let mut progress = Progress::new(plan.rounds(), "rounds");
     let report = run(&plan, |over| progress.show(over));
     progress.end();
     match report {

@@ -7,23 +7,24 @@
 //!
 //! - `plan`: which rounds, in which boots;
 //! - `judge`, `figures`: what became of a boot's rounds;
-//! - `command`: the command line; `progress`: what is shown meanwhile.
+//! - `command`: the command line.
 
 mod command;
 mod figures;
 mod judge;
 pub mod plan;
-mod progress;
 mod trace;
 
 use std::collections::VecDeque;
 use std::fs;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError, mpsc};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use crate::outcome::{self, Outcome};
+use crate::progress::SILENCE;
 use crate::qemu::{Mode, Qemu};
 use crate::{image, install, probe, system};
 use judge::{Judged, judge};
@@ -53,8 +54,8 @@ pub struct Report {
     pub failed: u64,
 }
 
-/// Runs a plan to its end, and calls `show` after each boot with the rounds that
-/// are over.
+/// Runs a plan to its end, and calls `show` with the rounds that are over: after each
+/// boot, and now and then.
 ///
 /// # Errors
 ///
@@ -95,9 +96,15 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
         }
         drop(send);
         let mut over = 0;
-        for (boot, judged) in &receive {
-            over += boot.rounds;
-            report.take(plan, &boot, &judged?);
+        loop {
+            match receive.recv_timeout(SILENCE) {
+                Ok((boot, judged)) => {
+                    over += boot.rounds;
+                    report.take(plan, &boot, &judged?);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
             show(over);
         }
         Ok::<(), String>(())

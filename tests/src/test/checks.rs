@@ -1,16 +1,16 @@
 //! Checks: properties of the whole tree, each counted as one test.
 //!
-//! They hold the promises that no unit test can: the image's weight, no package but our
-//! own, no file too long, layers in order, nothing for the formatter, the linter and the
-//! documentation to complain of, a hand-off of no more instructions than its baseline, and
-//! a guest under KVM where KVM works.
+//! They hold the promises that no unit test can: the image's weight, no package from
+//! elsewhere, no file too long, layers in order, nothing for the formatter, the linter
+//! and the documentation to complain of, a hand-off of no more instructions than its
+//! baseline, and a guest under KVM where KVM works. They judge the project's own packages.
 
 use std::fs;
 use std::path::PathBuf;
 
 use super::libtest::Plan;
 use super::tally::Tally;
-use super::{layers, lint};
+use super::{layers, lint, own};
 use crate::bench::hand_off;
 use crate::image::{self, MOST_STRIPPED_BYTES};
 use crate::probe;
@@ -22,7 +22,7 @@ const MOST_LINES: usize = 400;
 
 /// Runs the checks that the plan wants.
 pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
-    let sources = sources();
+    let sources = own::sources();
     let quick: [(&str, Result<(), String>); 4] = [
         ("Cargo.lock names only our own packages", lock_is_ours()),
         (
@@ -50,7 +50,8 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     if plan.quick {
         return;
     }
-    for app in image::apps() {
+    let own = own::packages();
+    for app in image::apps().into_iter().filter(|app| own.contains(app)) {
         let name = format!(
             "image of {app} weighs at most {} KiB",
             MOST_STRIPPED_BYTES >> 10
@@ -71,26 +72,6 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
             Err(why) => tally.skip(name, &why),
         }
     }
-}
-
-/// Returns all Rust files of the workspace but the generated ones.
-fn sources() -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    let mut folders = vec![system::workspace().to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
-            let path = entry.path();
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            if path.is_dir() && !name.starts_with('.') && name != "target" {
-                folders.push(path);
-            } else if name.ends_with(".rs") {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
 }
 
 /// A package of ours has no `source`: it lies in the workspace.

@@ -1,9 +1,10 @@
 //! How far the measurement is, for the person who waits.
 
-use std::io::{IsTerminal, Write, stderr};
+use std::io::{Write, stderr};
 use std::time::{Duration, Instant};
 
 use crate::protocol::read_line;
+use crate::system;
 
 /// A line on standard error: one that renews itself on a terminal.
 #[derive(Debug)]
@@ -22,7 +23,7 @@ pub(super) struct Progress {
 impl Progress {
     pub(super) fn new(total: usize) -> Progress {
         Progress {
-            on_terminal: stderr().is_terminal(),
+            on_terminal: system::stderr_moves(),
             total,
             complete: 0,
             measured: 0,

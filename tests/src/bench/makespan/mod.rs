@@ -29,6 +29,7 @@ use replay::shown::quoted;
 use crate::dag_file::stg::{TaskGraph, read_graphs};
 use crate::files;
 use crate::options::{Command, Opt, Parsed, Takes};
+use crate::progress::Progress;
 use crate::qemu::MOST_CORES;
 use crate::system;
 
@@ -85,12 +86,15 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     };
     let out = options.path("out");
     let mut all = Vec::new();
-    for cores in cores {
+    let mut progress = Progress::new(cores.len() as u64, "boots");
+    for (cores, over) in cores.into_iter().zip(1..) {
         match measure(&graphs, cores) {
             Ok(makespans) => all.extend(makespans),
             Err(line) => return TABLE.fail(&line),
         }
+        progress.show(over);
     }
+    progress.end();
     print!("{}", report::table(&all));
     if let Some(out) = out {
         let as_json = out.extension().is_some_and(|extension| extension == "json");

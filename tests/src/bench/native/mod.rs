@@ -28,6 +28,7 @@ use workload::Graph;
 use replay::shown::quoted;
 
 use crate::options::{Command, Opt, Parsed, Takes};
+use crate::progress::Progress;
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench native",
@@ -137,8 +138,14 @@ impl Plan {
 fn measure(plan: &Plan) -> ExitCode {
     let mut figures = Vec::new();
     let mut pinned = true;
+    let total = plan.graphs.len() as u64 * throughput::passes(&plan.workers);
+    let mut progress = Progress::new(total, "passes");
+    let mut over = 0;
     for &graph in &plan.graphs {
-        match throughput::measure(graph, &plan.workers, plan.rounds) {
+        match throughput::measure(graph, &plan.workers, plan.rounds, || {
+            over += 1;
+            progress.show(over);
+        }) {
             Ok((of_graph, all_pinned)) => {
                 figures.extend(of_graph);
                 pinned &= all_pinned;
@@ -146,6 +153,7 @@ fn measure(plan: &Plan) -> ExitCode {
             Err(line) => return TABLE.fail(&line),
         }
     }
+    progress.end();
     if plan.with_join {
         match join::measure(plan.jobs) {
             Ok(of_join) => figures.extend(of_join),
@@ -195,7 +203,7 @@ mod tests {
     #[test]
     fn a_short_run_measures_every_graph() {
         for graph in Graph::ALL {
-            let (figures, _) = throughput::measure(graph, &[1], 3).expect("it runs");
+            let (figures, _) = throughput::measure(graph, &[1], 3, || {}).expect("it runs");
             assert_eq!(figures.len(), 4, "{graph}");
         }
     }

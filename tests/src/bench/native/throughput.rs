@@ -37,20 +37,20 @@ impl Runner {
     }
 }
 
-/// Measures all runners; reports also whether all workers were pinned.
+/// Returns how many passes [`measure`] makes.
+pub(super) fn passes(workers: &[u32]) -> u64 {
+    (PASSES * runners(workers).len()) as u64
+}
+
+/// Measures all runners, calling `show` after each pass; reports also whether all workers
+/// were pinned.
 pub(super) fn measure(
     graph: Graph,
     workers: &[u32],
     rounds: usize,
+    mut show: impl FnMut(),
 ) -> Result<(Vec<Figure>, bool), String> {
-    let mut runners = vec![(Runner::Floor, 1)];
-    for &workers in workers {
-        runners.extend([
-            (Runner::Closures(Policy::StaticPriority), workers),
-            (Runner::Closures(Policy::Edf), workers),
-            (Runner::Typed(Policy::StaticPriority), workers),
-        ]);
-    }
+    let runners = runners(workers);
     let mut all_pinned = true;
     let mut samples = vec![Vec::new(); runners.len()];
     for _ in 0..PASSES {
@@ -58,6 +58,7 @@ pub(super) fn measure(
             let (durations, pinned) = pass(graph, runner, workers, rounds.div_ceil(PASSES))?;
             samples.extend(durations);
             all_pinned &= pinned;
+            show();
         }
     }
     let (step, steps) = graph.steps();
@@ -71,6 +72,18 @@ pub(super) fn measure(
             Figure::new(graph, step, runner.name(), workers, samples)
         });
     Ok((figures.collect(), all_pinned))
+}
+
+fn runners(workers: &[u32]) -> Vec<(Runner, u32)> {
+    let mut runners = vec![(Runner::Floor, 1)];
+    for &workers in workers {
+        runners.extend([
+            (Runner::Closures(Policy::StaticPriority), workers),
+            (Runner::Closures(Policy::Edf), workers),
+            (Runner::Typed(Policy::StaticPriority), workers),
+        ]);
+    }
+    runners
 }
 
 fn jobs_a_round(graph: Graph) -> u64 {
