@@ -106,15 +106,10 @@ extern "C" fn start_cores(start: &Start) -> ! {
     let clock = clock::calibrate(info.entry_tsc, platform.pm_timer).unwrap_or_else(|_| {
         panic!("no clock of known rate: the machine has neither an ACPI timer nor QEMU's APIC")
     });
-    // SAFETY: 1. The table identity-maps the image, and all stacks are mapped
-    // in it. 2. The page at 0x8000 is memory below 1 MiB, mapped, and unused.
-    let others = unsafe { processors::start_others(layout.root_table, other_core) };
     let cores = this_core::all().len();
-    assert!(
-        others as usize + 1 == cores,
-        "only {} of {cores} processors came up",
-        others + 1
-    );
+    if cores > 1 {
+        start_others(info, layout, cores);
+    }
     cpu::enable_interrupts();
     let probes = probe::is_asked_for(info);
     if !probes {
@@ -137,6 +132,23 @@ extern "C" fn start_cores(start: &Start) -> ! {
     } else {
         run_app(info, *app)
     })
+}
+
+/// Starts the other cores, all of which have to come up.
+fn start_others(info: &BootInfo, layout: &memory::Layout, cores: usize) {
+    let page = memory::trampoline_page(info.memory.as_slice(), info.modules.as_slice());
+    let page = page.expect("no page below 640 KiB is free for processors to start at");
+    // SAFETY: 1. The table identity-maps the image, and all stacks are mapped
+    // in it. 2. `trampoline_page` returns usable memory, which is mapped, and which
+    // frames are not taken from.
+    let others = unsafe { processors::start_others(layout.root_table, page, other_core) };
+    assert!(
+        others as usize + 1 == cores,
+        "only {} of {cores} processors came up within {} s; give the machine fewer, or the \
+         host less to do",
+        others + 1,
+        processors::PATIENCE_NS / 1_000_000_000
+    );
 }
 
 fn read_platform(info: &BootInfo) -> Platform {

@@ -52,19 +52,22 @@ pvh_entry:
 
 # Turns on long mode with the tables that cr3 holds, and SSE, which compiled
 # code uses from its first instruction on. Continues in 64-bit mode at the far
-# pointer that esi points to. Needs no stack; changes eax, ecx, edx. Used by every processor (Intel SDM volume 3, 11.8.5).
+# pointer that esi points to. Needs no stack; changes eax, ecx, edx. Used by every
+# processor (Intel SDM volume 3, 10.8.5).
+#
+# Nothing is taken over from whoever ran before: a firmware may leave five-level paging
+# on, and after INIT a processor has its caches off (CD, NW).
 enable_long_mode:
-    mov eax, cr4
-    or eax, (1 << 5) | (1 << 9) | (1 << 10)     # PAE, OSFXSR, OSXMMEXCPT
+    mov eax, (1 << 5) | (1 << 9) | (1 << 10)    # PAE, OSFXSR, OSXMMEXCPT
     mov cr4, eax
     mov ecx, 0xc0000080                         # EFER
     rdmsr
     or eax, (1 << 8) | (1 << 11)                # long mode, no-execute pages
     wrmsr
-    mov eax, cr0
-    and eax, ~((1 << 2) | (1 << 3))             # no emulation, no task-switched trap
-    or eax, (1 << 31) | (1 << 16) | (1 << 5) | (1 << 1) # paging, write protection, NE, MP
+    # Paging, write protection, NE, ET, MP, protected mode; no emulation, no trap.
+    mov eax, (1 << 31) | (1 << 16) | (1 << 5) | (1 << 4) | (1 << 1) | (1 << 0)
     mov cr0, eax
+    fninit
     jmp fword ptr [esi]
 
 .code64

@@ -6,13 +6,9 @@
 //!
 //! The order of a start is the kernel's, because the interrupts are sent with
 //! its local APIC: [`prepare`], then the INIT and startup interrupts (Intel SDM
-//! volume 3, 9.4.4) with [`startup_vector`].
+//! volume 3, 9.4.4), whose vector is the trampoline's page.
 
 use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-
-/// The number of the page that the trampoline is copied to: below 1 MiB, above the interrupt
-/// vectors and BIOS data of real mode, and used by no PVH loader at this point.
-const TRAMPOLINE_PAGE: u8 = 0x8;
 
 /// The entry function: called with the processor's APIC id, never to return.
 pub type Entry = extern "C" fn(apic_id: u32) -> !;
@@ -29,7 +25,7 @@ unsafe extern "C" {
     safe static trampoline_end: u8;
 }
 
-/// Lays the trampoline, so that processors can be started.
+/// Lays the trampoline at page number `page`, so that processors can be started there.
 ///
 /// # Panics
 ///
@@ -39,14 +35,14 @@ unsafe extern "C" {
 ///
 /// 1. `root_table` is the physical address of a page table that identity-maps
 ///    the image and maps all stacks.
-/// 2. The page at 0x8000 is mapped writable and holds nothing of use.
-pub unsafe fn prepare(root_table: u64, entry: Entry) {
+/// 2. The page is mapped writable and holds nothing of use.
+pub unsafe fn prepare(root_table: u64, page: u8, entry: Entry) {
     ENTRY.store(entry as usize, Ordering::Release);
     let root_table = u32::try_from(root_table).expect("the root page table lies below 4 GiB");
     let start = core::ptr::from_ref(&trampoline_start);
     let length = core::ptr::from_ref(&trampoline_end) as usize - start as usize;
     let field = core::ptr::from_ref(&trampoline_root_table) as usize - start as usize;
-    let page = (usize::from(TRAMPOLINE_PAGE) << 12) as *mut u8;
+    let page = (usize::from(page) << 12) as *mut u8;
     // SAFETY: the source is the trampoline's bytes between two symbols of one
     // section, the destination is the page of condition 2.
     unsafe { page.copy_from_nonoverlapping(start, length) };
@@ -61,11 +57,6 @@ pub unsafe fn prepare(root_table: u64, entry: Entry) {
 /// Gives processor `apic_id` its stack, which grows down from `top`.
 pub fn set_stack(apic_id: u8, top: u64) {
     STACK_TOPS[usize::from(apic_id)].store(top, Ordering::Release);
-}
-
-/// Returns the vector of the startup interrupt: the trampoline's page number.
-pub const fn startup_vector() -> u8 {
-    TRAMPOLINE_PAGE
 }
 
 /// Continues `entry.s` on an application processor's own stack.

@@ -17,8 +17,7 @@ trampoline_start:
     movl (trampoline_root_table - trampoline_start), %eax
     movl %eax, %cr3
     lgdtl (trampoline_gdt_pointer - trampoline_start)
-    movl %cr0, %eax
-    orl $1, %eax
+    movl $0x11, %eax                # protected mode, ET; caches on
     movl %eax, %cr0
     ljmpl *(trampoline_target - trampoline_start)
     .balign 8

@@ -11,7 +11,7 @@ use super::interrupt::vector;
 /// The registers' address; set once before any use.
 static BASE: AtomicU64 = AtomicU64::new(0);
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Register {
     Id = 0x20,
     TaskPriority = 0x80,
@@ -59,20 +59,29 @@ pub(crate) fn id() -> u8 {
     (read(Register::Id) >> 24).to_le_bytes()[0]
 }
 
+const SOFTWARE_ENABLE: u32 = 1 << 8;
+
+/// What turns a local APIC on, with only its timer unmasked. The software enable comes
+/// first: until then each entry of the local vector table stays masked, whatever is written
+/// to it (Intel SDM volume 3, 11.4.7.2), and so it is after an INIT.
+const TURN_ON: [(Register, u32); 7] = [
+    (
+        Register::SpuriousVector,
+        SOFTWARE_ENABLE | vector::SPURIOUS as u32,
+    ),
+    (Register::TaskPriority, 0),
+    (Register::Pin0Entry, MASKED),
+    (Register::Pin1Entry, MASKED),
+    (Register::ErrorEntry, MASKED),
+    (Register::DivideConfiguration, 0b1011), // by 1
+    (Register::TimerEntry, vector::TIMER as u32),
+];
+
 /// Turns on the local APIC of this core, with only its timer unmasked.
 pub(crate) fn enable() {
-    const SOFTWARE_ENABLE: u32 = 1 << 8;
-    const DIVIDE_BY_1: u32 = 0b1011;
-    write(Register::TaskPriority, 0);
-    write(Register::Pin0Entry, MASKED);
-    write(Register::Pin1Entry, MASKED);
-    write(Register::ErrorEntry, MASKED);
-    write(Register::DivideConfiguration, DIVIDE_BY_1);
-    write(Register::TimerEntry, u32::from(vector::TIMER));
-    write(
-        Register::SpuriousVector,
-        SOFTWARE_ENABLE | u32::from(vector::SPURIOUS),
-    );
+    for (register, value) in TURN_ON {
+        write(register, value);
+    }
 }
 
 /// Ends the interrupt that is being handled.
@@ -126,5 +135,60 @@ fn command(apic_id: u8, low: u32) {
     write(Register::CommandLow, low);
     if were_enabled {
         cpu::enable_interrupts();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A local APIC after INIT, as far as its local vector table goes.
+    #[derive(Debug)]
+    struct Model {
+        is_enabled: bool,
+        /// The timer, the two pins, the error.
+        entries: [(Register, u32); 4],
+    }
+
+    impl Model {
+        fn after_init() -> Self {
+            let entries = [
+                Register::TimerEntry,
+                Register::Pin0Entry,
+                Register::Pin1Entry,
+                Register::ErrorEntry,
+            ];
+            Self {
+                is_enabled: false,
+                entries: entries.map(|register| (register, MASKED)),
+            }
+        }
+
+        /// Takes a write as the manual says (Intel SDM volume 3, 11.4.7.2).
+        fn write(&mut self, register: Register, value: u32) {
+            if register == Register::SpuriousVector {
+                self.is_enabled = value & SOFTWARE_ENABLE != 0;
+            }
+            let entry = self.entries.iter_mut().find(|(of, _)| *of == register);
+            if let Some((_, kept)) = entry {
+                let forced = if self.is_enabled { 0 } else { MASKED };
+                *kept = value | forced;
+            }
+        }
+    }
+
+    #[test]
+    fn the_timer_alone_is_unmasked_when_a_processor_comes_from_init() {
+        let mut model = Model::after_init();
+        for (register, value) in TURN_ON {
+            model.write(register, value);
+        }
+        assert!(model.is_enabled);
+        let unmasked = model.entries.iter().filter(|(_, kept)| kept & MASKED == 0);
+        let unmasked: Vec<_> = unmasked.collect();
+        assert_eq!(
+            unmasked,
+            [&(Register::TimerEntry, u32::from(vector::TIMER))]
+        );
     }
 }

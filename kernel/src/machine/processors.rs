@@ -17,16 +17,24 @@ pub(crate) fn arrive() {
     ARRIVED.fetch_add(1, Ordering::Release);
 }
 
-/// Starts all other cores at `entry` and returns how many have arrived after at
-/// most 100 ms (Intel SDM volume 3, 9.4.4: INIT, 10 ms, startup, 200 us, startup).
+/// For how long cores may take to arrive. All are waited for, so this costs only where
+/// one does not come; a host that is busy may let a virtual one wait for long.
+pub(crate) const PATIENCE_NS: u64 = 5_000_000_000;
+
+/// Starts all other cores at `entry`, by way of the page number `page`, and returns how
+/// many have arrived (Intel SDM volume 3, 9.4.4: INIT, 10 ms, startup, 200 us, startup).
 ///
 /// # Safety
 ///
 /// As for [`boot_entry::processors::prepare`].
-pub(crate) unsafe fn start_others(root_table: u64, entry: boot_entry::processors::Entry) -> u32 {
+pub(crate) unsafe fn start_others(
+    root_table: u64,
+    page: u8,
+    entry: boot_entry::processors::Entry,
+) -> u32 {
     let others = || this_core::all().iter().skip(1);
     // SAFETY: passed on from the caller.
-    unsafe { boot_entry::processors::prepare(root_table, entry) };
+    unsafe { boot_entry::processors::prepare(root_table, page, entry) };
     for core in others() {
         boot_entry::processors::set_stack(core.apic_id(), core.context().stack_top());
     }
@@ -38,10 +46,10 @@ pub(crate) unsafe fn start_others(root_table: u64, entry: boot_entry::processors
         local_apic::send_init(core.apic_id());
     }
     wait(10_000_000, expected);
-    for attempt_ns in [200_000, 100_000_000] {
+    for attempt_ns in [200_000, PATIENCE_NS] {
         for core in others() {
             local_apic::start_timer(clock::apic_ticks(LONGEST_JUMP_NS));
-            local_apic::send_startup(core.apic_id(), boot_entry::processors::startup_vector());
+            local_apic::send_startup(core.apic_id(), page);
         }
         if wait(attempt_ns, expected) {
             break;

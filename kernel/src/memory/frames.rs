@@ -11,7 +11,7 @@ use boot::{List, MemoryRegion};
 pub(crate) const FRAME: u64 = 4096;
 
 /// Nothing below is handed out: the firmware's, and the trampoline's page.
-pub(super) const LOWEST: u64 = 1 << 20;
+const LOWEST: u64 = 1 << 20;
 
 /// The frames that nobody has taken.
 #[derive(Debug)]

@@ -93,8 +93,25 @@ fn pages_of(module: Option<Module>) -> Range<u64> {
     })
 }
 
-/// Reports whether a module lies in one range of usable memory above the first
-/// MiB and apart from the image, where loaders put modules.
+/// Returns the number of the page that processors are to start at: the highest one of
+/// usable memory that they can reach from real mode, and that no module lies in.
+pub(crate) fn trampoline_page(map: &[MemoryRegion], modules: &[Module]) -> Option<u8> {
+    /// Here a PC's firmware and adapters begin, whatever the map says.
+    const END: u64 = 640 << 10;
+    let is_free = |page: &Range<u64>| {
+        let lies = |region: &MemoryRegion| {
+            region.usable && region.start <= page.start && page.end <= region.end
+        };
+        let is_hit = |module: &Module| module.start < page.end && page.start < module.end;
+        map.iter().any(lies) && !modules.iter().any(is_hit)
+    };
+    let pages = (1..END / PAGE).map(|number| number * PAGE..(number + 1) * PAGE);
+    let page = pages.rev().find(is_free)?;
+    u8::try_from(page.start / PAGE).ok()
+}
+
+/// Reports whether a module lies in one range of usable memory, apart from page 0 and
+/// the image.
 pub(crate) fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range<u64>) -> bool {
     let fits = |region: &MemoryRegion| {
         region.usable && region.start <= module.start && module.end <= region.end
@@ -104,7 +121,7 @@ pub(crate) fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range
         return false;
     };
     module.start < module.end
-        && module.start >= frames::LOWEST
+        && module.start >= PAGE
         && (end <= image.start || module.start / PAGE * PAGE >= image.end)
         && map.iter().any(fits)
 }
@@ -175,6 +192,27 @@ mod tests {
     const MIB: u64 = 1 << 20;
 
     #[test]
+    fn processors_start_at_the_highest_low_page_that_is_free() {
+        let region = |start, end, usable| MemoryRegion { start, end, usable };
+        let module = |start, end| Module { start, end };
+        let ordinary = [
+            region(0, 0x9_fc00, true),
+            region(0x9_fc00, MIB, false),
+            region(MIB, 8 * MIB, true),
+        ];
+        let page = |modules: &[Module]| trampoline_page(&ordinary, modules);
+        assert_eq!(page(&[]), Some(0x9e), "a whole page");
+        assert_eq!(page(&[module(4 * MIB, 5 * MIB)]), Some(0x9e));
+        assert_eq!(page(&[module(0x1_4000, 0x9_e001)]), Some(0x13));
+        let two = [module(0x9_e800, 0x9_e900), module(0x9_d000, 0x9_d001)];
+        assert_eq!(page(&two), Some(0x9c));
+        assert_eq!(page(&[module(0x1000, 0x9_fc00)]), None, "page 0 is none");
+        let high = [region(0, MIB, true)];
+        assert_eq!(trampoline_page(&high, &[]), Some(0x9f), "below 640 KiB");
+        assert_eq!(trampoline_page(&[region(MIB, 8 * MIB, true)], &[]), None);
+    }
+
+    #[test]
     fn believes_a_module_only_where_memory_is_free() {
         let region = |start, end, usable| MemoryRegion { start, end, usable };
         let map = [
@@ -188,7 +226,13 @@ mod tests {
         assert!(lies(4 * MIB, 5 * MIB));
         assert!(lies(MIB, 2 * MIB));
         assert!(lies(8 * MIB - 1, 8 * MIB));
-        assert!(!lies(64 << 10, 65 << 10), "below the first MiB");
+        assert!(
+            lies(64 << 10, 65 << 10),
+            "below the first MiB, as GRUB does"
+        );
+        assert!(lies(4096, 8192));
+        assert!(!lies(4095, 8192), "into page 0");
+        assert!(!lies(639 << 10, 641 << 10), "into the firmware's");
         assert!(!lies(MIB, 2 * MIB + 1), "into the image");
         assert!(!lies(3 * MIB - 1, 4 * MIB), "out of the image");
         assert!(!lies(8 * MIB - 1, 8 * MIB + 1), "into reserved memory");
