@@ -1,4 +1,4 @@
-//! The topics of a verified DAG, for those who show the graph.
+//! The topics of a verified DAG, for code that shows the graph.
 //!
 //! Scheduling needs the edges alone, which are in [`Dag`](crate::Dag). What they
 //! carry is kept here, as it was stated.

@@ -15,7 +15,7 @@ use sched_dag::{
 use crate::build::Length;
 use crate::file::{FileDag, Set};
 
-/// The most faults that are told: who has mended these looks again.
+/// The most faults that are told: once these are mended, the next check tells more.
 const MOST_FAULTS: usize = 20;
 
 /// Verifies a set as its commit will, with any shape of graph allowed.

@@ -1,4 +1,4 @@
-//! Boots into one fault after the other and shows who survives.
+//! Boots into one fault after the other and shows which DAGs survive.
 
 #![no_std]
 #![no_main]

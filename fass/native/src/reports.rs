@@ -1,4 +1,4 @@
-//! What the scheduler reports during a run: to who looks on, and to bodies.
+//! What the scheduler reports during a run: to its observer, and to bodies.
 //!
 //! An instance that is *cancelled* never runs, but its predecessors may have run and
 //! sent it values. Later jobs need their slots. So its body

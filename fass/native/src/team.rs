@@ -86,7 +86,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
         }
     }
 
-    /// Returns the scheduler and who looked on, after all workers have returned.
+    /// Returns the scheduler and its observer, after all workers have returned.
     pub(crate) fn into_parts(self) -> (Scheduler, W) {
         let state = self.state.0.into_inner();
         let state = state.unwrap_or_else(PoisonError::into_inner);

@@ -149,7 +149,7 @@ fn both_workers_work() {
         workers: 2,
     };
     let task_set = commit(&[spec(6, &fork_join(4), 20)], setting);
-    // The branches meet in pairs, and nobody can meet who does not work. How many
+    // The branches meet in pairs, and a worker that does not work meets nobody. How many
     // instances each worker has is up to the host, which may hold one of them back.
     let meeting = Arc::new(Barrier::new(2));
     let body = |subtask| {

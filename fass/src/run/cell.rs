@@ -44,11 +44,11 @@
 //!
 //! # The shared value
 //!
-//! A [`Shared`] value is changed by one or looked at by several, never both. Who
-//! wants it *claims* it for that time. Nobody ever waits: the schedule is such that
+//! A [`Shared`] value is changed by one user or looked at by several, never both. A
+//! user *claims* it for that time. Nobody ever waits: the schedule is such that
 //! every claim succeeds, and one that does not is refused.
 //!
-//! > **Claim invariant.** The word `claims` counts those who look at the value, or
+//! > **Claim invariant.** The word `claims` counts the users that look at the value, or
 //! > is `CHANGING` while one may change it. Nobody touches the value without a
 //! > claim. A claim is made by an `Acquire` exchange that moves `claims` from 0 to
 //! > `CHANGING`, or from any smaller count to the next; it is given back by a
@@ -264,10 +264,10 @@ pub struct Shared<T> {
 // its place, by one thread after another; `T: Sync` because several look at it.
 unsafe impl<T: Send + Sync> Sync for Shared<T> {}
 
-/// The claim of one who may change the value.
+/// The claim of a user that may change the value.
 pub struct Changing<'a, T>(&'a Shared<T>);
 
-/// The claim of one who looks at the value.
+/// The claim of a user that looks at the value.
 pub struct Looking<'a, T>(&'a Shared<T>);
 
 impl<T> Shared<T> {

@@ -164,36 +164,59 @@ fn pages() -> Vec<(PathBuf, String)> {
 
 #[test]
 fn the_architecture_lists_every_lock() {
-    let mut folders = vec![workspace().join("kernel/src")];
-    let mut locks = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("the kernel").flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-                continue;
-            }
-            let text = fs::read_to_string(&path).expect("a source file");
-            let statics = text.split("static ").skip(1);
-            let names = statics.filter_map(|rest| rest.split_once(": SpinLock<"));
-            let is_name = |name: &&str| name.chars().all(|c| c.is_ascii_uppercase() || c == '_');
-            locks.extend(
-                names
-                    .map(|(name, _)| name)
-                    .filter(is_name)
-                    .map(String::from),
-            );
-        }
-    }
+    let sources = sources_below("kernel/src");
+    let statics = sources.split("static ").skip(1);
+    let names = statics.filter_map(|rest| rest.split_once(": SpinLock<"));
+    let is_name = |name: &&str| name.chars().all(|c| c.is_ascii_uppercase() || c == '_');
+    let mut locks: Vec<_> = names.map(|(name, _)| name).filter(is_name).collect();
     let page = workspace().join("docs/architecture.md");
     let page = fs::read_to_string(page).expect("the page");
     let table = page.split("| lock | protects |").nth(1).expect("the table");
     let rows = table.lines().skip(2).take_while(|row| row.starts_with('|'));
     let mut listed: Vec<_> = rows.filter_map(|row| row.split('`').nth(1)).collect();
-    locks.sort();
+    locks.sort_unstable();
     listed.sort_unstable();
     assert!(locks.len() >= 5, "{locks:?}");
     assert_eq!(listed, locks);
+}
+
+/// Returns all Rust files below a folder of the workspace, as one text.
+fn sources_below(folder: &str) -> String {
+    let mut folders = vec![workspace().join(folder)];
+    let mut text = String::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder of sources").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|kind| kind == "rs") {
+                text += &fs::read_to_string(&path).expect("a source file");
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn the_glossary_names_types_that_there_are() {
+    let page = workspace().join("docs/glossary.md");
+    let page = fs::read_to_string(page).expect("the page");
+    let sources = ["sched-dag/src", "fass/src"].map(sources_below).concat();
+    let mut found = 0;
+    for row in page.lines().filter(|row| row.starts_with("| **")) {
+        let word = row.split(" | ").next().expect("the word");
+        for name in word.split('`').skip(1).step_by(2) {
+            let is_there = ["struct", "enum", "trait"]
+                .iter()
+                .any(|kind| sources.contains(&format!("pub {kind} {name}")));
+            assert!(
+                is_there,
+                "the glossary names `{name}`, which is no public type"
+            );
+            found += 1;
+        }
+    }
+    assert!(found >= 10, "{found}");
 }
 
 #[test]
