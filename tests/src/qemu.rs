@@ -29,7 +29,7 @@ pub const PROGRAM: &str = "qemu-system-x86_64";
 pub const LEAST_MEMORY_MIB: u64 = 16;
 
 /// The most processors that a guest gets.
-pub const MOST_CORES: u64 = 64;
+pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
 
 /// What time means in the guest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -280,7 +280,8 @@ fn ten_thousand_subtasks_are_read_and_more_than_any_guest_holds_are_2() {
     }
     for path in many(20_000) {
         let said = refusal(&["--dag", &path]);
-        let words = format!("run: {path}: its 20000 subtasks and their jobs need 5");
+        let words =
+            format!("run: {path}: its 20000 subtasks, their jobs and the file itself need 5");
         assert!(said.starts_with(&words), "{said}");
     }
 }

@@ -1,6 +1,7 @@
 //! What `./scripts/run --dag FILE` boots: the file as a boot module, words for the
 //! guest, and enough memory and time.
 
+use std::fmt::{self, Write};
 use std::fs;
 use std::path::PathBuf;
 
@@ -129,10 +130,21 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     let memory_mib = memory_mib(&file, length, cores);
     if memory_mib > MOST_MEMORY_MIB && !options.is_given("memory") {
         return Err(refuse(format!(
-            "{}: its {} subtasks and their jobs need {memory_mib} MiB, and a guest has \
-             {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
+            "{}: its {} subtasks, their jobs and the file itself need {memory_mib} MiB, and a \
+             guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
             files::place(path),
             file.most_subtasks()
+        )));
+    }
+    let limit_s = limit_s(&file, length);
+    let has_limit = options.is_given("timeout") || options.is_given("print-dag");
+    if limit_s > MOST_S && !has_limit {
+        return Err(refuse(format!(
+            "{}: its jobs take {} hours or more, and a run has {} if nobody says how long; give \
+             fewer jobs by --jobs, or a limit by --timeout",
+            files::place(path),
+            limit_s / 3600,
+            MOST_S / 3600
         )));
     }
     let mut words = Vec::new();
@@ -147,7 +159,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     }
     Ok(Some(Prepared {
         memory_mib,
-        limit_s: limit_s(&file, length),
+        limit_s: limit_s.min(MOST_S),
         path: path.into(),
         file,
         module: None,
@@ -176,44 +188,70 @@ const MOST_MEMORY_MIB: u64 = 3072;
 
 /// Returns how much memory a file needs. A quarter of it becomes stacks, of which
 /// each subtask has one and each core a few, and the rest the heap, of which records may take half.
+///
+/// The guest has the file as text, and in the heap what it says: measured, an edge takes
+/// some 210 bytes and a sample some 17, while a line has 12 bytes and a sample 4. So the
+/// heap has 20 bytes for each of the text, and three quarters of the memory are the heap.
 fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
     const OF_A_CORE: u64 = 4 * (336 << 10);
     const OF_A_SUBTASK: u64 = 4 * (65 << 10);
     const OF_A_RECORD: u64 = 256;
+    const OF_A_BYTE: u64 = 1 + 20 * 4 / 3;
     const MIB: u64 = 1 << 20;
     let subtasks = file.most_subtasks() as u64;
     let records = file.sets.iter().map(|set| records(set, length));
     let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
         .saturating_add(records.max().unwrap_or(0).saturating_mul(OF_A_RECORD))
-        .saturating_add(cores.saturating_mul(OF_A_CORE));
+        .saturating_add(cores.saturating_mul(OF_A_CORE))
+        .saturating_add(length_of_text(file).saturating_mul(OF_A_BYTE));
     12 + bytes.div_ceil(MIB)
 }
 
-/// Two minutes, the time that all jobs span and the time that they would take on
-/// one core, and a second for every 500 records.
+/// Returns how many bytes the boot module has, without writing it anywhere.
+fn length_of_text(file: &DagFile) -> u64 {
+    struct Counter(u64);
+    impl Write for Counter {
+        fn write_str(&mut self, text: &str) -> fmt::Result {
+            self.0 += text.len() as u64;
+            Ok(())
+        }
+    }
+    let mut counter = Counter(0);
+    // Counting cannot fail.
+    let _ = write!(counter, "{file}");
+    counter.0
+}
+
+/// The longest that a run may take if nobody says how long, in seconds: a day.
+const MOST_S: u64 = 86_400;
+
+/// Returns for how long a run may take, in seconds: two minutes, the time from the first
+/// release to the last, the time that all jobs would take on one core, and a second for
+/// every 500 records.
 fn limit_s(file: &DagFile, length: Length) -> u64 {
     const NS_PER_S: u128 = 1_000_000_000;
     let mut seconds = 120_u128;
     for set in &file.sets {
         seconds += u128::from(records(set, length) / 500);
-        for dag in &set.dags {
-            let jobs = u128::from(length.jobs(&dag.spec));
-            let wcets = dag
-                .spec
-                .subtasks
-                .iter()
-                .filter_map(|subtask| subtask.wcet_ns);
-            let busy_ns: u128 = wcets.map(u128::from).sum();
-            let period_ns = u128::from(dag.spec.period_ns.unwrap_or(0));
-            seconds = seconds.saturating_add(jobs.saturating_mul(busy_ns + period_ns) / NS_PER_S);
+        let (mut span_ns, mut busy_ns) = (0_u128, 0_u128);
+        for FileDag { spec, .. } in &set.dags {
+            let jobs = u128::from(length.jobs(spec));
+            let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
+            let of_job_ns: u128 = wcets.map(u128::from).sum();
+            let period_ns = u128::from(spec.period_ns.unwrap_or(0));
+            let last_ns =
+                period_ns.saturating_mul(jobs.saturating_sub(1)) + u128::from(spec.offset_ns);
+            span_ns = span_ns.max(last_ns);
+            busy_ns = busy_ns.saturating_add(of_job_ns.saturating_mul(jobs));
         }
+        seconds = seconds.saturating_add(span_ns.saturating_add(busy_ns) / NS_PER_S);
     }
-    u64::try_from(seconds).unwrap_or(u64::MAX).min(86_400)
+    u64::try_from(seconds).unwrap_or(u64::MAX)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{limit_s, memory_mib, prepare};
+    use super::{MOST_S, limit_s, memory_mib, prepare};
     use crate::run::RUN;
     use crate::system::workspace;
     use dag_file::{DagFile, Length, parse};
@@ -251,7 +289,39 @@ mod tests {
 
     #[test]
     fn the_limit_has_room_for_real_time() {
-        assert_eq!(limit_s(&file(1), Length::Jobs(100)), 120 + 100);
-        assert_eq!(limit_s(&file(1), Length::Jobs(u64::MAX)), 86_400);
+        assert_eq!(limit_s(&file(1), Length::Jobs(101)), 120 + 100);
+        assert!(limit_s(&file(1), Length::Jobs(u64::MAX)) > MOST_S);
+        // DAGs of a set run side by side, sets one after the other.
+        let dag = |name: &str| format!("dag {name} period 10s\nsubtask a wcet 1s\n");
+        let text = format!("set one\n{}{}set two\n{}end", dag("x"), dag("y"), dag("z"));
+        let file = parse(&text).unwrap();
+        assert_eq!(
+            limit_s(&file, Length::Jobs(11)),
+            120 + (100 + 22) + (100 + 11)
+        );
+    }
+
+    #[test]
+    fn a_run_of_more_than_a_day_is_refused_if_nobody_says_how_long() {
+        let name = format!("century-{}.dag", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, "dag x period 3153600000s\nsubtask a wcet 1ms\nend\n").unwrap();
+        let prepared = |line: &str| prepare(&RUN.right(line).with("dag", path.clone()));
+        let said = prepared("--jobs 2").unwrap_err().join("\n");
+        let words = "its jobs take 876000 hours or more, and a run has 24 if nobody says how long";
+        assert!(said.contains(words), "{said}");
+        assert_eq!(prepared("--jobs 1").unwrap().unwrap().limit_s, 120);
+        assert!(prepared("--jobs 2 --timeout 60").is_ok());
+        assert!(prepared("--jobs 2 --print-dag").is_ok());
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn memory_grows_with_the_file_itself() {
+        let samples = vec!["1us"; 2_000_000].join(",");
+        let text = format!("dag x period 1s\nsubtask a wcet 1ms samples {samples}\nend");
+        let many = memory_mib(&parse(&text).unwrap(), Length::Jobs(1), 8);
+        // Measured: a heap of 34 MB at its peak, beside the text of 8 MB.
+        assert!((64..512).contains(&many), "{many}");
     }
 }
