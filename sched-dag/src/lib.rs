@@ -114,6 +114,6 @@ pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{
-    CommitOptions, ConstructionPolicy, Count, DagLabel, Direction, Fault, MAX_ARITY, Rejected,
-    SubtaskLabel, Time, Verified, Warning, verify,
+    CommitOptions, ConstructionPolicy, Count, DagLabel, Direction, Fault, MAX_ARITY, MOST_FAULTS,
+    Rejected, SubtaskLabel, Time, Verified, Warning, verify, write_faults,
 };

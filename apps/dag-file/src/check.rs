@@ -9,14 +9,12 @@ use alloc::vec::Vec;
 use replay::lines::Malformed;
 use replay::of_file;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagSpec, Fault, Policy, SubtaskId, SubtaskLabel, verify,
+    CommitOptions, ConstructionPolicy, DagSpec, Fault, MOST_FAULTS, Policy, SubtaskId,
+    SubtaskLabel, verify,
 };
 
 use crate::build::Length;
 use crate::file::{FileDag, Set};
-
-/// The most faults that are told: once these are mended, the next check tells more.
-const MOST_FAULTS: usize = 20;
 
 /// Verifies a set as its commit will, with any shape of graph allowed.
 ///

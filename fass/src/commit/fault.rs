@@ -333,7 +333,8 @@ impl fmt::Display for Count {
 
 /// A refused commit: all its faults, and the warnings.
 ///
-/// Its `Display` prints one line for each fault.
+/// Its `Display` prints one line for each fault; of very many the first 20, and how
+/// many more there are.
 ///
 /// # Examples
 ///
@@ -380,13 +381,7 @@ impl CommitError {
 
 impl fmt::Display for CommitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, fault) in self.faults.iter().enumerate() {
-            if index > 0 {
-                f.write_str("\n")?;
-            }
-            fault.fmt(f)?;
-        }
-        Ok(())
+        sched_dag::write_faults(&self.faults, f)
     }
 }
 

@@ -106,16 +106,32 @@ impl Rejected {
     }
 }
 
-/// Writes one line a fault, without a newline at the end.
+/// Writes as [`write_faults`] does.
 impl fmt::Display for Rejected {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (position, fault) in self.faults.iter().enumerate() {
-            if position > 0 {
-                f.write_str("\n")?;
-            }
-            write!(f, "{fault}")?;
+        write_faults(&self.faults, f)
+    }
+}
+
+/// The most faults that a message tells; what is left shows when these are mended.
+pub const MOST_FAULTS: usize = 20;
+
+/// Writes one line a fault, without a newline at the end; of very many the first
+/// [`MOST_FAULTS`], and how many more there are.
+///
+/// # Errors
+///
+/// The formatter's.
+pub fn write_faults(faults: &[impl fmt::Display], f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    for (position, fault) in faults.iter().take(MOST_FAULTS).enumerate() {
+        if position > 0 {
+            f.write_str("\n")?;
         }
-        Ok(())
+        write!(f, "{fault}")?;
+    }
+    match faults.len().saturating_sub(MOST_FAULTS) {
+        0 => Ok(()),
+        more => write!(f, "\nand {more} more faults"),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, verify};
 
-use crate::{assert_fault, assert_faults, dag, drive, options, port, subtask};
+use crate::{assert_fault, assert_faults, dag, drive, options, port, rejected, subtask};
 
 #[test]
 fn a_right_dag_has_neither_fault_nor_warning() {
@@ -150,4 +150,15 @@ fn several_parts_sources_and_sinks_under_the_papers_policy() {
     );
     let relaxed = options().with_construction(ConstructionPolicy::any_graph());
     assert_eq!(verify(&[spec], &relaxed).expect("any graph").warnings, []);
+}
+
+#[test]
+fn of_very_many_faults_the_first_are_written_and_all_are_there() {
+    let dags: Vec<_> = (0..10_000).map(|n| dag(&format!("d{n}"), vec![])).collect();
+    let rejected = rejected(&dags);
+    assert_eq!(rejected.faults().len(), 10_000);
+    let text = rejected.to_string();
+    assert_eq!(text.lines().count(), 21);
+    assert!(text.contains("dag `d19` has no subtask"), "{text}");
+    assert!(text.ends_with("\nand 9980 more faults"), "{text}");
 }
