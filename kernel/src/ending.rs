@@ -29,6 +29,20 @@ pub enum Ending {
     Shutdown,
 }
 
+impl Ending {
+    /// Lets a complaint of the kernel's be the ending of an app that ends well, or as a
+    /// person wants it. The app's own error takes precedence.
+    pub(crate) fn or_complaint(
+        result: Result<(), Self>,
+        complaint: Option<String>,
+    ) -> Result<(), Self> {
+        match (result, complaint) {
+            (Ok(()) | Err(Self::Shutdown), Some(text)) => Err(Self::Failure(text)),
+            (result, _) => result,
+        }
+    }
+}
+
 impl From<UsageError> for Ending {
     fn from(error: UsageError) -> Self {
         Self::Usage(error)

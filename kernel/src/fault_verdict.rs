@@ -3,8 +3,6 @@
 //! An app that ignores a fault in one of its DAGs has failed, and so says its verdict. An
 //! app to which faults belong says so
 //! ([`Machine::accept_faults`](crate::Machine::accept_faults)) and judges them by itself.
-//!
-//! The app's own error takes precedence.
 
 use alloc::format;
 use alloc::string::String;
@@ -52,10 +50,7 @@ impl FaultVerdict {
     /// Returns how an app ends whose function has returned `result`.
     pub(crate) fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
         let complaint = self.complaint.take().filter(|_| !self.are_accepted.get());
-        match (result, complaint) {
-            (Ok(()) | Err(Ending::Shutdown), Some(text)) => Err(Ending::Failure(text)),
-            (result, _) => result,
-        }
+        Ending::or_complaint(result, complaint)
     }
 }
 

@@ -50,6 +50,7 @@
 extern crate alloc;
 
 mod background;
+mod bound_verdict;
 pub mod console;
 mod containment;
 mod contexts;

@@ -11,6 +11,7 @@ use fass::{Platform, Policy, Preemption, Signal};
 use sched_dag::DagId;
 
 use crate::background::{Background, Wishes};
+use crate::bound_verdict::BoundVerdict;
 use crate::console::session;
 use crate::ending::Ending;
 use crate::fault_verdict::FaultVerdict;
@@ -54,6 +55,8 @@ pub struct Machine {
     pub(crate) runs: Cell<u64>,
     /// Whether faults in them make the app fail.
     pub(crate) fault_verdict: FaultVerdict,
+    /// Whether response times beyond their bounds do.
+    pub(crate) bound_verdict: BoundVerdict,
 }
 
 /// What of the machine's memory is in use while nothing runs.
@@ -174,6 +177,20 @@ impl Machine {
         self.fault_verdict.accept();
     }
 
+    /// Leaves it to the app to judge response times beyond their proven bounds. Unless
+    /// it says so, at any time before its function returns, one in any of its runs makes
+    /// it fail (not in the tool's mode `threads`). A line says so in any case.
+    ///
+    /// ```no_run
+    /// fn measures_wcets(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    ///     machine.accept_exceeded_bounds(); // those stated are guesses
+    ///     machine.run().map(drop)
+    /// }
+    /// ```
+    pub fn accept_exceeded_bounds(&self) {
+        self.bound_verdict.accept();
+    }
+
     /// Runs the committed DAGs until each has ended all its jobs.
     ///
     /// The calling core takes part. Progress is printed in machine lines of
@@ -231,6 +248,7 @@ impl Machine {
         let run = Run::new(ended, allocations, locks, epoch_ns);
         let faults = |dag| run.statistics(dag).faults;
         self.fault_verdict.note(run.task_set(), faults);
+        self.bound_verdict.note(&run);
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }

@@ -100,6 +100,11 @@ impl Run {
         self.execution.scheduler().statistics(dag)
     }
 
+    /// Returns the response time that the commit has proven for a DAG, if it has.
+    pub(crate) fn bound_ns(&self, dag: DagId) -> Option<u64> {
+        self.execution.bound_ns(dag)
+    }
+
     /// Returns how a DAG has ended.
     pub(crate) fn snapshot(&self, dag: DagId) -> Snapshot {
         Snapshot::of(self.execution.scheduler(), dag)

@@ -13,7 +13,7 @@
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
 //! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
-//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle, see `machine::counted_time` | |
+//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle, see `machine::counted_time`; `threads`: no bound is judged | |
 //! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
 
 use alloc::format;
@@ -62,6 +62,8 @@ pub(crate) struct Settings {
     pub(crate) dump: bool,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
+    /// Whether a response time beyond its bound is the app's fault.
+    pub(crate) judges_bounds: bool,
 }
 
 /// Takes the kernel's words and does what they say.
@@ -79,7 +81,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
         interrupts_off::enable();
     }
-    // What time means is the host's choice; of its names one alone matters here.
+    // What time means is the host's choice.
     if options.text("mode") == Some("deterministic") {
         counted_time::enable();
     }
@@ -100,6 +102,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
             console: options.choice("console", &consoles)?,
             status_ns: status_s * 1_000_000_000,
         },
+        judges_bounds: options.text("mode") != Some("threads"),
     })
 }
 

@@ -8,6 +8,7 @@ use boot::acpi::{self, Platform};
 use boot::physical::IdentityMap;
 use boot::{BootInfo, Module};
 
+use crate::bound_verdict::BoundVerdict;
 use crate::ending::Ending;
 use crate::fault_verdict::FaultVerdict;
 use crate::machine::this_core::{self, Stacks};
@@ -217,9 +218,11 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         input: Cell::new(None),
         runs: Cell::new(0),
         fault_verdict: FaultVerdict::default(),
+        bound_verdict: BoundVerdict::new(settings.judges_bounds),
     };
     let result = app(&machine);
-    machine.fault_verdict.judge(result)
+    let result = machine.fault_verdict.judge(result);
+    machine.bound_verdict.judge(result)
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.

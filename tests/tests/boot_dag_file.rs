@@ -51,7 +51,7 @@ fn generated_dags_run_without_violation() {
             "policy=static",
             "policy=edf execution=uniform:0.2..1 seed=7",
         ] {
-            let words = format!("jobs=20 {words}");
+            let words = format!("jobs=20 overheads_ns=1000,10000,4000 {words}");
             let outcome = boot(generated(name).as_bytes(), &words, Status::Success);
             let set = outcome
                 .transcript

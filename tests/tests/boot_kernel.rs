@@ -78,6 +78,29 @@ fn a_fault_that_the_app_does_not_look_at_is_a_failure() {
 }
 
 #[test]
+fn a_response_beyond_its_proven_bound_is_no_success() {
+    let outcome = guest("exceeded").end_in(Status::Failure);
+    let lines: Vec<_> = outcome.transcript.of_kind("bound_exceeded").collect();
+    let [line] = lines[..] else {
+        panic!("not one line of kind `bound_exceeded`\n{}", outcome.tail());
+    };
+    assert_eq!(line.text_at("dag_name"), Some("guess"), "{}", line.text);
+    assert_eq!(line.number_at("jobs"), Some(2), "{}", line.text);
+    assert_eq!(line.number_at("job"), Some(3), "{}", line.text);
+    assert_eq!(line.number_at("bound_ns"), Some(1_000_000));
+    assert!(line.number_at("response_ns") > Some(4_000_000));
+    let verdict = outcome.transcript.verdict().expect("checked before");
+    let names_both = verdict.reason.starts_with("dag `guess` took 4.")
+        && verdict
+            .reason
+            .contains("in job 3, beyond its proven bound of 1.000 ms; ");
+    assert!(names_both, "{}", verdict.reason);
+    // An app may know that its WCETs are guesses; a line says it all the same.
+    let outcome = guest("exceeded").word("accept=yes").succeed();
+    assert_eq!(outcome.transcript.of_kind("bound_exceeded").count(), 1);
+}
+
+#[test]
 fn values_that_are_left_behind_harm_nobody() {
     for cores in [1, 4] {
         let outcome = guest("large").cores(cores).succeed();

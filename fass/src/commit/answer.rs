@@ -250,6 +250,13 @@ impl Answers {
         }
     }
 
+    /// Returns the bounds, for the platform.
+    pub(crate) fn bounds_ns(&self) -> Vec<Option<u64>> {
+        let bounds = self.of_dags.iter().map(|answer| answer.verdict.bound());
+        let bounds = bounds.map(|bound| u64::try_from(bound?.as_nanos()).ok());
+        bounds.collect()
+    }
+
     /// Returns the warnings that follow: DAG and reason of what is certain.
     pub(crate) fn certain_misses(&self) -> impl Iterator<Item = (DagLabel, String)> {
         self.of_dags.iter().filter_map(|answer| {

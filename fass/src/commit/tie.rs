@@ -17,7 +17,7 @@ use crate::run::topic::Wiring;
 static PLANS: AtomicU64 = AtomicU64::new(0);
 
 /// Turns verified DAGs into a plan, and closes their handles.
-pub(crate) fn tie(dags: &[Dag], task_set: TaskSet) -> Plan {
+pub(crate) fn tie(dags: &[Dag], task_set: TaskSet, bounds_ns: Vec<Option<u64>>) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
     let bodies = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
         .map(|((id, dag), verified)| {
@@ -61,5 +61,6 @@ pub(crate) fn tie(dags: &[Dag], task_set: TaskSet) -> Plan {
         task_set,
         number,
         bodies,
+        bounds_ns,
     }
 }

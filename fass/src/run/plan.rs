@@ -39,6 +39,9 @@ pub struct Plan {
     pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<Body>>,
+    /// The response time of each DAG that the commit has proven, if it has
+    /// ([`Commit::answers`](crate::Commit::answers)).
+    pub bounds_ns: Vec<Option<u64>>,
 }
 
 /// The executable part of a subtask: its function with its ends of the topics.

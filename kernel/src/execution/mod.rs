@@ -82,6 +82,8 @@ pub(crate) struct Execution {
     signals: Signals,
     /// Where each core's events go.
     recorders: Recorders,
+    /// What the commit has proven of each DAG.
+    bounds_ns: Box<[Option<u64>]>,
 }
 
 static EXECUTION: SpinLock<Option<Execution>> = SpinLock::new(None);
@@ -126,6 +128,7 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         may_hand_off: KERNEL.coincidence_ns() == 0,
         signals,
         recorders: trace::recorders(),
+        bounds_ns: plan.bounds_ns.into(),
     };
     *EXECUTION.lock() = Some(execution);
     Ok(())
@@ -175,6 +178,11 @@ impl Execution {
     /// Returns the scheduler, for its model and its counters.
     pub(crate) const fn scheduler(&self) -> &Scheduler {
         &self.scheduler
+    }
+
+    /// Returns the response time that is proven of a DAG, if one is.
+    pub(crate) fn bound_ns(&self, dag: DagId) -> Option<u64> {
+        self.bounds_ns.get(dag.index()).copied().flatten()
     }
 
     /// Returns the times of all jobs and instances.

@@ -9,6 +9,7 @@ mod attacks;
 mod busy;
 mod checksum;
 mod endless;
+mod exceeded;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
@@ -29,7 +30,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 25] = [
+const TESTS: [(&str, Test); 26] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -54,6 +55,7 @@ const TESTS: [(&str, Test); 25] = [
     ("occupation", occupation::run),
     ("busy", busy::run),
     ("endless", endless::run),
+    ("exceeded", exceeded::run),
     ("flood", limits::flood),
     ("large", large::run),
     ("overrun", overrun::run),

@@ -218,6 +218,10 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "doomed_jobs",
         ],
     ),
+    (
+        "bound_exceeded",
+        &["dag", "dag_name", "jobs", "job", "response_ns", "bound_ns"],
+    ),
     ("panic", &["cpu", "place", "message"]),
     ("exception", &["cpu", "place", "message"]),
     (
