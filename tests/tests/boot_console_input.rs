@@ -52,3 +52,11 @@ fn a_run_without_end_ends_with_its_input() {
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("\"command\":\"shutdown\""), "{said}");
 }
+
+#[test]
+fn of_many_lines_at_once_whole_answers_are_left_out() {
+    let (code, said) = run(&"stats\n".repeat(300), 0);
+    // A damaged machine line would be a failure.
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("\"command\":\"stats\""), "{said}");
+}

@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::load::Format;
+use crate::json::quoted;
 use crate::options::Parsed;
 use crate::outcome::Outcome;
 use crate::protocol::MachineLine;
@@ -105,9 +106,44 @@ fn decimal(ns: u64) -> String {
 pub fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> + use<'o> {
     const BEGINNING: &str = "{\"kind\":\"dag_run\",";
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.replace(['"', '\\'], "?");
+    let name = quoted(&name);
     outcome.serial.lines().filter_map(move |line| {
         let rest = line.strip_prefix(BEGINNING)?;
-        Some(format!("{BEGINNING}\"file\":\"{name}\",{rest}"))
+        Some(format!("{BEGINNING}\"file\":{name},{rest}"))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::time::Duration;
+
+    use super::lines;
+    use crate::json::{self, Value};
+    use crate::outcome::Outcome;
+    use crate::protocol::Transcript;
+    use crate::qemu::Ending;
+
+    #[test]
+    fn any_name_of_a_file_is_one_member_of_a_machine_line() {
+        let serial = "{\"kind\":\"dag_run\",\"dag\":\"x\"}\n";
+        let outcome = Outcome {
+            ending: Ending::Signal,
+            serial: serial.into(),
+            transcript: Transcript::read(serial),
+            log: "the.log".into(),
+            image: "the image".into(),
+            elapsed: Duration::ZERO,
+            complaints: String::new(),
+        };
+        for name in ["a.dag", "a\nb.dag", "\"\\.dag", "\u{1b}.dag"] {
+            let all: Vec<String> = lines(Path::new(name), &outcome).collect();
+            let [line] = &all[..] else {
+                panic!("{all:?}");
+            };
+            assert_eq!(line.lines().count(), 1, "{line}");
+            let line = json::parse(line).expect("JSON");
+            assert_eq!(line.get("file").and_then(Value::as_text), Some(name));
+        }
+    }
 }

@@ -25,7 +25,7 @@ static SOAK: Command = Command {
         Opt::new(
             "short",
             Takes::Nothing,
-            "Seconds instead of minutes, of the same kinds.",
+            "7 s of guest time instead of 13 minutes, of the same kinds; the host takes longer.",
         ),
         Opt::new(
             "cores",

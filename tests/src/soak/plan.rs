@@ -215,6 +215,12 @@ mod tests {
     }
 
     #[test]
+    fn the_short_form_is_seven_seconds() {
+        let plan = Plan::new(Length::SHORT, 90, 130);
+        assert_eq!(u128::from(plan.rounds()) * plan.round.as_millis(), 7000);
+    }
+
+    #[test]
     fn boots_make_up_the_rounds() {
         let plan = Plan {
             first: 10,

@@ -30,6 +30,7 @@ use plan::{Boot, Plan};
 use super::on_machine;
 use crate::options::Request;
 use crate::outcome::boot;
+use crate::progress::Progress;
 use crate::qemu::Mode;
 use crate::{image, install, probe, system};
 
@@ -139,7 +140,9 @@ fn modes(plan: &Plan, image: &Path) -> Result<Vec<Mode>, String> {
 /// Makes all boots in one mode.
 fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     let mut figures: Vec<Figure> = Vec::new();
-    for boot in &plan.boots {
+    let mut progress = Progress::new(plan.boots.len() as u64, "boots");
+    for (boot, over) in plan.boots.iter().zip(0..) {
+        progress.show(over);
         for figure in measure(boot, mode, image)? {
             // What is counted afterwards stands with its workload.
             let end = figures.iter().rposition(|other| {
@@ -148,6 +151,7 @@ fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, St
             figures.insert(end.map_or(figures.len(), |end| end + 1), figure);
         }
     }
+    progress.end();
     Ok(figures)
 }
 

@@ -9,6 +9,7 @@ use super::compare::compare;
 use super::transcript::read;
 use super::{Judged, Settings};
 use crate::outcome::{Outcome, boot};
+use crate::progress::Progress;
 use crate::qemu::Qemu;
 use crate::{image, install, probe, system};
 
@@ -41,6 +42,7 @@ pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<
         cases.iter().zip(texts.iter().map(String::as_str)).collect();
     by_cores.sort_by_key(|(case, _)| case.cores);
     let mut judged = Vec::with_capacity(cases.len());
+    let mut progress = Progress::new(cases.len() as u64, "cases");
     for group in by_cores.chunk_by(|(a, _), (b, _)| a.cores == b.cores) {
         let mut waiting = group;
         while let Some((first, _)) = waiting.first() {
@@ -58,8 +60,10 @@ pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<
             let before = judged.len();
             judged.extend(judge(&outcome, &waiting[..count], settings));
             waiting = &waiting[judged.len() - before..];
+            progress.show(judged.len() as u64);
         }
     }
+    progress.end();
     Ok(judged)
 }
 
