@@ -100,8 +100,8 @@ fn sentence(address: u64, found: &str) -> String {
 
 /// Returns a file and line from the workspace on, if it is the app's.
 fn line_of_app(place: &str) -> Option<&str> {
-    // What follows the line, such as ` (discriminator 2)`, tells copies of it apart.
-    let place = place.split(' ').next()?;
+    // ` (discriminator 2)` after the line tells copies of it apart; a path may have spaces.
+    let place = place.split(" (discriminator ").next()?;
     let path = place.strip_prefix(system::workspace().to_str()?)?;
     let path = path.strip_prefix('/')?;
     let is_known = !path.ends_with(":?") && !path.ends_with(":0");
@@ -181,14 +181,14 @@ mod tests {
             "<fass::subtask::Turns as core::future::Future>::poll\n\
              /rustc/59807616e1fa/library/core/src/hint.rs:491\n\
              {{closure#0}}\n{root}/apps/vision/src/lib.rs:?\n\
-             edges\n{root}/apps/vision/src/lib.rs:7 (discriminator 2)\n\
+             edges\n{root}/apps/my vision/src/lib.rs:7 (discriminator 2)\n\
              {{closure#1}}\n{root}/apps/vision/src/lib.rs:9\n\
              poll\n{root}/fass/src/run/subtask.rs:81\n"
         );
         assert_eq!(
             sentence(0x20_e0b8, &found),
             "0x20e0b8 is <fass::subtask::Turns as core::future::Future>::poll, \
-             of apps/vision/src/lib.rs:7"
+             of apps/my vision/src/lib.rs:7"
         );
         let label = "interrupt_common\nfaults.2b61-cgu.0:?\n";
         assert_eq!(sentence(0x20_70e9, label), "0x2070e9 is interrupt_common");
