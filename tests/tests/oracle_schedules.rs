@@ -64,7 +64,13 @@ fn malformed_files_are_refused_with_their_line() {
             "case small 1 0 1 1",
             "case small 0 0 1 1",
             1,
-            "needs at least 1",
+            "expected 1 to 64 cores, found 0",
+        ),
+        (
+            "case small 1 0 1 1",
+            "case small 4294967295 0 1 1",
+            1,
+            "expected 1 to 64 cores, found 4294967295",
         ),
         (
             "case small 1 0 1 1",
@@ -170,8 +176,8 @@ fn a_cycle_is_refused_hop_by_hop() {
 }
 
 #[test]
-fn far_apart_times_and_more_cores_than_memory_has_are_no_trouble() {
-    let text = "case far 4294967295 1 1 1
+fn far_apart_times_and_as_many_cores_as_there_can_be_are_no_trouble() {
+    let text = "case far 64 1 1 1
 dag 9000000000000000000 9000000000000000000 5 2 1 0
 sub 3 0 1 3
 x 0 0 0 5 6 0
