@@ -118,7 +118,7 @@ fn a_failed_probe_is_told_in_words() {
     );
     fs::write(&image, tiny_image("", TinyEnd::Exit(0x10))).expect("the image is written");
     let why = probe::run(&Qemu::default(), &image, FAR).unwrap_err();
-    assert_eq!(why, "the guest printed no verdict line");
+    assert!(why.contains("gave no verdict"), "{why}");
     fs::remove_file(&image).expect("it is ours");
 }
 
