@@ -4,13 +4,14 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use alloc::boxed::Box;
 
+use crate::background::{self, watchdog};
 use crate::execution::{self, Runner, Work};
 use crate::machine::context::{Context, Parked};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu, section};
-use crate::{background, console, containment, contexts};
+use crate::{console, containment, contexts};
 
 /// The time between two signs of life of core 0. Without any alarm anywhere a
 /// virtual machine whose time is virtual would stand still forever.
@@ -114,10 +115,12 @@ pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
     core.timer_interrupts.fetch_add(1, Ordering::Relaxed);
     let now_ns = clock::now_ns();
+    core.interrupted_ns.store(now_ns, Ordering::Relaxed);
     // The instance that holds the core watches the clock: waking it is enough.
     timer::take_due(Alarm::Hold, now_ns);
     if timer::take_due(Alarm::Heartbeat, now_ns) {
         beat(core, now_ns);
+        watchdog::look(core, now_ns);
         if core.index == 0 {
             background::beat(now_ns);
         }
@@ -138,7 +141,11 @@ pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {
 /// and the others none.
 pub(crate) fn set_heartbeats(period_ns: u64) {
     for core in this_core::all() {
-        let ordinary_ns = if core.index == 0 { HEARTBEAT_NS } else { 0 };
+        let ordinary_ns = match core.index {
+            0 => HEARTBEAT_NS,
+            1 => watchdog::LOOK_NS,
+            _ => 0,
+        };
         let own_ns = if period_ns == 0 {
             ordinary_ns
         } else {
@@ -188,11 +195,13 @@ fn beat(core: &Core, now_ns: u64) {
 /// or another heartbeat.
 pub(crate) fn wake_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
+    let now_ns = clock::now_ns();
+    core.interrupted_ns.store(now_ns, Ordering::Relaxed);
     if core.index == 0 {
         execution::arm_next_event();
     }
     keep_beating(core);
-    execution::interrupt(interrupted, clock::now_ns(), false);
+    execution::interrupt(interrupted, now_ns, false);
 }
 
 /// Occupies the calling instance's core for `ns` of execution, halted in between.

@@ -155,3 +155,29 @@ fn an_app_that_ends_the_machine_itself_has_not_succeeded() {
                 QEMU's exit port itself";
     assert_eq!(fault.reason, said, "{}", outcome.tail());
 }
+
+#[test]
+fn a_core_that_takes_no_interrupts_is_noticed_by_another() {
+    let cores = ["deaf_alone", "deaf_beside"].map(|test| {
+        let guest = Guest::new("guest-tests").word(&format!("test={test}"));
+        let outcome = guest.cores(2).end_in(Status::Failure);
+        let line = outcome.transcript.of_kind("exception").next();
+        let line = line.unwrap_or_else(|| panic!("no exception\n{}", outcome.tail()));
+        let message = line.text_at("message").unwrap_or_default();
+        assert!(
+            message.starts_with("interrupts disabled for seconds"),
+            "{message}"
+        );
+        assert!(
+            outcome
+                .serial
+                .contains("that is subtask `deaf` of DAG `deaf`")
+        );
+        assert_eq!(line.number_at("job"), Some(0), "{}", line.text);
+        line.number_at("cpu")
+    });
+    assert!(
+        cores.contains(&Some(0)) && cores.contains(&Some(1)),
+        "{cores:?}"
+    );
+}

@@ -15,6 +15,7 @@ mod patience;
 mod progress;
 mod stall;
 mod status;
+pub(crate) mod watchdog;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 

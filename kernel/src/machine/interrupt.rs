@@ -110,8 +110,11 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
 extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
     // SAFETY: `interrupt.s` passes the registers it pushed to the exception's
     // own stack, where nobody else looks.
-    let registers = unsafe { &*registers };
-    fault::raise(registers, HANDLERS.get(), &mut Interrupted(()));
+    let pushed = unsafe { &*registers };
+    if fault::raise(pushed, HANDLERS.get(), &mut Interrupted(())) {
+        // They lie there as in a save area, below them the vector state.
+        return registers;
+    }
     this_core::get().context().registers()
 }
 

@@ -122,6 +122,12 @@ pub(crate) fn send_stop_to_others() {
     command(0, NON_MASKABLE_ALL_BUT_SELF);
 }
 
+/// Sends the non-maskable interrupt to the core with id `apic_id`.
+pub(crate) fn send_non_maskable(apic_id: u8) {
+    const NON_MASKABLE: u32 = 0b100 << 8 | 1 << 14;
+    command(apic_id, NON_MASKABLE);
+}
+
 /// Writes an interrupt command. The two halves must not be separated by a
 /// handler's command, so interrupts are disabled meanwhile.
 fn command(apic_id: u8, low: u32) {

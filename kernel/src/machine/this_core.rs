@@ -50,6 +50,8 @@ pub(crate) struct Core {
     pub(crate) alarms: [AtomicU64; 4],
     /// The number of timer interrupts taken.
     pub(crate) timer_interrupts: AtomicU64,
+    /// When this core took its last interrupt, by its timer or from another core.
+    pub(crate) interrupted_ns: AtomicU64,
     /// The time between two heartbeats of this core, 0 if it has none.
     pub(crate) heartbeat_ns: AtomicU64,
     interrupts_off: Meter,
@@ -79,6 +81,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         watches: AtomicBool::new(false),
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         timer_interrupts: AtomicU64::new(0),
+        interrupted_ns: AtomicU64::new(0),
         heartbeat_ns: AtomicU64::new(0),
         interrupts_off: Meter::new(),
         running: [const { AtomicU64::new(u64::MAX) }; 2],

@@ -59,3 +59,10 @@ pub(crate) fn end_the_machine() -> Unpunished {
     unsafe { asm!("out 0xf4, eax", in("eax") 0x10) };
     Unpunished
 }
+
+/// Disables interrupts and waits for one.
+pub(crate) fn take_no_interrupts() -> Unpunished {
+    // SAFETY: none; another core has to notice it (see the module).
+    unsafe { asm!("cli", "hlt") };
+    Unpunished
+}

@@ -8,6 +8,7 @@ extern crate alloc;
 mod attacks;
 mod busy;
 mod checksum;
+mod deaf;
 mod endless;
 mod exceeded;
 #[allow(unsafe_code, reason = "what the kernel must report")]
@@ -30,7 +31,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 26] = [
+const TESTS: [(&str, Test); 28] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -51,6 +52,8 @@ const TESTS: [(&str, Test); 26] = [
         "exit_port",
         |_| unpunished(kernel_crimes::end_the_machine()),
     ),
+    ("deaf_alone", deaf::alone),
+    ("deaf_beside", deaf::beside),
     ("preemption", preemption::run),
     ("occupation", occupation::run),
     ("busy", busy::run),
