@@ -50,12 +50,13 @@ impl Random {
         self.pick(&[time, time, time, time, Duration::ZERO])
     }
 
-    /// Returns the attributes of a subtask that takes `time`: its WCET, unless
-    /// the commit would refuse that, and now and then that it keeps its core.
+    /// Returns the attributes of a subtask that takes `time`: a WCET, unless the commit
+    /// would refuse that, and now and then that it keeps its core. A WCET is never 0, or
+    /// nothing would be proven.
     fn attributes(&mut self, name: &str, time: Duration, deadline: Duration) -> SubtaskAttributes {
         let mut attributes = SubtaskAttributes::named(name);
         if time <= deadline {
-            attributes = attributes.wcet(time);
+            attributes = attributes.wcet(time.max(Duration::from_nanos(1)));
         }
         if self.below(6) == 0 {
             attributes = attributes.non_preemptive();

@@ -30,7 +30,7 @@ fn a_file_is_read_and_written_back() {
         (3, 5, 6)
     );
     assert_eq!(&*camera.subtasks[0].samples_ns, [1_000_000, 2_000_000]);
-    assert_eq!(camera.spec.relative_deadline_ns, Some(30_000_000));
+    assert_eq!(camera.spec.relative_deadline_ns, Some(100_000_000));
     assert_eq!(camera.spec.in_flight, Some(4));
     // Without a deadline it is the period.
     let alone = &file.sets[1].dags[0];
