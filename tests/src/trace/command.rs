@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use super::model::Run;
-use super::{check, read, report};
+use super::{bound, check, read, report};
 use crate::files;
 use crate::options::{Command, Opt, Parsed, Takes};
 
@@ -26,9 +26,8 @@ pub static CHECK_TRACE: Command = Command {
             "bound-us",
             Takes::number(0..=1_000_000_000),
             "Microseconds for which an instance may wait for what it is owed, because a \
-             decision takes effect after an interrupt.",
-        )
-        .or("1000"),
+             decision takes effect after an interrupt; 50 in mode deterministic, else 1000.",
+        ),
         Opt::new(
             "show",
             Takes::number(0..=u64::MAX),
@@ -108,7 +107,7 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<Run>, String> {
 
 /// Checks a run, prints what was found, and returns the number of breaches.
 fn judge(file: &str, run: &Run, options: &Parsed) -> usize {
-    let bound_ns = options.number("bound-us").unwrap_or(0).saturating_mul(1000);
+    let bound_ns = bound::of(run, options);
     let shown = options.number("show").unwrap_or(u64::MAX);
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
     let findings = check(run, bound_ns);

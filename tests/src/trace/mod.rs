@@ -21,6 +21,7 @@
 //! An instance that has not finished when the trace ends breaks no rule, unless
 //! the run says that it is complete.
 
+pub mod bound;
 pub mod breach;
 pub mod command;
 mod cores;

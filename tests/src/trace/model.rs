@@ -26,6 +26,8 @@ pub struct Run {
     pub preemption: Preemption,
     /// The cores that the scheduler served, at least 1.
     pub cores: u32,
+    /// Whether the guest's time was counted, as it is in mode `deterministic`.
+    pub is_counted: bool,
     /// The DAGs by number.
     pub dags: Vec<Dag>,
     /// What happened, in the order of the log.

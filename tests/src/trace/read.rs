@@ -11,6 +11,7 @@ use std::ops::RangeInclusive;
 
 use sched_dag::{CoreId, DagId, Policy, Preemption, SubtaskId};
 
+use super::bound;
 use super::model::{Dag, Event, Releases, Run, Subtask, Word};
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
@@ -28,6 +29,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     let mut open: Option<Run> = None;
     // A line of a trace that something before its `{` makes one for people.
     let mut spoilt = None;
+    let mut is_counted = false;
     for (index, text) in log.lines().enumerate() {
         let Some(line) = read_line(index + 1, text) else {
             if text.contains("{\"kind\":\"trace_begin\"") {
@@ -41,8 +43,9 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
         })?;
         let line = Line(&line);
         match (line.0.kind.as_str(), &mut open) {
+            ("boot", _) => is_counted = bound::is_counted(line.0),
             ("trace_begin", None) => {
-                let run = begin(&line)?;
+                let run = begin(&line, is_counted)?;
                 if let Some(first) = runs.iter().find(|first| first.number == run.number) {
                     return Err(line.malformed(format!(
                         "run {} stands here twice, first on line {}; give each boot's log alone",
@@ -79,7 +82,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     }
 }
 
-fn begin(line: &Line<'_>) -> Result<Run, Malformed> {
+fn begin(line: &Line<'_>, is_counted: bool) -> Result<Run, Malformed> {
     let cores = line.within("cores", 1..=MOST_CORES)?;
     Ok(Run {
         number: line.number("run")?,
@@ -95,6 +98,7 @@ fn begin(line: &Line<'_>) -> Result<Run, Malformed> {
             other => return Err(line.unknown("preemption", other, "on or off")),
         },
         cores: line.small(cores)?,
+        is_counted,
         dags: Vec::new(),
         events: Vec::new(),
         lost: 0,

@@ -278,3 +278,17 @@ fn a_chain_of_many_subtasks_is_no_cycle() {
         .replace("[[0,1]]", &format!("[{}]", edges.join(",")));
     assert_eq!(read(&log).unwrap()[0].dags[0].predecessors.len(), 3000);
 }
+
+#[test]
+fn a_log_says_whether_its_time_was_counted() {
+    let of_mode = |words: &str| {
+        let boot = r#"{"kind":"boot","version":"1","app":"a","cpus":2,"memory_kib":1,"clock":"c""#;
+        read(&format!("{boot},\"command_line\":\"{words}\"}}\n{GOOD}"))
+            .unwrap()
+            .remove(0)
+            .is_counted
+    };
+    assert!(of_mode("policy=edf mode=deterministic"));
+    assert!(!of_mode("mode=threads"));
+    assert!(!read(GOOD).unwrap().remove(0).is_counted);
+}

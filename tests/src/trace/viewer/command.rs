@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use super::convert;
 use crate::files::{self, Named};
 use crate::options::{Command, Opt, Parsed, Takes};
+use crate::trace::bound;
 use crate::trace::command::read_file;
 
 /// The table of `trace`.
@@ -34,8 +35,7 @@ pub static TRACE: Command = Command {
             "bound-us",
             Takes::number(0..=1_000_000_000),
             "As for ./scripts/check-trace, whose breaches are shown as markers.",
-        )
-        .or("1000"),
+        ),
     ],
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
@@ -92,6 +92,7 @@ fn draw(options: &Parsed) -> Result<String, String> {
             ));
         }
     }
-    let bound_ns = options.number("bound-us").unwrap_or(0).saturating_mul(1000);
+    // The runs of a log are those of one boot.
+    let bound_ns = runs.first().map_or(0, |run| bound::of(run, options));
     Ok(convert(&runs, bound_ns))
 }

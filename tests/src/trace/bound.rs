@@ -1,0 +1,38 @@
+//! For how long an instance may wait for what the rules owe it.
+//!
+//! A decision takes effect after an interrupt, and where a run's time is real, the host may
+//! do something else meanwhile. In mode `deterministic` that cannot happen, so there a log
+//! is judged more strictly: its first line tells the mode.
+
+use super::model::Run;
+use crate::options::Parsed;
+use crate::protocol::MachineLine;
+use crate::qemu::Mode;
+
+/// For how long counted time lets a core wait for others' turns, and for what the kernel
+/// executes meanwhile (`docs/decisions/0021-turns.md`).
+pub const TURN_NS: u64 = 20_000;
+
+/// In counted time: for turns, and for the kernel's steps, which are the longer the more
+/// happens at once.
+pub const COUNTED_NS: u64 = 50_000;
+
+/// Where time is real.
+pub const REAL_NS: u64 = 1_000_000;
+
+/// Returns the bound that a person has chosen, or else that of the run's mode.
+pub(super) fn of(run: &Run, options: &Parsed) -> u64 {
+    let chosen = options.number("bound-us");
+    let usual_ns = if run.is_counted { COUNTED_NS } else { REAL_NS };
+    chosen.map_or(usual_ns, |bound_us| bound_us.saturating_mul(1000))
+}
+
+/// Reports whether a boot's line says that instructions were counted: the tool tells
+/// each guest its mode.
+pub(super) fn is_counted(boot: &MachineLine) -> bool {
+    let words = boot.text_at("command_line").unwrap_or_default();
+    let mode = words
+        .split(' ')
+        .find_map(|word| word.strip_prefix("mode="));
+    mode.and_then(Mode::from_name) == Some(Mode::Deterministic)
+}
