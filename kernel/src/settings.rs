@@ -13,7 +13,7 @@
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
 //! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
-//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle, see `machine::counted_time`; `threads`: no bound is judged | |
+//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
 //! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
 
 use alloc::format;
@@ -22,7 +22,7 @@ use fass::{Overheads, Policy, Preemption};
 
 use crate::background::{Echo, Wishes};
 use crate::graph;
-use crate::machine::{counted_time, interrupts_off};
+use crate::machine::{counted_time, interrupts_off, turns};
 use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
 use crate::worker;
@@ -84,6 +84,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     // What time means is the host's choice.
     if options.text("mode") == Some("deterministic") {
         counted_time::enable();
+        turns::enable();
     }
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;

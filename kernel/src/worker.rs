@@ -10,7 +10,7 @@ use crate::machine::context::{Context, Parked};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, section};
+use crate::machine::{clock, cpu, section, turns};
 use crate::{console, containment, contexts};
 
 /// The time between two signs of life of core 0. Without any alarm anywhere a
@@ -30,17 +30,29 @@ pub(crate) fn new_context() -> Parked {
 /// context that the core is to go on with instead, with interrupts disabled.
 pub(crate) fn work() -> Parked {
     cpu::disable_interrupts();
-    let mut work = execution::find_work();
+    let mut work = find_work();
     loop {
         work = match work {
             Work::Run(runner) => run(runner),
-            Work::Continue(context) => return context,
+            Work::Continue(context) => {
+                turns::enter_by_interrupt(this_core::get());
+                return context;
+            }
             Work::Rest => {
                 rest(this_core::get());
-                execution::find_work()
+                find_work()
             }
         };
     }
+}
+
+/// Finds what this core, which has computed nothing, is to do. Interrupts are disabled.
+fn find_work() -> Work {
+    let work = execution::find_work();
+    if let Work::Run(_) = &work {
+        turns::enter();
+    }
+    work
 }
 
 /// Calls a subtask's function, with interrupts enabled meanwhile.
@@ -210,11 +222,14 @@ pub(crate) fn hold(ns: u64) {
     loop {
         cpu::disable_interrupts();
         let left_ns = ns.saturating_sub(executed.ns());
+        let core = this_core::get();
         if left_ns == 0 {
             timer::set(Alarm::Hold, u64::MAX);
+            turns::enter();
             cpu::enable_interrupts();
             return;
         }
+        turns::leave(core);
         timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
         // If this is preempted it is here: it then goes round again, on whatever
         // core it continues, and sets that core's alarm.
@@ -226,8 +241,10 @@ pub(crate) fn hold(ns: u64) {
 pub(crate) fn spin(ns: u64) {
     let executed = Executed::from_now();
     while executed.ns() < ns {
+        turns::stand_back();
         cpu::relax();
     }
+    turns::come_back();
 }
 
 /// A stopwatch that stands still while its context is suspended.

@@ -17,6 +17,7 @@ extern crate alloc;
 mod arity;
 mod draw;
 mod sink;
+mod work;
 
 use alloc::format;
 use alloc::vec;
@@ -26,6 +27,7 @@ use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
 
 pub use draw::ExecutionTimes;
 pub use sink::Joins;
+pub use work::compute;
 
 /// The time between two jobs.
 pub const PERIOD: Duration = Duration::from_millis(25);

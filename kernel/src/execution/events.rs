@@ -19,7 +19,7 @@ use super::{EPOCH_NS, EXECUTION, Event, NEXT_EVENT_NS, Work};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, section, this_core};
+use crate::machine::{clock, section, this_core, turns};
 use crate::trace::{Recorder, Subject, What};
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
@@ -40,19 +40,23 @@ pub(crate) fn find_work() -> Work {
 /// it says.
 #[inline]
 fn begin(core: &Core, recorder: Recorder, mut work: Work) -> Work {
-    if let Work::Run(runner) = &mut work {
-        let now_ns = clock::now_ns();
-        let budget_end_ns = match runner.budget_ns {
-            u64::MAX => u64::MAX,
-            budget_ns => {
-                let end_ns = now_ns.saturating_add(budget_ns);
-                timer::set_no_later(core, Alarm::Budget, end_ns);
-                end_ns
-            }
-        };
-        core.context().set_budget_end(budget_end_ns);
-        runner.start_ns = instance_time_ns(now_ns);
-        recorder.own(What::Start, runner.start_ns, runner.subject());
+    match &mut work {
+        Work::Run(runner) => {
+            let now_ns = clock::now_ns();
+            let budget_end_ns = match runner.budget_ns {
+                u64::MAX => u64::MAX,
+                budget_ns => {
+                    let end_ns = now_ns.saturating_add(budget_ns);
+                    timer::set_no_later(core, Alarm::Budget, end_ns);
+                    end_ns
+                }
+            };
+            core.context().set_budget_end(budget_end_ns);
+            runner.start_ns = instance_time_ns(now_ns);
+            recorder.own(What::Start, runner.start_ns, runner.subject());
+        }
+        Work::Continue(context) if !context.is_background() => {}
+        Work::Continue(_) | Work::Rest => turns::rest(core),
     }
     work
 }

@@ -17,7 +17,7 @@ use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, this_core};
+use crate::machine::{clock, this_core, turns};
 use crate::platform::KERNEL;
 use crate::trace::{Recorder, Subject, What};
 use crate::worker;
@@ -237,6 +237,9 @@ impl Execution {
             let instance = self.scheduler.instance_of(vertex);
             let recorder = self.recorders.of(CoreId(core.index));
             recorder.own(What::Suspend, time_ns, Subject::of(instance));
+            // The hold, or the turn, was the instance's.
+            turns::leave(core);
+            timer::set(Alarm::Hold, u64::MAX);
         }
         let next = match self.books.placement.take_suspended(here) {
             Some(context) => {
@@ -250,7 +253,6 @@ impl Execution {
         match suspended {
             Some(vertex) => {
                 last.note_suspended(now_ns);
-                timer::set(Alarm::Hold, u64::MAX);
                 self.books.placement.suspend(vertex, last)
             }
             None => {
@@ -264,6 +266,7 @@ impl Execution {
     fn note_resumed(&self, core: &Core, context: &Parked, now_ns: u64) {
         context.note_resumed(now_ns);
         timer::set_no_later(core, Alarm::Budget, context.budget_end_ns());
+        turns::join(core);
         let here = CoreId(core.index);
         if let Some(instance) = self.current(here.index()) {
             let time_ns = since_epoch(clock::now_ns());

@@ -180,6 +180,12 @@ impl Context {
         &self.sections
     }
 
+    /// Notes that the context has waited for `ns` without executing.
+    pub(super) fn note_waited(&self, ns: u64) {
+        self.suspended_ns.fetch_add(ns, Ordering::Relaxed);
+        self.set_budget_end(self.budget_end_ns().saturating_add(ns));
+    }
+
     /// Returns for how long the context has been suspended since it was made.
     pub(crate) fn suspended_ns(&self) -> u64 {
         self.suspended_ns.load(Ordering::Relaxed)
@@ -244,9 +250,7 @@ impl Parked {
     /// Notes that the context goes on at `now_ns`.
     pub(crate) fn note_resumed(&self, now_ns: u64) {
         let since_ns = now_ns.saturating_sub(self.0.suspended_at_ns.load(Ordering::Relaxed));
-        self.0.suspended_ns.fetch_add(since_ns, Ordering::Relaxed);
-        self.0
-            .set_budget_end(self.0.budget_end_ns().saturating_add(since_ns));
+        self.0.note_waited(since_ns);
     }
 
     /// Returns when the budget ends of what the context runs.
@@ -257,6 +261,11 @@ impl Parked {
     /// Returns where `interrupt.s` keeps the context's registers.
     pub(super) fn registers(&self) -> *mut Registers {
         self.0.registers()
+    }
+
+    /// Reports whether this is what its core does when nothing is assigned to it.
+    pub(crate) const fn is_background(&self) -> bool {
+        self.0.is_background()
     }
 
     /// Gives the context up to a core that is to run it.

@@ -9,7 +9,7 @@ use core::panic::Location;
 
 use super::context::{Parked, Registers};
 use super::once::Once;
-use super::{cpu, descriptors, fault, interrupts_off, local_apic, this_core, timer};
+use super::{cpu, descriptors, fault, interrupts_off, local_apic, this_core, timer, turns};
 
 global_asm!(
     include_str!("interrupt.s"),
@@ -86,6 +86,7 @@ pub(crate) fn load_table() {
 /// Handles one interrupt and returns the registers to resume.
 extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
     interrupts_off::begin(Location::caller());
+    turns::begin_urgent();
     // SAFETY: `interrupt.s` passes the registers of the context that this core
     // was running, which are this core's (context invariant).
     let vector = unsafe { (*registers).vector };
@@ -103,6 +104,7 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
         _ => local_apic::acknowledge(),
     }
     interrupts_off::end();
+    turns::end_interrupt();
     this_core::get().context().registers()
 }
 

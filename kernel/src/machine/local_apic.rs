@@ -17,6 +17,8 @@ enum Register {
     TaskPriority = 0x80,
     EndOfInterrupt = 0xb0,
     SpuriousVector = 0xf0,
+    /// Of the interrupts that are pending, the part that holds ours.
+    Requests = 0x220,
     CommandLow = 0x300,
     CommandHigh = 0x310,
     TimerEntry = 0x320,
@@ -82,6 +84,13 @@ pub(crate) fn enable() {
     for (register, value) in TURN_ON {
         write(register, value);
     }
+}
+
+/// Reports whether an interrupt waits for this core to enable interrupts.
+pub(crate) fn is_interrupt_pending() -> bool {
+    // Each such register has the bits of 32 vectors.
+    const OURS: u32 = 1 << (vector::TIMER % 32) | 1 << (vector::WAKE % 32);
+    read(Register::Requests) & OURS != 0
 }
 
 /// Ends the interrupt that is being handled.

@@ -25,3 +25,4 @@ pub(crate) mod serial;
 pub(crate) mod spinlock;
 pub(crate) mod this_core;
 pub(crate) mod timer;
+pub(crate) mod turns;

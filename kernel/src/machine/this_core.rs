@@ -5,7 +5,7 @@
 //! [`get`]: everything that changes in it is atomic.
 
 use core::arch::asm;
-use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
@@ -13,7 +13,7 @@ use super::context::{Context, Parked, Registers};
 use super::descriptors::{self, TaskState};
 use super::interrupts_off::Meter;
 use super::once::Once;
-use super::{cpu, local_apic};
+use super::{cpu, local_apic, turns};
 
 /// What a core needs to begin: the tops of stacks, each with a guard page below,
 /// and the context that it runs first.
@@ -25,6 +25,20 @@ pub(crate) struct Stacks {
     pub(crate) handler: u64,
     /// Run exceptions: ordinary, double fault, non-maskable, machine check.
     pub(crate) exceptions: [u64; 4],
+}
+
+/// A core's part in the turns of those that compute ([`turns`](super::turns)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Part {
+    /// It takes no part.
+    None,
+    /// It waits for its first turn.
+    Fresh,
+    /// It has the turn.
+    Computes,
+    /// It waits for its next turn.
+    Waits,
 }
 
 /// One core's own data, on cache lines of its own.
@@ -46,6 +60,8 @@ pub(crate) struct Core {
     pub(crate) wake: AtomicBool,
     /// This core watches `wake`: it needs no interrupt to see it.
     watches: AtomicBool,
+    /// Its [`Part`] in the turns.
+    part: AtomicU8,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
     pub(crate) alarms: [AtomicU64; 4],
     /// The number of timer interrupts taken.
@@ -79,6 +95,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         spare: AtomicPtr::new(core::ptr::null_mut()),
         wake: AtomicBool::new(false),
         watches: AtomicBool::new(false),
+        part: AtomicU8::new(Part::None as u8),
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         timer_interrupts: AtomicU64::new(0),
         interrupted_ns: AtomicU64::new(0),
@@ -216,8 +233,28 @@ impl Core {
         // that it is to wake up, or this sees here that it does not watch yet.
         self.wake.store(true, Ordering::SeqCst);
         if self.index != get().index && !self.watches.load(Ordering::SeqCst) {
+            turns::begin_urgent();
             local_apic::send(self.apic_id, super::interrupt::vector::WAKE);
+            turns::end_urgent();
         }
+    }
+
+    /// Returns the core's part in the turns.
+    pub(super) fn part(&self) -> Part {
+        const FRESH: u8 = Part::Fresh as u8;
+        const COMPUTES: u8 = Part::Computes as u8;
+        const WAITS: u8 = Part::Waits as u8;
+        match self.part.load(Ordering::Relaxed) {
+            FRESH => Part::Fresh,
+            COMPUTES => Part::Computes,
+            WAITS => Part::Waits,
+            _ => Part::None,
+        }
+    }
+
+    /// Notes the core's part in the turns.
+    pub(super) fn set_part(&self, part: Part) {
+        self.part.store(part as u8, Ordering::Relaxed);
     }
 
     /// Lets others know that this core watches `wake` from now on.

@@ -14,7 +14,7 @@ use super::{clock, counted_time, cpu, local_apic};
 pub(crate) enum Alarm {
     /// The scheduler's next event.
     Schedule = 0,
-    /// The end of a subtask's hold of its core.
+    /// The end of a subtask's hold of its core, or of the core's turn ([`turns`](super::turns)).
     Hold = 1,
     /// The end of the running instance's budget.
     Budget = 3,

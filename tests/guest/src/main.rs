@@ -8,6 +8,7 @@ extern crate alloc;
 mod attacks;
 mod busy;
 mod checksum;
+mod computing;
 mod deaf;
 mod endless;
 mod exceeded;
@@ -31,7 +32,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 28] = [
+const TESTS: [(&str, Test); 29] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -52,6 +53,7 @@ const TESTS: [(&str, Test); 28] = [
         "exit_port",
         |_| unpunished(kernel_crimes::end_the_machine()),
     ),
+    ("computing", computing::run),
     ("deaf_alone", deaf::alone),
     ("deaf_beside", deaf::beside),
     ("preemption", preemption::run),

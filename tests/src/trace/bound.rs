@@ -31,8 +31,6 @@ pub(super) fn of(run: &Run, options: &Parsed) -> u64 {
 /// each guest its mode.
 pub(super) fn is_counted(boot: &MachineLine) -> bool {
     let words = boot.text_at("command_line").unwrap_or_default();
-    let mode = words
-        .split(' ')
-        .find_map(|word| word.strip_prefix("mode="));
+    let mode = words.split(' ').find_map(|word| word.strip_prefix("mode="));
     mode.and_then(Mode::from_name) == Some(Mode::Deterministic)
 }
