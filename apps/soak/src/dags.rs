@@ -1,14 +1,18 @@
 //! From a drawn set to DAGs that execute for its times.
 //!
-//! Every instance holds its core for a time that its subtask's seed and the
-//! job's number give, and counts what it has done. Meanwhile the processor halts:
-//! so all cores execute at once even where busy processors share one clock.
+//! Every instance executes for a time that its subtask's seed and the job's number
+//! give, and counts what it has done. Mostly it holds its core, which halts meanwhile:
+//! so all cores execute at once even where busy processors share one clock. Or it
+//! computes for that time ([`Executed::by_computing`]).
 
 use alloc::format;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::hint::black_box;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
+
+use fork_join::compute;
 
 use fass::{Dag, Occupation, OverrunPolicy, SubtaskAttributes, Untyped, create_dag};
 
@@ -17,7 +21,11 @@ use crate::set::{DagPlan, LEAST_PERCENT};
 
 /// What the instances of a round have counted themselves.
 #[derive(Clone, Debug, Default)]
-pub struct Executed(Arc<Counters>);
+pub struct Executed {
+    counters: Arc<Counters>,
+    /// How long a round of work takes, where instances compute.
+    round_ns: Option<u64>,
+}
 
 #[derive(Debug, Default)]
 struct Counters {
@@ -26,22 +34,37 @@ struct Counters {
 }
 
 impl Executed {
+    /// Lets instances compute instead of holding their cores, where a round of
+    /// [`compute`] takes so long.
+    #[must_use]
+    pub fn by_computing(round_ns: u64) -> Self {
+        Self {
+            round_ns: Some(round_ns.max(1)),
+            ..Self::default()
+        }
+    }
+
     /// Returns how many instances have run.
     #[must_use]
     pub fn instances(&self) -> u64 {
-        self.0.instances.load(Ordering::Relaxed)
+        self.counters.instances.load(Ordering::Relaxed)
     }
 
     /// Returns for how long they were to execute, in all.
     #[must_use]
     pub fn ns(&self) -> u64 {
-        self.0.ns.load(Ordering::Relaxed)
+        self.counters.ns.load(Ordering::Relaxed)
     }
 
     fn execute_for(&self, ns: u64) {
-        self.0.ns.fetch_add(ns, Ordering::Relaxed);
-        fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
-        self.0.instances.fetch_add(1, Ordering::Relaxed);
+        self.counters.ns.fetch_add(ns, Ordering::Relaxed);
+        match self.round_ns {
+            None => fass::execute_for(Duration::from_nanos(ns), Occupation::Hold),
+            Some(round_ns) => {
+                black_box(compute(ns / round_ns, ns));
+            }
+        }
+        self.counters.instances.fetch_add(1, Ordering::Relaxed);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Boots into random DAG sets, one after the other, and checks after each.
 //!
 //! Words of the command line: `rounds` of `round_ms` each, from round `first`
-//! on, at `load` percent of the cores, with what `overrun` says; and `seed`. The
-//! policy is the kernel's word.
+//! on, at `load` percent of the cores, with what `overrun` says; `work`, which is `hold`
+//! or `compute`; and `seed`. The policy is the kernel's word.
 
 #![no_std]
 #![no_main]
@@ -11,9 +11,11 @@ extern crate alloc;
 
 use alloc::format;
 use alloc::string::{String, ToString};
+use core::hint::black_box;
 use core::time::Duration;
 
 use fass::{ConstructionPolicy, OverrunPolicy, finish_create_dags_with};
+use fork_join::compute;
 use kernel::{Ending, Machine, Resources, Run, json, println};
 use soak::{Account, DagPlan, Executed, build, draw_set, largest_set};
 
@@ -33,6 +35,8 @@ struct Soak<'a> {
     seed: u64,
     load: u64,
     length: Duration,
+    /// How long a round of work takes, if instances compute.
+    round_ns: Option<u64>,
     overrun: OverrunPolicy,
     overrun_name: &'a str,
     policy_name: &'a str,
@@ -53,12 +57,21 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let soak = Soak {
         seed: options.number("seed", 0..=u64::MAX, 1)?,
         load: options.number("load", 1..=1000, 90)?,
+        round_ns: options
+            .choice("work", &[("hold", false), ("compute", true)])?
+            .then(time_of_round),
         length: Duration::from_millis(options.number("round_ms", 1..=3_600_000, 1000)?),
         overrun,
         overrun_name: options.text("overrun").unwrap_or(OVERRUNS[0].0),
         policy_name: options.text("policy").unwrap_or("static"),
     };
-    options.finish(&["first", "rounds", "overrun", "seed", "load", "round_ms"])?;
+    options.finish(&[
+        "first", "rounds", "overrun", "seed", "load", "round_ms", "work",
+    ])?;
+    if soak.round_ns.is_some() {
+        // The WCETs are those of a core that computes alone.
+        machine.accept_exceeded_bounds();
+    }
     println!(
         "{rounds} rounds of {} ms at {} % load of {} cores, overrun: {}",
         soak.length.as_millis(),
@@ -85,6 +98,14 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     complaint.map_or(Ok(()), |text| Err(Ending::Failure(text)))
 }
 
+/// Measures how long a round of work takes.
+fn time_of_round() -> u64 {
+    const ROUNDS: u64 = 100;
+    let start_ns = fass::now_ns();
+    black_box(compute(ROUNDS, 1));
+    (fass::now_ns() - start_ns) / ROUNDS
+}
+
 impl Soak<'_> {
     /// Runs the largest set for a moment, so that all memory that is kept from
     /// run to run is there. Returns what then is in use.
@@ -99,14 +120,21 @@ impl Soak<'_> {
         plans: &[DagPlan],
         length: Duration,
     ) -> Result<(Run, Executed), Ending> {
-        let executed = Executed::default();
+        let executed = self
+            .round_ns
+            .map_or_else(Executed::default, Executed::by_computing);
         let dags = build(plans, length, self.overrun, &executed);
         finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
         Ok((machine.run()?, executed))
     }
 
     fn round(&self, machine: &Machine, round: u64, baseline: Resources) -> Result<Outcome, Ending> {
-        let plans = draw_set(self.seed, round, self.load, machine.cores());
+        // Where instructions are counted, all cores together compute as much as one.
+        let load = match self.round_ns {
+            None => self.load,
+            Some(_) => (self.load / u64::from(machine.cores())).max(1),
+        };
+        let plans = draw_set(self.seed, round, load, machine.cores());
         let subtasks: usize = plans.iter().map(|dag| dag.subtasks.len()).sum();
         let (run, executed) = self.run(machine, &plans, self.length)?;
         let dags = plans.len();

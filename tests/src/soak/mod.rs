@@ -138,6 +138,7 @@ fn words(plan: &Plan, boot: &Boot<'_>) -> String {
         policy,
         load,
         overrun,
+        work,
         ..
     } = boot.part;
     // In real time the host's noise would exceed budgets that nobody asked for.
@@ -146,7 +147,7 @@ fn words(plan: &Plan, boot: &Boot<'_>) -> String {
         Mode::Kvm | Mode::Threads => 0,
     };
     format!(
-        "mode={} policy={policy} load={load} overrun={overrun} first={} rounds={} round_ms={} \
+        "mode={} policy={policy} load={load} overrun={overrun} work={work} first={} rounds={} round_ms={} \
          seed={} trace=dump trace_events={} budget_factor={budget_factor}",
         plan.mode,
         boot.first,

@@ -9,6 +9,7 @@ use std::fmt;
 use std::time::Duration;
 
 use crate::qemu::Mode;
+use crate::trace::bound;
 
 /// What to run, and on what.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,6 +43,8 @@ pub struct Part {
     pub load: u64,
     /// The guest's word: `queue`, `skip` or `abort`.
     pub overrun: &'static str,
+    /// The guest's word: `hold` or `compute`, what an instance does while it executes.
+    pub work: &'static str,
     /// How many rounds.
     pub rounds: u64,
 }
@@ -49,13 +52,19 @@ pub struct Part {
 /// The words for the two policies.
 pub(super) const POLICIES: [&str; 2] = ["static", "edf"];
 
+/// The words for what an instance does while it executes.
+const WORKS: [&str; 2] = ["hold", "compute"];
+
 /// The words for the overrun policies.
 pub(super) const OVERRUNS: [&str; 3] = ["queue", "skip", "abort"];
 
 impl fmt::Display for Part {
-    /// Writes it as it is written for `--only`: `edf-130-skip`.
+    /// Writes it as it is written for `--only`: `edf-130-skip`, `edf-90-queue-compute`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = format!("{}-{}-{}", self.policy, self.load, self.overrun);
+        let mut text = format!("{}-{}-{}", self.policy, self.load, self.overrun);
+        if self.work != WORKS[0] {
+            text = format!("{text}-{}", self.work);
+        }
         f.pad(&text)
     }
 }
@@ -65,7 +74,7 @@ impl fmt::Display for Part {
 /// does meanwhile.
 pub(super) fn usual_bound_ns(mode: Mode) -> u64 {
     match mode {
-        Mode::Deterministic => 50_000,
+        Mode::Deterministic => bound::COUNTED_NS,
         Mode::Kvm => 10_000_000,
         Mode::Threads => 1_000_000_000,
     }
@@ -114,8 +123,8 @@ impl Length {
 }
 
 impl Plan {
-    /// Makes the plan of a soak run: both policies at `load` percent, and at
-    /// `overload` percent with each overrun policy.
+    /// Makes the plan of a soak run: both policies at `load` percent, at `overload` percent
+    /// with each overrun policy, and at `load` percent with instances that compute.
     #[must_use]
     pub fn new(length: Length, load: u64, overload: u64) -> Plan {
         let round_ms = u64::try_from(length.round.as_millis())
@@ -126,6 +135,7 @@ impl Plan {
             policy,
             load,
             overrun,
+            work: WORKS[0],
             rounds: rounds(seconds),
         };
         let mut parts: Vec<Part> = POLICIES
@@ -137,6 +147,11 @@ impl Plan {
                 parts.push(part(policy, overload, overrun, length.overload_seconds));
             }
         }
+        let seconds = length.overload_seconds;
+        parts.extend(POLICIES.iter().map(|policy| Part {
+            work: WORKS[1],
+            ..part(policy, load, OVERRUNS[0], seconds)
+        }));
         parts.retain(|part| part.rounds > 0);
         Plan {
             parts,
@@ -191,7 +206,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_long_form_is_ten_minutes_and_three_of_overload() {
+    fn the_long_form_is_ten_minutes_three_of_overload_and_one_of_computing() {
         let plan = Plan::new(Length::LONG, 90, 130);
         let names: Vec<_> = plan
             .parts
@@ -209,9 +224,11 @@ mod tests {
                 "edf-130-skip 6",
                 "static-130-abort 6",
                 "edf-130-abort 6",
+                "static-90-queue-compute 6",
+                "edf-90-queue-compute 6",
             ]
         );
-        assert_eq!(plan.rounds() * plan.round.as_secs(), 780);
+        assert_eq!(plan.rounds() * plan.round.as_secs(), 840);
     }
 
     #[test]
@@ -229,6 +246,7 @@ mod tests {
                 policy: "edf",
                 load: 90,
                 overrun: "queue",
+                work: "hold",
                 rounds: 9,
             }],
             ..Plan::new(Length::SHORT, 90, 130)
