@@ -10,7 +10,14 @@ use std::path::PathBuf;
 use harness::system::workspace;
 
 /// Files with items that apps use: all of a folder, or these.
-const FOLDERS: [&str; 2] = ["fass/src", "fass/virtual-time/src"];
+const FOLDERS: [&str; 6] = [
+    "fass/src",
+    "fass/src/api",
+    "fass/src/commit",
+    "fass/src/draft",
+    "fass/src/run",
+    "fass/virtual-time/src",
+];
 const FILES: [&str; 10] = [
     "kernel/src/lib.rs",
     "kernel/src/machine_handle.rs",
