@@ -84,10 +84,12 @@ fn has_matches(plan: &Plan, binary: &TestBinary) -> bool {
 
 fn run_binary(plan: &Plan, binary: &TestBinary, tally: &mut Tally) {
     let mut command = bound_to_us(&binary.executable);
-    // As cargo does it: tests run in their package's folder.
+    // As cargo does it: tests run in their package's folder. A tool that they start is
+    // called from where they start it, not from where this one was.
     command
         .current_dir(&binary.folder)
-        .env("CARGO_MANIFEST_DIR", &binary.folder);
+        .env("CARGO_MANIFEST_DIR", &binary.folder)
+        .env_remove("HARNESS_CALLED_IN");
     command.args(&plan.filter);
     run_and_read(plan, &binary.name(), command, tally);
 }
