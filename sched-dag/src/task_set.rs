@@ -6,14 +6,18 @@
 use alloc::boxed::Box;
 use alloc::string::String;
 
-use crate::ids::{DagId, SubtaskId};
+use crate::ids::{DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::{Activation, OverrunPolicy, Priority};
 use crate::topic::Topic;
 
 /// All DAG tasks of one commit.
 #[derive(Clone, Debug)]
 pub struct TaskSet {
-    pub(crate) dags: Box<[Dag]>,
+    dags: Box<[Dag]>,
+    /// Each DAG's first vertex.
+    first_vertices: Box<[u32]>,
+    /// The number of vertices.
+    vertices: usize,
 }
 
 /// A verified DAG task.
@@ -67,6 +71,21 @@ pub(crate) struct Adjacency {
 }
 
 impl TaskSet {
+    /// Counts the subtasks of verified DAGs.
+    pub(crate) fn new(dags: Box<[Dag]>) -> Self {
+        let mut vertices = 0;
+        let firsts = dags.iter().map(|dag| {
+            let first = to_u32(vertices);
+            vertices += dag.subtasks.len();
+            first
+        });
+        Self {
+            first_vertices: firsts.collect(),
+            vertices,
+            dags,
+        }
+    }
+
     /// Returns the DAGs in the order of the commit.
     #[must_use]
     pub fn dags(&self) -> &[Dag] {
@@ -81,6 +100,28 @@ impl TaskSet {
     #[must_use]
     pub fn dag(&self, dag: DagId) -> &Dag {
         &self.dags[dag.index()]
+    }
+
+    /// Returns the number of all DAGs' subtasks, which are the vertices from 0 on.
+    #[must_use]
+    pub const fn vertices(&self) -> usize {
+        self.vertices
+    }
+
+    /// Returns the vertex of an instance's subtask.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[inline]
+    #[must_use]
+    pub fn vertex(&self, instance: Instance) -> Vertex {
+        Vertex(self.first_vertex(instance.dag) + instance.subtask.0)
+    }
+
+    #[inline]
+    pub(crate) fn first_vertex(&self, dag: DagId) -> u32 {
+        self.first_vertices[dag.index()]
     }
 }
 

@@ -37,12 +37,14 @@
 //! ```
 
 use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::scheduler::heap::IndexedHeap;
 use crate::scheduler::{Decision, HandOff, Observer, Scheduler};
+use crate::task_set::TaskSet;
 
 /// What instances do and how long it takes them.
 ///
@@ -144,11 +146,9 @@ struct Cores {
     finish_times: IndexedHeap<(u64, CoreId)>,
     /// What each core executes.
     executing: Box<[Option<Instance>]>,
-    /// What is left of each preempted instance, by its subtask's index over all
-    /// DAGs.
+    /// What is left of each preempted instance, by its vertex.
     remaining_ns: Box<[u64]>,
-    /// The index of each DAG's first subtask.
-    first_subtasks: Box<[usize]>,
+    task_set: Arc<TaskSet>,
 }
 
 /// Why a run in virtual time has ended.
@@ -173,20 +173,15 @@ impl VirtualTime {
     #[must_use]
     pub fn new(scheduler: Scheduler) -> Self {
         let cores = scheduler.options().cores as usize;
-        let mut subtasks = 0;
-        let first_subtasks = scheduler.task_set().dags().iter().map(|dag| {
-            subtasks += dag.subtasks().len();
-            subtasks - dag.subtasks().len()
-        });
-        let first_subtasks = first_subtasks.collect();
+        let subtasks = scheduler.task_set().vertices();
         Self {
-            scheduler,
             cores: Cores {
                 finish_times: IndexedHeap::new(cores),
                 executing: vec![None; cores].into_boxed_slice(),
                 remaining_ns: vec![0; subtasks].into_boxed_slice(),
-                first_subtasks,
+                task_set: Arc::clone(scheduler.task_set()),
             },
+            scheduler,
             failing: Vec::with_capacity(cores),
         }
     }
@@ -310,7 +305,7 @@ impl Cores {
         workload: &mut impl Workload,
     ) -> Result<(), Instance> {
         let (core, instance) = (decision.core(), decision.instance());
-        let index = self.first_subtasks[instance.dag.index()] + instance.subtask.index();
+        let index = self.task_set.vertex(instance).index();
         let remaining_ns = match decision {
             Decision::Preempt { .. } => {
                 let finish_ns = self.finish_times.key(core.index());

@@ -27,8 +27,7 @@ use crate::execute::Execute;
 pub(crate) struct Reports<W, B> {
     pub(crate) watch: W,
     pub(crate) bodies: B,
-    /// The first vertex of each DAG.
-    firsts: Box<[usize]>,
+    task_set: Arc<TaskSet>,
 }
 
 /// Bodies at rest can be found among them, by vertex.
@@ -60,17 +59,11 @@ impl<B: Execute> Bodies for Shared<B> {
 }
 
 impl<W, B> Reports<W, B> {
-    pub(crate) fn new(task_set: &TaskSet, watch: W, bodies: B) -> Self {
-        let mut vertices = 0;
-        let firsts = task_set.dags().iter().map(|dag| {
-            let first = vertices;
-            vertices += dag.subtasks().len();
-            first
-        });
+    pub(crate) fn new(task_set: &Arc<TaskSet>, watch: W, bodies: B) -> Self {
         Self {
-            firsts: firsts.collect(),
             watch,
             bodies,
+            task_set: Arc::clone(task_set),
         }
     }
 }
@@ -81,8 +74,8 @@ impl<W: Observer, B: Bodies> Observer for Reports<W, B> {
     #[inline(never)]
     fn cancelled(&mut self, instance: Instance) {
         self.watch.cancelled(instance);
-        let vertex = self.firsts[instance.dag.index()] + instance.subtask.index();
-        self.bodies.discard(vertex, instance.job);
+        let vertex = self.task_set.vertex(instance);
+        self.bodies.discard(vertex.index(), instance.job);
     }
 
     #[inline]

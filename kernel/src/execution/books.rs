@@ -1,12 +1,12 @@
-//! What the execution keeps beside the scheduler: the bodies with their places,
-//! the record, and where each DAG's vertices begin.
+//! What the execution keeps beside the scheduler: the bodies with their places, and
+//! the record.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use fass::Body;
 use sched_dag::record::Record;
-use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use super::placement::Placement;
 use super::runner::Runner;
@@ -17,8 +17,6 @@ use crate::platform::KERNEL;
 pub(super) struct Books {
     pub(super) record: Record,
     pub(super) placement: Placement<Box<Runner>, Parked>,
-    /// Each DAG's first vertex.
-    first_vertices: Box<[u32]>,
 }
 
 impl Books {
@@ -28,12 +26,8 @@ impl Books {
         bodies: Vec<Vec<Body>>,
         cores: usize,
     ) -> Self {
-        let mut first_vertices = Vec::with_capacity(bodies.len());
         let mut runners = Vec::new();
         for (dag, bodies) in (0..).map(DagId).zip(bodies) {
-            // The verification has seen to it that subtasks can be counted so.
-            let vertex = |count| u32::try_from(count).unwrap_or(u32::MAX);
-            first_vertices.push(vertex(runners.len()));
             for (subtask, body) in (0..).map(SubtaskId).zip(bodies) {
                 let first_instance = Instance {
                     dag,
@@ -42,7 +36,7 @@ impl Books {
                 };
                 runners.push(Box::new(Runner::new(
                     body,
-                    Vertex(vertex(runners.len())),
+                    task_set.vertex(first_instance),
                     first_instance,
                     budget_ns(task_set, first_instance),
                 )));
@@ -51,13 +45,7 @@ impl Books {
         Self {
             record,
             placement: Placement::new(runners.into_iter(), cores),
-            first_vertices: first_vertices.into(),
         }
-    }
-
-    /// Returns the vertex of an instance's subtask.
-    pub(super) fn vertex(&self, instance: Instance) -> Vertex {
-        Vertex(self.first_vertices[instance.dag.index()] + instance.subtask.0)
     }
 }
 

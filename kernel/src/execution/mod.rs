@@ -69,6 +69,7 @@ enum Event {
 
 /// A run, from its launch until its record is taken.
 pub(crate) struct Execution {
+    task_set: Arc<TaskSet>,
     scheduler: Scheduler,
     books: Books,
     /// What core 0 does when nothing is assigned to it, while something is.
@@ -120,9 +121,11 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         ))
     })?;
     let signals = Signals::new(&plan);
+    let task_set = Arc::new(plan.task_set);
     let execution = Execution {
-        books: Books::new(&plan.task_set, record, plan.bodies, cores),
-        scheduler: Scheduler::new(Arc::new(plan.task_set), options),
+        books: Books::new(&task_set, record, plan.bodies, cores),
+        scheduler: Scheduler::new(Arc::clone(&task_set), options),
+        task_set,
         background: None,
         dispatch_due_ns: None,
         may_hand_off: KERNEL.coincidence_ns() == 0,
@@ -191,7 +194,7 @@ impl Execution {
     }
 
     /// Returns the model.
-    pub(crate) fn task_set(&self) -> &Arc<TaskSet> {
-        self.scheduler.task_set()
+    pub(crate) const fn task_set(&self) -> &Arc<TaskSet> {
+        &self.task_set
     }
 }

@@ -65,6 +65,7 @@ impl Execution {
     /// Begins to pass signals on, those from before at time 0.
     pub(super) fn begin_signals(&mut self) {
         let Self {
+            task_set,
             scheduler,
             books,
             signals,
@@ -74,6 +75,7 @@ impl Execution {
         let here = here();
         let mut watcher = Watcher {
             books,
+            task_set,
             recorder: recorders.of(here),
             has_job_news: false,
         };

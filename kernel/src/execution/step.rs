@@ -73,10 +73,14 @@ impl Execution {
     ) -> Ended {
         let here = CoreId(core.index);
         let Self {
-            scheduler, books, ..
+            task_set,
+            scheduler,
+            books,
+            ..
         } = self;
         let mut watcher = Watcher {
             books,
+            task_set,
             recorder,
             has_job_news: false,
         };
@@ -107,6 +111,7 @@ impl Execution {
         let here = here();
         let recorder = self.recorders.of(here);
         let Self {
+            task_set,
             scheduler,
             books,
             dispatch_due_ns,
@@ -116,6 +121,7 @@ impl Execution {
         } = self;
         let mut watcher = Watcher {
             books,
+            task_set,
             recorder,
             has_job_news: false,
         };
@@ -144,7 +150,7 @@ impl Execution {
         let mut preempted = None;
         for decision in moment.release_due(&mut watcher).dispatch() {
             let (core, instance) = (decision.core(), decision.instance());
-            let vertex = books.vertex(instance);
+            let vertex = task_set.vertex(instance);
             if let Decision::Preempt { .. } = decision {
                 books.placement.set_target(core, None);
                 preempted = Some(core);

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::{DagId, Instance, JobOutcome, Observer};
+use sched_dag::{DagId, Instance, JobOutcome, Observer, TaskSet};
 
 use super::JOBS_ENDED;
 use super::books::Books;
@@ -14,6 +14,7 @@ use crate::trace::{Recorder, Subject, What};
 /// that very moment: so a join's latency includes the wait for the lock.
 pub(super) struct Watcher<'a> {
     pub(super) books: &'a mut Books,
+    pub(super) task_set: &'a TaskSet,
     pub(super) recorder: Recorder,
     /// Whether anything has happened to a job as a whole.
     pub(super) has_job_news: bool,
@@ -93,7 +94,7 @@ impl Observer for Watcher<'_> {
     fn cancelled(&mut self, instance: Instance) {
         self.recorder
             .own(What::Cancelled, self.now_ns(), Subject::of(instance));
-        let vertex = self.books.vertex(instance);
+        let vertex = self.task_set.vertex(instance);
         if let Some(runner) = self.books.placement.resting(vertex) {
             runner.body.discard(instance.job);
         }

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use super::bits::BitSet;
 use super::heap::IndexedHeap;
 use super::key::Key;
-use crate::ids::to_u32;
+use crate::ids::{DagId, to_u32};
 use crate::task_set::TaskSet;
 
 /// Instances by the absolute deadline, then by the slot of the job, then by vertex.
@@ -34,14 +34,11 @@ struct Line {
 impl ByDeadline {
     pub(super) fn new(task_set: &TaskSet) -> Self {
         let mut lines = Vec::new();
-        let mut first = 0;
-        for dag in task_set.dags() {
-            let subtasks = dag.subtasks().len();
+        for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
             lines.extend((0..dag.slots()).map(|_| Line {
-                first: to_u32(first),
-                subtasks: BitSet::new(subtasks),
+                first: task_set.first_vertex(id),
+                subtasks: BitSet::new(dag.subtasks().len()),
             }));
-            first += subtasks;
         }
         Self {
             jobs: IndexedHeap::new(lines.len()),

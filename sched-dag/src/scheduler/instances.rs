@@ -59,8 +59,9 @@ impl Scheduler {
         } = self;
         let state = &dags[dag.index()];
         let job = state.jobs.job(sequence);
+        let first_vertex = task_set.first_vertex(dag);
         for source in task_set.dag(dag).sources() {
-            let number = state.first_vertex + source.0;
+            let number = first_vertex + source.0;
             if let Some(vertex) = vertices.arrive(number, sequence) {
                 line_up(number, vertex, job, ready, observer);
                 *fresh += 1;
@@ -74,7 +75,7 @@ impl Scheduler {
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64, observer: &mut impl Observer) {
         let state = &self.dags[dag.index()];
         for &subtask in self.task_set.dag(dag).topological_order() {
-            let number = state.first_vertex + subtask.0;
+            let number = self.task_set.first_vertex(dag) + subtask.0;
             let vertex = self.vertices.get_mut(number);
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == Phase::Ready && is_meant {

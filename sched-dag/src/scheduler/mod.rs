@@ -119,8 +119,6 @@ const OWED: u32 = 1 << 31;
 /// The state of one DAG.
 #[derive(Debug)]
 struct DagState {
-    /// Its first subtask among the vertices.
-    first_vertex: u32,
     jobs: Jobs,
     statistics: DagStatistics,
     is_paused: bool,
@@ -147,16 +145,13 @@ impl Scheduler {
             .map(|dag| dag.subtasks().len())
             .max()
             .unwrap_or(0);
-        let (mut subtasks, mut slots) = (0, 0);
+        let mut slots = 0;
         let states: Box<[DagState]> = dags
             .iter()
             .map(|dag| {
-                let first_vertex = to_u32(subtasks);
                 let first_slot = to_u32(slots);
-                subtasks += dag.subtasks().len();
                 slots += dag.slots();
                 DagState {
-                    first_vertex,
                     jobs: Jobs::new(dag, first_slot),
                     statistics: DagStatistics::default(),
                     is_paused: false,
@@ -294,7 +289,7 @@ impl Scheduler {
     /// If there is no such DAG.
     #[must_use]
     pub fn vertex(&self, instance: Instance) -> Vertex {
-        Vertex(self.dags[instance.dag.index()].first_vertex + instance.subtask.0)
+        self.task_set.vertex(instance)
     }
 
     /// Returns the instance that a vertex does, or has to do next. If its job is

@@ -79,16 +79,15 @@ pub(super) struct Vertices {
 
 impl Vertices {
     pub(super) fn new(task_set: &TaskSet, preemption: Preemption) -> Self {
-        let count = task_set.dags().iter().map(|dag| dag.subtasks().len()).sum();
         let mut all = Self {
             vertices: Box::default(),
             successors: Box::default(),
             counters: Box::default(),
         };
-        let mut vertices = Vec::with_capacity(count);
+        let mut vertices = Vec::with_capacity(task_set.vertices());
         let (mut successors, mut counters) = (Vec::new(), Vec::new());
         for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
-            let first = to_u32(vertices.len());
+            let first = task_set.first_vertex(id);
             for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
                 let initial = to_u32(dag.predecessors(subtask).len().max(1));
                 let from = to_u32(successors.len());

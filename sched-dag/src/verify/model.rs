@@ -31,11 +31,8 @@ pub(super) fn build(
         return None;
     }
     let dags = specs.iter().zip(shapes).zip(bases);
-    Some(TaskSet {
-        dags: dags
-            .map(|((spec, shape), base)| build_dag(spec, shape, base))
-            .collect(),
-    })
+    let dags = dags.map(|((spec, shape), base)| build_dag(spec, shape, base));
+    Some(TaskSet::new(dags.collect()))
 }
 
 /// Returns for each DAG without priorities the number of its first one:
