@@ -74,7 +74,7 @@ impl Exceeded {
     fn find(run: &Run, dag: DagId) -> Option<Self> {
         let bound_ns = run.bound_ns(dag)?;
         let record = run.record();
-        let complete = |(job, times): (u64, &sched_dag::record::JobRecord)| {
+        let complete = |(job, times): (u64, &sched_dag::law::JobRecord)| {
             times.outcome?;
             Some((
                 record
@@ -83,11 +83,20 @@ impl Exceeded {
                 job,
             ))
         };
-        let responses = (0..).zip(record.jobs(dag)).filter_map(complete);
+        let responses = record.numbered(dag).filter_map(complete);
         let late = responses.filter(|(response_ns, _)| *response_ns > bound_ns);
-        let (jobs, (response_ns, job)) = late.fold((0, (0, 0)), |(jobs, longest), of_job| {
+        let (mut jobs, mut longest) = late.fold((0, (0, 0)), |(jobs, longest), of_job| {
             (jobs + 1, of_job.max(longest))
         });
+        // Of jobs that are not recorded any more, the longest one is known.
+        if record.first_job(dag) > 0
+            && let Some(times) = run.times()
+            && times.dag(dag).longest().0 > bound_ns
+        {
+            jobs = jobs.max(1);
+            longest = times.dag(dag).longest();
+        }
+        let (response_ns, job) = longest;
         (jobs > 0).then_some(Self {
             dag,
             jobs,

@@ -63,6 +63,7 @@ mod excerpt;
 mod execution;
 mod fault_verdict;
 mod graph;
+mod journal;
 pub mod json;
 mod lock;
 #[allow(unsafe_code, reason = "registers, ports, interrupts, page tables")]
@@ -79,7 +80,6 @@ mod run;
 mod settings;
 #[allow(unsafe_code, reason = "the way up to the first safe state")]
 mod start;
-mod trace;
 mod worker;
 
 pub use ending::Ending;

@@ -22,7 +22,7 @@ use crate::platform::KERNEL;
 use crate::report::Ns;
 use crate::run::Run;
 use crate::worker;
-use crate::{console, contexts, execution, json, machine, trace};
+use crate::{console, contexts, execution, journal, json, machine};
 
 /// The machine, lent to the app's function for the time of the run.
 ///
@@ -47,6 +47,8 @@ pub struct Machine {
     pub(crate) module: Option<&'static [u8]>,
     /// Whether each run's trace is printed after it.
     pub(crate) dumps_trace: bool,
+    /// Whether each run's statistics are printed after it.
+    pub(crate) dumps_times: bool,
     /// What people want to see, and say, during a run.
     pub(crate) wishes: Wishes,
     /// What bytes of input raise during a run: a plan and a DAG of it.
@@ -252,8 +254,11 @@ impl Machine {
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }
+        if self.dumps_times {
+            journal::times::dump(&run);
+        }
         if self.dumps_trace {
-            trace::dump(&run, self.runs.replace(self.runs.get() + 1));
+            journal::dump(&run, self.runs.replace(self.runs.get() + 1));
         }
         if shuts_down {
             return Err(shutdown(&run));

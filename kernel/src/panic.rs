@@ -16,7 +16,7 @@ use crate::machine::context::Registers;
 use crate::machine::fault::{self, Exception};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::{cpu, exit, this_core};
-use crate::{execution, json, trace};
+use crate::{execution, journal, json};
 
 /// The most recent events of this core that a report shows.
 const EVENTS_SHOWN: usize = 16;
@@ -85,7 +85,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         write_in_emergency(format_args!("{registers}"));
     }
     if core.is_some() {
-        write_in_emergency(format_args!("{}", trace::latest(EVENTS_SHOWN)));
+        write_in_emergency(format_args!("{}", journal::latest::<EVENTS_SHOWN>()));
     }
     let line = json::line(what, |line| {
         line.number("cpu", index);

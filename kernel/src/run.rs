@@ -1,9 +1,12 @@
 //! What a run leaves behind.
 
-use sched_dag::record::{Record, Violation};
+use core::cell::OnceCell;
+
+use sched_dag::law::{self, Precision, Record, Tally, Violation};
 use sched_dag::{DagId, DagStatistics, TaskSet};
 
 use crate::execution::{Execution, Snapshot};
+use crate::journal::Journal;
 
 /// A run that has ended: its model, its times and its counts.
 ///
@@ -14,7 +17,7 @@ use crate::execution::{Execution, Snapshot};
 ///
 /// fn report(run: &Run) {
 ///     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-///         let jobs = (0..).zip(run.record().jobs(dag));
+///         let jobs = run.record().numbered(dag);
 ///         let response_times = Distribution::new(jobs.filter_map(|(job, times)| {
 ///             Some(run.record().completion_ns(dag, job)? - times.release_ns?)
 ///         }));
@@ -29,6 +32,8 @@ use crate::execution::{Execution, Snapshot};
 /// ```
 pub struct Run {
     execution: Execution,
+    record: OnceCell<Record>,
+    times: OnceCell<Option<Tally>>,
     allocations: u64,
     lock_acquisitions: u32,
     epoch_ns: u64,
@@ -51,6 +56,8 @@ impl Run {
     ) -> Self {
         Self {
             execution,
+            record: OnceCell::new(),
+            times: OnceCell::new(),
             allocations,
             lock_acquisitions,
             epoch_ns,
@@ -66,12 +73,51 @@ impl Run {
     }
 
     /// Returns the times of all jobs and instances, in nanoseconds from the
-    /// instant from which releases count.
+    /// instant from which releases count; of the latest whole jobs if there was no
+    /// memory for all events.
+    ///
+    /// Computed from the journal when it is asked for first.
+    ///
+    /// # Panics
+    ///
+    /// If there is no memory for it.
     ///
     /// See [`Run`].
     #[must_use]
-    pub const fn record(&self) -> &Record {
-        self.execution.record()
+    pub fn record(&self) -> &Record {
+        self.record.get_or_init(|| {
+            let journal = self.journal();
+            let is_whole = journal.lost() == 0;
+            Record::of_events(
+                self.task_set(),
+                Precision::Measured,
+                is_whole,
+                journal.events(),
+            )
+            .expect("the times of a journal's events fit into memory")
+        })
+    }
+
+    /// Returns the statistics of all jobs and instances, those included whose events
+    /// made way for later ones; `None` if some were not recorded, because of
+    /// `trace_events=0` or the console's `trace off`.
+    ///
+    /// ```no_run
+    /// use sched_dag::DagId;
+    ///
+    /// /// The response time that one job in a thousand exceeds.
+    /// fn tail_ns(run: &kernel::Run, dag: DagId) -> Option<u64> {
+    ///     Some(run.times()?.dag(dag).response_time.per_mille(999))
+    /// }
+    /// ```
+    #[must_use]
+    pub fn times(&self) -> Option<&Tally> {
+        let tally = || self.journal().statistics(self.execution.task_set());
+        self.times.get_or_init(tally).as_ref()
+    }
+
+    pub(crate) const fn journal(&self) -> &Journal {
+        self.execution.journal()
     }
 
     /// Returns the instant from which releases count, in nanoseconds since the
@@ -114,7 +160,7 @@ impl Run {
     ///
     /// See [`Run`].
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
-        sched_dag::record::violations(self.task_set(), self.record())
+        law::violations(self.task_set(), self.record())
     }
 
     /// Returns how often anything, kernel or app, allocated memory between the

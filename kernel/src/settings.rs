@@ -7,7 +7,8 @@
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
 //! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
-//! | `trace_events=N` | how many events each core keeps, or up to the next power of two; 0: none | 4096 |
+//! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a third of the free memory |
+//! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
 //! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
@@ -28,13 +29,14 @@ use crate::platform::KERNEL;
 use crate::worker;
 
 /// The words, for messages.
-pub(crate) const WORDS: [&str; 13] = [
+pub(crate) const WORDS: [&str; 14] = [
     "policy",
     "preemption",
     "budget_factor",
     "overheads_ns",
     "trace",
     "trace_events",
+    "times",
     "graph",
     "measure",
     "idle",
@@ -49,17 +51,16 @@ const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf
 const PREEMPTIONS: [(&str, Preemption); 2] =
     [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
 
-/// 128 KiB a core.
-const TRACE_EVENTS: u64 = 4096;
-
 /// What the words say about tracing and the background; all else is set where it
 /// belongs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// How many events each core keeps.
-    pub(crate) events: usize,
+    /// The most events that a journal keeps.
+    pub(crate) events: u64,
     /// Whether each run's trace is printed after it.
     pub(crate) dump: bool,
+    /// Whether each run's statistics are printed after it.
+    pub(crate) dumps_times: bool,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
     /// Whether a response time beyond its bound is the app's fault.
@@ -88,7 +89,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     }
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;
-    let events = options.number("trace_events", 0..=1 << 24, TRACE_EVENTS)?;
+    let events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
     let status_s = options.number("status", 0..=86_400, 0)?;
     let consoles = [
         ("off", None),
@@ -96,8 +97,9 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
         ("echo", Some(Echo::On)),
     ];
     Ok(Settings {
-        events: usize::try_from(events).unwrap_or(0),
+        events,
         dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
+        dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,
         wishes: Wishes {
             input: None,
             console: options.choice("console", &consoles)?,

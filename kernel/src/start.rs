@@ -17,7 +17,7 @@ use crate::machine_handle::Machine;
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
 use crate::platform::KERNEL;
-use crate::{console, contexts, json, panic, println, probe, settings, trace, worker};
+use crate::{console, contexts, journal, json, panic, println, probe, settings, worker};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -209,11 +209,12 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
     let settings = settings::apply(&options)?;
-    trace::create(this_core::all().len(), settings.events)?;
+    journal::limit(settings.events);
     let machine = Machine {
         options,
         module: module_bytes(info),
         dumps_trace: settings.dump,
+        dumps_times: settings.dumps_times,
         wishes: settings.wishes,
         input: Cell::new(None),
         runs: Cell::new(0),

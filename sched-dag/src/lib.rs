@@ -63,7 +63,8 @@
 //! 4. [`Scheduler`]: the rules as a pure state machine. A driver tells it
 //!    what has happened and when, and carries its [`Decision`]s out: the
 //!    kernel with timers and interrupts, or [`virtual_time`] on the host.
-//! 5. [`record`]: what happened in a run, held against the rules.
+//! 5. [`journal`]: what happened in a run. [`law`]: its times and statistics, and the rules that it
+//!    is held against.
 //!
 //! # What each user may rely on
 //!
@@ -92,10 +93,11 @@ extern crate alloc;
 
 pub mod analysis;
 mod ids;
+pub mod journal;
+pub mod law;
 mod order;
 mod policy;
 mod priorities;
-pub mod record;
 mod scheduler;
 mod spec;
 mod task_set;

@@ -164,6 +164,14 @@ impl Dag {
         self.offset_ns
     }
 
+    /// Returns the nominal release O + kT of a periodic DAG's job `job`, at most the
+    /// last time there is.
+    #[must_use]
+    pub const fn grid_ns(&self, job: u64) -> u64 {
+        job.saturating_mul(self.period_ns)
+            .saturating_add(self.offset_ns)
+    }
+
     /// Returns the most jobs that may be in flight, never 0.
     #[must_use]
     pub const fn in_flight(&self) -> u32 {

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use sched_dag::analysis::{Overheads, Settings, answer};
-use sched_dag::record::{InstanceRecord, JobRecord, Precision, Record, Violation, violations};
+use sched_dag::law::{InstanceRecord, JobRecord, Precision, Record, Violation, violations};
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     Activation, CoreId, DagId, DagSpec, DagStatistics, Instance, JobOutcome, Observer,
@@ -124,7 +124,7 @@ fn run(
     let task_set = commit(specs, options);
     let last = DagId(u32::try_from(specs.len() - 1).expect("few DAGs"));
     let mut run = Run {
-        record: Record::with_jobs(&task_set, Precision::Exact, |_| 64).expect("it fits"),
+        record: Record::with_jobs(&task_set, Precision::Exact, |_| 0..64).expect("it fits"),
         task_set: Arc::clone(&task_set),
         now_ns: 0,
         signals: signals.iter().map(|&at_ns| (at_ns, last)).collect(),
@@ -261,7 +261,7 @@ fn signals_to_an_ended_dag_are_dropped() {
 #[test]
 fn the_check_finds_releases_that_are_too_close() {
     let task_set = commit(&[sporadic(dag(10, 10, 2, &[0], &[]))], PREEMPTIVE);
-    let mut record = Record::new(&task_set).expect("it fits");
+    let mut record = Record::with_jobs(&task_set, Precision::Measured, |_| 0..2).expect("it fits");
     for (job, release_ns) in [(0, 5), (1, 14)] {
         let record = record.job_mut(DagId(0), job).expect("recorded");
         record.release_ns = Some(release_ns);
@@ -316,7 +316,7 @@ fn bounds_hold_for_random_signals() {
             (at_ns, DagId(u32::try_from(sporadic_at).expect("small")))
         });
         let mut run = Run {
-            record: Record::with_jobs(&task_set, Precision::Exact, |_| 20).expect("it fits"),
+            record: Record::with_jobs(&task_set, Precision::Exact, |_| 0..20).expect("it fits"),
             task_set: Arc::clone(&task_set),
             now_ns: 0,
             signals: signals.collect(),

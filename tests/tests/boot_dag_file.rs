@@ -141,24 +141,14 @@ fn what_only_the_guest_finds_has_the_line_of_the_persons_file() {
     let text = "# a period of six days\nnodes:\n- id: 0\n  execution_time: 1\n  period: 584000\n";
     fs::write(&file, text).expect("a file in it");
     let path = file.to_str().expect("UTF-8");
-    for (words, reason) in [
-        (
-            "--unit 1s --append jobs=1000000",
-            format!("run: {path}:3: the deadline of the last job of dag"),
-        ),
-        (
-            "--unit 1ms --jobs 1000000 --memory 24",
-            format!("run: {path}: the platform did not take the plan: the record of all jobs"),
-        ),
-    ] {
-        let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
-        run.args(["run", "--mode", "deterministic", "--timeout", "100"]);
-        run.args(["--dag", path]).args(words.split(' '));
-        let output = run.output().expect("the tool can be started");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.starts_with(&reason), "{said}");
-    }
+    let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
+    run.args(["run", "--mode", "deterministic", "--timeout", "100"]);
+    run.args(["--dag", path, "--unit", "1s", "--append", "jobs=1000000"]);
+    let output = run.output().expect("the tool can be started");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    let reason = format!("run: {path}:3: the deadline of the last job of dag");
+    assert!(said.starts_with(&reason), "{said}");
     let _ = fs::remove_file(&file);
 }
 

@@ -261,7 +261,7 @@ fn a_storm_of_interrupts_in_real_time_leaves_every_checksum_alone() {
 fn preemption(mode: Mode, cores: u64, policy: &str, least_preemptions: u64) -> Outcome {
     let guest = guest("preemption").mode(mode).cores(cores).memory_mib(64);
     let guest = guest.word(&format!("policy={policy}")).word("ms=500");
-    let guest = guest.word("trace=dump").word("trace_events=16384");
+    let guest = guest.word("trace=dump");
     let outcome = guest.succeed();
     let line = outcome.transcript.of_kind("preemption").next();
     let line = line.unwrap_or_else(|| panic!("no preemption line\n{}", outcome.tail()));

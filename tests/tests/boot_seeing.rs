@@ -4,7 +4,7 @@
 use std::process::Command;
 
 use harness::json::Value;
-use harness::protocol::{MachineLine, Status};
+use harness::protocol::MachineLine;
 use harness::{Guest, Outcome};
 
 /// Waits until virtual time has gone on by asking again and again.
@@ -247,14 +247,37 @@ fn a_fast_dag_without_end_hides_no_progress_and_makes_none() {
 }
 
 #[test]
-fn a_trace_that_memory_does_not_hold_is_refused() {
-    let guest = Guest::new("fork-join").cores(4).word("trace_events=300000");
-    let outcome = guest.end_in(Status::Usage);
-    let verdict = outcome.transcript.verdict().expect("checked before");
-    let says = verdict
-        .reason
-        .starts_with("`trace_events=300000` takes 65536 KiB on 4 cores, and ");
-    assert!(says, "{}", verdict.reason);
+fn a_run_longer_than_its_journal_keeps_its_latest_jobs_and_all_statistics() {
+    let guest = Guest::new("fork-join").cores(4).word("subtasks=2");
+    let guest = guest.word("jobs=300").word("trace_events=1000");
+    let outcome = guest.word("trace=dump").word("times=dump").succeed();
+    let line = outcome.transcript.of_kind("times_dag").next();
+    let line = line.expect("statistics are asked for");
+    let first = line
+        .number_at("first_recorded_job")
+        .expect("checked before");
+    assert!((1..300).contains(&first), "{first}");
+    for of_dag in ["response_time_ns", "release_jitter_ns"] {
+        assert_eq!(count(line, of_dag), Some(300));
+    }
+    let subtasks: Vec<_> = outcome.transcript.of_kind("times_subtask").collect();
+    assert_eq!(subtasks.len(), 4);
+    for (number, line) in subtasks.into_iter().enumerate() {
+        assert_eq!(count(line, "execution_time_ns"), Some(300));
+        let joins = if number == 0 { 0 } else { 300 };
+        assert_eq!(count(line, "join_latency_ns"), Some(joins));
+    }
+    let runs = harness::trace::read(&outcome.serial).expect("a trace");
+    let events = runs[0].events.len();
+    assert_eq!(events, 1000);
+    assert!(runs[0].lost > 1000, "{}", runs[0].lost);
+    let findings = harness::trace::check(&runs[0], 1_000_000);
+    let texts: Vec<String> = findings.breaches.iter().map(ToString::to_string).collect();
+    assert_eq!(texts, [""; 0], "{}", outcome.tail());
+}
+
+fn count(line: &MachineLine, times: &str) -> Option<u64> {
+    line.value.get(times)?.get("count")?.as_u64()
 }
 
 #[test]

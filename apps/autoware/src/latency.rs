@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::record::Record;
+use sched_dag::law::Record;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 const LIDAR: DagId = DagId(0);
@@ -36,7 +36,7 @@ impl Latencies {
         };
         let release_ns = |job| record.job(LIDAR, job)?.release_ns;
         let mut latencies = Self::default();
-        for job in (0u64..).take(record.jobs(LIDAR).len()) {
+        for (job, _) in record.numbered(LIDAR) {
             let finish_ns = finish_ns(LIDAR, job, "ObjectCollisionEstimator");
             let (Some(release_ns), Some(finish_ns)) = (release_ns(job), finish_ns) else {
                 continue;

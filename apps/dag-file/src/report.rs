@@ -8,7 +8,7 @@ use dag_file::Set;
 use fass::{Answer, Verdict};
 use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
-use sched_dag::record::Violation;
+use sched_dag::law::Violation;
 use sched_dag::{DagId, DagStatistics};
 
 /// The figures of one set.
@@ -151,7 +151,12 @@ fn percent(permille: u64) -> String {
 
 /// Returns the response times of all jobs that were completed.
 fn responses(dag: DagId, run: &Run) -> Distribution {
-    let jobs = (0..).zip(run.record().jobs(dag));
+    if run.record().first_job(dag) > 0
+        && let Some(times) = run.times()
+    {
+        return Distribution::counted(times.dag(dag).response_time.clone());
+    }
+    let jobs = run.record().numbered(dag);
     Distribution::new(jobs.filter_map(|(job, times)| {
         let completion_ns = run.record().completion_ns(dag, job)?;
         Some(completion_ns.saturating_sub(times.release_ns?))

@@ -115,10 +115,7 @@ fn commit_crime(machine: &Machine, name: &str, crime: Crime) -> Result<Verdict, 
 /// Reports whether a job of the healthy DAG met its deadline.
 fn is_on_time(run: &Run, job: u64) -> bool {
     let deadline_ns = run.task_set().dag(HEALTHY).relative_deadline_ns();
-    let release = run
-        .record()
-        .jobs(HEALTHY)
-        .get(usize::try_from(job).unwrap_or(usize::MAX));
+    let release = run.record().job(HEALTHY, job);
     release
         .and_then(|release| Some(run.record().completion_ns(HEALTHY, job)? - release.release_ns?))
         .is_some_and(|response_ns| response_ns <= deadline_ns)

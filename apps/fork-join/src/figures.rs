@@ -32,9 +32,9 @@ pub(crate) struct Figures {
 impl Figures {
     pub(crate) fn new(parallel: usize, run: &Run, joins: &Joins) -> Self {
         let record = run.record();
-        let jobs = record.jobs(FORK_JOIN);
+        let jobs = record.numbered(FORK_JOIN);
         let sink = SubtaskId(u32::try_from(parallel + 1).unwrap_or(u32::MAX));
-        let sinks = (0u64..).zip(jobs).filter_map(|(job, _)| {
+        let sinks = jobs.clone().filter_map(|(job, _)| {
             let instance = Instance {
                 dag: FORK_JOIN,
                 job,
@@ -46,7 +46,7 @@ impl Figures {
             ))
         });
         let since = |later: Option<u64>, earlier: u64| Some(later?.saturating_sub(earlier));
-        let releases = (0u64..).zip(jobs);
+        let releases = jobs;
         let statistics = run.statistics(FORK_JOIN);
         let found = run
             .violations()

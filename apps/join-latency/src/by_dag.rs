@@ -3,7 +3,7 @@
 use fork_join::Workload;
 use join_latency::{Joined, Samples, Span};
 use kernel::{Ending, Machine, Run};
-use sched_dag::record::InstanceRecord;
+use sched_dag::law::InstanceRecord;
 use sched_dag::{DagId, Instance, SubtaskId};
 
 use crate::output::Outcome;
@@ -32,7 +32,7 @@ pub(crate) fn run(machine: &Machine, workload: &Workload) -> Result<Outcome, End
 /// Reads the times from the scheduler's record. Each join has the values of its own
 /// job, which `fork-join` checks and counts otherwise.
 fn samples(run: &Run, parallel: usize) -> Samples {
-    let jobs = (0u64..).zip(run.record().jobs(DAG)).map(|(job, _)| job);
+    let jobs = run.record().numbered(DAG).map(|(job, _)| job);
     let instances = |subtask: usize| {
         jobs.clone().filter_map(move |job| {
             let subtask = SubtaskId(u32::try_from(subtask).ok()?);

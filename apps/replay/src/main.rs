@@ -107,7 +107,7 @@ fn print(case: &Case, run: &Run) {
     print_rows("replay_instances", instances);
     let jobs = (0..case.dags.len()).flat_map(|number| {
         let dag = DagId(u32::try_from(number).unwrap_or(u32::MAX));
-        (0..).zip(record.jobs(dag)).map(move |(job, times)| {
+        record.numbered(dag).map(move |(job, times)| {
             format!(
                 "[{number},{job},{},{},{}]",
                 times.release_ns.unwrap_or(absent),

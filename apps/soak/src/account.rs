@@ -10,7 +10,7 @@ use alloc::{format, vec::Vec};
 use core::fmt;
 
 use fass::OverrunPolicy;
-use sched_dag::record::Record;
+use sched_dag::law::Record;
 use sched_dag::{DagId, DagStatistics, JobOutcome, TaskSet};
 
 use crate::dags::Executed;

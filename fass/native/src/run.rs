@@ -5,14 +5,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 
-use sched_dag::record::Violation;
+use sched_dag::journal::Recorder;
+use sched_dag::law::Violation;
 use sched_dag::{
     CoreId, DagId, DagStatistics, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet,
 };
 
 use crate::execute::Execute;
 use crate::pin::{Pinning, pin, processors};
-use crate::recorder::Recorder;
+use crate::recorder::judge;
 use crate::relax::poll;
 use crate::reports::Reports;
 use crate::watch::Watch;
@@ -130,9 +131,9 @@ pub(crate) fn run_bodies_recorded<B: Execute>(
         );
     }
     let task_set = Arc::new(task_set);
-    let recorder = Recorder::new(&task_set);
+    let recorder = Recorder::new(Arc::clone(&task_set));
     let (report, recorder) = run_watched(&task_set, bodies, setting, recorder);
-    recorder.finish(report, &task_set, options(setting))
+    judge(&recorder, report, &task_set, options(setting))
 }
 
 const fn options(setting: Setting) -> SchedulerOptions {

@@ -32,28 +32,25 @@
 #![forbid(unsafe_code)]
 
 mod error;
-mod event;
 mod platform;
 mod record;
-mod recorder;
 mod report;
-mod rules;
 mod session;
 
 use std::rc::Rc;
 use std::time::Duration;
 
 use fass::{Overheads, Policy, Preemption, Signal};
-pub use sched_dag::record::{Rule, Violation};
+pub use sched_dag::law::{Rule, Violation};
 pub use sched_dag::{
     CoreId, DagId, DagLabel, DagStatistics, Instance, JobOutcome, SubtaskId, SubtaskLabel,
 };
 
 pub use error::RunError;
-pub use event::{Event, EventKind};
 use platform::Machine;
 pub use record::{InstanceRecord, JobRecord, PanicRecord};
 pub use report::Report;
+pub use sched_dag::journal::{Event, What};
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///

@@ -1,14 +1,14 @@
 //! What a run leaves behind.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use sched_dag::record::{Record, Violation};
+use sched_dag::journal::{Event, What};
+use sched_dag::law::{self, Precision, Record, Violation};
 use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
 
-use crate::event::{Event, EventKind};
 use crate::record::{InstanceRecord, JobRecord, PanicRecord};
-use crate::rules;
 
 /// Everything that happened from the commit to the end of a run.
 ///
@@ -99,7 +99,9 @@ impl Report {
     /// See [`Report`].
     #[must_use]
     pub fn record(&self) -> Record {
-        rules::record(self).expect("the report's jobs fit into memory")
+        let events = self.events.iter().copied();
+        let record = Record::of_events(&self.task_set, Precision::Exact, true, events);
+        record.expect("the report's jobs fit into memory")
     }
 
     /// Checks rules R1 to R5 of the task model over what was recorded, and
@@ -115,12 +117,18 @@ impl Report {
     /// See [`Report`].
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
-        rules::check(self)
+        let record = self.record();
+        let stretches = law::stretches(self.events.iter().copied());
+        let of_dispatch =
+            law::dispatch_violations(&self.task_set, &self.options, &record, &stretches);
+        law::violations(&self.task_set, &record)
+            .chain(of_dispatch)
+            .collect()
     }
 
-    /// Returns the events as lines such as `5000000 start sink[0] core 1`:
-    /// time, verb, name with the job in brackets, and what else there is. The end
-    /// of a DAG and a signal have no job.
+    /// Returns the events as lines such as `5000000 start sink[0] core 1`: time, what
+    /// has happened, name with the job in brackets, and what else there is. That a DAG
+    /// is stopped has no job.
     ///
     /// For tests that compare whole sequences in words.
     ///
@@ -131,40 +139,68 @@ impl Report {
     }
 
     fn line(&self, event: &Event) -> String {
-        let mut line = format!("{} {} ", event.time_ns, event.kind.verb());
-        let (name, job, more) = match event.kind {
-            EventKind::DagEnded { dag } => return line + &self.dag_name(dag),
-            EventKind::Signalled { dag, release_ns } => {
-                let what = match release_ns {
-                    Some(release_ns) => format!(" release {release_ns}"),
-                    None => " dropped".to_owned(),
-                };
-                return line + &self.dag_name(dag) + &what;
+        let Event {
+            time_ns, what, job, ..
+        } = event;
+        let dag = self.dag_name(event.dag);
+        let name = match event.instance() {
+            Some(instance) => self.subtask_name(instance),
+            None if *what == What::Stopped => return format!("{time_ns} {what} {dag}"),
+            None => dag,
+        };
+        let mut line = format!("{time_ns} {what} {name}[{job}]");
+        let more = match what {
+            _ if what.is_of_machine() => write!(line, " core {}", event.core.0),
+            What::Completed => {
+                let mut jobs = self.jobs.iter();
+                let of_job = jobs.find(|of_job| (of_job.dag, of_job.job) == (event.dag, *job));
+                let outcome = of_job.and_then(|of_job| of_job.outcome);
+                let outcome = outcome.map_or(String::new(), |outcome| format!(" {outcome:?}"));
+                write!(line, "{}", outcome.to_lowercase())
             }
-            EventKind::Released { dag, job }
-            | EventKind::Queued { dag, job }
-            | EventKind::Skipped { dag, job }
-            | EventKind::Aborted { dag, job }
-            | EventKind::DeadlineMissed { dag, job } => (self.dag_name(dag), job, String::new()),
-            EventKind::JobCompleted { dag, job, outcome } => {
-                let outcome = format!(" {outcome:?}").to_lowercase();
-                (self.dag_name(dag), job, outcome)
-            }
-            EventKind::Ready { instance } | EventKind::Cancelled { instance } => {
-                (self.subtask_name(instance), instance.job, String::new())
-            }
-            EventKind::Started { instance, core }
-            | EventKind::Preempted { instance, core }
-            | EventKind::Resumed { instance, core }
-            | EventKind::Finished { instance, core }
-            | EventKind::Failed { instance, core } => {
-                let core = format!(" core {}", core.0);
-                (self.subtask_name(instance), instance.job, core)
-            }
+            _ => Ok(()),
         };
         // Writing to a string cannot fail.
-        let _ = write!(line, "{name}[{job}]{more}");
+        let _ = more;
         line
+    }
+
+    /// Fills in what the events say about instances and jobs.
+    pub(crate) fn look_at_events(&mut self, executed_ns: &BTreeMap<Instance, u64>) {
+        let record = self.record();
+        for event in &self.events {
+            if event.what == What::Released
+                && let Some(of_job) = record.job(event.dag, event.job)
+            {
+                let release_ns = of_job.release_ns.unwrap_or(event.time_ns);
+                let relative_deadline_ns = self.task_set.dag(event.dag).relative_deadline_ns();
+                self.jobs.push(JobRecord {
+                    dag: event.dag,
+                    job: event.job,
+                    release_ns,
+                    released_at_ns: event.time_ns,
+                    deadline_ns: release_ns.saturating_add(relative_deadline_ns),
+                    finish_ns: of_job.ended_ns,
+                    outcome: of_job.outcome,
+                    has_missed: of_job.missed_ns.is_some(),
+                });
+            }
+            if event.what == What::Ready
+                && let Some(instance) = event.instance()
+                && let Some(times) = record.instance(instance)
+            {
+                self.instances.push(InstanceRecord {
+                    instance,
+                    ready_ns: event.time_ns,
+                    start_ns: times.start_ns,
+                    finish_ns: times.finish_ns,
+                    failed_ns: times.failed_ns,
+                    execution_ns: executed_ns.get(&instance).copied().unwrap_or(0),
+                    core: times.core,
+                    preemptions: times.preemptions,
+                });
+            }
+        }
     }
 
     /// Returns a DAG's name, or `dag 0`.

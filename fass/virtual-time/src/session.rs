@@ -1,14 +1,16 @@
-//! A plan while it runs: the scheduler's driver, the bodies and the recorder.
+//! A plan while it runs: the scheduler's driver, the bodies and the journal.
 //!
 //! The driver is `sched_dag::virtual_time`, the one loop in virtual time; it
 //! asks for the execution time of each instance at its start. [`Runner`] answers
 //! by running the instance's real body and adding up what it executed.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Body, Plan};
+use sched_dag::journal::{Recorder, What};
 use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
 use sched_dag::{
     CoreId, DagId, DagLabel, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions,
@@ -16,10 +18,8 @@ use sched_dag::{
 };
 
 use crate::error::RunError;
-use crate::event::EventKind;
 use crate::platform::Machine;
 use crate::record::PanicRecord;
-use crate::recorder::Recorder;
 use crate::report::Report;
 
 /// A plan that runs, or can go on running.
@@ -28,7 +28,7 @@ pub(crate) struct Session {
     task_set: Arc<TaskSet>,
     driver: Driver,
     bodies: Vec<Vec<Body>>,
-    recorder: Recorder,
+    recording: Recording,
 }
 
 impl Session {
@@ -41,7 +41,12 @@ impl Session {
         };
         Self {
             driver: Driver::new(Scheduler::new(Arc::clone(&task_set), options)),
-            recorder: Recorder::new(Arc::clone(&task_set)),
+            recording: Recording {
+                journal: Recorder::new(Arc::clone(&task_set)),
+                executed_ns: BTreeMap::new(),
+                panics: Vec::new(),
+                run_until_ns: 0,
+            },
             bodies: plan.bodies,
             task_set,
         }
@@ -56,7 +61,7 @@ impl Session {
         let until_ns = match duration {
             Some(duration) => {
                 let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
-                self.recorder.run_until_ns.saturating_add(ns)
+                self.recording.run_until_ns.saturating_add(ns)
             }
             None => {
                 self.require_end()?;
@@ -66,16 +71,15 @@ impl Session {
         let mut runner = Runner {
             machine,
             bodies: &mut self.bodies,
-            recorder: &mut self.recorder,
+            recording: &mut self.recording,
             panic: None,
-            now_ns: 0,
         };
         let end = self.driver.run_until(until_ns, &mut runner);
         let panic = runner.panic;
-        self.recorder.run_until_ns = until_ns;
+        self.recording.run_until_ns = until_ns;
         machine.now_ns.set(match end {
             End::TimeReached => until_ns,
-            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recorder.now_ns,
+            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recording.journal.now_ns,
         });
         if let Some(PanicRecord { instance, message }) = panic {
             return Err(RunError::Panicked {
@@ -125,39 +129,49 @@ impl Session {
     fn report(&self) -> Report {
         let scheduler = self.driver.scheduler();
         let dags = (0..).map(DagId).zip(self.task_set.dags());
-        Report {
-            instances: self.recorder.instances.clone(),
-            jobs: self.recorder.jobs.clone(),
-            panics: self.recorder.panics.clone(),
-            events: self.recorder.events.clone(),
-            statistics: dags.map(|(dag, _)| *scheduler.statistics(dag)).collect(),
-            end_ns: self.recorder.now_ns,
+        let statistics = dags.map(|(dag, _)| *scheduler.statistics(dag)).collect();
+        let Recording {
+            journal, panics, ..
+        } = &self.recording;
+        let mut report = Report {
+            instances: Vec::new(),
+            jobs: Vec::new(),
+            panics: panics.clone(),
+            events: journal.events.clone(),
+            statistics,
+            end_ns: journal.now_ns,
             task_set: Arc::clone(&self.task_set),
             options: scheduler.options(),
-        }
+        };
+        report.look_at_events(&self.recording.executed_ns);
+        report
     }
+}
+
+/// What is written down of a run.
+#[derive(Debug)]
+struct Recording {
+    journal: Recorder,
+    /// How long each instance executes in all.
+    executed_ns: BTreeMap<Instance, u64>,
+    /// The contained panics.
+    panics: Vec<PanicRecord>,
+    run_until_ns: u64,
 }
 
 /// The workload of the driver: runs bodies, and passes all else to the recorder.
 struct Runner<'s> {
     machine: &'s Machine,
     bodies: &'s mut [Vec<Body>],
-    recorder: &'s mut Recorder,
+    recording: &'s mut Recording,
     /// The panic that fails the run and stops it. In what is left of its instant
     /// nothing runs, and nothing is recorded.
     panic: Option<PanicRecord>,
-    /// The present instant.
-    now_ns: u64,
 }
 
 impl Runner<'_> {
     fn body(&mut self, instance: Instance) -> &mut Body {
         &mut self.bodies[instance.dag.index()][instance.subtask.index()]
-    }
-
-    /// Returns the recorder, unless the run has failed.
-    fn recorder(&mut self) -> Option<&mut Recorder> {
-        self.panic.is_none().then_some(&mut *self.recorder)
     }
 }
 
@@ -182,44 +196,32 @@ impl Workload for Runner<'_> {
             let panic = PanicRecord { instance, message };
             if !machine.contains_panics.get() {
                 self.panic = Some(panic);
+                self.recording.journal.close();
                 return 0;
             }
-            self.recorder.panics.push(panic);
+            self.recording.panics.push(panic);
         }
-        self.recorder
-            .of(instance, |record| record.execution_ns = executed_ns);
+        self.recording.executed_ns.insert(instance, executed_ns);
         executed_ns
     }
 
     fn fails(&mut self, instance: Instance) -> bool {
-        let mut panics = self.recorder.panics.iter();
+        let mut panics = self.recording.panics.iter();
         panics.any(|panic| panic.instance == instance)
     }
 
-    fn started(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(now_ns, EventKind::Started { instance, core });
-        recorder.of(instance, |record| {
-            record.start_ns = Some(now_ns);
-            record.core = Some(core);
-        });
+    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.recording.journal.on_core(What::Start, instance, core);
     }
 
-    fn preempted(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(now_ns, EventKind::Preempted { instance, core });
-        recorder.of(instance, |record| record.preemptions += 1);
+    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.recording
+            .journal
+            .on_core(What::Suspend, instance, core);
     }
 
-    fn resumed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(now_ns, EventKind::Resumed { instance, core });
+    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.recording.journal.on_core(What::Resume, instance, core);
     }
 
     fn stops(&self) -> bool {
@@ -227,7 +229,9 @@ impl Workload for Runner<'_> {
     }
 
     fn instant(&mut self, now_ns: u64) {
-        self.now_ns = now_ns;
+        if self.panic.is_none() {
+            self.recording.journal.now_ns = now_ns;
+        }
     }
 
     fn next_signal_ns(&self) -> Option<u64> {
@@ -244,88 +248,58 @@ impl Workload for Runner<'_> {
             let raise = &mut |dag| machine.signal_at(now_ns, dag);
             self.body(instance).complete(now_ns, raise);
         }
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(now_ns, EventKind::Finished { instance, core });
-        recorder.of(instance, |record| record.finish_ns = Some(now_ns));
+        self.recording.journal.on_core(What::Finish, instance, core);
     }
 
-    fn failed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(now_ns, EventKind::Failed { instance, core });
-        recorder.of(instance, |record| record.failed_ns = Some(now_ns));
+    fn failed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.recording.journal.on_core(What::Ended, instance, core);
     }
 }
 
 impl Observer for Runner<'_> {
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        if let Some(recorder) = self.recorder() {
-            recorder.released(dag, job, release_ns);
-        }
+        self.recording.journal.released(dag, job, release_ns);
     }
 
     fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(release_ns, EventKind::Queued { dag, job });
+        self.recording.journal.queued(dag, job, release_ns);
     }
 
     fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.at(release_ns, EventKind::Skipped { dag, job });
+        self.recording.journal.skipped(dag, job, release_ns);
     }
 
-    fn signalled(&mut self, dag: DagId, _job: u64, release_ns: Option<u64>) {
-        let now_ns = self.now_ns;
-        if let Some(recorder) = self.recorder() {
-            recorder.at(now_ns, EventKind::Signalled { dag, release_ns });
-        }
+    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
+        self.recording.journal.signalled(dag, job, release_ns);
     }
 
     fn ready(&mut self, instance: Instance) {
-        if let Some(recorder) = self.recorder() {
-            recorder.ready(instance);
-        }
+        self.recording.journal.ready(instance);
     }
 
     fn cancelled(&mut self, instance: Instance) {
-        if self.panic.is_some() {
-            return;
+        self.recording.journal.cancelled(instance);
+        if self.panic.is_none() {
+            // Functions run at the start of their instances, so whatever the
+            // predecessors will ever send has been sent.
+            self.body(instance).discard(instance.job);
         }
-        self.recorder.now(EventKind::Cancelled { instance });
-        // Functions run at the start of their instances, so whatever the
-        // predecessors will ever send has been sent.
-        self.body(instance).discard(instance.job);
     }
 
     fn ended(&mut self, dag: DagId) {
-        if let Some(recorder) = self.recorder() {
-            recorder.now(EventKind::DagEnded { dag });
-        }
+        self.recording.journal.ended(dag);
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {
-        let Some(recorder) = self.recorder() else {
-            return;
-        };
-        recorder.now(EventKind::Aborted { dag, job });
+        self.recording.journal.aborted(dag, job);
     }
 
     fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        if let Some(recorder) = self.recorder() {
-            recorder.deadline_missed(dag, job, deadline_ns);
-        }
+        let journal = &mut self.recording.journal;
+        journal.deadline_missed(dag, job, deadline_ns);
     }
 
     fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        if let Some(recorder) = self.recorder() {
-            recorder.job_completed(dag, job, outcome);
-        }
+        self.recording.journal.job_completed(dag, job, outcome);
     }
 }

@@ -50,20 +50,20 @@ fn a_contained_panic_ends_its_dag_at_the_time_of_the_panic() {
     let lines = report.event_lines();
     let job_2 = lines
         .iter()
-        .position(|line| line == "20000000 release faulty[2]");
+        .position(|line| line == "20000000 released faulty[2]");
     assert_eq!(
         lines[job_2.expect("job 2 is released")..],
         [
-            "20000000 release faulty[2]",
+            "20000000 released faulty[2]",
             "20000000 ready source[2]",
             "20000000 start source[2] core 0",
             "20000000 finish source[2] core 0",
             "20000000 ready middle[2]",
             "20000000 start middle[2] core 0",
-            "22000000 fail middle[2] core 0",
-            "22000000 end faulty",
-            "22000000 cancel sink[2]",
-            "22000000 complete faulty[2] dagended",
+            "22000000 ended middle[2] core 0",
+            "22000000 stopped faulty",
+            "22000000 cancelled sink[2]",
+            "22000000 completed faulty[2] dagended",
         ]
     );
     assert_eq!(report.panics.len(), 1);

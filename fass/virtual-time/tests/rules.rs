@@ -4,7 +4,7 @@ mod support;
 
 use fass::{Policy, Preemption, SubtaskAttributes, create_dag};
 use support::{commit, diamond, ms, named, pair};
-use virtual_time::{EventKind, JobOutcome, Report, Rule, VirtualTime};
+use virtual_time::{Event, JobOutcome, Report, Rule, SubtaskId, VirtualTime, What};
 
 const MS: u64 = 1_000_000;
 
@@ -60,7 +60,7 @@ fn r3_successors_of_one_instance_become_ready_at_one_instant() {
     assert_eq!(
         lines,
         [
-            "0 release diamond[0]",
+            "0 released diamond[0]",
             "0 ready source[0]",
             "0 start source[0] core 0",
             "7000000 finish source[0] core 0",
@@ -73,7 +73,7 @@ fn r3_successors_of_one_instance_become_ready_at_one_instant() {
             "17000000 ready join[0]",
             "17000000 start join[0] core 0",
             "19000000 finish join[0] core 0",
-            "19000000 complete diamond[0] met",
+            "19000000 completed diamond[0] met",
         ]
     );
 }
@@ -216,35 +216,50 @@ fn broken_by(forge: impl FnOnce(&mut Report)) -> Vec<Rule> {
         .collect()
 }
 
+/// Changes the times of a subtask's events of job 0.
+fn shift(report: &mut Report, what: What, subtask: u32, change: impl Fn(u64) -> u64) {
+    for event in &mut report.events {
+        let is_it = event.what == what && event.subtask.is_some_and(|it| it.0 == subtask);
+        if is_it && event.job == 0 {
+            event.time_ns = change(event.time_ns);
+        }
+    }
+}
+
 #[test]
-fn the_check_finds_forged_records() {
-    // Instances are in the order of readiness: source, left, right, join.
-    let late_release = |report: &mut Report| report.jobs[1].release_ns += 1;
-    assert!(broken_by(late_release).contains(&Rule::Release));
-    let late_join = |report: &mut Report| {
-        report.instances[3].ready_ns += 1;
-        report.instances[3].start_ns = Some(22 * MS);
-    };
-    // A core runs the join before it is ready by its record.
-    assert_eq!(broken_by(late_join), [Rule::AndJoin]);
-    let early_join = |report: &mut Report| report.instances[3].ready_ns -= 1;
-    // Then it waits although a core is idle.
-    assert_eq!(broken_by(early_join), [Rule::AndJoin, Rule::Dispatch]);
-    let early_start = |report: &mut Report| report.instances[3].start_ns = Some(20 * MS);
-    let rules = broken_by(early_start);
-    assert_eq!(rules, [Rule::AndJoin, Rule::CompletionBoundary]);
-    let lost_finish = |report: &mut Report| report.instances[3].finish_ns = None;
-    assert!(broken_by(lost_finish).contains(&Rule::JobCompletion));
-    let false_miss = |report: &mut Report| report.jobs[0].outcome = Some(JobOutcome::Missed);
-    assert_eq!(broken_by(false_miss), [Rule::JobCompletion]);
-    let idle = |report: &mut Report| {
+fn the_check_finds_forged_journals() {
+    // Subtasks: source 0, left 1, right 2, join 3.
+    let late_release = |report: &mut Report| {
         for event in &mut report.events {
-            let is_right = matches!(event.kind, EventKind::Started { instance, .. } if instance.subtask.0 == 2);
-            if is_right {
-                event.time_ns += 1;
-            }
+            event.time_ns += u64::from(event.what == What::Released);
         }
     };
-    // In both jobs.
-    assert_eq!(broken_by(idle), [Rule::Dispatch, Rule::Dispatch]);
+    assert!(broken_by(late_release).contains(&Rule::Release));
+    let late_join = |report: &mut Report| shift(report, What::Ready, 3, |ns| ns + 1);
+    assert_eq!(broken_by(late_join), [Rule::AndJoin, Rule::AndJoin]);
+    let early_join = |report: &mut Report| shift(report, What::Ready, 3, |ns| ns - 1);
+    // Then it waits although a core is idle.
+    assert_eq!(broken_by(early_join), [Rule::AndJoin, Rule::Dispatch]);
+    let early_start = |report: &mut Report| shift(report, What::Start, 3, |_| 20 * MS);
+    let rules = broken_by(early_start);
+    assert_eq!(rules[..2], [Rule::AndJoin, Rule::CompletionBoundary]);
+    let lost_finish = |report: &mut Report| {
+        let is_it =
+            |event: &Event| event.what == What::Finish && event.subtask == Some(SubtaskId(3));
+        report.events.retain(|event| !is_it(event));
+    };
+    assert!(broken_by(lost_finish).contains(&Rule::JobCompletion));
+    let false_miss = |report: &mut Report| {
+        let mut events = report.events.iter();
+        let completed = events.position(|event| event.what == What::Completed);
+        let completed = completed.expect("job 0 is completed");
+        let missed = Event {
+            what: What::Missed,
+            ..report.events[completed]
+        };
+        report.events.insert(completed, missed);
+    };
+    assert_eq!(broken_by(false_miss), [Rule::JobCompletion]);
+    let idle = |report: &mut Report| shift(report, What::Start, 2, |ns| ns + 1);
+    assert_eq!(broken_by(idle), [Rule::Dispatch]);
 }

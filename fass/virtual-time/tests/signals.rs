@@ -32,7 +32,7 @@ fn a_signal_takes_effect_at_the_completion_that_raises_it() {
     assert_eq!(releases, [3, 18, 33]);
     assert_eq!(report.statistics[0].dropped_signals, 1);
     let lines = report.event_lines();
-    assert!(lines.contains(&"13000000 signal answers release 18000000".to_owned()));
+    assert!(lines.contains(&"13000000 signalled answers[1]".to_owned()));
 }
 
 #[test]

@@ -1,17 +1,20 @@
 //! Status lines: how a run does, now and then.
 //!
-//! The load of each core is computed from the trace, so that counting it costs
-//! nothing between two lines. Where the trace holds less than that time, the load
+//! The load of each core is computed from the journal, so that counting it costs
+//! nothing between two lines. Where the journal holds less than that time, the load
 //! is of what it holds; where events are not recorded there is none.
 
 use sched_dag::DagId;
 
 use super::patience::Patience;
 use crate::machine::clock;
-use crate::{execution, json, trace};
+use crate::{execution, journal, json};
 
-/// So many of each core's events are read where time is short.
+/// So many events are read where time is short.
 const FEW_EVENTS: u64 = 128;
+
+/// So many are read else.
+const MOST_EVENTS: u64 = 1 << 16;
 
 /// When and what to print.
 #[derive(Debug)]
@@ -47,9 +50,9 @@ impl Status {
             .map_while(|dag| execution::snapshot(DagId(dag)))
             .map(|dag| dag.statistics.misses)
             .sum::<u64>();
-        // In an interrupt's handler there is no time to read whole rings.
-        let most = if is_starved { FEW_EVENTS } else { u64::MAX };
-        let loads = || trace::loads_permille(from_ns, to_ns, most);
+        // In an interrupt's handler there is no time to read many events.
+        let most = if is_starved { FEW_EVENTS } else { MOST_EVENTS };
+        let loads = || journal::loads_permille(from_ns, to_ns, most);
         json::emit("status", |line| {
             line.number("time_ns", to_ns)
                 .number("done", execution::jobs_ended())

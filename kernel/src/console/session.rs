@@ -17,7 +17,7 @@ use super::input::{Input, Typed};
 use crate::execution::{self, Control, Snapshot, State};
 use crate::machine::serial;
 use crate::options::whole_number;
-use crate::{json, println, trace};
+use crate::{json, println};
 
 /// How often core 0 looks for bytes, at least.
 pub(crate) const PERIOD_NS: u64 = 20_000_000;
@@ -138,12 +138,14 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
         }
         Command::Dags => return list(line, task_set, None, describe),
         Command::Stats(name) => return list(line, task_set, name, count),
-        Command::Trace(true) if !trace::has_room() => {
-            let why = "there is no room for events; boot with `trace_events=4096`";
+        Command::Trace(true)
+            if !execution::with_journal(|journal| journal.has_room()).unwrap_or(false) =>
+        {
+            let why = "there is no room for events; boot without `trace_events=0`";
             refuse(line, &why);
         }
         Command::Trace(on) => {
-            trace::record_events(on);
+            execution::with_journal(|journal| journal.record_events(on));
             let what = if on { "events" } else { "no events" };
             println!("{what} are recorded");
             accept(line);

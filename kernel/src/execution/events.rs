@@ -10,17 +10,18 @@ use core::sync::atomic::Ordering;
 use alloc::boxed::Box;
 
 use sched_dag::CoreId;
+use sched_dag::journal::{Subject, What};
 
 use super::core_set::CoreSet;
 use super::runner::Runner;
 use super::status::note_running;
 use super::step::Ended;
 use super::{EPOCH_NS, EXECUTION, Event, NEXT_EVENT_NS, Work};
+use crate::journal::Journal;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, section, this_core, turns};
-use crate::trace::{Recorder, Subject, What};
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
 pub(crate) fn find_work() -> Work {
@@ -29,36 +30,39 @@ pub(crate) fn find_work() -> Work {
     let Some(execution) = place.as_mut() else {
         return Work::Rest;
     };
-    let recorder = execution.recorders.of(CoreId(core.index));
     let work = execution.find_work(core);
     drop(place);
-    begin(core, recorder, work)
+    take_turns(core, work)
 }
 
-/// Stamps the start of what this core begins. Start and finish are stamped with
-/// interrupts disabled, so that no preemption can stand between a stamp and what
-/// it says.
-#[inline]
-fn begin(core: &Core, recorder: Recorder, mut work: Work) -> Work {
-    match &mut work {
-        Work::Run(runner) => {
-            let now_ns = clock::now_ns();
-            let budget_end_ns = match runner.budget_ns {
-                u64::MAX => u64::MAX,
-                budget_ns => {
-                    let end_ns = now_ns.saturating_add(budget_ns);
-                    timer::set_no_later(core, Alarm::Budget, end_ns);
-                    end_ns
-                }
-            };
-            core.context().set_budget_end(budget_end_ns);
-            runner.start_ns = instance_time_ns(now_ns);
-            recorder.own(What::Start, runner.start_ns, runner.subject());
-        }
+/// Leaves the turns to others if this core does not compute.
+fn take_turns(core: &Core, work: Work) -> Work {
+    match &work {
+        Work::Run(_) => {}
         Work::Continue(context) if !context.is_background() => {}
         Work::Continue(_) | Work::Rest => turns::rest(core),
     }
     work
+}
+
+/// Stamps the start of the instance that this core begins as soon as the lock is free.
+/// Start and finish are stamped with interrupts disabled, so that no preemption can
+/// stand between a stamp and what it says.
+#[inline]
+pub(super) fn begin(core: &Core, journal: &mut Journal, runner: &Runner) {
+    let now_ns = clock::now_ns();
+    let budget_end_ns = match runner.budget_ns {
+        u64::MAX => u64::MAX,
+        budget_ns => {
+            let end_ns = now_ns.saturating_add(budget_ns);
+            timer::set_no_later(core, Alarm::Budget, end_ns);
+            end_ns
+        }
+    };
+    core.context().set_budget_end(budget_end_ns);
+    let start_ns = instance_time_ns(now_ns);
+    let here = CoreId(core.index);
+    journal.write(here, What::Start, start_ns, runner.subject());
 }
 
 /// Converts a time on the clock to the run's time; one before time 0 becomes that.
@@ -86,20 +90,16 @@ pub(crate) fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     let Some(execution) = place.as_mut() else {
         return Work::Rest;
     };
-    let recorder = execution.recorders.of(here);
     let vertex = finished.vertex;
     if finished.body.has_effects() {
         execution.signals.take(&mut finished.body, finish_ns);
     }
     let finished_ns = instance_time_ns(finish_ns);
-    execution.note_finish(recorder, here, finished, finished_ns);
+    execution.note_finish(here, finished, finished_ns);
     let mut woken = None;
     if execution.may_hand_off && execution.signals.are_none() {
-        match execution.hand_off(recorder, core, vertex, finished_ns) {
-            Ended::HandedOff(successor) => {
-                drop(place);
-                return begin(core, recorder, Work::Run(successor));
-            }
+        match execution.hand_off(core, vertex, finished_ns) {
+            Ended::HandedOff(successor) => return Work::Run(successor),
             Ended::Open => woken = Some(execution.step(finish_ns, Event::Time)),
             Ended::WithNews => woken = Some(execution.announce()),
             Ended::Quiet => {}
@@ -113,7 +113,7 @@ pub(crate) fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     if let Some(woken) = woken {
         woken.wake();
     }
-    begin(core, recorder, work)
+    take_turns(core, work)
 }
 
 /// Ends this core's instance, and with it its DAG, because of a fault. The
@@ -124,20 +124,17 @@ pub(crate) fn fail(now_ns: u64) {
         return;
     };
     let core = this_core::get();
-    let Some(vertex) = execution.books.placement.lose(core.index as usize) else {
+    let Some(vertex) = execution.placement.lose(core.index as usize) else {
         return;
     };
     let instance = execution.scheduler.instance_of(vertex);
     // Not when the interrupt came: a step may have left events since then.
     let ended_ns = since_epoch(clock::now_ns());
     let here = CoreId(core.index);
-    let recorder = execution.recorders.of(here);
-    recorder.own(What::Ended, ended_ns, Subject::of(instance));
+    execution
+        .journal
+        .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
-    if let Some(record) = execution.books.record.instance_mut(instance) {
-        record.failed_ns = Some(since_epoch(now_ns));
-        record.core = Some(CoreId(core.index));
-    }
     let woken = execution.step(now_ns, Event::Failed(instance));
     drop(place);
     woken.wake();

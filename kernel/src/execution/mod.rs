@@ -7,7 +7,6 @@
 //!
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
-mod books;
 mod control;
 mod core_set;
 mod events;
@@ -25,22 +24,22 @@ use alloc::format;
 use alloc::sync::Arc;
 
 use fass::{LaunchError, Plan};
-use sched_dag::record::Record;
 use sched_dag::{DagId, Instance, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::contexts;
+use crate::journal::Journal;
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
 use crate::platform::KERNEL;
-use crate::trace::{self, Recorders};
-use books::Books;
 pub(crate) use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
 pub(crate) use events::{arm_next_event, complete, fail, find_work, interrupt, since_epoch};
+use placement::Placement;
 pub(crate) use runner::Runner;
 use signals::Signals;
 pub(crate) use signals::raise;
 pub(crate) use status::{
-    budget_ns, is_finished, jobs_ended, lock_acquisitions, next_event_ns, running, try_names,
+    budget_ns, is_finished, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
+    try_names, with_journal,
 };
 
 /// What a core is to do next.
@@ -67,11 +66,15 @@ enum Event {
     Control(Control),
 }
 
-/// A run, from its launch until its record is taken.
+type Bodies = Placement<Box<Runner>, Parked>;
+
+/// A run, from its launch until it is taken out.
 pub(crate) struct Execution {
     task_set: Arc<TaskSet>,
     scheduler: Scheduler,
-    books: Books,
+    /// The bodies, and which core has which.
+    placement: Bodies,
+    journal: Journal,
     /// What core 0 does when nothing is assigned to it, while something is.
     background: Option<Parked>,
     /// When the next dispatch is due, on the clock, if it waits for further events
@@ -81,8 +84,6 @@ pub(crate) struct Execution {
     /// waits.
     may_hand_off: bool,
     signals: Signals,
-    /// Where each core's events go.
-    recorders: Recorders,
     /// What the commit has proven of each DAG.
     bounds_ns: Box<[Option<u64>]>,
 }
@@ -109,7 +110,6 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
             "other DAGs are committed already; run them first, or commit all in one call",
         ));
     }
-    let record = new_record(&plan.task_set)?;
     let subtasks: usize = plan.bodies.iter().map(|bodies| bodies.len()).sum();
     let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
     let total = subtasks.saturating_add(cores.saturating_mul(2));
@@ -122,35 +122,22 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
     })?;
     let signals = Signals::new(&plan);
     let task_set = Arc::new(plan.task_set);
+    let runners = runner::runners(&task_set, plan.bodies);
+    let placement = Placement::new(runners, cores);
+    let heap = crate::memory::heap::usage();
     let execution = Execution {
-        books: Books::new(&task_set, record, plan.bodies, cores),
+        placement,
+        journal: Journal::new(&task_set, heap.capacity_bytes - heap.in_use_bytes),
         scheduler: Scheduler::new(Arc::clone(&task_set), options),
         task_set,
         background: None,
         dispatch_due_ns: None,
         may_hand_off: KERNEL.coincidence_ns() == 0,
         signals,
-        recorders: trace::recorders(),
         bounds_ns: plan.bounds_ns.into(),
     };
     *EXECUTION.lock() = Some(execution);
     Ok(())
-}
-
-fn new_record(task_set: &TaskSet) -> Result<Record, LaunchError> {
-    let heap = crate::memory::heap::usage();
-    let free = heap.capacity_bytes - heap.in_use_bytes;
-    let needed = Record::size_of(task_set);
-    let record = needed
-        .filter(|bytes| *bytes <= free / 2)
-        .and_then(|_| Record::new(task_set));
-    record.ok_or_else(|| {
-        let (free, needed) = (free / 1024, needed.map_or(usize::MAX, |bytes| bytes / 1024));
-        LaunchError::new(format!(
-            "the record of all jobs needs {needed} KiB and {free} KiB of memory are free; \
-             release fewer jobs or give the machine more memory"
-        ))
-    })
 }
 
 /// Sets time 0 of the prepared run, from which the releases count. Returns the
@@ -159,7 +146,6 @@ pub(crate) fn begin(epoch_ns: u64) -> Option<u64> {
     let mut place = EXECUTION.lock();
     let execution = place.as_mut()?;
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
-    trace::clear();
     execution.begin_signals();
     JOBS_ENDED.store(0, Ordering::Relaxed);
     execution.publish();
@@ -188,9 +174,9 @@ impl Execution {
         self.bounds_ns.get(dag.index()).copied().flatten()
     }
 
-    /// Returns the times of all jobs and instances.
-    pub(crate) const fn record(&self) -> &Record {
-        &self.books.record
+    /// Returns what has happened.
+    pub(crate) const fn journal(&self) -> &Journal {
+        &self.journal
     }
 
     /// Returns the model.

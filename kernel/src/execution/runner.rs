@@ -1,9 +1,13 @@
 //! What runs the instances of one subtask.
 
-use fass::Body;
-use sched_dag::{Instance, Vertex};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 
-use crate::trace::Subject;
+use fass::Body;
+use sched_dag::journal::Subject;
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
+
+use crate::platform::KERNEL;
 
 /// A subtask's body, and what running an instance of it takes.
 ///
@@ -18,8 +22,6 @@ pub(crate) struct Runner {
     pub(super) instance: Instance,
     /// The part of [`subject`](Self::subject) that is the same for all.
     ids: u64,
-    /// When that started, on the run's time.
-    pub(super) start_ns: u64,
 }
 
 impl Runner {
@@ -31,7 +33,6 @@ impl Runner {
             budget_ns,
             instance: any,
             ids: Subject::of(any).ids,
-            start_ns: 0,
         }
     }
 
@@ -48,4 +49,31 @@ impl Runner {
             job: self.instance.job,
         }
     }
+}
+
+/// Makes a runner for each body, by vertex.
+pub(super) fn runners(
+    task_set: &TaskSet,
+    bodies: Vec<Vec<Body>>,
+) -> impl Iterator<Item = Box<Runner>> {
+    let of_dags = (0..).map(DagId).zip(bodies);
+    of_dags.flat_map(move |(dag, bodies)| {
+        let of_subtasks = (0..).map(SubtaskId).zip(bodies);
+        of_subtasks.map(move |(subtask, body)| {
+            let job = 0;
+            let first = Instance { dag, job, subtask };
+            let budget_ns = budget_ns(task_set, first);
+            Box::new(Runner::new(body, task_set.vertex(first), first, budget_ns))
+        })
+    })
+}
+
+/// Returns how long an instance of a subtask may execute for, `u64::MAX` if for
+/// ever.
+pub(super) fn budget_ns(task_set: &TaskSet, instance: Instance) -> u64 {
+    let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
+    subtask
+        .budget_ns()
+        .or_else(|| KERNEL.budget_of_wcet(subtask.wcet_ns()?))
+        .unwrap_or(u64::MAX)
 }

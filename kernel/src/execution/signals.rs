@@ -67,16 +67,16 @@ impl Execution {
         let Self {
             task_set,
             scheduler,
-            books,
+            placement,
+            journal,
             signals,
-            recorders,
             ..
         } = self;
-        let here = here();
         let mut watcher = Watcher {
-            books,
+            journal,
+            placement,
             task_set,
-            recorder: recorders.of(here),
+            here: here(),
             has_job_news: false,
         };
         signals.has_begun = true;

@@ -3,10 +3,14 @@
 use core::sync::atomic::Ordering;
 
 use sched_dag::Instance;
+use sched_dag::journal::Subject;
 
-use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS, books};
+use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS, runner};
+use crate::journal::Journal;
 use crate::machine::this_core::Core;
-use crate::trace::Subject;
+
+/// Stands where the ids of an instance do, for none.
+const NOTHING: u64 = u64::MAX;
 
 /// Reports whether all jobs of the run have ended.
 pub(crate) fn is_finished() -> bool {
@@ -48,12 +52,12 @@ pub(crate) fn running(core: &Core) -> Option<Instance> {
         .running
         .each_ref()
         .map(|field| field.load(Ordering::Relaxed));
-    Subject { ids, job }.instance()
+    (ids != NOTHING).then(|| Subject { ids, job }.instance())
 }
 
 /// Notes which instance a core runs, for [`running`].
 pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
-    let Subject { ids, job } = subject.unwrap_or(Subject::NONE);
+    let (ids, job) = subject.map_or((NOTHING, 0), |subject| (subject.ids, subject.job));
     core.note_running([ids, job]);
 }
 
@@ -61,6 +65,19 @@ pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
 pub(crate) fn budget_ns(instance: Instance) -> u64 {
     let place = EXECUTION.lock();
     place.as_ref().map_or(u64::MAX, |execution| {
-        books::budget_ns(execution.task_set(), instance)
+        runner::budget_ns(execution.task_set(), instance)
     })
+}
+
+/// Looks at the journal of the run, or changes what it records, if a run goes on. To
+/// be done shortly: nothing is completed meanwhile.
+pub(crate) fn with_journal<R>(look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+    let mut place = EXECUTION.lock();
+    place.as_mut().map(|execution| look(&mut execution.journal))
+}
+
+/// Looks at the journal of the run, if there is one and nobody is at work on it.
+pub(crate) fn try_journal<R>(look: impl FnOnce(&Journal) -> R) -> Option<R> {
+    let place = EXECUTION.try_lock()?;
+    place.as_ref().map(|execution| look(&execution.journal))
 }

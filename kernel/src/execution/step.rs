@@ -4,10 +4,11 @@ use core::sync::atomic::Ordering;
 
 use alloc::boxed::Box;
 
+use sched_dag::journal::{Subject, What};
 use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
 
 use super::core_set::CoreSet;
-use super::events::{arm_next_event, here, since_epoch};
+use super::events::{arm_next_event, begin, here, since_epoch};
 use super::placement::Next;
 use super::runner::Runner;
 use super::status::{is_finished, note_running};
@@ -19,7 +20,6 @@ use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, this_core, turns};
 use crate::platform::KERNEL;
-use crate::trace::{Recorder, Subject, What};
 use crate::worker;
 
 /// What comes of [`Execution::hand_off`].
@@ -38,50 +38,30 @@ pub(super) enum Ended {
 impl Execution {
     /// Notes that this core has finished its instance.
     #[inline]
-    pub(super) fn note_finish(
-        &mut self,
-        recorder: Recorder,
-        here: CoreId,
-        finished: Box<Runner>,
-        finish_ns: u64,
-    ) {
-        let Runner {
-            vertex,
-            instance,
-            start_ns,
-            ..
-        } = *finished;
-        recorder.own(What::Finish, finish_ns, finished.subject());
-        self.books.placement.finish(here.index(), vertex, finished);
-        if let Some(record) = self.books.record.instance_mut(instance) {
-            record.start_ns = Some(start_ns);
-            record.finish_ns = Some(finish_ns);
-            record.core = Some(here);
-            record.runs += 1;
-        }
+    pub(super) fn note_finish(&mut self, here: CoreId, finished: Box<Runner>, finish_ns: u64) {
+        self.journal
+            .write(here, What::Finish, finish_ns, finished.subject());
+        let vertex = finished.vertex;
+        self.placement.finish(here.index(), vertex, finished);
     }
 
     /// Lets the scheduler know that this core has finished an instance, and gives
     /// the core the next one at once if nothing else is to be decided.
     #[inline]
-    pub(super) fn hand_off(
-        &mut self,
-        recorder: Recorder,
-        core: &Core,
-        finished: Vertex,
-        finish_ns: u64,
-    ) -> Ended {
+    pub(super) fn hand_off(&mut self, core: &Core, finished: Vertex, finish_ns: u64) -> Ended {
         let here = CoreId(core.index);
         let Self {
             task_set,
             scheduler,
-            books,
+            placement,
+            journal,
             ..
         } = self;
         let mut watcher = Watcher {
-            books,
+            journal,
+            placement,
             task_set,
-            recorder,
+            here,
             has_job_news: false,
         };
         let done = scheduler.hand_off(finish_ns, here, finished, &mut watcher);
@@ -89,12 +69,13 @@ impl Execution {
         match done {
             HandOff::Open => return Ended::Open,
             HandOff::To(vertex, decision) => {
-                if !has_job_news && let Some(mut runner) = books.placement.start(here, vertex) {
+                if !has_job_news && let Some(mut runner) = placement.start(here, vertex) {
                     runner.instance.job = decision.instance().job;
                     note_running(core, Some(runner.subject()));
+                    begin(core, journal, &runner);
                     return Ended::HandedOff(runner);
                 }
-                books.placement.set_target(here, Some(vertex));
+                placement.set_target(here, Some(vertex));
             }
             HandOff::Idle => {}
         }
@@ -109,20 +90,21 @@ impl Execution {
     /// look at what they should run.
     pub(super) fn step(&mut self, now_ns: u64, event: Event) -> CoreSet {
         let here = here();
-        let recorder = self.recorders.of(here);
         let Self {
             task_set,
             scheduler,
-            books,
+            placement,
+            journal,
             dispatch_due_ns,
             may_hand_off,
             signals,
             ..
         } = self;
         let mut watcher = Watcher {
-            books,
+            journal,
+            placement,
             task_set,
-            recorder,
+            here,
             has_job_news: false,
         };
         let mut moment = scheduler.at(since_epoch(now_ns));
@@ -152,16 +134,13 @@ impl Execution {
             let (core, instance) = (decision.core(), decision.instance());
             let vertex = task_set.vertex(instance);
             if let Decision::Preempt { .. } = decision {
-                books.placement.set_target(core, None);
+                placement.set_target(core, None);
                 preempted = Some(core);
-                if let Some(record) = books.record.instance_mut(instance) {
-                    record.preemptions += 1;
-                }
             } else {
-                books.placement.set_target(core, Some(vertex));
+                placement.set_target(core, Some(vertex));
                 if preempted == Some(core) {
                     let time_ns = since_epoch(clock::now_ns());
-                    recorder.for_core(core, What::Request, time_ns, Subject::of(instance));
+                    journal.write(core, What::Request, time_ns, Subject::of(instance));
                 }
             }
             if core != here {
@@ -200,10 +179,11 @@ impl Execution {
     /// Finds what this core, which runs nothing, is to do.
     pub(super) fn find_work(&mut self, core: &Core) -> Work {
         let here = core.index as usize;
-        match self.books.placement.next(here) {
+        match self.placement.next(here) {
             Next::Start(vertex, mut runner) => {
                 runner.instance.job = self.scheduler.instance_of(vertex).job;
                 note_running(core, Some(runner.subject()));
+                begin(core, &mut self.journal, &runner);
                 Work::Run(runner)
             }
             Next::Continue(context) => {
@@ -222,7 +202,7 @@ impl Execution {
 
     /// Returns the instance that a core has.
     pub(super) fn current(&self, core: usize) -> Option<Instance> {
-        let vertex = self.books.placement.current(core)?;
+        let vertex = self.placement.current(core)?;
         Some(self.scheduler.instance_of(vertex))
     }
 
@@ -232,22 +212,26 @@ impl Execution {
         let core = this_core::get();
         let here = core.index as usize;
         let is_background = core.context().is_background();
-        let leaves_background = is_background && self.books.placement.is_wanted(here);
-        if !self.books.placement.must_suspend(here) && !leaves_background {
+        let leaves_background = is_background && self.placement.is_wanted(here);
+        if !self.placement.must_suspend(here) && !leaves_background {
             return None;
         }
-        let suspended = self.books.placement.detach(here);
+        let suspended = self.placement.detach(here);
         if let Some(vertex) = suspended {
             // Not when the interrupt came: its step has left events since then.
             let time_ns = since_epoch(clock::now_ns());
             let instance = self.scheduler.instance_of(vertex);
-            let recorder = self.recorders.of(CoreId(core.index));
-            recorder.own(What::Suspend, time_ns, Subject::of(instance));
+            self.journal.write(
+                CoreId(core.index),
+                What::Suspend,
+                time_ns,
+                Subject::of(instance),
+            );
             // The hold, or the turn, was the instance's.
             turns::leave(core);
             timer::set(Alarm::Hold, u64::MAX);
         }
-        let next = match self.books.placement.take_suspended(here) {
+        let next = match self.placement.take_suspended(here) {
             Some(context) => {
                 self.note_resumed(core, &context, now_ns);
                 context
@@ -259,7 +243,7 @@ impl Execution {
         match suspended {
             Some(vertex) => {
                 last.note_suspended(now_ns);
-                self.books.placement.suspend(vertex, last)
+                self.placement.suspend(vertex, last)
             }
             None => {
                 self.background = Some(last);
@@ -269,15 +253,15 @@ impl Execution {
     }
 
     /// Notes that this core's current instance continues in `context`.
-    fn note_resumed(&self, core: &Core, context: &Parked, now_ns: u64) {
+    fn note_resumed(&mut self, core: &Core, context: &Parked, now_ns: u64) {
         context.note_resumed(now_ns);
         timer::set_no_later(core, Alarm::Budget, context.budget_end_ns());
         turns::join(core);
         let here = CoreId(core.index);
         if let Some(instance) = self.current(here.index()) {
             let time_ns = since_epoch(clock::now_ns());
-            let recorder = self.recorders.of(here);
-            recorder.own(What::Resume, time_ns, Subject::of(instance));
+            self.journal
+                .write(here, What::Resume, time_ns, Subject::of(instance));
         }
     }
 }

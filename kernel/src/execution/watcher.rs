@@ -2,113 +2,97 @@
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::{DagId, Instance, JobOutcome, Observer, TaskSet};
+use sched_dag::journal::{Subject, What};
+use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, TaskSet};
 
+use super::Bodies;
 use super::JOBS_ENDED;
-use super::books::Books;
 use super::events::{instance_time_ns, since_epoch};
+use crate::journal::Journal;
 use crate::machine::clock;
-use crate::trace::{Recorder, Subject, What};
 
-/// Writes what the scheduler reports into the record, with the clock's time at
-/// that very moment: so a join's latency includes the wait for the lock.
+/// Writes what the scheduler reports into the journal, with the clock's time at that
+/// very moment: so a join's latency includes the wait for the lock.
 pub(super) struct Watcher<'a> {
-    pub(super) books: &'a mut Books,
+    pub(super) journal: &'a mut Journal,
+    pub(super) placement: &'a mut Bodies,
     pub(super) task_set: &'a TaskSet,
-    pub(super) recorder: Recorder,
+    /// The core that takes the step.
+    pub(super) here: CoreId,
     /// Whether anything has happened to a job as a whole.
     pub(super) has_job_news: bool,
 }
 
 impl Watcher<'_> {
-    #[inline]
-    fn now_ns(&self) -> u64 {
-        since_epoch(clock::now_ns())
+    /// Writes down what has happened now to a whole job.
+    fn of_job(&mut self, what: What, dag: DagId, job: u64) {
+        self.has_job_news = true;
+        let now_ns = since_epoch(clock::now_ns());
+        let subject = Subject::of_job(dag, job);
+        self.journal.write(self.here, what, now_ns, subject);
     }
 }
 
 impl Observer for Watcher<'_> {
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.has_job_news = true;
-        let now_ns = self.now_ns();
-        self.recorder
-            .own(What::Released, now_ns, Subject::of_job(dag, job));
-        if let Some(record) = self.books.record.job_mut(dag, job) {
-            record.release_ns = Some(release_ns);
-            record.released_ns = Some(now_ns);
+        if self.task_set.dag(dag).is_sporadic() {
+            let subject = Subject::of_job(dag, job);
+            self.journal
+                .write(self.here, What::Due, release_ns, subject);
         }
+        self.of_job(What::Released, dag, job);
     }
 
     fn queued(&mut self, dag: DagId, job: u64, _: u64) {
-        self.has_job_news = true;
-        self.recorder
-            .own(What::Queued, self.now_ns(), Subject::of_job(dag, job));
+        self.of_job(What::Queued, dag, job);
     }
 
     fn skipped(&mut self, dag: DagId, job: u64, _: u64) {
-        self.has_job_news = true;
-        self.recorder
-            .own(What::Skipped, self.now_ns(), Subject::of_job(dag, job));
+        self.of_job(What::Skipped, dag, job);
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {
-        self.has_job_news = true;
-        let now_ns = self.now_ns();
-        self.recorder
-            .own(What::Aborted, now_ns, Subject::of_job(dag, job));
-        if let Some(record) = self.books.record.job_mut(dag, job) {
-            record.cut_ns = Some(now_ns);
-        }
+        self.of_job(What::Aborted, dag, job);
+    }
+
+    fn ended(&mut self, dag: DagId) {
+        self.of_job(What::Stopped, dag, 0);
     }
 
     fn deadline_missed(&mut self, dag: DagId, job: u64, _: u64) {
-        self.has_job_news = true;
-        let now_ns = self.now_ns();
-        self.recorder
-            .own(What::Missed, now_ns, Subject::of_job(dag, job));
-        if let Some(record) = self.books.record.job_mut(dag, job) {
-            record.missed_ns = Some(now_ns);
-        }
+        self.of_job(What::Missed, dag, job);
     }
 
     fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
-        self.has_job_news = true;
         let what = match release_ns {
             Some(_) => What::Signalled,
             None => What::Dropped,
         };
-        self.recorder
-            .own(what, self.now_ns(), Subject::of_job(dag, job));
+        self.of_job(what, dag, job);
     }
 
     #[inline]
     fn ready(&mut self, instance: Instance) {
         let now_ns = instance_time_ns(clock::now_ns());
-        self.recorder
-            .own(What::Ready, now_ns, Subject::of(instance));
-        if let Some(record) = self.books.record.instance_mut(instance) {
-            record.ready_ns = Some(now_ns);
-        }
+        let subject = Subject::of(instance);
+        self.journal.write(self.here, What::Ready, now_ns, subject);
     }
 
     fn cancelled(&mut self, instance: Instance) {
-        self.recorder
-            .own(What::Cancelled, self.now_ns(), Subject::of(instance));
+        let now_ns = since_epoch(clock::now_ns());
+        let subject = Subject::of(instance);
+        self.journal
+            .write(self.here, What::Cancelled, now_ns, subject);
         let vertex = self.task_set.vertex(instance);
-        if let Some(runner) = self.books.placement.resting(vertex) {
+        if let Some(runner) = self.placement.resting(vertex) {
             runner.body.discard(instance.job);
         }
     }
 
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.has_job_news = true;
-        let now_ns = self.now_ns();
-        self.recorder
-            .own(What::Completed, now_ns, Subject::of_job(dag, job));
-        if let Some(record) = self.books.record.job_mut(dag, job) {
-            record.ended_ns = Some(now_ns);
-            record.outcome = Some(outcome);
-            // A DAG without end has no record, and its jobs are no progress.
+    fn job_completed(&mut self, dag: DagId, job: u64, _: JobOutcome) {
+        self.of_job(What::Completed, dag, job);
+        // The jobs of a DAG without end are no progress.
+        if self.task_set.dag(dag).jobs().is_some() {
             JOBS_ENDED.fetch_add(1, Ordering::Relaxed);
         }
     }

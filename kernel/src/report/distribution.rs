@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 
+use sched_dag::law::Histogram;
+
 use crate::json::Object;
 
 /// The samples of one quantity, in nanoseconds.
@@ -16,7 +18,15 @@ use crate::json::Object;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Distribution {
-    sorted_ns: Vec<u64>,
+    samples: Samples,
+}
+
+#[derive(Clone, Debug)]
+enum Samples {
+    /// All of them, in order.
+    Sorted(Vec<u64>),
+    /// How many there are, by value.
+    Counted(Histogram),
 }
 
 impl Distribution {
@@ -27,7 +37,27 @@ impl Distribution {
     pub fn new(samples_ns: impl IntoIterator<Item = u64>) -> Self {
         let mut sorted_ns: Vec<u64> = samples_ns.into_iter().collect();
         sorted_ns.sort_unstable();
-        Self { sorted_ns }
+        Self {
+            samples: Samples::Sorted(sorted_ns),
+        }
+    }
+
+    /// Takes samples that were counted.
+    ///
+    /// ```no_run
+    /// use kernel::report::Distribution;
+    /// use sched_dag::DagId;
+    ///
+    /// fn responses(run: &kernel::Run, dag: DagId) -> Option<Distribution> {
+    ///     let times = &run.times()?.dag(dag).response_time;
+    ///     Some(Distribution::counted(times.clone()))
+    /// }
+    /// ```
+    #[must_use]
+    pub const fn counted(samples_ns: Histogram) -> Self {
+        Self {
+            samples: Samples::Counted(samples_ns),
+        }
     }
 
     /// Returns the number of samples.
@@ -35,7 +65,10 @@ impl Distribution {
     /// See [`Distribution`].
     #[must_use]
     pub fn count(&self) -> usize {
-        self.sorted_ns.len()
+        match &self.samples {
+            Samples::Sorted(sorted_ns) => sorted_ns.len(),
+            Samples::Counted(counted) => usize::try_from(counted.count()).unwrap_or(usize::MAX),
+        }
     }
 
     /// Returns the smallest sample that at least `percent` per cent of the
@@ -49,12 +82,15 @@ impl Distribution {
     /// ```
     #[must_use]
     pub fn percentile(&self, percent: usize) -> u64 {
-        let rank = (self.count() * percent).div_ceil(100).max(1);
-        self.sorted_ns
-            .get(rank - 1)
-            .or(self.sorted_ns.last())
-            .copied()
-            .unwrap_or(0)
+        match &self.samples {
+            Samples::Sorted(sorted_ns) => {
+                let rank = (self.count() * percent).div_ceil(100).max(1);
+                let sample = sorted_ns.get(rank - 1).or(sorted_ns.last());
+                sample.copied().unwrap_or(0)
+            }
+            Samples::Counted(counted) if percent == 0 => counted.min(),
+            Samples::Counted(counted) => counted.per_mille(percent as u64 * 10),
+        }
     }
 
     /// Returns the smallest sample, or 0.

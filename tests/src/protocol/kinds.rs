@@ -229,6 +229,26 @@ pub const KINDS: &[(&str, &[&str])] = &[
         &["instances", "preemptions", "diverged", "violations", "cpus"],
     ),
     ("storm", &["cpus", "interrupts", "rounds", "diverged"]),
+    (
+        "times_dag",
+        &[
+            "dag",
+            "name",
+            "first_recorded_job",
+            "response_time_ns",
+            "release_jitter_ns",
+        ],
+    ),
+    (
+        "times_subtask",
+        &[
+            "dag",
+            "subtask",
+            "name",
+            "join_latency_ns",
+            "execution_time_ns",
+        ],
+    ),
     ("trace_begin", &["policy", "preemption", "cores", "run"]),
     (
         "trace_dag",

@@ -33,11 +33,8 @@ use plan::{Boot, Part, Plan};
 pub use command::soak;
 pub use figures::Figures;
 
-/// The guest's memory, a quarter of which is for traces.
+/// The guest's memory, up to a third of which is for journals.
 const MEMORY_MIB: u64 = 256;
-
-/// The events that the traces of all cores keep, of 32 bytes each.
-const TRACE_EVENTS: u64 = (MEMORY_MIB << 20) / 4 / 32;
 
 /// What a soak run has come to.
 #[derive(Clone, Debug, Default)]
@@ -148,13 +145,12 @@ fn words(plan: &Plan, boot: &Boot<'_>) -> String {
     };
     format!(
         "mode={} policy={policy} load={load} overrun={overrun} work={work} first={} rounds={} round_ms={} \
-         seed={} trace=dump trace_events={} budget_factor={budget_factor}",
+         seed={} trace=dump budget_factor={budget_factor}",
         plan.mode,
         boot.first,
         boot.rounds,
         plan.round.as_millis(),
-        plan.seed,
-        TRACE_EVENTS / plan.cores
+        plan.seed
     )
 }
 

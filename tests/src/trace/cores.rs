@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use sched_dag::{CoreId, Instance};
 
 use super::breach::{Breach, Rule};
-use super::model::Word;
+use super::model::What;
 use super::view::View;
 
 /// Judges all cores.
@@ -19,8 +19,8 @@ pub(super) fn judge(view: &View<'_>, breaches: &mut Vec<Breach>) {
         let Some(instance) = event.instance() else {
             continue;
         };
-        match event.word {
-            Word::Start | Word::Resume => {
+        match event.what {
+            What::Start | What::Resume => {
                 let occupant = occupants.insert(event.core, instance);
                 let stays =
                     |occupant: &Instance| !ends_now(view, *occupant, instance, event.time_ns);
@@ -37,11 +37,11 @@ pub(super) fn judge(view: &View<'_>, breaches: &mut Vec<Breach>) {
                     });
                 }
             }
-            Word::Suspend | Word::Finish if occupants.get(&event.core) == Some(&instance) => {
+            What::Suspend | What::Finish if occupants.get(&event.core) == Some(&instance) => {
                 occupants.remove(&event.core);
             }
             // Another core may have ended it.
-            Word::Ended => occupants.retain(|_, occupant| *occupant != instance),
+            What::Ended => occupants.retain(|_, occupant| *occupant != instance),
             _ => {}
         }
     }

@@ -23,7 +23,7 @@ use sched_dag::{CoreId, DagId, Instance};
 
 use super::breach::{Breach, Rule};
 use super::history::Stage;
-use super::model::Word;
+use super::model::What;
 use super::view::View;
 
 /// An instance's place in the order of dispatch.
@@ -106,11 +106,11 @@ fn changes(view: &View<'_>) -> Vec<(u64, Change)> {
         let first = view
             .events
             .iter()
-            .find(|(event, _)| event.core == core && event.word.is_of_machine());
+            .find(|(event, _)| event.core == core && event.what.is_of_machine());
         let known_ns = match first {
             _ if !view.is_lossy() => Some(0),
-            Some((event, _)) => match event.word {
-                Word::Start | Word::Resume => Some(event.time_ns),
+            Some((event, _)) => match event.what {
+                What::Start | What::Resume => Some(event.time_ns),
                 _ => Some(view.from_ns),
             },
             None => None,

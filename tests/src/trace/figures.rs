@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use sched_dag::CoreId;
 
 use super::dispatch::Waits;
-use super::model::Word;
+use super::model::What;
 use super::view::View;
 
 /// The figures of one run. Times are in nanoseconds.
@@ -104,7 +104,7 @@ fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
     // The next request for each core, as seen from the one at hand.
     let mut next_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     let requests = view.events.iter().rev();
-    for (event, _) in requests.filter(|(event, _)| event.word == Word::Request) {
+    for (event, _) in requests.filter(|(event, _)| event.what == What::Request) {
         let overtaken_ns = next_ns.insert(event.core, event.time_ns);
         let history = event.instance().and_then(|it| view.histories.get(&it));
         let slices = history.map_or(&[][..], |history| &history.slices);

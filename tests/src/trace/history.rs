@@ -15,7 +15,7 @@
 use sched_dag::{CoreId, Instance};
 
 use super::breach::{Breach, Rule};
-use super::model::{Event, Run, Word};
+use super::model::{Event, Run, What};
 use super::view::{Moment, View};
 
 /// What is known of an instance.
@@ -141,13 +141,13 @@ impl Search {
 }
 
 fn is_allowed(stage: Stage, event: &Event) -> bool {
-    match (stage, event.word) {
-        (Stage::Absent, Word::Ready | Word::Cancelled)
-        | (Stage::Ready, Word::Start | Word::Cancelled)
-        | (Stage::Suspended, Word::Resume)
+    match (stage, event.what) {
+        (Stage::Absent, What::Ready | What::Cancelled)
+        | (Stage::Ready, What::Start | What::Cancelled)
+        | (Stage::Suspended, What::Resume)
         // Whichever core finds the fault, or stops the DAG, ends the instance.
-        | (Stage::Running(_) | Stage::Suspended, Word::Ended) => true,
-        (Stage::Running(core), Word::Suspend | Word::Finish) => core == event.core,
+        | (Stage::Running(_) | Stage::Suspended, What::Ended) => true,
+        (Stage::Running(core), What::Suspend | What::Finish) => core == event.core,
         _ => false,
     }
 }
@@ -155,10 +155,10 @@ fn is_allowed(stage: Stage, event: &Event) -> bool {
 /// Returns what an instance must have been before its first known instant: what
 /// one of the events asks for, if all of them are allowed then.
 fn before(first: &[(Event, Moment)]) -> Stage {
-    let asked_for = |(event, _): &(Event, Moment)| match event.word {
-        Word::Start => Stage::Ready,
-        Word::Resume => Stage::Suspended,
-        Word::Suspend | Word::Finish | Word::Ended => Stage::Running(event.core),
+    let asked_for = |(event, _): &(Event, Moment)| match event.what {
+        What::Start => Stage::Ready,
+        What::Resume => Stage::Suspended,
+        What::Suspend | What::Finish | What::Ended => Stage::Running(event.core),
         _ => Stage::Absent,
     };
     let allows_all = |stage: &Stage| {
@@ -175,22 +175,22 @@ fn before(first: &[(Event, Moment)]) -> Stage {
 
 /// Returns what an instance is after an event.
 fn after(event: &Event) -> Stage {
-    match event.word {
-        Word::Ready => Stage::Ready,
-        Word::Start | Word::Resume => Stage::Running(event.core),
-        Word::Suspend => Stage::Suspended,
+    match event.what {
+        What::Ready => Stage::Ready,
+        What::Start | What::Resume => Stage::Running(event.core),
+        What::Suspend => Stage::Suspended,
         _ => Stage::Over,
     }
 }
 
 fn objection(run: &Run, instance: Instance, stage: Stage, event: &Event) -> Breach {
-    let does = match event.word {
-        Word::Ready => "becomes ready in a step on",
-        Word::Start => "starts on",
-        Word::Suspend => "is suspended on",
-        Word::Resume => "is resumed on",
-        Word::Finish => "finishes on",
-        Word::Cancelled => "is cancelled in a step on",
+    let does = match event.what {
+        What::Ready => "becomes ready in a step on",
+        What::Start => "starts on",
+        What::Suspend => "is suspended on",
+        What::Resume => "is resumed on",
+        What::Finish => "finishes on",
+        What::Cancelled => "is cancelled in a step on",
         _ => "is ended on",
     };
     let is = match stage {
@@ -212,17 +212,17 @@ fn objection(run: &Run, instance: Instance, stage: Stage, event: &Event) -> Brea
 impl History {
     /// Takes note of an event, whether it is allowed or not.
     fn note(&mut self, event: &Event, moment: Moment) {
-        let place = match event.word {
-            Word::Ready => Some(&mut self.ready),
-            Word::Start => Some(&mut self.start),
-            Word::Finish => Some(&mut self.finish),
-            Word::Cancelled | Word::Ended => Some(&mut self.dropped),
+        let place = match event.what {
+            What::Ready => Some(&mut self.ready),
+            What::Start => Some(&mut self.start),
+            What::Finish => Some(&mut self.finish),
+            What::Cancelled | What::Ended => Some(&mut self.dropped),
             _ => None,
         };
         if let Some(place) = place {
             place.get_or_insert(moment);
         }
-        self.suspensions += u64::from(event.word == Word::Suspend);
+        self.suspensions += u64::from(event.what == What::Suspend);
         self.enter(event.time_ns, after(event));
     }
 

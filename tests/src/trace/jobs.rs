@@ -18,7 +18,7 @@ use sched_dag::{DagId, Instance, SubtaskId};
 
 use super::breach::{Breach, Rule};
 use super::history::History;
-use super::model::{Event, Run, Word};
+use super::model::{Event, Run, What};
 use super::view::{Moment, View};
 
 /// What is known of a job.
@@ -39,12 +39,12 @@ impl JobHistory {
 
     /// Takes note of an event; that it happens twice is a breach.
     pub(super) fn note(&mut self, run: &Run, event: &Event, moment: Moment) -> Option<Breach> {
-        let (place, rule) = match event.word {
-            Word::Released => (&mut self.released, Rule::Release),
-            Word::Queued => (&mut self.queued, Rule::Release),
-            Word::Skipped => (&mut self.skipped, Rule::Release),
-            Word::Aborted => (&mut self.aborted, Rule::Completion),
-            Word::Missed => (&mut self.missed, Rule::Completion),
+        let (place, rule) = match event.what {
+            What::Released => (&mut self.released, Rule::Release),
+            What::Queued => (&mut self.queued, Rule::Release),
+            What::Skipped => (&mut self.skipped, Rule::Release),
+            What::Aborted => (&mut self.aborted, Rule::Completion),
+            What::Missed => (&mut self.missed, Rule::Completion),
             _ => (&mut self.completed, Rule::Completion),
         };
         let Some(earlier) = place else {
@@ -57,7 +57,7 @@ impl JobHistory {
             text: format!(
                 "{} is {} a second time, after {} ns",
                 run.job_name(event.dag, event.job),
-                event.word.text(),
+                event.what,
                 earlier.time_ns
             ),
         })

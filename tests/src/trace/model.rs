@@ -4,14 +4,15 @@
 //! instant from which the nominal release times O + kT count. Sums that leave
 //! `u64` stay at its end, for a trace may state any number.
 //!
-//! *Events* are either of a job or of an instance; [`Word`] says which. Those
+//! *Events* are either of a job or of an instance; [`What`] says which. Those
 //! of the machine (`start` to `ended`) happened on the core that they name,
 //! those of the scheduler in a step that was made on that core; only `request`
 //! names another core, the one that shall switch.
 
 use std::collections::BTreeMap;
 
-use sched_dag::{CoreId, DagId, Instance, Policy, Preemption, SubtaskId};
+pub use sched_dag::journal::{Event, What};
+use sched_dag::{DagId, Instance, Policy, Preemption, SubtaskId};
 
 /// One run of one boot.
 #[derive(Clone, Debug)]
@@ -32,10 +33,8 @@ pub struct Run {
     pub dags: Vec<Dag>,
     /// What happened, in the order of the log.
     pub events: Vec<Event>,
-    /// Events that were overwritten before they were printed.
+    /// Events, the oldest ones, that had made way before they were printed.
     pub lost: u64,
-    /// The same for each core, if the run says so.
-    pub lost_by_core: Option<Vec<u64>>,
     /// Whether the run says that it went on until every job had ended.
     pub complete: bool,
 }
@@ -78,125 +77,6 @@ pub struct Subtask {
     pub priority: u32,
     /// Whether a started instance keeps its core although preemption is on.
     pub non_preemptive: bool,
-}
-
-/// Something that happened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Event {
-    /// When.
-    pub time_ns: u64,
-    /// What.
-    pub word: Word,
-    /// Where; see [the module](self).
-    pub core: CoreId,
-    /// Of which DAG.
-    pub dag: DagId,
-    /// Of which job.
-    pub job: u64,
-    /// Of which subtask; `None` for the events of jobs.
-    pub subtask: Option<SubtaskId>,
-}
-
-/// What happened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Word {
-    /// The job was released.
-    Released,
-    /// The job was due and had to wait for its release.
-    Queued,
-    /// The job was due and is never released.
-    Skipped,
-    /// The job starts no further instance.
-    Aborted,
-    /// The job's deadline passed before its completion.
-    Missed,
-    /// No instance of the job is left.
-    Completed,
-    /// The instance waits for nothing but a core.
-    Ready,
-    /// The instance will not run.
-    Cancelled,
-    /// The scheduler wants the core to run the instance instead of another.
-    Request,
-    /// The instance's function was called.
-    Start,
-    /// The instance lost its core.
-    Suspend,
-    /// The instance went on.
-    Resume,
-    /// The instance's function returned.
-    Finish,
-    /// The instance was ended by a fault, and its DAG with it.
-    Ended,
-    /// A signal came for the sporadic DAG's job.
-    Signalled,
-    /// A signal came while one was kept for the job, or no job was left.
-    Dropped,
-}
-
-impl Word {
-    /// All words as the trace spells them.
-    pub const ALL: [(&str, Word); 16] = [
-        ("released", Word::Released),
-        ("queued", Word::Queued),
-        ("skipped", Word::Skipped),
-        ("aborted", Word::Aborted),
-        ("missed", Word::Missed),
-        ("completed", Word::Completed),
-        ("ready", Word::Ready),
-        ("cancelled", Word::Cancelled),
-        ("request", Word::Request),
-        ("start", Word::Start),
-        ("suspend", Word::Suspend),
-        ("resume", Word::Resume),
-        ("finish", Word::Finish),
-        ("ended", Word::Ended),
-        ("signalled", Word::Signalled),
-        ("dropped", Word::Dropped),
-    ];
-
-    /// Finds a word by its spelling.
-    #[must_use]
-    pub fn from_text(text: &str) -> Option<Word> {
-        let known = Word::ALL.iter().find(|(spelling, _)| *spelling == text);
-        known.map(|(_, word)| *word)
-    }
-
-    /// Returns the spelling.
-    #[must_use]
-    pub fn text(self) -> &'static str {
-        let known = Word::ALL.iter().find(|(_, word)| *word == self);
-        known.map_or("?", |(spelling, _)| spelling)
-    }
-
-    /// Reports whether it happens to a job, not to an instance.
-    #[must_use]
-    pub fn is_of_job(self) -> bool {
-        use Word::{Aborted, Completed, Missed, Queued, Released, Skipped};
-        let is_signal = matches!(self, Word::Signalled | Word::Dropped);
-        is_signal
-            || matches!(
-                self,
-                Released | Queued | Skipped | Aborted | Missed | Completed
-            )
-    }
-
-    /// Reports whether it really happened on a core, beside the scheduler's
-    /// books.
-    #[must_use]
-    pub fn is_of_machine(self) -> bool {
-        use Word::{Ended, Finish, Resume, Start, Suspend};
-        matches!(self, Start | Suspend | Resume | Finish | Ended)
-    }
-}
-
-impl Event {
-    /// Returns the instance, if the event is of one.
-    #[must_use]
-    pub fn instance(&self) -> Option<Instance> {
-        let Self { dag, job, .. } = *self;
-        self.subtask.map(|subtask| Instance { dag, job, subtask })
-    }
 }
 
 impl Run {

@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 use sched_dag::{CoreId, DagId, Policy, Preemption, SubtaskId};
 
 use super::bound;
-use super::model::{Dag, Event, Releases, Run, Subtask, Word};
+use super::model::{Dag, Event, Releases, Run, Subtask, What};
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
 use crate::qemu::MOST_CORES;
@@ -102,7 +102,6 @@ fn begin(line: &Line<'_>, is_counted: bool) -> Result<Run, Malformed> {
         dags: Vec::new(),
         events: Vec::new(),
         lost: 0,
-        lost_by_core: None,
         complete: false,
     })
 }
@@ -187,6 +186,9 @@ fn releases(line: &Line<'_>) -> Result<Option<Releases>, Malformed> {
         return Ok(None);
     }
     let mut times_ns = BTreeMap::new();
+    if line.0.value.get("releases").is_none() {
+        return Ok(Some(Releases::default()));
+    }
     for release in line.elements("releases")? {
         let pair: Option<Vec<u64>> = release.elements().iter().map(Value::as_u64).collect();
         let Some(&[job, time_ns]) = pair.as_deref() else {
@@ -202,11 +204,19 @@ fn releases(line: &Line<'_>) -> Result<Option<Releases>, Malformed> {
     }))
 }
 
-/// Where the trace does not state a sporadic DAG's releases, takes for them when
-/// the scheduler first dealt with each job.
-fn estimate_releases(run: &mut Run) {
+/// Takes the releases of sporadic DAGs from the events. Where they do not state one,
+/// it is taken to be when the scheduler first dealt with the job.
+fn find_releases(run: &mut Run) {
     for event in &run.events {
-        let is_due = matches!(event.word, Word::Released | Word::Queued | Word::Skipped);
+        if event.what == What::Due
+            && let Some(releases) = &mut run.dags[event.dag.index()].sporadic
+        {
+            releases.times_ns.insert(event.job, event.time_ns);
+            releases.are_exact = true;
+        }
+    }
+    for event in &run.events {
+        let is_due = matches!(event.what, What::Released | What::Queued | What::Skipped);
         if let Some(releases) = &mut run.dags[event.dag.index()].sporadic
             && is_due
             && !releases.are_exact
@@ -255,12 +265,14 @@ fn event(run: &Run, value: &Value) -> Result<Event, String> {
         number.ok_or_else(|| format!("its {what} is not a number less than {below}"))
     };
     let text = word.as_text().unwrap_or_default();
-    let word = Word::from_text(text).ok_or_else(|| format!("{} is no event", quoted(text)))?;
+    let what: What = text
+        .parse()
+        .map_err(|_| format!("{} is no event", quoted(text)))?;
     let core = number("core", core, u64::from(run.cores))?;
     let dag = number("dag", dag, run.dags.len() as u64)?;
     let dag = DagId(u32::try_from(dag).map_err(|error| error.to_string())?);
     let subtasks = run.dags[dag.index()].subtasks.len() as u64;
-    let subtask = match word.is_of_job() {
+    let subtask = match what.is_of_job() {
         true if *subtask == Value::Integer(-1) => None,
         true => return Err(format!("`{text}` is of a job, and its subtask not -1")),
         false => Some(number("subtask", subtask, subtasks)?),
@@ -268,7 +280,7 @@ fn event(run: &Run, value: &Value) -> Result<Event, String> {
     let small = |number: u64| u32::try_from(number).map_err(|error| error.to_string());
     Ok(Event {
         time_ns: number("time", time_ns, u64::MAX)?,
-        word,
+        what,
         core: CoreId(small(core)?),
         dag,
         job: number("job", job, u64::MAX)?,
@@ -283,31 +295,29 @@ fn end(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
     }
     run.lost = line.number("lost")?;
     run.complete = line.flag("complete")?;
-    if line.0.value.get("lost_by_core").is_some() {
-        let counts = line.elements("lost_by_core")?.iter().map(Value::as_u64);
-        let counts: Option<Vec<u64>> = counts.collect();
-        let counts = counts.filter(|counts| counts.len() == run.cores as usize);
-        let reason = "`lost_by_core` is not a list of a count for each core";
-        let counts = counts.ok_or_else(|| line.malformed(reason))?;
-        let sum = counts.iter().copied().fold(0, u64::saturating_add);
-        if sum != run.lost {
-            let lost = run.lost;
-            let reason = format!("`lost` is {lost}, and `lost_by_core` has {sum} in all");
-            return Err(line.malformed(reason));
+    find_releases(run);
+    in_order(run).map_err(|core| {
+        line.malformed(format!(
+            "time goes back in the events of core {}; each core's must be in the order of time",
+            core.0
+        ))
+    })
+}
+
+/// Reports whether each core's own events are in the order of time, or else whose are
+/// not.
+fn in_order(run: &Run) -> Result<(), CoreId> {
+    let mut latest_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
+    for event in &run.events {
+        // These two state another core, and another time, than those of their making.
+        if matches!(event.what, What::Request | What::Due) {
+            continue;
         }
-        run.lost_by_core = Some(counts);
-    }
-    estimate_releases(run);
-    // Each core's events are in the order of time.
-    let pairs = run.events.windows(2);
-    let back = pairs.filter(|pair| pair[1].time_ns < pair[0].time_ns);
-    let back = back.count();
-    if back >= run.cores as usize {
-        return Err(line.malformed(format!(
-            "time goes back {back} times in the events of {} cores; each core's must be in the \
-             order of time",
-            run.cores
-        )));
+        let latest_ns = latest_ns.entry(event.core).or_insert(0);
+        if event.time_ns < *latest_ns {
+            return Err(event.core);
+        }
+        *latest_ns = event.time_ns;
     }
     Ok(())
 }

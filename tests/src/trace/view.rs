@@ -1,19 +1,13 @@
 //! A run's events put in order, and sorted by whom they happened to.
 //!
-//! Words. A *ring* is what one core recorded; the log has them one after the
-//! other. A *step* of the scheduler is known by the core that made it and by
+//! Words. A *step* of the scheduler is known by the core that made it and by
 //! that core's last machine event before it: between two machine events of a
 //! core, a completion's step cannot begin. A *moment* is when and in which step
 //! something happened.
 //!
-//! If events were lost, they were the oldest of their rings. A trace is
-//! *complete from* the first instant after which no ring has a gap; what
-//! happened before is left out here, and then nothing can be concluded from an
-//! event that is not there.
-//!
-//! Events of one instant are in the order of their ring, but nothing says how
-//! those of different rings follow each other; [`history`]
-//! deals with that.
+//! If events were lost, they were the oldest. A trace is *complete from* the first
+//! instant after the first event that is left; what happened before is left out here,
+//! and then nothing can be concluded from an event that is not there.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,7 +16,7 @@ use sched_dag::{CoreId, DagId, Instance};
 use super::breach::Breach;
 use super::history::{self, History};
 use super::jobs::JobHistory;
-use super::model::{Event, Run, Word};
+use super::model::{Event, Run, What};
 
 /// When and in which step of the scheduler something happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,12 +97,15 @@ impl<'r> View<'r> {
     fn sort_by_job(&mut self, breaches: &mut Vec<Breach>) {
         for &(event, moment) in &self.events {
             let (dag, job) = (event.dag, event.job);
-            let is_signal = matches!(event.word, Word::Signalled | Word::Dropped);
-            if event.word.is_of_job() && !is_signal {
+            let is_signal = matches!(
+                event.what,
+                What::Signalled | What::Dropped | What::Due | What::Stopped
+            );
+            if event.what.is_of_job() && !is_signal {
                 let history = self.jobs.entry((dag, job)).or_default();
                 breaches.extend(history.note(self.run, &event, moment));
             }
-            let runs = event.word == Word::Released || event.subtask.is_some();
+            let runs = event.what == What::Released || event.subtask.is_some();
             if runs {
                 self.released.entry(dag).or_default().insert(job);
             }
@@ -120,7 +117,7 @@ impl<'r> View<'r> {
         for &(event, moment) in &self.events {
             // A request is a wish; nothing has happened to the instance.
             if let Some(instance) = event.instance()
-                && event.word != Word::Request
+                && event.what != What::Request
             {
                 lives.entry(instance).or_default().push((event, moment));
             }
@@ -135,10 +132,10 @@ impl<'r> View<'r> {
         let mut stopped = BTreeMap::new();
         for (event, _) in &self.events {
             let is_aborted = |job: &JobHistory| job.is_aborted();
-            let is_stop = match event.word {
-                Word::Ended => true,
+            let is_stop = match event.what {
+                What::Ended | What::Stopped => true,
                 // Only an abort and an end cancel, so this was an end.
-                Word::Cancelled => {
+                What::Cancelled => {
                     let job = self.jobs.get(&(event.dag, event.job));
                     !job.is_some_and(is_aborted)
                 }
@@ -152,34 +149,23 @@ impl<'r> View<'r> {
     }
 }
 
-/// Finds the first instant after which no ring has a gap.
+/// Finds the first instant after which no event is missing.
 fn complete_from_ns(run: &Run) -> u64 {
     if run.lost == 0 {
         return 0;
     }
-    let mut firsts: BTreeMap<CoreId, u64> = BTreeMap::new();
-    for event in &run.events {
-        // A request names another core than the one that recorded it.
-        if event.word != Word::Request {
-            firsts.entry(event.core).or_insert(event.time_ns);
-        }
-    }
-    let lost = run.lost_by_core.as_deref();
-    let has_lost = |core: &CoreId| lost.is_none_or(|lost| lost[core.index()] > 0);
-    let latest = firsts
-        .iter()
-        .filter(|(core, _)| has_lost(core))
-        .map(|(_, first_ns)| *first_ns)
-        .max();
+    // What is lost came before it, and the time of these was read as they were written.
+    let mut events = run.events.iter();
+    let first = events.find(|event| !matches!(event.what, What::Finish | What::Due));
     // At that very instant something may be missing.
-    latest.map_or(0, |latest_ns| latest_ns.saturating_add(1))
+    first.map_or(u64::MAX, |first| first.time_ns.saturating_add(1))
 }
 
 fn with_moments(run: &Run) -> Vec<(Event, Moment)> {
     let mut steps: BTreeMap<CoreId, u64> = BTreeMap::new();
     let moment = |event: &Event| {
         let step = steps.entry(event.core).or_insert(0);
-        *step += u64::from(event.word.is_of_machine());
+        *step += u64::from(event.what.is_of_machine());
         let moment = Moment {
             time_ns: event.time_ns,
             core: event.core,

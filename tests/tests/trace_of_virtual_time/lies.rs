@@ -3,7 +3,7 @@
 //! A lie says whether it could be told of the run at hand. What would not break
 //! a rule, such as moving an event within an instant, is never told.
 
-use harness::trace::model::{Event, Run, Word};
+use harness::trace::model::{Event, Run, What};
 
 use crate::random::Random;
 
@@ -13,29 +13,29 @@ pub(crate) type Lie = fn(&mut Run, &mut Random) -> bool;
 /// All lies by name.
 pub(crate) const LIES: [(&str, Lie); 16] = [
     ("a start is missing", |run, random| {
-        drop_one(run, random, Word::Start)
+        drop_one(run, random, What::Start)
     }),
     ("a finish is missing", |run, random| {
-        drop_one(run, random, Word::Finish)
+        drop_one(run, random, What::Finish)
     }),
     ("a suspension is missing", |run, random| {
-        drop_one(run, random, Word::Suspend)
+        drop_one(run, random, What::Suspend)
     }),
     ("a resumption is missing", |run, random| {
-        drop_one(run, random, Word::Resume)
+        drop_one(run, random, What::Resume)
     }),
     ("a readiness is missing", missing_readiness),
     ("a release is missing", |run, random| {
-        drop_one(run, random, Word::Released)
+        drop_one(run, random, What::Released)
     }),
     ("a completion is missing", |run, random| {
-        drop_one(run, random, Word::Completed)
+        drop_one(run, random, What::Completed)
     }),
     ("a start happens twice", |run, random| {
-        double(run, random, Word::Start)
+        double(run, random, What::Start)
     }),
     ("a finish happens twice", |run, random| {
-        double(run, random, Word::Finish)
+        double(run, random, What::Finish)
     }),
     ("a miss is made up", made_up_miss),
     ("a miss is not noticed", missing_miss),
@@ -60,33 +60,33 @@ fn pick(run: &Run, random: &mut Random, is_it: impl Fn(&Event) -> bool) -> Optio
     (!positions.is_empty()).then(|| positions[random.below(positions.len())])
 }
 
-fn find(run: &Run, like: &Event, word: Word) -> Option<usize> {
+fn find(run: &Run, like: &Event, what: What) -> Option<usize> {
     let is_it = |event: &Event| {
-        event.word == word
+        event.what == what
             && (event.dag, event.job, event.subtask) == (like.dag, like.job, like.subtask)
     };
     run.events.iter().position(is_it)
 }
 
-fn drop_one(run: &mut Run, random: &mut Random, word: Word) -> bool {
-    let position = pick(run, random, |event| event.word == word);
+fn drop_one(run: &mut Run, random: &mut Random, what: What) -> bool {
+    let position = pick(run, random, |event| event.what == what);
     position
         .map(|position| run.events.remove(position))
         .is_some()
 }
 
 fn missing_readiness(run: &mut Run, random: &mut Random) -> bool {
-    let starts = |event: &Event| find(run, event, Word::Start).is_some();
+    let starts = |event: &Event| find(run, event, What::Start).is_some();
     let position = pick(run, random, |event| {
-        event.word == Word::Ready && starts(event)
+        event.what == What::Ready && starts(event)
     });
     position
         .map(|position| run.events.remove(position))
         .is_some()
 }
 
-fn double(run: &mut Run, random: &mut Random, word: Word) -> bool {
-    let position = pick(run, random, |event| event.word == word);
+fn double(run: &mut Run, random: &mut Random, what: What) -> bool {
+    let position = pick(run, random, |event| event.what == what);
     let Some(position) = position else {
         return false;
     };
@@ -96,18 +96,18 @@ fn double(run: &mut Run, random: &mut Random, word: Word) -> bool {
 }
 
 fn made_up_miss(run: &mut Run, random: &mut Random) -> bool {
-    let position = pick(run, random, |event| event.word == Word::Completed);
+    let position = pick(run, random, |event| event.what == What::Completed);
     let Some(completed) = position.map(|position| run.events[position]) else {
         return false;
     };
     let of_job = |event: &Event| (event.dag, event.job) == (completed.dag, completed.job);
     let is_other =
-        |event: &Event| of_job(event) && matches!(event.word, Word::Missed | Word::Aborted);
+        |event: &Event| of_job(event) && matches!(event.what, What::Missed | What::Aborted);
     if run.events.iter().any(is_other) {
         return false;
     }
     run.events.push(Event {
-        word: Word::Missed,
+        what: What::Missed,
         ..completed
     });
     true
@@ -117,12 +117,12 @@ fn missing_miss(run: &mut Run, random: &mut Random) -> bool {
     let completes = |event: &Event| {
         let is_cut = |other: &Event| {
             (other.dag, other.job) == (event.dag, event.job)
-                && matches!(other.word, Word::Skipped | Word::Aborted)
+                && matches!(other.what, What::Skipped | What::Aborted)
         };
         !run.events.iter().any(is_cut)
     };
     let position = pick(run, random, |event| {
-        event.word == Word::Missed && completes(event)
+        event.what == What::Missed && completes(event)
     });
     position
         .map(|position| run.events.remove(position))
@@ -131,7 +131,7 @@ fn missing_miss(run: &mut Run, random: &mut Random) -> bool {
 
 fn early_release(run: &mut Run, random: &mut Random) -> bool {
     let is_late_enough =
-        |event: &Event| event.word == Word::Released && run.release_ns(event.dag, event.job) > 0;
+        |event: &Event| event.what == What::Released && run.release_ns(event.dag, event.job) > 0;
     let Some(position) = pick(run, random, is_late_enough) else {
         return false;
     };
@@ -150,14 +150,14 @@ fn join_ns(run: &Run, event: &Event) -> Option<u64> {
             subtask: Some(predecessor),
             ..*event
         };
-        Some(run.events[find(run, &like, Word::Finish)?].time_ns)
+        Some(run.events[find(run, &like, What::Finish)?].time_ns)
     });
     finishes.max().flatten()
 }
 
 fn start_before_join(run: &mut Run, random: &mut Random) -> bool {
     let waits = |event: &Event| {
-        event.word == Word::Start && join_ns(run, event).is_some_and(|join_ns| join_ns > 0)
+        event.what == What::Start && join_ns(run, event).is_some_and(|join_ns| join_ns > 0)
     };
     let Some(position) = pick(run, random, waits) else {
         return false;
@@ -169,12 +169,12 @@ fn start_before_join(run: &mut Run, random: &mut Random) -> bool {
 
 fn late_start(run: &mut Run, random: &mut Random) -> bool {
     let lasts = |event: &Event| {
-        let next = [Word::Suspend, Word::Finish].map(|word| find(run, event, word));
+        let next = [What::Suspend, What::Finish].map(|what| find(run, event, what));
         let mut next = next
             .into_iter()
             .flatten()
             .map(|next| run.events[next].time_ns);
-        event.word == Word::Start && next.all(|next_ns| next_ns > event.time_ns + 1)
+        event.what == What::Start && next.all(|next_ns| next_ns > event.time_ns + 1)
     };
     let Some(position) = pick(run, random, lasts) else {
         return false;
@@ -185,14 +185,14 @@ fn late_start(run: &mut Run, random: &mut Random) -> bool {
 
 fn swapped(run: &mut Run, random: &mut Random) -> bool {
     let lasts = |event: &Event| {
-        let finish = find(run, event, Word::Finish);
+        let finish = find(run, event, What::Finish);
         let finish_ns = finish.map(|finish| run.events[finish].time_ns);
-        event.word == Word::Start && finish_ns.is_some_and(|finish_ns| finish_ns > event.time_ns)
+        event.what == What::Start && finish_ns.is_some_and(|finish_ns| finish_ns > event.time_ns)
     };
     let Some(start) = pick(run, random, lasts) else {
         return false;
     };
-    let finish = find(run, &run.events[start], Word::Finish).expect("it lasts");
+    let finish = find(run, &run.events[start], What::Finish).expect("it lasts");
     let start_ns = run.events[start].time_ns;
     run.events[start].time_ns = run.events[finish].time_ns;
     run.events[finish].time_ns = start_ns;
@@ -200,7 +200,7 @@ fn swapped(run: &mut Run, random: &mut Random) -> bool {
 }
 
 fn finish_elsewhere(run: &mut Run, random: &mut Random) -> bool {
-    let position = pick(run, random, |event| event.word == Word::Finish);
+    let position = pick(run, random, |event| event.what == What::Finish);
     let Some(position) = position.filter(|_| run.cores > 1) else {
         return false;
     };

@@ -1,12 +1,12 @@
-//! A set in the real scheduler and virtual time, with a ring for each core.
+//! A set in the real scheduler and virtual time, and the trace that a kernel leaves.
 //!
 //! What a kernel does is imitated: a completion's step is made by the core that
-//! has finished, any other by core 0, and each core's events go to its own ring.
+//! has finished, any other by core 0.
 
 use std::fmt::Write;
 use std::sync::Arc;
 
-use harness::trace::model::Word;
+use sched_dag::journal::{Event, Recorder as Journal, What};
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Observer,
@@ -16,17 +16,12 @@ use sched_dag::{
 use crate::random::Random;
 use crate::set::Set;
 
-/// A run's trace, ring by ring.
+/// A run's trace.
 #[derive(Clone)]
 pub(crate) struct Recorder {
     set: Set,
-    rings: Vec<Vec<String>>,
-    lost: Vec<usize>,
-    now_ns: u64,
-    /// The core that makes the scheduler's step.
-    stepping: CoreId,
-    /// What has just been taken from a core: the next start there was requested.
-    preempted: Option<CoreId>,
+    events: Vec<Event>,
+    lost: usize,
 }
 
 impl Recorder {
@@ -35,27 +30,26 @@ impl Recorder {
         let options = CommitOptions::new(set.options.policy, set.options.cores)
             .with_construction(ConstructionPolicy::any_graph());
         let verified = verify(&set.specs(), &options).expect("sets are right");
-        let cores = set.options.cores as usize;
-        let mut recorder = Recorder {
-            set: set.clone(),
-            rings: vec![Vec::new(); cores],
-            lost: vec![0; cores],
-            now_ns: 0,
-            stepping: CoreId(0),
+        let task_set = Arc::new(verified.task_set);
+        let mut driver = Driver {
+            set,
+            journal: Journal::new(Arc::clone(&task_set)),
             preempted: None,
         };
-        let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), set.options));
-        assert_eq!(run.run(&mut recorder), End::Finished);
-        recorder
+        let mut run = VirtualTime::new(Scheduler::new(task_set, set.options));
+        assert_eq!(run.run(&mut driver), End::Finished);
+        Recorder {
+            set: set.clone(),
+            events: driver.journal.events,
+            lost: 0,
+        }
     }
 
-    /// Loses the oldest events of some cores.
+    /// Loses the oldest events.
     pub(crate) fn lose(&mut self, random: &mut Random) {
-        for (ring, lost) in self.rings.iter_mut().zip(&mut self.lost) {
-            if !ring.is_empty() && random.chance(60) {
-                *lost = random.below(ring.len());
-                ring.drain(..*lost);
-            }
+        if !self.events.is_empty() {
+            self.lost = random.below(self.events.len());
+            self.events.drain(..self.lost);
         }
     }
 
@@ -80,22 +74,16 @@ impl Recorder {
         for number in 0..self.set.dags.len() {
             say(self.dag_line(number));
         }
-        let events: Vec<&String> = self.rings.iter().flatten().collect();
-        for chunk in events.chunks(32) {
-            let chunk: Vec<&str> = chunk.iter().map(|event| event.as_str()).collect();
+        for chunk in self.events.chunks(32) {
+            let chunk: Vec<String> = chunk.iter().map(as_json).collect();
             let chunk = chunk.join(",");
             say(format!("{{\"kind\":\"trace\",\"events\":[{chunk}]}}"));
         }
-        let lost: usize = self.lost.iter().sum();
-        // Half of all logs say of which core they were.
-        let by_core = match lost % 2 {
-            0 => String::new(),
-            _ => format!(",\"lost_by_core\":{:?}", self.lost),
-        };
         say(format!(
-            "{{\"kind\":\"trace_end\",\"events\":{},\"lost\":{lost}{by_core},\"complete\":{}}}",
-            events.len(),
-            lost == 0
+            "{{\"kind\":\"trace_end\",\"events\":{},\"lost\":{},\"complete\":{}}}",
+            self.events.len(),
+            self.lost,
+            self.lost == 0
         ));
         log
     }
@@ -129,72 +117,79 @@ impl Recorder {
             edges.join(",")
         )
     }
+}
 
-    fn of_job(&mut self, word: Word, dag: DagId, job: u64) {
-        let core = self.stepping;
-        let (now_ns, word) = (self.now_ns, word.text());
-        self.rings[core.index()].push(format!(
-            "[{now_ns},\"{word}\",{},{},{job},-1]",
-            core.0, dag.0
-        ));
-    }
+fn as_json(event: &Event) -> String {
+    let Event {
+        time_ns,
+        what,
+        core,
+        dag,
+        job,
+        subtask,
+    } = event;
+    let subtask = subtask.map_or(-1, |subtask| i64::from(subtask.0));
+    format!(
+        "[{time_ns},\"{what}\",{},{},{job},{subtask}]",
+        core.0, dag.0
+    )
+}
 
-    /// Notes an instance's event, about `core`, in the ring of `ring`.
-    fn of_instance(&mut self, word: Word, instance: Instance, core: CoreId, ring: CoreId) {
-        let Instance { dag, job, subtask } = instance;
-        let (now_ns, word) = (self.now_ns, word.text());
-        self.rings[ring.index()].push(format!(
-            "[{now_ns},\"{word}\",{},{},{job},{}]",
-            core.0, dag.0, subtask.0
-        ));
-    }
+/// The run as the driver shows it.
+struct Driver<'s> {
+    set: &'s Set,
+    journal: Journal,
+    /// What has just been taken from a core: the next start there was requested.
+    preempted: Option<CoreId>,
+}
 
-    fn runs(&mut self, word: Word, instance: Instance, core: CoreId) {
+impl Driver<'_> {
+    fn runs(&mut self, what: What, instance: Instance, core: CoreId) {
         if self.preempted.take() == Some(core) {
-            self.of_instance(Word::Request, instance, core, self.stepping);
+            self.journal.on_core(What::Request, instance, core);
         }
-        self.of_instance(word, instance, core, core);
+        self.journal.on_core(what, instance, core);
     }
 }
 
-impl Observer for Recorder {
-    fn released(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.of_job(Word::Released, dag, job);
+impl Observer for Driver<'_> {
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.journal.released(dag, job, release_ns);
     }
 
-    fn queued(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.of_job(Word::Queued, dag, job);
+    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.journal.queued(dag, job, release_ns);
     }
 
-    fn skipped(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.of_job(Word::Skipped, dag, job);
+    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.journal.skipped(dag, job, release_ns);
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {
-        self.of_job(Word::Aborted, dag, job);
+        self.journal.aborted(dag, job);
     }
 
-    fn deadline_missed(&mut self, dag: DagId, job: u64, _deadline_ns: u64) {
-        self.of_job(Word::Missed, dag, job);
+    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        self.journal.deadline_missed(dag, job, deadline_ns);
     }
 
-    fn job_completed(&mut self, dag: DagId, job: u64, _outcome: JobOutcome) {
-        self.of_job(Word::Completed, dag, job);
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
+        self.journal.job_completed(dag, job, outcome);
     }
 
     fn ready(&mut self, instance: Instance) {
-        self.of_instance(Word::Ready, instance, self.stepping, self.stepping);
+        self.journal.ready(instance);
     }
 
     fn cancelled(&mut self, instance: Instance) {
-        self.of_instance(Word::Cancelled, instance, self.stepping, self.stepping);
+        self.journal.cancelled(instance);
     }
 }
 
-impl Workload for Recorder {
+impl Workload for Driver<'_> {
     fn instant(&mut self, now_ns: u64) {
-        self.now_ns = now_ns;
-        self.stepping = CoreId(0);
+        self.journal.now_ns = now_ns;
+        self.journal.here = CoreId(0);
     }
 
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
@@ -204,20 +199,20 @@ impl Workload for Recorder {
     }
 
     fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.runs(Word::Start, instance, core);
+        self.runs(What::Start, instance, core);
     }
 
     fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.runs(Word::Resume, instance, core);
+        self.runs(What::Resume, instance, core);
     }
 
     fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.of_instance(Word::Suspend, instance, core, core);
+        self.journal.on_core(What::Suspend, instance, core);
         self.preempted = Some(core);
     }
 
     fn finished(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.stepping = core;
-        self.of_instance(Word::Finish, instance, core, core);
+        self.journal.here = core;
+        self.journal.on_core(What::Finish, instance, core);
     }
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use sched_dag::DagId;
 
 use super::figure::Figure;
-use crate::trace::model::{Event, Run, Word};
+use crate::trace::model::{Event, Run, What};
 use crate::trace::read;
 
 /// The preemptor's DAG in the runs that have one.
@@ -45,9 +45,9 @@ fn wakeups(runs: &[Run], cores: u64) -> Vec<Figure> {
             |is_it: &dyn Fn(&&Event) -> bool| run.events.iter().filter(is_it).count() as u64;
         let (ready, jobs) = counts.entry(sink - 1).or_default();
         *ready += count(&|event| {
-            event.word == Word::Ready && event.subtask.is_some_and(|of| of.index() == sink)
+            event.what == What::Ready && event.subtask.is_some_and(|of| of.index() == sink)
         });
-        *jobs += count(&|event| event.word == Word::Released);
+        *jobs += count(&|event| event.what == What::Released);
     }
     let counts = counts.into_iter().filter(|(_, (_, jobs))| *jobs > 0);
     counts
@@ -76,7 +76,7 @@ fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
     events.sort_by_key(|event| event.time_ns);
     let requests = events.iter().enumerate();
     let requests = requests.filter(|(_, event)| {
-        event.word == Word::Request
+        event.what == What::Request
             && event.dag == PREEMPTOR
             && (cores == 1 || event.core.index() > 0)
     });
@@ -85,17 +85,17 @@ fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
         let mut later = events[place..].iter();
         let mut next = |word, of_preemptor: bool| {
             let event = later.find(|event| {
-                event.word == word
+                event.what == word
                     && event.core == request.core
                     && (event.dag == PREEMPTOR) == of_preemptor
             })?;
             Some(event.time_ns)
         };
         let times = [
-            next(Word::Suspend, false),
-            next(Word::Start, true),
-            next(Word::Finish, true),
-            next(Word::Resume, false),
+            next(What::Suspend, false),
+            next(What::Start, true),
+            next(What::Finish, true),
+            next(What::Resume, false),
         ];
         let [Some(suspended), Some(start), Some(finish), Some(resumed)] = times else {
             continue;
@@ -137,7 +137,7 @@ mod tests {
 {{"kind":"trace_dag","dag":0,"name":"{name}","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,null],["b",1,0,null],["c",2,0,null]],"edges":[[0,1],[1,2]]}}
 {{"kind":"trace_dag","dag":1,"name":"low","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",9,0,null]],"edges":[]}}
 {{"kind":"trace","events":[{events}]}}
-{{"kind":"trace_end","events":{},"lost":0,"lost_by_core":[0],"complete":true}}
+{{"kind":"trace_end","events":{},"lost":0,"complete":true}}
 "#,
             events.matches("[").count()
         )

@@ -10,7 +10,7 @@ mod malformed;
 mod rules;
 mod sporadic;
 
-use super::model::{Event, Run, Word};
+use super::model::{Event, Run};
 use super::{Findings, check, read};
 use sched_dag::{CoreId, DagId, SubtaskId};
 
@@ -23,9 +23,6 @@ pub(super) fn run_of(header: &str, events: &str) -> Run {
     let mut run = read(&log).unwrap().remove(0);
     let lines = events.lines().map(str::trim);
     run.events = lines.filter(|line| !line.is_empty()).map(event).collect();
-    // A log has each core's events in turn. A request goes with the core that it
-    // names here; none of these traces cares.
-    run.events.sort_by_key(|event| event.core);
     run
 }
 
@@ -40,7 +37,7 @@ fn event(line: &str) -> Event {
     let small = |number: u64| u32::try_from(number).unwrap();
     Event {
         time_ns: time.parse().unwrap(),
-        word: Word::from_text(word).unwrap(),
+        what: word.parse().unwrap(),
         core: CoreId(core.strip_prefix('c').unwrap().parse().unwrap()),
         dag: DagId(small(of[0])),
         job: of[1],

@@ -3,7 +3,7 @@
 use sched_dag::{CoreId, Instance};
 
 use super::super::history::Slice;
-use super::super::model::Word;
+use super::super::model::What;
 use super::super::view::View;
 use super::flows::Flows;
 use super::output::{Output, Track};
@@ -92,10 +92,10 @@ fn draw_piece(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) 
 /// Draws what was asked of a core and what it did.
 fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
     for (event, _) in &view.events {
-        let what = match event.word {
-            Word::Request => "preempt for",
-            Word::Suspend => "preempted",
-            Word::Ended => "fault in",
+        let what = match event.what {
+            What::Request => "preempt for",
+            What::Suspend => "preempted",
+            What::Ended => "fault in",
             _ => continue,
         };
         if let Some(instance) = event.instance()

@@ -7,7 +7,7 @@
 use sched_dag::{DagId, Instance, SubtaskId};
 
 use super::super::jobs::JobHistory;
-use super::super::model::Word;
+use super::super::model::What;
 use super::super::view::View;
 use super::flows::Flows;
 use super::output::{Group, Output, Track};
@@ -41,14 +41,14 @@ fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) 
     let mut track = output.track(group, "releases, deadlines");
     let args = |job: u64| Object::new().number("job", job).end();
     for (event, _) in view.events.iter().filter(|(event, _)| event.dag == dag) {
-        let what = match event.word {
-            Word::Released => "release",
-            Word::Queued => "release waits",
-            Word::Skipped => "skip",
-            Word::Aborted => "abort",
-            Word::Missed => "MISS",
-            Word::Signalled => "signal for",
-            Word::Dropped => "signal dropped,",
+        let what = match event.what {
+            What::Released => "release",
+            What::Queued => "release waits",
+            What::Skipped => "skip",
+            What::Aborted => "abort",
+            What::Missed => "MISS",
+            What::Signalled => "signal for",
+            What::Dropped => "signal dropped,",
             _ => continue,
         };
         let name = format!("{what} #{}", event.job);

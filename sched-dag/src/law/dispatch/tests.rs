@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::ids::{DagId, SubtaskId};
-use crate::record::InstanceRecord;
+use crate::law::InstanceRecord;
 use crate::{CommitOptions, DagSpec, Priority, SubtaskSpec, verify};
 
 /// DAGs of one subtask each, DAG 0 the most urgent; the last one's subtask
@@ -39,7 +39,7 @@ fn check(
     ready_ns: &[u64],
     ran: &[(u32, u32, u64, u64)],
 ) -> Vec<Violation> {
-    let mut record = Record::new(task_set).unwrap();
+    let mut record = Record::with_jobs(task_set, crate::law::Precision::Exact, |_| 0..1).unwrap();
     for (dag, &ready_ns) in (0..).zip(ready_ns) {
         let own = || ran.iter().filter(|stretch| stretch.0 == dag);
         *record.instance_mut(of(dag)).unwrap() = InstanceRecord {

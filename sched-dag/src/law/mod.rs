@@ -1,25 +1,37 @@
-//! What happened in a run: the times of every job and instance.
+//! The law: what follows from a run's journal.
 //!
-//! A driver fills a [`Record`] while it runs a task set whose DAGs have a limit
-//! of jobs; all its memory is taken before. Or it makes one afterwards from what
-//! it has written down. Then [`violations`] holds the record against the model's
-//! rules R1 to R4, [`dispatch_violations`] holds it together with the
-//! [`Stretch`]es in which cores ran against R5, and reports compute their
-//! figures from it. Times are in nanoseconds on the scheduler's clock.
+//! All of it is computed from the [events](crate::journal) that a driver has written
+//! down:
 //!
-//! These two are the only checks of the rules after a run, in virtual time and
+//! - [`Record::of_events`]: the times of every job and instance, of the latest whole
+//!   jobs if the oldest events are lost;
+//! - [`violations`]: every breach of the model's rules R1 to R4 in a record;
+//! - [`dispatch_violations`]: every breach of R5, by the [`stretches`] in which cores
+//!   ran;
+//! - [`Tally`]: statistics of a run of any length, in a fixed amount of memory.
+//!
+//! Times are in nanoseconds from the run's epoch.
+//!
+//! These are the only checks of the rules after a run, in virtual time, on threads and
 //! in the kernel. They are written from the rules alone and share no code with
 //! the scheduler, so that an error there cannot hide here.
 
 mod check;
 mod dispatch;
+mod facts;
+mod histogram;
+mod tally;
 mod violation;
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 pub use check::violations;
 pub use dispatch::{Stretch, dispatch_violations};
+pub use facts::stretches;
+pub use histogram::Histogram;
+pub use tally::{OfDag, OfSubtask, Tally};
 pub use violation::{Rule, Violation};
 
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
@@ -85,25 +97,16 @@ pub struct Record {
 #[derive(Clone, Debug)]
 struct DagRecord {
     subtasks: usize,
+    /// The number of the first job that is recorded.
+    first_job: u64,
     jobs: Vec<JobRecord>,
     /// Job by job, within a job by subtask.
     instances: Vec<InstanceRecord>,
 }
 
 impl Record {
-    /// Makes an empty record of measured times for all jobs of `task_set`. A DAG
-    /// without a limit of jobs gets no room: nothing is recorded of it.
-    ///
-    /// Returns `None` if the jobs are too many for this machine's memory to
-    /// address.
-    #[must_use]
-    pub fn new(task_set: &TaskSet) -> Option<Self> {
-        let jobs = |dag| task_set.dag(dag).jobs().unwrap_or(0);
-        Self::with_jobs(task_set, Precision::Measured, jobs)
-    }
-
-    /// Makes an empty record with room for the first `jobs(dag)` jobs of each
-    /// DAG, for runs that end before the DAGs do.
+    /// Makes an empty record with room for the jobs of each DAG whose numbers are in
+    /// `jobs(dag)`.
     ///
     /// Returns `None` if the jobs are too many for this machine's memory to
     /// address.
@@ -111,14 +114,16 @@ impl Record {
     pub fn with_jobs(
         task_set: &TaskSet,
         precision: Precision,
-        jobs: impl Fn(DagId) -> u64,
+        jobs: impl Fn(DagId) -> Range<u64>,
     ) -> Option<Self> {
         let dags = (0..).map(DagId).zip(task_set.dags()).map(|(id, dag)| {
-            let jobs = usize::try_from(jobs(id)).ok()?;
+            let Range { start, end } = jobs(id);
+            let jobs = usize::try_from(end.saturating_sub(start)).ok()?;
             let subtasks = dag.subtasks().len();
             let instances = jobs.checked_mul(subtasks)?;
             Some(DagRecord {
                 subtasks,
+                first_job: start,
                 jobs: vec![JobRecord::default(); jobs],
                 instances: vec![InstanceRecord::default(); instances],
             })
@@ -129,26 +134,14 @@ impl Record {
         })
     }
 
-    /// Returns the bytes that a record for `task_set` needs, `None` if that is
-    /// beyond a `usize`.
-    #[must_use]
-    pub fn size_of(task_set: &TaskSet) -> Option<usize> {
-        task_set.dags().iter().try_fold(0usize, |sum, dag| {
-            let jobs = usize::try_from(dag.jobs().unwrap_or(0)).ok()?;
-            let job = size_of::<InstanceRecord>()
-                .checked_mul(dag.subtasks().len())?
-                .checked_add(size_of::<JobRecord>())?;
-            sum.checked_add(jobs.checked_mul(job)?)
-        })
-    }
-
     /// Returns how exact the times are.
     #[must_use]
     pub const fn precision(&self) -> Precision {
         self.precision
     }
 
-    /// Returns the jobs of a DAG.
+    /// Returns the recorded jobs of a DAG, one number after the other from
+    /// [`first_job`](Self::first_job) on.
     ///
     /// # Panics
     ///
@@ -158,13 +151,31 @@ impl Record {
         &self.dags[dag.index()].jobs
     }
 
+    /// Returns the number of the first recorded job of a DAG; not 0 if the memory did
+    /// not hold all jobs.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn first_job(&self, dag: DagId) -> u64 {
+        self.dags[dag.index()].first_job
+    }
+
+    /// Returns the recorded jobs of a DAG with their numbers.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    pub fn numbered(&self, dag: DagId) -> impl Iterator<Item = (u64, &JobRecord)> + Clone {
+        (self.first_job(dag)..).zip(self.jobs(dag))
+    }
+
     /// Returns one job, `None` if it is not recorded.
     #[must_use]
     pub fn job(&self, dag: DagId, job: u64) -> Option<&JobRecord> {
-        self.dags
-            .get(dag.index())?
-            .jobs
-            .get(usize::try_from(job).ok()?)
+        let dag = self.dags.get(dag.index())?;
+        dag.jobs.get(dag.place(job)?)
     }
 
     /// Returns the instances of a job by subtask; empty if it is not recorded.
@@ -175,8 +186,8 @@ impl Record {
     #[must_use]
     pub fn instances(&self, dag: DagId, job: u64) -> &[InstanceRecord] {
         let dag = &self.dags[dag.index()];
-        let range = usize::try_from(job).ok().and_then(|job| {
-            let start = job.checked_mul(dag.subtasks)?;
+        let range = dag.place(job).and_then(|place| {
+            let start = place.checked_mul(dag.subtasks)?;
             Some(start..start.checked_add(dag.subtasks)?)
         });
         range
@@ -192,23 +203,21 @@ impl Record {
     }
 
     /// Returns an instance's times to be filled in, `None` if it is not recorded.
-    #[inline]
     pub fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
         let dag = self.dags.get_mut(instance.dag.index())?;
-        let job = usize::try_from(instance.job).ok()?;
-        if job >= dag.jobs.len() || instance.subtask.index() >= dag.subtasks {
+        let place = dag.place(instance.job)?;
+        if place >= dag.jobs.len() || instance.subtask.index() >= dag.subtasks {
             return None;
         }
         dag.instances
-            .get_mut(job * dag.subtasks + instance.subtask.index())
+            .get_mut(place * dag.subtasks + instance.subtask.index())
     }
 
     /// Returns a job's times to be filled in, `None` if it is not recorded.
     pub fn job_mut(&mut self, dag: DagId, job: u64) -> Option<&mut JobRecord> {
-        self.dags
-            .get_mut(dag.index())?
-            .jobs
-            .get_mut(usize::try_from(job).ok()?)
+        let dag = self.dags.get_mut(dag.index())?;
+        let place = dag.place(job)?;
+        dag.jobs.get_mut(place)
     }
 
     /// Returns when all predecessors of a subtask had finished their part of
@@ -242,13 +251,19 @@ impl Record {
             .map(DagId)
             .zip(task_set.dags())
             .flat_map(move |(dag, _)| {
-                (0u64..).zip(self.jobs(dag)).flat_map(move |(job, _)| {
+                self.numbered(dag).flat_map(move |(job, _)| {
                     (0..)
                         .map(SubtaskId)
                         .zip(self.instances(dag, job))
                         .map(move |(subtask, record)| (Instance { dag, job, subtask }, record))
                 })
             })
+    }
+}
+
+impl DagRecord {
+    fn place(&self, job: u64) -> Option<usize> {
+        usize::try_from(job.checked_sub(self.first_job)?).ok()
     }
 }
 

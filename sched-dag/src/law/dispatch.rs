@@ -232,7 +232,7 @@ impl Sweep<'_> {
             let of_job = self.record.job(dag, job);
             return of_job.and_then(|job| job.release_ns).unwrap_or(u64::MAX);
         }
-        (job.saturating_mul(model.period_ns())).saturating_add(model.offset_ns())
+        model.grid_ns(job)
     }
 
     /// Static priority: (priority, DAG, job, subtask). EDF: the deadline instead.

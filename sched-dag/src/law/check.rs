@@ -40,7 +40,7 @@ pub fn violations<'a>(
             let mut instances = record.instances(dag, job).iter();
             times.release_ns.is_some() || instances.any(|times| *times != Default::default())
         };
-        let jobs = (0_u64..).zip(record.jobs(dag)).filter(is_told);
+        let jobs = record.numbered(dag).filter(is_told);
         jobs.flat_map(move |(job, times)| {
             let precursor = released;
             if times.release_ns.is_some() {
@@ -136,7 +136,7 @@ impl<'a> Check<'a> {
                 earliest_ns,
             });
         }
-        let grid_ns = (job.saturating_mul(model.period_ns())).saturating_add(model.offset_ns());
+        let grid_ns = model.grid_ns(job);
         (release_ns != grid_ns).then_some(Violation::OffGrid {
             dag,
             job,
@@ -162,6 +162,10 @@ impl<'a> Check<'a> {
             // their order.
             OverrunPolicy::Queue => match job.checked_sub(model.in_flight().into()) {
                 None => Some(release_ns),
+                // That job is not recorded any more.
+                Some(blocking) if blocking < self.record.first_job(dag) => {
+                    Some(released_ns.max(release_ns))
+                }
                 Some(blocking) => {
                     let blocking = self.record.job(dag, blocking);
                     let ended_ns = blocking.and_then(|blocking| blocking.ended_ns);
@@ -248,7 +252,9 @@ impl<'a> Check<'a> {
         for &predecessor in self.task_set.dag(dag).predecessors(subtask) {
             wait_for(self.finish_ns(dag, job, predecessor));
         }
-        let mut is_exact = self.is_exact();
+        // The job before the first one that is recorded is not known.
+        let is_first = precursor.is_none() && self.record.first_job(dag) > 0;
+        let mut is_exact = self.is_exact() && !is_first;
         if let Some(precursor) = precursor {
             let finish_ns = self.finish_ns(dag, precursor, subtask);
             let is_cut = self.is_cut(dag, precursor);
@@ -277,7 +283,7 @@ impl<'a> Check<'a> {
     /// R2: a subtask is sequential over its own jobs, cut ones included.
     fn overlap(self, instance: Instance, times: &InstanceRecord) -> Option<Violation> {
         let start_ns = times.start_ns?;
-        let older = (0..instance.job).rev();
+        let older = (self.record.first_job(instance.dag)..instance.job).rev();
         let mut started = older.filter_map(|job| {
             let older = self.record.instance(Instance { job, ..instance })?;
             older.start_ns.map(|_| older.finish_ns)

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::ids::CoreId;
-use crate::record::Rule;
+use crate::law::Rule;
 use crate::{CommitOptions, DagSpec, Policy, SubtaskSpec, verify};
 
 const DAG: DagId = DagId(0);
@@ -36,7 +36,7 @@ fn at(job: u64, subtask: u32) -> Instance {
 
 /// Three jobs at 0, 10 and 20; `u` runs in [0, 2) and `v` in [2, 5) of each.
 fn good(task_set: &TaskSet, precision: Precision) -> Record {
-    let mut record = Record::with_jobs(task_set, precision, |_| 3).unwrap();
+    let mut record = Record::with_jobs(task_set, precision, |_| 0..3).unwrap();
     for job in 0..3 {
         let release = 10 * job;
         *record.job_mut(DAG, job).unwrap() = JobRecord {
@@ -323,9 +323,9 @@ fn a_queued_release_waits_for_the_job_in_its_way() {
 #[test]
 fn a_dag_without_end_is_checked_as_far_as_it_is_recorded() {
     let task_set = chain_of_two(|spec| spec.jobs = None);
-    let none = Record::new(&task_set).unwrap();
+    let none = Record::with_jobs(&task_set, Precision::Measured, |_| 0..0).unwrap();
     assert_eq!(violations(&task_set, &none).count(), 0);
-    let mut record = Record::with_jobs(&task_set, Precision::Exact, |_| 1).unwrap();
+    let mut record = Record::with_jobs(&task_set, Precision::Exact, |_| 0..1).unwrap();
     let start_ns = Some(3);
     *record.job_mut(DAG, 0).unwrap() = JobRecord {
         release_ns: Some(0),

@@ -1,0 +1,108 @@
+//! The trace as machine lines; `docs/trace-format.md` has the format.
+
+use core::fmt;
+
+use sched_dag::journal::Event;
+use sched_dag::{Dag, SubtaskId};
+
+use crate::platform::KERNEL;
+use crate::run::Run;
+use crate::{execution, graph, json};
+use fass::{Platform, Policy, Preemption};
+
+/// The most events on one line.
+const EVENTS_A_LINE: usize = 32;
+
+/// Prints the model and the events of a run, the `number`th since boot.
+pub(crate) fn dump(run: &Run, number: u64) {
+    json::emit("trace_begin", |line| {
+        let policy = match KERNEL.policy() {
+            Policy::StaticPriority => "static",
+            Policy::Edf => "edf",
+        };
+        let preemption = match KERNEL.preemption() {
+            Preemption::Enabled => "on",
+            Preemption::Disabled => "off",
+        };
+        line.text("policy", policy)
+            .text("preemption", preemption)
+            .number("cores", KERNEL.cores())
+            .number("run", number);
+    });
+    for (number, dag) in (0u32..).zip(run.task_set().dags()) {
+        dump_dag(number, dag);
+    }
+    let journal = run.journal();
+    let mut events = journal.events().peekable();
+    while events.peek().is_some() {
+        let mut batch = [None; EVENTS_A_LINE];
+        for (place, event) in batch.iter_mut().zip(&mut events) {
+            *place = Some(event);
+        }
+        json::emit("trace", |line| {
+            line.list(
+                "events",
+                batch.iter().flatten().map(|event| as_json(*event)),
+            );
+        });
+    }
+    json::emit("trace_end", |line| {
+        line.number("events", journal.events().count() as u64)
+            .number("lost", journal.lost())
+            // A run ends when all its jobs have: nothing is still to come.
+            .flag("complete", true);
+    });
+}
+
+/// Returns the latest `most` events, a line each, the oldest first; none while the
+/// scheduler is at work.
+pub(crate) fn latest<const MOST: usize>() -> impl fmt::Display {
+    fmt::from_fn(move |f| {
+        let mut latest = [None; MOST];
+        execution::try_journal(|journal| journal.copy_back(journal.written(), &mut latest));
+        latest.iter().rev().flatten().try_for_each(|event| {
+            let Event {
+                time_ns,
+                what,
+                core,
+                dag,
+                job,
+                subtask,
+            } = event;
+            let (core, dag) = (core.0, dag.0);
+            write!(
+                f,
+                "  {time_ns:>12} ns  core {core} {what} dag {dag} job {job}"
+            )?;
+            subtask.map_or(Ok(()), |subtask| write!(f, " subtask {}", subtask.0))?;
+            writeln!(f)
+        })
+    })
+}
+
+fn as_json(event: Event) -> impl fmt::Display {
+    fmt::from_fn(move |f| {
+        let Event {
+            time_ns,
+            what,
+            core,
+            dag,
+            job,
+            subtask,
+        } = event;
+        write!(f, "[{time_ns},\"{what}\",{},{},{job},", core.0, dag.0)?;
+        match subtask {
+            Some(SubtaskId(subtask)) => write!(f, "{subtask}]"),
+            None => f.write_str("-1]"),
+        }
+    })
+}
+
+fn dump_dag(number: u32, dag: &Dag) {
+    json::emit("trace_dag", |line| {
+        graph::describe(line, number, dag);
+        if dag.is_sporadic() {
+            line.flag("sporadic", true);
+        }
+    });
+}

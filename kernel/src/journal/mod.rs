@@ -1,0 +1,209 @@
+//! The journal of a run: what happened when, on all cores, in one list.
+//!
+//! Every event but a core's clock is read and written under the scheduler's lock, so
+//! the list is in the order in which the scheduler learnt of things, and needs neither
+//! atomics nor a lock of its own. It is written once a moment and read after the run:
+//! all times, breaches of the rules and statistics are computed from it then, by
+//! [`sched_dag::law`].
+//!
+//! # Memory
+//!
+//! Its memory is taken at commit: as much as the events of all jobs can need (a newly
+//! ready instance preempts at most one other, so an instance has at most six events),
+//! or a third of what is free, if that is less, or no job is the last. When it is
+//! full, the oldest event makes way for each new one. Before it goes, it is counted in
+//! the [`Tally`], so statistics remain those of the whole run.
+//!
+//! Times are nanoseconds since the run's epoch.
+
+mod dump;
+mod load;
+pub(crate) mod times;
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use sched_dag::journal::{Event, Subject, What};
+use sched_dag::law::Tally;
+use sched_dag::{CoreId, Dag, TaskSet};
+
+pub(crate) use dump::{dump, latest};
+pub(crate) use load::loads_permille;
+
+/// The most events that a journal has room for, as the command line says;
+/// `u64::MAX`: as many as make sense.
+static MOST_EVENTS: AtomicU64 = AtomicU64::new(u64::MAX);
+
+/// Where a run has no last job, as many events as make sense: 6 MiB.
+const EVENTS_WITHOUT_END: usize = 1 << 18;
+
+/// The finest resolution of statistics: 32 buckets a doubling.
+const FINEST: u32 = 5;
+
+/// Lets journals from now on have room for at most so many events.
+pub(crate) fn limit(most: u64) {
+    MOST_EVENTS.store(most, Ordering::Relaxed);
+}
+
+/// The events of a run, the latest ones if it is long.
+#[derive(Debug)]
+pub(crate) struct Journal {
+    /// As many as there is room for; none while nothing is recorded.
+    events: Vec<[u64; 3]>,
+    /// The room while nothing is recorded.
+    put_away: Vec<[u64; 3]>,
+    /// Where the oldest event is, once all room is taken.
+    oldest: usize,
+    /// How many events are not there any more, or never were.
+    lost: u64,
+    /// What is known of the lost ones, if there can be any.
+    tally: Option<Tally>,
+    /// Whether each lost event is counted in the tally.
+    is_complete: bool,
+}
+
+impl Journal {
+    /// Takes the memory for a run, of `free_bytes`.
+    pub(crate) fn new(task_set: &Arc<TaskSet>, free_bytes: usize) -> Self {
+        let needed = most_events(task_set);
+        let wished = usize::try_from(MOST_EVENTS.load(Ordering::Relaxed)).unwrap_or(usize::MAX);
+        let affordable = free_bytes / 3 / size_of::<[u64; 3]>();
+        let room = needed.unwrap_or(EVENTS_WITHOUT_END);
+        let room = room.min(wished).min(affordable);
+        // Nothing says how many signals are dropped.
+        let has_signals = task_set.dags().iter().any(Dag::is_sporadic);
+        let is_enough = needed.is_some_and(|needed| needed <= room && !has_signals);
+        let tally = (!is_enough && room > 0).then(|| tally(task_set, free_bytes / 8));
+        Self {
+            events: Vec::with_capacity(room),
+            put_away: Vec::new(),
+            oldest: 0,
+            lost: 0,
+            tally,
+            is_complete: true,
+        }
+    }
+
+    /// Writes down that something has happened.
+    #[inline]
+    pub(crate) fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
+        self.push(Event::words(time_ns, what, core, subject));
+    }
+
+    #[inline]
+    fn push(&mut self, words: [u64; 3]) {
+        if self.events.len() == self.events.capacity() {
+            self.replace_oldest(words);
+        } else {
+            self.events.push(words);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn replace_oldest(&mut self, words: [u64; 3]) {
+        self.lost += 1;
+        let Some(oldest) = self.events.get_mut(self.oldest) else {
+            self.is_complete = false;
+            return;
+        };
+        let words = core::mem::replace(oldest, words);
+        self.oldest += 1;
+        if self.oldest == self.events.len() {
+            self.oldest = 0;
+        }
+        if let (Some(tally), Some(event)) = (&mut self.tally, Event::unpack(words)) {
+            tally.take(&event);
+        }
+    }
+
+    /// Records events from now on, or forgets those so far and records no more.
+    pub(crate) fn record_events(&mut self, on: bool) {
+        if on == self.is_recording() {
+            return;
+        }
+        self.lost += self.events.len() as u64;
+        self.is_complete = false;
+        self.events.clear();
+        self.oldest = 0;
+        core::mem::swap(&mut self.events, &mut self.put_away);
+        if let Some(tally) = &mut self.tally {
+            tally.skip();
+        }
+    }
+
+    pub(crate) fn is_recording(&self) -> bool {
+        self.events.capacity() > 0
+    }
+
+    /// Reports whether there is room for events.
+    pub(crate) fn has_room(&self) -> bool {
+        self.is_recording() || self.put_away.capacity() > 0
+    }
+
+    /// Returns how many events are not there any more, or were not recorded.
+    pub(crate) const fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Returns the events that are left, in their order.
+    pub(crate) fn events(&self) -> impl DoubleEndedIterator<Item = Event> + Clone {
+        let (newer, older) = self.events.split_at(self.oldest);
+        let words = older.iter().chain(newer);
+        words.filter_map(|words| Event::unpack(*words))
+    }
+
+    /// Returns how many events were written, and so the number of the next one.
+    pub(crate) const fn written(&self) -> u64 {
+        self.lost + self.events.len() as u64
+    }
+
+    /// Copies the events before number `end`, from the latest of them back, and returns
+    /// the number of the oldest one copied.
+    pub(crate) fn copy_back(&self, end: u64, buffer: &mut [Option<Event>]) -> u64 {
+        let before = |count: usize| {
+            let number = end.checked_sub(count as u64 + 1)?;
+            let index = usize::try_from(number.checked_sub(self.lost)?).ok()?;
+            let place = self.oldest + index;
+            let place = place.checked_sub(self.events.len()).unwrap_or(place);
+            Event::unpack(*self.events.get(place)?)
+        };
+        let mut number = end;
+        for (count, place) in buffer.iter_mut().enumerate() {
+            *place = before(count);
+            number -= u64::from(place.is_some());
+        }
+        number
+    }
+
+    /// Computes the statistics of the run, which has ended; `None` if events were
+    /// neither kept nor counted.
+    pub(crate) fn statistics(&self, task_set: &Arc<TaskSet>) -> Option<Tally> {
+        let mut tally = match &self.tally {
+            Some(tally) => tally.clone(),
+            None => Tally::new(task_set, FINEST),
+        };
+        self.events().for_each(|event| tally.take(&event));
+        self.is_complete.then_some(tally)
+    }
+}
+
+/// Returns how many events a run can have; `None` if there is no last job.
+fn most_events(task_set: &TaskSet) -> Option<usize> {
+    let of_dag = |dag: &Dag| {
+        // Released, due, queued or skipped, aborted, missed, completed, signalled.
+        let a_job = dag.subtasks().len().checked_mul(6)?.checked_add(7)?;
+        let jobs = usize::try_from(dag.jobs()?).ok()?;
+        jobs.checked_mul(a_job)?.checked_add(1)
+    };
+    let mut dags = task_set.dags().iter();
+    dags.try_fold(0usize, |sum, dag| sum.checked_add(of_dag(dag)?))
+}
+
+/// Makes a tally that takes at most so many bytes, if there is one.
+fn tally(task_set: &Arc<TaskSet>, most_bytes: usize) -> Tally {
+    let mut finest = (0..=FINEST).rev();
+    let bits = finest.find(|&bits| Tally::size_of(task_set, bits) <= most_bytes);
+    Tally::new(task_set, bits.unwrap_or(0))
+}

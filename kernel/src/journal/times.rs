@@ -1,0 +1,55 @@
+//! A run's statistics as machine lines; `docs/serial-protocol.md` has the format.
+
+use sched_dag::law::Histogram;
+use sched_dag::{DagId, Instance, SubtaskId};
+
+use crate::json::{self, Object};
+use crate::run::Run;
+
+/// Prints the statistics of a run: a line for each DAG, and one for each subtask.
+pub(crate) fn dump(run: &Run) {
+    let Some(times) = run.times() else {
+        crate::println!("there are no statistics, for not all events were recorded");
+        return;
+    };
+    for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
+        let of_dag = times.dag(dag);
+        json::emit("times_dag", |line| {
+            line.number("dag", dag.0)
+                .text("name", model.name())
+                .number("first_recorded_job", run.record().first_job(dag))
+                .object("response_time_ns", |object| {
+                    describe(&of_dag.response_time, object);
+                })
+                .object("release_jitter_ns", |object| {
+                    describe(&of_dag.release_jitter, object);
+                });
+        });
+        for (subtask, model) in (0..).map(SubtaskId).zip(model.subtasks()) {
+            let job = 0;
+            let instance = Instance { dag, job, subtask };
+            let of_subtask = times.subtask(run.task_set().vertex(instance));
+            json::emit("times_subtask", |line| {
+                line.number("dag", dag.0)
+                    .number("subtask", subtask.0)
+                    .text("name", model.name())
+                    .object("join_latency_ns", |object| {
+                        describe(&of_subtask.join_latency, object);
+                    })
+                    .object("execution_time_ns", |object| {
+                        describe(&of_subtask.execution_time, object);
+                    });
+            });
+        }
+    }
+}
+
+fn describe(times: &Histogram, object: &mut Object<'_, '_>) {
+    object
+        .number("count", times.count())
+        .number("min", times.min())
+        .number("median", times.per_mille(500))
+        .number("p99", times.per_mille(990))
+        .number("p999", times.per_mille(999))
+        .number("max", times.max());
+}

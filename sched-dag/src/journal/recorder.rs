@@ -1,0 +1,109 @@
+//! The journal of a driver that has room for all events.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use super::{Event, Subject, What};
+use crate::ids::{CoreId, DagId, Instance};
+use crate::scheduler::{JobOutcome, Observer};
+use crate::task_set::TaskSet;
+
+/// Writes down what the scheduler reports, and what the driver says that cores do, at
+/// the time that the driver has set last.
+#[derive(Clone, Debug)]
+pub struct Recorder {
+    task_set: Arc<TaskSet>,
+    /// The present instant on the scheduler's clock.
+    pub now_ns: u64,
+    /// The core that takes the scheduler's step.
+    pub here: CoreId,
+    /// What has happened, in its order.
+    pub events: Vec<Event>,
+    is_closed: bool,
+}
+
+impl Recorder {
+    /// Begins at time 0, on core 0.
+    #[must_use]
+    pub const fn new(task_set: Arc<TaskSet>) -> Self {
+        Self {
+            task_set,
+            now_ns: 0,
+            here: CoreId(0),
+            events: Vec::new(),
+            is_closed: false,
+        }
+    }
+
+    /// Writes down what a core does with an instance.
+    pub fn on_core(&mut self, what: What, instance: Instance, core: CoreId) {
+        self.write(what, self.now_ns, core, Subject::of(instance));
+    }
+
+    /// Writes nothing down any more.
+    pub const fn close(&mut self) {
+        self.is_closed = true;
+    }
+
+    fn of_job(&mut self, what: What, dag: DagId, job: u64) {
+        let subject = Subject::of_job(dag, job);
+        self.write(what, self.now_ns, self.here, subject);
+    }
+
+    fn write(&mut self, what: What, time_ns: u64, core: CoreId, subject: Subject) {
+        if !self.is_closed {
+            let words = Event::words(time_ns, what, core, subject);
+            self.events.extend(Event::unpack(words));
+        }
+    }
+}
+
+impl Observer for Recorder {
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        if self.task_set.dag(dag).is_sporadic() {
+            let subject = Subject::of_job(dag, job);
+            self.write(What::Due, release_ns, self.here, subject);
+        }
+        self.of_job(What::Released, dag, job);
+    }
+
+    fn queued(&mut self, dag: DagId, job: u64, _: u64) {
+        self.of_job(What::Queued, dag, job);
+    }
+
+    fn skipped(&mut self, dag: DagId, job: u64, _: u64) {
+        self.of_job(What::Skipped, dag, job);
+    }
+
+    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
+        let what = match release_ns {
+            Some(_) => What::Signalled,
+            None => What::Dropped,
+        };
+        self.of_job(what, dag, job);
+    }
+
+    fn ready(&mut self, instance: Instance) {
+        self.on_core(What::Ready, instance, self.here);
+    }
+
+    fn cancelled(&mut self, instance: Instance) {
+        self.on_core(What::Cancelled, instance, self.here);
+    }
+
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        self.of_job(What::Aborted, dag, job);
+    }
+
+    fn ended(&mut self, dag: DagId) {
+        self.of_job(What::Stopped, dag, 0);
+    }
+
+    fn deadline_missed(&mut self, dag: DagId, job: u64, _: u64) {
+        self.of_job(What::Missed, dag, job);
+    }
+
+    fn job_completed(&mut self, dag: DagId, job: u64, _: JobOutcome) {
+        self.of_job(What::Completed, dag, job);
+    }
+}

@@ -1,0 +1,148 @@
+//! What can happen: the vocabulary of the journal.
+
+use core::fmt;
+use core::str::FromStr;
+
+/// What has happened. Printed, and read, as its name in lower case.
+///
+/// ```
+/// use sched_dag::journal::What;
+///
+/// assert_eq!(What::Suspend.to_string(), "suspend");
+/// assert_eq!("suspend".parse(), Ok(What::Suspend));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum What {
+    /// A job is released.
+    Released,
+    /// A job's release waits for an older job to end.
+    Queued,
+    /// A job's release does not happen.
+    Skipped,
+    /// A job starts no further instance.
+    Aborted,
+    /// A job's deadline has passed, and it is not complete.
+    Missed,
+    /// No instance of a job is left.
+    Completed,
+    /// All that an instance waits for has happened.
+    Ready,
+    /// An instance will not run.
+    Cancelled,
+    /// A core shall run the instance instead of what it runs.
+    Request,
+    /// The instance's function is called.
+    Start,
+    /// The instance loses its core.
+    Suspend,
+    /// The instance continues.
+    Resume,
+    /// The instance's function has returned.
+    Finish,
+    /// The instance was ended by a fault.
+    Ended,
+    /// A signal came, which lets a sporadic DAG's job be due.
+    Signalled,
+    /// A signal came while one was kept for the job, or no job was left.
+    Dropped,
+    /// A sporadic DAG's job that is being released was due: the event's time is the
+    /// nominal release, which no grid tells.
+    Due,
+    /// A DAG starts no further instance, because of a fault or a stop. The event's job
+    /// is 0 and means nothing.
+    Stopped,
+}
+
+/// All of it, by number, as it is printed.
+const WORDS: [(What, &str); 18] = [
+    (What::Released, "released"),
+    (What::Queued, "queued"),
+    (What::Skipped, "skipped"),
+    (What::Aborted, "aborted"),
+    (What::Missed, "missed"),
+    (What::Completed, "completed"),
+    (What::Ready, "ready"),
+    (What::Cancelled, "cancelled"),
+    (What::Request, "request"),
+    (What::Start, "start"),
+    (What::Suspend, "suspend"),
+    (What::Resume, "resume"),
+    (What::Finish, "finish"),
+    (What::Ended, "ended"),
+    (What::Signalled, "signalled"),
+    (What::Dropped, "dropped"),
+    (What::Due, "due"),
+    (What::Stopped, "stopped"),
+];
+
+/// A text that is none of the words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnknownWord;
+
+impl What {
+    /// Returns all of it.
+    pub fn all() -> impl Iterator<Item = Self> {
+        WORDS.iter().map(|(what, _)| *what)
+    }
+
+    /// Returns what has a number; the inverse of `as u8`.
+    #[must_use]
+    pub fn from_number(number: u8) -> Option<Self> {
+        WORDS.get(usize::from(number)).map(|(what, _)| *what)
+    }
+
+    /// Returns the word.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        WORDS[self as usize].1
+    }
+
+    /// Reports whether it happens to a job or a DAG, not to an instance.
+    #[must_use]
+    pub const fn is_of_job(self) -> bool {
+        !matches!(self, Self::Ready | Self::Cancelled | Self::Request) && !self.is_of_machine()
+    }
+
+    /// Reports whether it happens on a core, not only in the scheduler's books.
+    #[must_use]
+    pub const fn is_of_machine(self) -> bool {
+        matches!(
+            self,
+            Self::Start | Self::Suspend | Self::Resume | Self::Finish | Self::Ended
+        )
+    }
+}
+
+impl fmt::Display for What {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+impl FromStr for What {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let known = WORDS.iter().find(|(_, word)| *word == text);
+        known.map(|(what, _)| *what).ok_or(UnknownWord)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::string::ToString;
+
+    use super::*;
+
+    #[test]
+    fn every_word_is_read_back_and_stands_at_its_number() {
+        for (number, what) in (0..).zip(What::all()) {
+            assert_eq!(what as u8, number);
+            assert_eq!(What::from_number(number), Some(what));
+            assert_eq!(what.to_string().parse(), Ok(what));
+        }
+        assert_eq!(What::from_number(18), None);
+        assert_eq!("Start".parse::<What>(), Err(UnknownWord));
+    }
+}

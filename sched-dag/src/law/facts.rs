@@ -1,0 +1,177 @@
+//! From events to times: the facts that the rules are about.
+
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use super::{Precision, Record, Stretch};
+use crate::ids::{DagId, Instance};
+use crate::journal::{Event, What};
+use crate::scheduler::JobOutcome;
+use crate::task_set::TaskSet;
+
+impl Record {
+    /// Computes the times from a journal's events, in their order.
+    ///
+    /// If the oldest events are lost (`is_whole` is false), it has the jobs that were
+    /// due at or after the first event that is left: of these no event is missing.
+    ///
+    /// Returns `None` if the jobs are too many for this machine's memory to address.
+    #[must_use]
+    pub fn of_events(
+        task_set: &TaskSet,
+        precision: Precision,
+        is_whole: bool,
+        events: impl Iterator<Item = Event> + Clone,
+    ) -> Option<Self> {
+        let jobs = jobs(task_set, is_whole, events.clone());
+        let mut record = Self::with_jobs(task_set, precision, |dag| jobs[dag.index()].clone())?;
+        let mut stopped_ns = vec![None; jobs.len()];
+        let mut due_ns = vec![0; jobs.len()];
+        for event in events {
+            let index = event.dag.index();
+            match event.what {
+                What::Due => due_ns[index] = event.time_ns,
+                What::Stopped => {
+                    stopped_ns[index].get_or_insert(event.time_ns);
+                }
+                _ => match event.instance() {
+                    Some(instance) => record.note_instance(instance, &event),
+                    None => {
+                        let release_ns = match task_set.dag(event.dag).is_sporadic() {
+                            true => due_ns[index],
+                            false => task_set.dag(event.dag).grid_ns(event.job),
+                        };
+                        record.note_job(&event, release_ns, stopped_ns[index]);
+                    }
+                },
+            }
+        }
+        // What was in flight at a stop is cut by it.
+        for (dag, stopped_ns) in (0..).map(DagId).zip(stopped_ns) {
+            for job in &mut record.dags[dag.index()].jobs {
+                let was_in_flight = job.release_ns.is_some()
+                    && matches!(job.outcome, None | Some(JobOutcome::DagEnded));
+                if was_in_flight {
+                    job.cut_ns = job.cut_ns.or(stopped_ns);
+                }
+            }
+        }
+        Some(record)
+    }
+
+    fn note_job(&mut self, event: &Event, release_ns: u64, stopped_ns: Option<u64>) {
+        let Some(job) = self.job_mut(event.dag, event.job) else {
+            return;
+        };
+        let time_ns = event.time_ns;
+        match event.what {
+            What::Released => {
+                job.release_ns = Some(release_ns);
+                job.released_ns = Some(time_ns);
+            }
+            What::Aborted => job.cut_ns = Some(time_ns),
+            What::Missed => job.missed_ns = Some(time_ns),
+            What::Completed => {
+                job.ended_ns = Some(time_ns);
+                job.outcome = Some(match (job.cut_ns, stopped_ns, job.missed_ns) {
+                    (Some(_), _, _) => JobOutcome::Aborted,
+                    (None, Some(_), _) => JobOutcome::DagEnded,
+                    (None, None, Some(_)) => JobOutcome::Missed,
+                    (None, None, None) => JobOutcome::Met,
+                });
+            }
+            _ => {}
+        }
+    }
+
+    fn note_instance(&mut self, instance: Instance, event: &Event) {
+        let Some(times) = self.instance_mut(instance) else {
+            return;
+        };
+        let time_ns = Some(event.time_ns);
+        match event.what {
+            What::Ready => times.ready_ns = time_ns,
+            What::Start => {
+                times.start_ns = time_ns;
+                times.core = Some(event.core);
+            }
+            What::Resume => times.core = Some(event.core),
+            What::Suspend => times.preemptions += 1,
+            What::Finish => {
+                times.finish_ns = time_ns;
+                times.core = Some(event.core);
+                times.runs += 1;
+            }
+            What::Ended => times.failed_ns = time_ns,
+            _ => {}
+        }
+    }
+}
+
+/// Returns for each DAG the numbers of the jobs of which no event is missing.
+fn jobs(
+    task_set: &TaskSet,
+    is_whole: bool,
+    events: impl Iterator<Item = Event> + Clone,
+) -> Vec<Range<u64>> {
+    // The first one, and the one after the last.
+    let mut jobs = vec![(u64::MAX, 0); task_set.dags().len()];
+    let mut due_ns = vec![0; jobs.len()];
+    let oldest_ns = events.clone().next().map_or(0, |event| event.time_ns);
+    for event in events {
+        let of_dag = &mut jobs[event.dag.index()];
+        match event.what {
+            What::Due => due_ns[event.dag.index()] = event.time_ns,
+            What::Signalled | What::Dropped | What::Stopped => {}
+            _ if is_whole => *of_dag = (0, of_dag.1.max(event.job + 1)),
+            What::Released => {
+                let model = task_set.dag(event.dag);
+                let release_ns = match model.is_sporadic() {
+                    true => due_ns[event.dag.index()],
+                    false => model.grid_ns(event.job),
+                };
+                if release_ns > oldest_ns {
+                    *of_dag = (of_dag.0.min(event.job), event.job + 1);
+                }
+            }
+            _ => {}
+        }
+    }
+    let ranges = jobs.into_iter().map(|(first, end)| first.min(end)..end);
+    ranges.collect()
+}
+
+/// Returns when which core ran what, from events in their order. What still runs at
+/// the end has no end.
+pub fn stretches(events: impl Iterator<Item = Event>) -> Vec<Stretch> {
+    let mut open: BTreeMap<Instance, Stretch> = BTreeMap::new();
+    let mut stretches = Vec::new();
+    for event in events {
+        let Some(instance) = event.instance() else {
+            continue;
+        };
+        match event.what {
+            What::Start | What::Resume => {
+                let begun = Stretch {
+                    instance,
+                    core: event.core,
+                    from_ns: event.time_ns,
+                    to_ns: u64::MAX,
+                };
+                stretches.extend(open.insert(instance, begun));
+            }
+            What::Suspend | What::Finish | What::Ended => {
+                let ended = open.remove(&instance);
+                stretches.extend(ended.map(|begun| Stretch {
+                    to_ns: event.time_ns,
+                    ..begun
+                }));
+            }
+            _ => {}
+        }
+    }
+    stretches.extend(open.into_values());
+    stretches
+}

@@ -1,0 +1,261 @@
+//! Statistics of a run of any length, in memory that is taken before it begins.
+//!
+//! A [`Tally`] takes the events of a journal in their order, each once, and forgets
+//! each job with its end. What it keeps is a [`Histogram`] of each time that is asked
+//! about, and the times of the jobs in flight.
+//!
+//! - *Response time*, of a DAG's jobs: from the nominal release to the last finish.
+//! - *Release jitter*, of a DAG's jobs: from the nominal release to the release.
+//! - *Join latency*, of a subtask's instances: from the last predecessor's finish to
+//!   the start. A source has none.
+//! - *Execution time*, of a subtask's instances: from the start to the finish, without
+//!   the time for which it was suspended.
+//!
+//! Only complete jobs count in the response time: neither aborted nor cut short.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec;
+
+use super::Histogram;
+use crate::ids::{DagId, Instance, Vertex};
+use crate::journal::{Event, What};
+use crate::task_set::{Dag, TaskSet};
+
+/// The statistics, and the jobs in flight.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    task_set: Arc<TaskSet>,
+    dags: Box<[OfDag]>,
+    subtasks: Box<[OfSubtask]>,
+}
+
+/// What is asked about a DAG.
+#[derive(Clone, Debug)]
+pub struct OfDag {
+    /// From the nominal release of a complete job to its last finish.
+    pub response_time: Histogram,
+    /// From the nominal release of a job to its release.
+    pub release_jitter: Histogram,
+    /// The longest response time, and the job that had it.
+    longest: (u64, u64),
+    /// The nominal release of the sporadic job that is being released.
+    due_ns: u64,
+    /// The jobs in flight, each at the first free place from its number's on.
+    open: Box<[Job]>,
+    /// The instances of these jobs.
+    instances: Box<[Times]>,
+}
+
+/// What is asked about a subtask.
+#[derive(Clone, Debug)]
+pub struct OfSubtask {
+    /// From the last predecessor's finish to the start.
+    pub join_latency: Histogram,
+    /// From the start to the finish, without the time of suspensions.
+    pub execution_time: Histogram,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Job {
+    /// Its number and 1 more; 0: the place is free.
+    number: u64,
+    release_ns: u64,
+    last_finish_ns: u64,
+    is_cut: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Times {
+    /// When it started or was resumed.
+    since_ns: u64,
+    executed_ns: u64,
+    /// The latest finish of its predecessors.
+    join_ns: u64,
+}
+
+impl Tally {
+    /// Makes an empty one whose histograms have `2^bits` buckets a doubling.
+    #[must_use]
+    pub fn new(task_set: &Arc<TaskSet>, bits: u32) -> Self {
+        let of_dag = |dag: &Dag| OfDag {
+            response_time: Histogram::new(bits),
+            release_jitter: Histogram::new(bits),
+            longest: (0, 0),
+            due_ns: 0,
+            open: vec![Job::default(); dag.in_flight() as usize].into(),
+            instances: vec![Times::default(); dag.in_flight() as usize * dag.subtasks().len()]
+                .into(),
+        };
+        let of_subtask = || OfSubtask {
+            join_latency: Histogram::new(bits),
+            execution_time: Histogram::new(bits),
+        };
+        Self {
+            dags: task_set.dags().iter().map(of_dag).collect(),
+            subtasks: (0..task_set.vertices()).map(|_| of_subtask()).collect(),
+            task_set: Arc::clone(task_set),
+        }
+    }
+
+    /// Returns the bytes that one takes.
+    #[must_use]
+    pub fn size_of(task_set: &TaskSet, bits: u32) -> usize {
+        let in_flight = |dag: &Dag| {
+            let job = size_of::<Job>() + dag.subtasks().len() * size_of::<Times>();
+            size_of::<OfDag>() + (dag.in_flight() as usize).saturating_mul(job)
+        };
+        let places: usize = task_set.dags().iter().map(in_flight).sum();
+        let histograms = 2 * (task_set.dags().len() + task_set.vertices());
+        places.saturating_add(histograms * Histogram::size_of(bits))
+    }
+
+    /// Returns the statistics of a DAG's jobs.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn dag(&self, dag: DagId) -> &OfDag {
+        &self.dags[dag.index()]
+    }
+
+    /// Returns the statistics of a subtask's instances.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such subtask.
+    #[must_use]
+    pub fn subtask(&self, vertex: Vertex) -> &OfSubtask {
+        &self.subtasks[vertex.index()]
+    }
+
+    /// Forgets the jobs in flight, because events of them are missing.
+    pub fn skip(&mut self) {
+        for dag in &mut self.dags {
+            dag.open.fill(Job::default());
+        }
+    }
+
+    /// Takes the next event. Those of a job whose release it has not seen are passed
+    /// over.
+    pub fn take(&mut self, event: &Event) {
+        let model = self.task_set.dag(event.dag);
+        let dag = &mut self.dags[event.dag.index()];
+        match event.what {
+            What::Due => {
+                dag.due_ns = event.time_ns;
+                return;
+            }
+            What::Released => {
+                let release_ns = match model.is_sporadic() {
+                    true => dag.due_ns,
+                    false => model.grid_ns(event.job),
+                };
+                dag.begin(event, release_ns, model.subtasks().len());
+                return;
+            }
+            What::Stopped => {
+                for job in &mut dag.open {
+                    job.is_cut = true;
+                }
+                return;
+            }
+            _ => {}
+        }
+        let Some(place) = dag.place(event.job) else {
+            return;
+        };
+        let Some(instance) = event.instance() else {
+            dag.of_job(place, event.what);
+            return;
+        };
+        let statistics = &mut self.subtasks[self.task_set.vertex(instance).index()];
+        dag.of_instance(place, model, instance, event, statistics);
+    }
+}
+
+impl OfDag {
+    /// Returns the longest response time of a complete job, and the job's number.
+    #[must_use]
+    pub const fn longest(&self) -> (u64, u64) {
+        self.longest
+    }
+
+    /// Returns where a job in flight is.
+    fn place(&self, job: u64) -> Option<usize> {
+        let places = self.open.len();
+        // Less than the number of places.
+        let first = usize::try_from(job % places as u64).unwrap_or(0);
+        let mut order = (first..places).chain(0..first);
+        order.find(|&place| self.open[place].number == job + 1)
+    }
+
+    fn begin(&mut self, event: &Event, release_ns: u64, subtasks: usize) {
+        let places = self.open.len();
+        let first = usize::try_from(event.job % places as u64).unwrap_or(0);
+        let mut order = (first..places).chain(0..first);
+        // There is a free place, for no more are in flight.
+        let free = order.find(|&place| self.open[place].number == 0);
+        let place = free.unwrap_or(first);
+        self.open[place] = Job {
+            number: event.job + 1,
+            release_ns,
+            ..Job::default()
+        };
+        self.instances[place * subtasks..][..subtasks].fill(Times::default());
+        let jitter_ns = event.time_ns.saturating_sub(release_ns);
+        self.release_jitter.add(jitter_ns);
+    }
+
+    fn of_job(&mut self, place: usize, what: What) {
+        let job = &mut self.open[place];
+        match what {
+            What::Aborted => job.is_cut = true,
+            What::Completed => {
+                if !job.is_cut {
+                    let response_ns = job.last_finish_ns.saturating_sub(job.release_ns);
+                    self.response_time.add(response_ns);
+                    self.longest = self.longest.max((response_ns, job.number - 1));
+                }
+                *job = Job::default();
+            }
+            _ => {}
+        }
+    }
+
+    fn of_instance(
+        &mut self,
+        place: usize,
+        model: &Dag,
+        instance: Instance,
+        event: &Event,
+        statistics: &mut OfSubtask,
+    ) {
+        let subtasks = model.subtasks().len();
+        let instances = &mut self.instances[place * subtasks..][..subtasks];
+        let times = &mut instances[instance.subtask.index()];
+        match event.what {
+            What::Start => {
+                times.since_ns = event.time_ns;
+                if !model.predecessors(instance.subtask).is_empty() {
+                    let latency_ns = event.time_ns.saturating_sub(times.join_ns);
+                    statistics.join_latency.add(latency_ns);
+                }
+            }
+            What::Resume => times.since_ns = event.time_ns,
+            What::Suspend => times.executed_ns += event.time_ns.saturating_sub(times.since_ns),
+            What::Finish => {
+                let last_ns = event.time_ns.saturating_sub(times.since_ns);
+                statistics.execution_time.add(times.executed_ns + last_ns);
+                for next in model.successors(instance.subtask) {
+                    let join_ns = &mut instances[next.index()].join_ns;
+                    *join_ns = event.time_ns.max(*join_ns);
+                }
+                let job = &mut self.open[place];
+                job.last_finish_ns = event.time_ns.max(job.last_finish_ns);
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The law on journals of random sets, whole ones and those that have lost their
+//! oldest events.
+//!
+//! More or other sets: `JOURNALS=100000 JOURNAL_SEED=7 cargo test -p sched-dag --test
+//! journal`.
+
+#[path = "support/random.rs"]
+mod random;
+#[allow(dead_code, reason = "its own test uses all of it")]
+#[path = "properties/set.rs"]
+mod set;
+
+use std::sync::Arc;
+
+use random::Random;
+use sched_dag::journal::{Event, Recorder, What};
+use sched_dag::law::{Precision, Record, Tally, dispatch_violations, stretches, violations};
+use sched_dag::virtual_time::{End, VirtualTime, Workload};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Observer, Scheduler,
+    TaskSet, verify,
+};
+use set::{Overruns, Set};
+
+/// A run of a set: its model, and its journal.
+struct Run {
+    task_set: Arc<TaskSet>,
+    events: Vec<Event>,
+}
+
+struct Driver<'s>(&'s Set, Recorder);
+
+impl Observer for Driver<'_> {
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.1.released(dag, job, release_ns);
+    }
+
+    fn ready(&mut self, instance: Instance) {
+        self.1.ready(instance);
+    }
+
+    fn cancelled(&mut self, instance: Instance) {
+        self.1.cancelled(instance);
+    }
+
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        self.1.aborted(dag, job);
+    }
+
+    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        self.1.deadline_missed(dag, job, deadline_ns);
+    }
+
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
+        self.1.job_completed(dag, job, outcome);
+    }
+}
+
+impl Workload for Driver<'_> {
+    fn instant(&mut self, now_ns: u64) {
+        self.1.now_ns = now_ns;
+    }
+
+    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
+        let subtask = &self.0.dags[instance.dag.index()].subtasks[instance.subtask.index()];
+        subtask.executions_ns[usize::try_from(instance.job).expect("few jobs")]
+    }
+
+    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.1.on_core(What::Start, instance, core);
+    }
+
+    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.1.on_core(What::Suspend, instance, core);
+    }
+
+    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.1.on_core(What::Resume, instance, core);
+    }
+
+    fn finished(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.1.on_core(What::Finish, instance, core);
+    }
+}
+
+fn number(variable: &str, default: u64) -> u64 {
+    let given = std::env::var(variable).ok();
+    given.map_or(default, |text| text.parse().expect("a whole number"))
+}
+
+fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
+    let (count, first_seed) = (number("JOURNALS", 500), number("JOURNAL_SEED", 1));
+    println!("{count} sets from seed {first_seed} on");
+    for seed in first_seed..first_seed + count {
+        let mut random = Random::new(seed);
+        let overruns = match random.chance(50) {
+            true => Overruns::Often,
+            false => Overruns::Never,
+        };
+        let set = set::draw(&mut random, overruns);
+        let options = CommitOptions::new(set.options.policy, set.options.cores)
+            .with_construction(ConstructionPolicy::any_graph());
+        let verified = verify(&set.specs(), &options).expect("sets are right");
+        let task_set = Arc::new(verified.task_set);
+        let mut driver = Driver(&set, Recorder::new(Arc::clone(&task_set)));
+        let scheduler = Scheduler::new(Arc::clone(&task_set), set.options);
+        assert_eq!(VirtualTime::new(scheduler).run(&mut driver), End::Finished);
+        let events = driver.1.events;
+        with(seed, &mut random, &set, &Run { task_set, events });
+    }
+}
+
+fn record(run: &Run, is_whole: bool, from: usize) -> Record {
+    let events = run.events[from..].iter().copied();
+    Record::of_events(&run.task_set, Precision::Exact, is_whole, events).expect("it fits")
+}
+
+#[test]
+fn a_whole_journal_keeps_all_rules() {
+    for_each_run(|seed, _, set, run| {
+        let record = record(run, true, 0);
+        let found: Vec<_> = violations(&run.task_set, &record).collect();
+        assert_eq!(found, [], "seed {seed}");
+        let stretches = stretches(run.events.iter().copied());
+        let found = dispatch_violations(&run.task_set, &set.options, &record, &stretches);
+        assert_eq!(found, [], "seed {seed}");
+    });
+}
+
+#[test]
+fn the_latest_events_have_the_latest_jobs_whole() {
+    let mut kept = 0;
+    for_each_run(|seed, random, _, run| {
+        let whole = record(run, true, 0);
+        let rest = record(run, false, random.below(run.events.len()));
+        for (dag, _) in (0..).map(DagId).zip(run.task_set.dags()) {
+            for (job, times) in rest.numbered(dag) {
+                assert_eq!(Some(times), whole.job(dag, job), "seed {seed}");
+                let instances = rest.instances(dag, job);
+                assert_eq!(instances, whole.instances(dag, job), "seed {seed}");
+                kept += u64::from(rest.first_job(dag) > 0);
+            }
+        }
+        let found: Vec<_> = violations(&run.task_set, &rest).collect();
+        assert_eq!(found, [], "seed {seed}");
+    });
+    println!("{kept} jobs of DAGs that lost others");
+    assert!(kept > 100);
+}
+
+#[test]
+fn statistics_are_those_of_the_record() {
+    for_each_run(|seed, _, _, run| {
+        let record = record(run, true, 0);
+        let mut tally = Tally::new(&run.task_set, 5);
+        run.events.iter().for_each(|event| tally.take(event));
+        for (dag, model) in (0..).map(DagId).zip(run.task_set.dags()) {
+            let complete = record.numbered(dag).filter_map(|(job, times)| {
+                let is_complete =
+                    matches!(times.outcome, Some(JobOutcome::Met | JobOutcome::Missed));
+                let response_ns = record.completion_ns(dag, job)? - times.release_ns?;
+                is_complete.then_some(response_ns)
+            });
+            let responses: Vec<u64> = complete.collect();
+            let counted = &tally.dag(dag).response_time;
+            assert_eq!(counted.count(), responses.len() as u64, "seed {seed}");
+            let longest = responses.iter().max().copied().unwrap_or(0);
+            assert_eq!(counted.max(), longest, "seed {seed}");
+            for (subtask, _) in (0..).map(sched_dag::SubtaskId).zip(model.subtasks()) {
+                let instance = |job| Instance { dag, job, subtask };
+                let times = || {
+                    record.numbered(dag).filter_map(|(job, _)| {
+                        let instance = instance(job);
+                        record.instance(instance).map(|times| (instance, *times))
+                    })
+                };
+                let statistics = tally.subtask(run.task_set.vertex(instance(0)));
+                let joins = times().filter_map(|(instance, times)| {
+                    let join_ns = record.join_ns(&run.task_set, instance)?;
+                    Some(times.start_ns? - join_ns)
+                });
+                let joins: Vec<u64> = joins.collect();
+                let counted = &statistics.join_latency;
+                assert_eq!(counted.count(), joins.len() as u64, "seed {seed}");
+                assert_eq!(counted.max(), joins.into_iter().max().unwrap_or(0));
+                let finished = times().filter(|(_, times)| times.finish_ns.is_some());
+                assert_eq!(statistics.execution_time.count(), finished.count() as u64);
+            }
+        }
+    });
+}
