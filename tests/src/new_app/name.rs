@@ -144,7 +144,7 @@ fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
     let mut folders = vec![workspace.to_path_buf()];
     while let Some(folder) = folders.pop() {
         let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
-        if manifest.lines().any(|line| is_name(line, name)) {
+        if names(&manifest).any(|other| other == name) {
             return folder.strip_prefix(workspace).ok().map(Path::to_path_buf);
         }
         for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
@@ -157,18 +157,24 @@ fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
     None
 }
 
-/// Whether a manifest's line gives a package (or a library) this name.
-fn is_name(line: &str, name: &str) -> bool {
-    let value = line
-        .split_once('=')
-        .filter(|(key, _)| key.trim() == "name")
-        .map(|(_, value)| value.trim().trim_matches('"').replace('_', "-"));
-    value.as_deref() == Some(name)
+/// Returns the names that a manifest gives to a package, a library or a program, with
+/// `-` for `_`. Those of examples, tests and benchmarks are in nobody's way.
+fn names(manifest: &str) -> impl Iterator<Item = String> {
+    let mut table = "";
+    manifest.lines().filter_map(move |line| {
+        if line.starts_with('[') {
+            table = line.trim_end();
+        }
+        let (key, value) = line.split_once('=')?;
+        let counts = ["[package]", "[lib]", "[[bin]]"].contains(&table);
+        let is_name = counts && key.trim() == "name";
+        is_name.then(|| value.trim().trim_matches('"').replace('_', "-"))
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::check;
+    use super::{check, names};
     use crate::system::workspace;
 
     #[test]
@@ -222,5 +228,13 @@ mod tests {
             assert_eq!(check(workspace(), name), Err(line.to_string()));
         }
         assert_eq!(check(workspace(), "brake-assist-2"), Ok(()));
+    }
+
+    #[test]
+    fn an_example_leaves_its_name_to_an_app() {
+        let manifest = "[package]\nname = \"virtual-time\"\n\n[lib]\nname = \"virtual_time\"\n\
+                        [[bin]]\nname = \"tool\"\n[[example]]\nname = \"vision\"\n";
+        let found: Vec<String> = names(manifest).collect();
+        assert_eq!(found, ["virtual-time", "virtual-time", "tool"]);
     }
 }

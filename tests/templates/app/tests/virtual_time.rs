@@ -20,6 +20,4 @@ fn every_job_is_in_time_and_within_its_bound() {
         let response_time_ns = job.response_time_ns().expect("it is complete");
         assert!(u128::from(response_time_ns) <= bound.as_nanos());
     }
-    // 0.8 ms to sense, 3.5 ms to steer (and meanwhile to brake), 0.5 ms to act
-    assert_eq!(report.jobs[0].response_time_ns(), Some(4_800_000));
 }
