@@ -95,6 +95,7 @@ pub mod analysis;
 mod ids;
 pub mod journal;
 pub mod law;
+mod nearest;
 mod order;
 mod policy;
 mod priorities;
@@ -106,6 +107,7 @@ mod verify;
 pub mod virtual_time;
 
 pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
+pub use nearest::nearest;
 pub use policy::{Activation, OverrunPolicy, Policy, Preemption, Priority};
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use scheduler::{

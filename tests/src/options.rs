@@ -16,7 +16,6 @@ mod help;
 mod menu;
 mod parsed;
 mod read;
-mod suggest;
 mod value;
 
 use std::ffi::{OsStr, OsString};
@@ -28,7 +27,7 @@ use replay::shown::quoted;
 
 pub use menu::{Choice, Menu};
 pub use parsed::Parsed;
-pub use suggest::nearest;
+pub use sched_dag::nearest;
 
 /// A subcommand of the tool.
 #[derive(Debug)]

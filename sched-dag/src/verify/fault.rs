@@ -85,12 +85,16 @@ pub enum Fault {
         dag: DagLabel,
         topic: String,
         writer: SubtaskLabel,
+        /// The topic that was probably meant.
+        meant: Option<String>,
     },
     /// A topic that is read and never written.
     UnwrittenTopic {
         dag: DagLabel,
         topic: String,
         reader: SubtaskLabel,
+        /// The topic that was probably meant.
+        meant: Option<String>,
     },
     /// A reader that expects another type than the writer writes.
     TypeMismatch {
@@ -183,7 +187,12 @@ pub enum Fault {
         users: Vec<SubtaskLabel>,
     },
     /// The latest value of a topic that no subtask writes.
-    LatestUnwritten { dag: DagLabel, topic: String },
+    LatestUnwritten {
+        dag: DagLabel,
+        topic: String,
+        /// The topic that was probably meant.
+        meant: Option<String>,
+    },
     /// The latest value of a topic is read as another type than is written.
     LatestTypeMismatch {
         dag: DagLabel,

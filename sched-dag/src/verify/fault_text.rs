@@ -196,15 +196,27 @@ impl Fault {
 
     fn fmt_topic(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::UnreadTopic { dag, topic, writer } => write!(
+            Self::UnreadTopic {
+                dag,
+                topic,
+                writer,
+                meant,
+            } => write!(
                 f,
-                "{writer} of {dag} writes topic `{topic}`, which no subtask reads; register a reader or drop \
-                 the output"
+                "{writer} of {dag} writes topic `{topic}`, which no subtask reads; {}register a reader or drop \
+                 the output",
+                question(meant.as_ref())
             ),
-            Self::UnwrittenTopic { dag, topic, reader } => write!(
+            Self::UnwrittenTopic {
+                dag,
+                topic,
+                reader,
+                meant,
+            } => write!(
                 f,
-                "{reader} of {dag} reads topic `{topic}`, which no subtask writes; register a writer or drop \
-                 the input"
+                "{reader} of {dag} reads topic `{topic}`, which no subtask writes; {}register a writer or drop \
+                 the input",
+                question(meant.as_ref())
             ),
             Self::TypeMismatch {
                 dag,
@@ -273,6 +285,14 @@ impl Fault {
             _ => self.fmt_shared(f),
         }
     }
+}
+
+/// Returns what stands before the remedy: whether another topic was meant.
+pub(super) fn question(meant: Option<&String>) -> impl Display {
+    fmt::from_fn(move |f| match meant {
+        Some(topic) => write!(f, "did you mean `{topic}`? If not, "),
+        None => Ok(()),
+    })
 }
 
 /// Returns the labels with commas between them, at most [`LISTED`].

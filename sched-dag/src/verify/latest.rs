@@ -42,7 +42,14 @@ fn check_one(specs: &[DagSpec], dag: usize, latest: &LatestSpec, findings: &mut 
     let writers = (spec.subtasks.iter().enumerate())
         .filter_map(|(index, subtask)| Some((index, subtask.outputs.iter().find(is_here)?)));
     let Some((writer, written)) = writers.into_iter().next() else {
-        findings.fault(dag, Fault::LatestUnwritten { dag: label, topic });
+        findings.fault(
+            dag,
+            Fault::LatestUnwritten {
+                dag: label,
+                topic,
+                meant: None,
+            },
+        );
         return;
     };
     if written.type_id != latest.port.type_id {

@@ -17,6 +17,7 @@ mod graph;
 mod interner;
 mod label;
 mod latest;
+mod misspelt;
 mod model;
 mod names;
 mod options;
@@ -85,7 +86,8 @@ pub fn verify(specs: &[DagSpec], options: &CommitOptions) -> Result<Verified, Re
     } else {
         model::build(specs, shapes, &mut findings)
     };
-    let (faults, warnings) = findings.into_parts();
+    let (mut faults, warnings) = findings.into_parts();
+    misspelt::suggest(specs, &mut faults);
     match task_set {
         Some(task_set) => Ok(Verified { task_set, warnings }),
         None => Err(Rejected { faults, warnings }),

@@ -228,6 +228,7 @@ impl Check<'_> {
                         dag,
                         topic,
                         writer: label,
+                        meant: None,
                     },
                 );
             }

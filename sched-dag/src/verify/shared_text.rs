@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::fault::Fault;
-use super::fault_text::list;
+use super::fault_text::{list, question};
 
 impl Fault {
     pub(super) fn fmt_shared(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -39,10 +39,11 @@ impl Fault {
                  allow 1 job in flight, or let one subtask own the state",
                 list(users)
             ),
-            Self::LatestUnwritten { dag, topic } => write!(
+            Self::LatestUnwritten { dag, topic, meant } => write!(
                 f,
                 "the latest value of topic `{topic}` of {dag} is asked for, and no subtask writes \
-                 that topic; register a writer or correct the name"
+                 that topic; {}register a writer or correct the name",
+                question(meant.as_ref())
             ),
             Self::LatestTypeMismatch {
                 dag,

@@ -174,6 +174,7 @@ fn check_topic<'a>(
                         dag: dag_label(),
                         topic: topic.clone(),
                         reader: label(reader),
+                        meant: None,
                     },
                 );
             }

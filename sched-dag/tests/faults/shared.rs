@@ -76,7 +76,7 @@ fn the_latest_value_of_no_topic() {
         |spec| spec.latest = vec![latest(port::<u32>("obstakle"), 1)],
         "latest_unwritten",
         "the latest value of topic `obstakle` of dag `drive` is asked for, and no subtask writes \
-         that topic; register a writer or correct the name",
+         that topic; did you mean `obstacle`? If not, register a writer or correct the name",
     );
 }
 

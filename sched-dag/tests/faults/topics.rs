@@ -31,6 +31,71 @@ fn a_misspelt_topic_is_reported_from_both_sides_and_makes_no_second_sink() {
         .map(sched_dag::Fault::code)
         .collect();
     assert_eq!(codes, ["unwritten_topic", "not_connected", "unread_topic"]);
+    let texts = [0, 2].map(|fault| rejected.faults()[fault].to_string());
+    assert_eq!(
+        texts,
+        [
+            "subtask `brake` of dag `drive` reads topic `obstacle`, which no subtask writes; did you mean \
+             `obstacel`? If not, register a writer or drop the input",
+            "subtask `fuse` of dag `drive` writes topic `obstacel`, which no subtask reads; did you mean \
+             `obstacle`? If not, register a reader or drop the output",
+        ]
+    );
+}
+
+#[test]
+fn a_topic_that_would_be_another_fault_is_not_suggested() {
+    // `fuse` reads `image` already, and so cannot mean it again.
+    assert_fault(
+        |spec| spec.subtasks[1].inputs.push(port::<u32>("image2")),
+        "unwritten_topic",
+        "subtask `fuse` of dag `drive` reads topic `image2`, which no subtask writes; register a writer or \
+         drop the input",
+    );
+    // `image` has its writer.
+    assert_fault(
+        |spec| spec.subtasks[1].outputs.push(port::<u32>("imagf")),
+        "unread_topic",
+        "subtask `fuse` of dag `drive` writes topic `imagf`, which no subtask reads; register a reader or \
+         drop the output",
+    );
+}
+
+#[test]
+fn a_topic_of_another_dag_is_not_suggested() {
+    let mut spec = drive();
+    spec.subtasks[2].inputs.push(port::<u32>("nera"));
+    let other = dag(
+        "park",
+        vec![
+            subtask("sonar", &[], &["near"]),
+            subtask("stop", &["near"], &[]),
+        ],
+    );
+    assert_faults(
+        &[spec, other],
+        &[(
+            "unwritten_topic",
+            "subtask `brake` of dag `drive` reads topic `nera`, which no subtask writes; register a writer \
+             or drop the input",
+        )],
+    );
+}
+
+#[test]
+fn of_many_misspelt_topics_those_that_are_told_get_a_suggestion() {
+    let topics: Vec<String> = (0..25).map(|number| format!("topic {number:03}")).collect();
+    let mut subtasks = vec![subtask("from", &[], &["start"])];
+    for topic in &topics {
+        let misspelt = topic.replace("topic", "topci");
+        subtasks.push(subtask("", &["start"], &[topic.as_str()]));
+        subtasks.push(subtask("", &[misspelt.as_str()], &[]));
+    }
+    let rejected = rejected(&[dag("", subtasks)]);
+    let is_asked = |fault: &sched_dag::Fault| fault.to_string().contains("did you mean `topic 0");
+    let asked: Vec<bool> = rejected.faults().iter().map(is_asked).collect();
+    assert_eq!(asked[..20], [true; 20]);
+    assert!(!asked[20..].contains(&true));
 }
 
 #[test]

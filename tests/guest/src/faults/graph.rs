@@ -118,7 +118,8 @@ pub(super) fn unread_topic() -> Vec<Dag> {
 pub(super) fn unwritten_topic() -> Vec<Dag> {
     let dag = named("lidar");
     source(&dag, "read", "points");
-    joining_sink(&dag, "store", ["points", "pose"]);
+    relay(&dag, "filter", "points", "ground");
+    joining_sink(&dag, "store", ["ground", "point"]);
     vec![dag]
 }
 
