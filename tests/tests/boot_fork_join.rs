@@ -3,6 +3,7 @@
 //! the same run every time.
 
 use harness::protocol::{MachineLine, Status};
+use harness::trace::{bound, check, read};
 use harness::{Guest, Outcome};
 
 const JOBS: u64 = 60;
@@ -73,6 +74,21 @@ fn every_job_joins_while_its_subtasks_spin() {
 }
 
 #[test]
+fn every_job_joins_while_its_subtasks_compute() {
+    // Some 300 million instructions each: all cores compute in one clock.
+    const FEW: u64 = 6;
+    for cores in [1, 2, 4, 8] {
+        let guest = demo_of(FEW).cores(cores).word("work=compute");
+        let outcome = guest.word("subtasks=2").word("trace=dump").succeed();
+        joins_are_right(&outcome, FEW, &[2]);
+        let runs = read(&outcome.serial).expect("a trace");
+        assert_eq!(runs[0].lost, 0);
+        let found = check(&runs[0], bound::COUNTED_NS);
+        assert_eq!(found.breaches, [], "{cores} cores");
+    }
+}
+
+#[test]
 fn two_deterministic_runs_print_the_same_bytes() {
     let run = || demo().word("seed=7").succeed().serial;
     let (first, second) = (run(), run());
@@ -117,6 +133,14 @@ fn the_first_release_is_within_100_ms_of_the_kernels_entry() {
 }
 
 #[test]
+fn work_that_computes_has_no_simulated_execution() {
+    let guest = Guest::new("fork-join").word("work=compute");
+    let outcome = guest.word("occupy=spin").end_in(Status::Usage);
+    let reason = &outcome.transcript.verdict().expect("checked before").reason;
+    assert!(reason.starts_with("`occupy` says how"), "{reason}");
+}
+
+#[test]
 fn a_wrong_guest_command_line_ends_in_a_usage_error() {
     for word in [
         "job=5",
@@ -126,6 +150,7 @@ fn a_wrong_guest_command_line_ends_in_a_usage_error() {
         "subtasks=0",
         "subtasks=2,,4",
         "occupy=wait",
+        "work=hard",
         "stray",
     ] {
         let outcome = Guest::new("fork-join").word(word).end_in(Status::Usage);

@@ -16,6 +16,7 @@ extern crate alloc;
 
 mod arity;
 mod draw;
+mod execution;
 mod sink;
 mod work;
 
@@ -23,9 +24,10 @@ use alloc::format;
 use alloc::vec;
 use core::time::Duration;
 
-use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
+use fass::{Dag, SubtaskAttributes, create_dag};
 
 pub use draw::ExecutionTimes;
+pub use execution::{Pace, Work};
 pub use sink::Joins;
 pub use work::compute;
 
@@ -62,8 +64,8 @@ pub struct Workload {
     pub jobs: u64,
     /// The seed of the execution times.
     pub seed: u64,
-    /// How execution occupies a core.
-    pub occupation: Occupation,
+    /// How execution times are spent.
+    pub work: Work,
 }
 
 impl Workload {
@@ -100,9 +102,9 @@ impl Workload {
 
         for branch in 0..self.parallel {
             let mut times = ExecutionTimes::new(self.seed, branch);
-            let occupation = self.occupation;
+            let work = self.work;
             let execute = move |(job,): (u64,)| {
-                fass::execute_for(times.next_time(), occupation);
+                work.execute_for(times.next_time());
                 (job,)
             };
             let attributes = SubtaskAttributes::named(&format!("parallel-{branch}"));
@@ -120,6 +122,7 @@ impl Workload {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fass::Occupation;
     use virtual_time::VirtualTime;
 
     fn workload(parallel: usize) -> Workload {
@@ -127,7 +130,7 @@ mod tests {
             parallel,
             jobs: 100,
             seed: 1,
-            occupation: Occupation::Hold,
+            work: Work::Simulate(Occupation::Hold),
         }
     }
 

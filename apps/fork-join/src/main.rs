@@ -10,7 +10,8 @@ mod figures;
 use alloc::vec::Vec;
 
 use fass::{Occupation, finish_create_dags};
-use fork_join::{MOST_PARALLEL, Workload};
+use fork_join::{MOST_PARALLEL, Pace, Work, Workload};
+use kernel::options::{Options, UsageError};
 use kernel::{Ending, Machine, println};
 
 use figures::Figures;
@@ -25,9 +26,11 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     );
     println!(
         "each parallel subtask executes 1 to 50 ms, {}.",
-        match workloads[0].occupation {
-            Occupation::Hold => "simulated: it holds its core, which halts meanwhile",
-            Occupation::Spin => "computing",
+        match workloads[0].work {
+            Work::Simulate(Occupation::Hold) =>
+                "simulated: it holds its core, which halts meanwhile",
+            Work::Simulate(Occupation::Spin) => "simulated: it watches the clock",
+            Work::Compute(_) => "computing: so long with a processor for itself",
         }
     );
     println!("Its mean load is 25.5 / 25: backlog and deadline misses grow with the jobs.");
@@ -65,11 +68,8 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
     let least_jobs = u64::from(!machine.has_console());
     let jobs = options.number("jobs", least_jobs..=1_000_000, 200)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
-    let occupation = options.choice(
-        "occupy",
-        &[("hold", Occupation::Hold), ("spin", Occupation::Spin)],
-    )?;
-    options.finish(&["subtasks", "jobs", "seed", "occupy"])?;
+    let work = work(options)?;
+    options.finish(&["subtasks", "jobs", "seed", "work", "occupy"])?;
     let parallel = subtasks
         .into_iter()
         .filter_map(|parallel| usize::try_from(parallel).ok());
@@ -78,7 +78,23 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
             parallel,
             jobs,
             seed,
-            occupation,
+            work,
         })
         .collect())
+}
+
+/// Reads how the parallel subtasks spend their execution times.
+fn work(options: &Options<'_>) -> Result<Work, UsageError> {
+    let computes = options.choice("work", &[("simulate", false), ("compute", true)])?;
+    let occupations = [("hold", Occupation::Hold), ("spin", Occupation::Spin)];
+    if !computes {
+        return options.choice("occupy", &occupations).map(Work::Simulate);
+    }
+    match options.text("occupy") {
+        None => Ok(Work::Compute(Pace::measure())),
+        Some(_) => Err(UsageError::new(
+            "`occupy` says how execution is simulated, and `work=compute` simulates none; leave \
+             one of them out",
+        )),
+    }
 }

@@ -6,7 +6,6 @@
 //! everything it has done, so that a register or a byte that goes wrong shows.
 
 use core::hint::black_box;
-
 /// The matrices' rows and columns.
 const SIDE: usize = 8;
 

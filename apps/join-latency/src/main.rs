@@ -15,7 +15,7 @@ use core::num::NonZeroUsize;
 use core::time::Duration;
 
 use fass::Occupation;
-use fork_join::{MOST_PARALLEL, PERIOD, Workload};
+use fork_join::{MOST_PARALLEL, PERIOD, Work, Workload};
 use join_latency::{Experiment, Matching};
 use kernel::options::UsageError;
 use kernel::{Ending, Machine, println};
@@ -67,12 +67,11 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     }
     let (name, outcome) = match policy {
         PolicyUnderTest::Fass => {
-            let occupation = Occupation::Hold;
             let workload = Workload {
                 parallel,
                 jobs,
                 seed,
-                occupation,
+                work: Work::Simulate(Occupation::Hold),
             };
             (String::from("fass"), by_dag::run(machine, &workload)?)
         }

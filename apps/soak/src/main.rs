@@ -11,11 +11,10 @@ extern crate alloc;
 
 use alloc::format;
 use alloc::string::{String, ToString};
-use core::hint::black_box;
 use core::time::Duration;
 
 use fass::{ConstructionPolicy, OverrunPolicy, finish_create_dags_with};
-use fork_join::compute;
+use fork_join::Pace;
 use kernel::{Ending, Machine, Resources, Run, json, println};
 use soak::{Account, DagPlan, Executed, build, draw_set, largest_set};
 
@@ -59,7 +58,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         load: options.number("load", 1..=1000, 90)?,
         round_ns: options
             .choice("work", &[("hold", false), ("compute", true)])?
-            .then(time_of_round),
+            .then(|| Pace::measure().round_ns()),
         length: Duration::from_millis(options.number("round_ms", 1..=3_600_000, 1000)?),
         overrun,
         overrun_name: options.text("overrun").unwrap_or(OVERRUNS[0].0),
@@ -96,14 +95,6 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     print_total(rounds, &total, violations);
     machine.report_memory();
     complaint.map_or(Ok(()), |text| Err(Ending::Failure(text)))
-}
-
-/// Measures how long a round of work takes.
-fn time_of_round() -> u64 {
-    const ROUNDS: u64 = 100;
-    let start_ns = fass::now_ns();
-    black_box(compute(ROUNDS, 1));
-    (fass::now_ns() - start_ns) / ROUNDS
 }
 
 impl Soak<'_> {

@@ -14,6 +14,7 @@ pub(super) const GUEST_WORDS: &[&str] = &[
     "seed",
     "execution",
     "subtasks",
+    "work",
     "occupy",
 ];
 
@@ -65,10 +66,16 @@ pub static RUN: Command = Command {
             "fork-join: parallel subtasks, one run each; the app's default is 2,4,6.",
         ),
         Opt::new(
+            "work",
+            Takes::OneOf(&["simulate", "compute"]),
+            "fork-join: whether a subtask's execution is simulated (the app's default), or it \
+             really computes for the drawn time.",
+        ),
+        Opt::new(
             "occupy",
             Takes::OneOf(&["hold", "spin"]),
-            "fork-join, --dag: how a subtask executes: it holds its core while the \
-             processor halts (the app's default), or it spins.",
+            "fork-join, --dag: how a simulated execution occupies its core, which halts \
+             meanwhile (the app's default), or spins.",
         ),
         Opt::new(
             "dag",

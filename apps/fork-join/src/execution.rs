@@ -1,0 +1,96 @@
+//! How execution times are spent: simulated, or by computing.
+//!
+//! What computes is to take as long as was drawn *with a core for itself*: the pace of one
+//! core is measured before anything else runs. Next to others it may take longer, as where
+//! instructions are counted, or memory is shared.
+
+use core::hint::black_box;
+use core::time::Duration;
+
+use fass::Occupation;
+
+use crate::compute;
+
+/// How a parallel subtask spends its execution time.
+#[derive(Clone, Copy, Debug)]
+pub enum Work {
+    /// It occupies its core, and its execution is simulated.
+    Simulate(Occupation),
+    /// It computes.
+    Compute(Pace),
+}
+
+impl Work {
+    /// Executes for a time.
+    pub(crate) fn execute_for(self, time: Duration) {
+        match self {
+            Self::Simulate(occupation) => fass::execute_for(time, occupation),
+            Self::Compute(pace) => pace.compute_for(time),
+        }
+    }
+}
+
+/// How much a core that is alone computes in a time, and what comes out of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    stretch_ns: u64,
+    result: u64,
+}
+
+impl Pace {
+    /// How many rounds are done, and judged, at a stretch.
+    const STRETCH: u64 = 8;
+
+    const SEED: u64 = 1;
+
+    /// Measures this core's pace.
+    #[must_use]
+    pub fn measure() -> Self {
+        const STRETCHES: u64 = 16;
+        // For the first time code and data come from further away.
+        let result = compute(Self::STRETCH, Self::SEED);
+        let start_ns = fass::now_ns();
+        for _ in 0..STRETCHES {
+            black_box(compute(Self::STRETCH, Self::SEED));
+        }
+        let stretch_ns = (fass::now_ns() - start_ns) / STRETCHES;
+        Self {
+            stretch_ns: stretch_ns.max(1),
+            result,
+        }
+    }
+
+    /// Returns how long a round takes.
+    #[must_use]
+    pub const fn round_ns(self) -> u64 {
+        self.stretch_ns / Self::STRETCH
+    }
+
+    /// Computes what takes this time on a core that is alone, in whole stretches.
+    ///
+    /// # Panics
+    ///
+    /// If a result is wrong: something was lost while others had the core.
+    fn compute_for(self, time: Duration) {
+        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        for _ in 0..ns.div_ceil(self.stretch_ns) {
+            let result = compute(Self::STRETCH, Self::SEED);
+            assert_eq!(result, self.result, "what was computed is wrong");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "what was computed is wrong")]
+    fn a_wrong_result_is_found() {
+        let pace = Pace {
+            stretch_ns: 1000,
+            result: 7,
+        };
+        pace.compute_for(Duration::from_nanos(1));
+    }
+}
