@@ -7,8 +7,8 @@
 use core::fmt;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use fass::{OverrunPolicy, Policy};
-use sched_dag::{Dag, SchedulerOptions, SubtaskId, TaskSet};
+use fass::{OverrunPolicy, Plan, Policy};
+use sched_dag::{Dag, DagId, SchedulerOptions, SubtaskId};
 
 use crate::json::{self, Object};
 
@@ -24,7 +24,7 @@ pub(crate) fn enable() {
 }
 
 /// Prints the DAGs of a commit, if commits do.
-pub(crate) fn dump(task_set: &TaskSet, options: SchedulerOptions) {
+pub(crate) fn dump(plan: &Plan, options: SchedulerOptions) {
     if !DUMPS.load(Ordering::Relaxed) {
         return;
     }
@@ -33,7 +33,7 @@ pub(crate) fn dump(task_set: &TaskSet, options: SchedulerOptions) {
         Policy::StaticPriority => "static",
         Policy::Edf => "edf",
     };
-    for (number, dag) in (0u32..).zip(task_set.dags()) {
+    for (number, dag) in (0u32..).zip(plan.task_set.dags()) {
         json::emit("graph", |line| {
             line.number("commit", commit)
                 .text("policy", policy)
@@ -42,7 +42,8 @@ pub(crate) fn dump(task_set: &TaskSet, options: SchedulerOptions) {
             line.flag("sporadic", dag.is_sporadic())
                 .list("jobs", dag.jobs().iter())
                 .list("topics", topics(dag))
-                .list("states", states(dag));
+                .list("states", states(dag))
+                .list("samples", samples(plan, DagId(number)));
         });
     }
 }
@@ -108,5 +109,23 @@ fn states(dag: &Dag) -> impl Iterator<Item = impl fmt::Display> {
             let state = json::quoted(&edge.state);
             write!(f, "[{state},{},{}]", edge.earlier.0, edge.later.0)
         })
+    })
+}
+
+/// Writes which subtasks of a DAG sample which topics, and how old their values can be.
+fn samples(plan: &Plan, reader: DagId) -> impl Iterator<Item = impl fmt::Display> {
+    let of_reader = plan.staleness.iter();
+    let of_reader = of_reader.filter(move |sample| sample.reader_dag.id == reader);
+    of_reader.filter_map(|sample| {
+        let writer = sample.writer_dag.id;
+        let topics = plan.task_set.dags()[writer.index()].topics();
+        let topic = topics.iter().position(|topic| topic.name == sample.topic)?;
+        Some(fmt::from_fn(move |f| {
+            write!(f, "[{},{},{topic},", sample.reader.id.0, writer.0)?;
+            match sample.bound {
+                Some(bound) => write!(f, "{}]", bound.as_nanos()),
+                None => f.write_str("null]"),
+            }
+        }))
     })
 }

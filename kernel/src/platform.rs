@@ -134,7 +134,7 @@ impl Platform for Kernel {
             preemption: self.preemption(),
             cores: self.cores(),
         };
-        graph::dump(&plan.task_set, options);
+        graph::dump(&plan, options);
         execution::prepare(plan, options)
     }
 }

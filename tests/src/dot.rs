@@ -4,8 +4,9 @@
 //! kind `graph`. Here the lines of a run become one `digraph` in the DOT language: a
 //! cluster for each DAG with its period and deadline; a box for each subtask with
 //! its WCET and priority; an arrow for each edge, with the topic and the message's
-//! type, dotted where a state makes the edge. A topic whose latest value is read
-//! from elsewhere has a note of its own.
+//! type, dotted where a state makes the edge. A topic whose latest value is sampled
+//! has a note of its own, with a dashed arrow to each subtask, of any DAG, that
+//! samples it.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -29,15 +30,21 @@ pub fn text(transcript: &Transcript) -> Result<String, String> {
          fontname=\"sans-serif\"];\n  edge [fontname=\"sans-serif\", fontsize=10];\n  \
          graph [fontname=\"sans-serif\"];\n",
     );
+    // An arrow between two clusters stands outside both.
+    let mut between = String::new();
     for line in lines {
-        let dag = Dag(line).text().ok_or_else(|| {
+        let dag = Dag(line);
+        let parts = dag.text().zip(dag.samples());
+        let (cluster, samples) = parts.ok_or_else(|| {
             format!(
                 "serial line {}: a line of kind `graph` is malformed",
                 line.number
             )
         })?;
-        text += &dag;
+        text += &cluster;
+        between += &samples;
     }
+    text += &between;
     text += "}\n";
     Ok(text)
 }
@@ -48,8 +55,7 @@ struct Dag<'l>(&'l MachineLine);
 impl Dag<'_> {
     fn text(&self) -> Option<String> {
         let line = self.0;
-        let (commit, dag) = (line.number_at("commit")?, line.number_at("dag")?);
-        let id = format!("c{commit}_d{dag}");
+        let id = self.id(line.number_at("dag")?)?;
         let mut text = format!(
             "  subgraph cluster_{id} {{\n    label={};\n",
             quoted(&self.label()?)
@@ -61,6 +67,34 @@ impl Dag<'_> {
         }
         self.add_edges(&id, &mut text)?;
         text += "  }\n";
+        Some(text)
+    }
+
+    /// What the names of a DAG of this commit begin with.
+    fn id(&self, dag: u64) -> Option<String> {
+        Some(format!("c{}_d{dag}", self.0.number_at("commit")?))
+    }
+
+    /// The arrows to this DAG's subtasks from the topics that they sample.
+    fn samples(&self) -> Option<String> {
+        let line = self.0;
+        let id = self.id(line.number_at("dag")?)?;
+        let mut text = String::new();
+        for sample in line.value.get("samples")?.elements() {
+            let [reader, writer, topic, staleness_ns] = sample.elements() else {
+                return None;
+            };
+            let (reader, topic) = (reader.as_u64()?, topic.as_u64()?);
+            let writer = self.id(writer.as_u64()?)?;
+            let label = staleness_ns.as_u64().map_or(String::new(), |ns| {
+                format!(", label=\"less than {} old\"", time(ns))
+            });
+            // Writing into a `String` cannot fail.
+            let _ = writeln!(
+                text,
+                "  {writer}_t{topic} -> {id}_s{reader} [style=dashed{label}];"
+            );
+        }
         Some(text)
     }
 
@@ -201,7 +235,7 @@ mod tests {
         r#""overrun":"queue","subtasks":[["camera",1,0,1000000],["",2,1,null],["fuse",3,0,null]],"#,
         r#""edges":[[0,1],[0,2],[1,2]],"sporadic":false,"jobs":[20],"#,
         r#""topics":[["frame","alloc::sync::Arc<[vision::Frame]>",0,[1],1]],"#,
-        r#""states":[["map",1,2]]}"#
+        r#""states":[["map",1,2]],"samples":[]}"#
     );
 
     #[test]
@@ -222,6 +256,22 @@ mod tests {
         let (head, rest) = dot.split_once("  subgraph").expect("a cluster");
         assert!(head.starts_with("digraph committed {\n"));
         assert_eq!(format!("  subgraph{rest}"), format!("{expected}}}\n"));
+    }
+
+    #[test]
+    fn a_sampled_topic_has_an_arrow_to_each_subtask_that_samples_it() {
+        let samples = r#""samples":[[0,1,0,12000000],[2,1,0,null]]}"#;
+        let reader = LINE.replace("\"dag\":1", "\"dag\":0");
+        let reader = reader.replace("\"samples\":[]}", samples);
+        let dot = text(&Transcript::read(&format!("{reader}\n{LINE}\n"))).expect("good lines");
+        let expected = "  }\n  c0_d1_t0 -> c0_d0_s0 [style=dashed, label=\"less than 12 ms old\"];\n  \
+                        c0_d1_t0 -> c0_d0_s2 [style=dashed];\n}\n";
+        assert!(dot.ends_with(expected), "{dot}");
+        // No arrow leads to or from what is not drawn.
+        assert!(dot.contains("    c0_d1_t0 [shape=note,"), "{dot}");
+        assert!(dot.contains("    c0_d0_s2 [label="), "{dot}");
+        let damaged = LINE.replace("\"samples\":[]", "\"samples\":[[0,1,0]]");
+        assert!(text(&Transcript::read(&damaged)).is_err());
     }
 
     #[test]

@@ -194,6 +194,51 @@ fn each_commit_prints_its_dags_if_asked() {
 }
 
 #[test]
+fn dags_that_sample_each_other_are_joined_by_dashed_arrows() {
+    let guest = Guest::new("autoware").cores(4).word("jobs=1");
+    let outcome = guest.word("graph=dump").succeed();
+    let dot = harness::dot::text(&outcome.transcript).expect("good lines");
+    let lines: Vec<_> = outcome.transcript.of_kind("graph").collect();
+    let name = |dag: u64, list: &str, index: u64| -> String {
+        let line = lines.iter().find(|line| line.number_at("dag") == Some(dag));
+        let list = line.expect("the DAG").value.get(list).expect(list);
+        let element = &list.elements()[usize::try_from(index).expect("small")];
+        element.elements()[0].as_text().expect("a name").into()
+    };
+    let mut arrows = Vec::new();
+    for line in &lines {
+        let reader_dag = line.number_at("dag").expect("its number");
+        for sample in line.value.get("samples").expect("a list").elements() {
+            let numbers = sample.elements().iter().map(Value::as_u64);
+            let numbers: Option<Vec<u64>> = numbers.collect();
+            let [reader, writer_dag, topic, _] = numbers.expect("all are proven")[..] else {
+                panic!("{}", line.text);
+            };
+            assert_ne!(reader_dag, writer_dag, "{}", line.text);
+            let arrow = format!("  c0_d{writer_dag}_t{topic} -> c0_d{reader_dag}_s{reader} [");
+            assert!(dot.contains(&arrow), "{arrow} is not in\n{dot}");
+            let topic = name(writer_dag, "topics", topic);
+            arrows.push(format!("{topic} {}", name(reader_dag, "subtasks", reader)));
+        }
+    }
+    assert_eq!(
+        arrows,
+        [
+            "PointCloudMapLoader NDTLocalizer",
+            "EuclideanClusterSettings EuclideanClusterDetector",
+            "Visualizer Lanelet2GlobalPlanner",
+            "NDTLocalizer Lanelet2GlobalPlanner",
+            "ObjectCollisionEstimator BehaviorPlanner",
+            "NDTLocalizer BehaviorPlanner",
+            "Lanelet2GlobalPlanner BehaviorPlanner",
+            "Lanelet2MapLoader BehaviorPlanner",
+            "ParkingPlanner BehaviorPlanner",
+            "LanePlanner BehaviorPlanner",
+        ]
+    );
+}
+
+#[test]
 fn a_run_whose_output_goes_to_a_program_is_not_asked_for_its_status() {
     let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
     let words = [

@@ -142,7 +142,7 @@ pub fn finish_create_dags_with(
         return Err(CommitError { faults, warnings });
     }
     let staleness = staleness::of_all(dags, &task_set, &answers.of_dags);
-    let plan = tie(dags, task_set, answers.bounds_ns());
+    let plan = tie(dags, task_set, answers.bounds_ns(), staleness.clone());
     match platform.launch(plan) {
         Ok(()) => Ok(Commit {
             warnings,

@@ -8,6 +8,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::{DagId, DagSpec, SubtaskSpec, TaskSet};
 
+use super::staleness::Staleness;
 use crate::api::dag::Dag;
 use crate::run::plan::{Body, Plan};
 use crate::run::subtask::MakeBody;
@@ -17,7 +18,12 @@ use crate::run::topic::Wiring;
 static PLANS: AtomicU64 = AtomicU64::new(0);
 
 /// Turns verified DAGs into a plan, and closes their handles.
-pub(crate) fn tie(dags: &[Dag], task_set: TaskSet, bounds_ns: Vec<Option<u64>>) -> Plan {
+pub(crate) fn tie(
+    dags: &[Dag],
+    task_set: TaskSet,
+    bounds_ns: Vec<Option<u64>>,
+    staleness: Vec<Staleness>,
+) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
     let bodies = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
         .map(|((id, dag), verified)| {
@@ -62,5 +68,6 @@ pub(crate) fn tie(dags: &[Dag], task_set: TaskSet, bounds_ns: Vec<Option<u64>>) 
         number,
         bodies,
         bounds_ns,
+        staleness,
     }
 }

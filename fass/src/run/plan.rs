@@ -13,6 +13,7 @@ use sched_dag::{DagId, TaskSet};
 
 use super::effect::Effect;
 use super::gate::Gate;
+use crate::commit::staleness::Staleness;
 
 /// A committed set of DAGs, ready to be scheduled.
 ///
@@ -42,6 +43,9 @@ pub struct Plan {
     /// The response time of each DAG that the commit has proven, if it has
     /// ([`Commit::answers`](crate::Commit::answers)).
     pub bounds_ns: Vec<Option<u64>>,
+    /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
+    /// passes between DAGs, for platforms that show it.
+    pub staleness: Vec<Staleness>,
 }
 
 /// The executable part of a subtask: its function with its ends of the topics.
