@@ -1,5 +1,6 @@
 //! What a run leaves behind.
 
+use alloc::vec::Vec;
 use core::cell::OnceCell;
 
 use sched_dag::law::{self, Precision, Record, Tally, Violation};
@@ -161,6 +162,25 @@ impl Run {
     /// See [`Run`].
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         law::violations(self.task_set(), self.record())
+    }
+
+    /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
+    /// `bound_ns`: a decision takes effect after an interrupt. `None` if events are lost.
+    ///
+    /// ```no_run
+    /// /// How often an instance waited for a core for more than 50 us without need.
+    /// fn passed_over(run: &kernel::Run) -> Option<usize> {
+    ///     Some(run.dispatch_violations(50_000)?.len())
+    /// }
+    /// ```
+    #[must_use]
+    pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
+        let journal = self.journal();
+        let options = self.execution.scheduler().options();
+        (journal.lost() == 0).then(|| {
+            let events = journal.events();
+            law::dispatch_violations(self.task_set(), &options, self.record(), events, bound_ns)
+        })
     }
 
     /// Returns how often anything, kernel or app, allocated memory between the

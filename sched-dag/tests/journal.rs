@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use random::Random;
 use sched_dag::journal::{Event, Recorder, What};
-use sched_dag::law::{Precision, Record, Tally, dispatch_violations, stretches, violations};
+use sched_dag::law::{Precision, Record, Tally, dispatch_violations, violations};
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Observer, Scheduler,
@@ -121,8 +121,13 @@ fn a_whole_journal_keeps_all_rules() {
         let record = record(run, true, 0);
         let found: Vec<_> = violations(&run.task_set, &record).collect();
         assert_eq!(found, [], "seed {seed}");
-        let stretches = stretches(run.events.iter().copied());
-        let found = dispatch_violations(&run.task_set, &set.options, &record, &stretches);
+        let found = dispatch_violations(
+            &run.task_set,
+            &set.options,
+            &record,
+            run.events.iter().copied(),
+            0,
+        );
         assert_eq!(found, [], "seed {seed}");
     });
 }

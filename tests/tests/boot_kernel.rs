@@ -269,6 +269,9 @@ fn preemption(mode: Mode, cores: u64, policy: &str, least_preemptions: u64) -> O
     assert!(preemptions >= Some(least_preemptions), "{}", line.text);
     assert_eq!(line.number_at("diverged"), Some(0), "{}", line.text);
     assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+    if mode == Mode::Deterministic {
+        assert_eq!(line.number_at("passed_over"), Some(0), "{}", line.text);
+    }
     outcome
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sched_dag::journal::{Recorder, What};
-use sched_dag::law::{Precision, Record, dispatch_violations, stretches, violations};
+use sched_dag::law::{Precision, Record, dispatch_violations, violations};
 use sched_dag::{CoreId, Instance, SchedulerOptions, TaskSet};
 
 use crate::run::{Recorded, Report};
@@ -39,7 +39,7 @@ pub(crate) fn judge(
     let events = recorder.events.iter().copied();
     let record = Record::of_events(task_set, Precision::Exact, true, events.clone());
     let record = record.expect("the times of a run fit into memory; state fewer jobs");
-    let of_dispatch = dispatch_violations(task_set, &options, &record, &stretches(events.clone()));
+    let of_dispatch = dispatch_violations(task_set, &options, &record, events.clone(), 0);
     let mut by_worker = vec![0; options.cores as usize];
     for event in events.filter(|event| event.what == What::Finish) {
         by_worker[event.core.index()] += 1;

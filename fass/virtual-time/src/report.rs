@@ -118,9 +118,12 @@ impl Report {
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         let record = self.record();
-        let stretches = law::stretches(self.events.iter().copied());
+        // Who has changed times may have put them out of order.
+        let mut events = self.events.clone();
+        events.sort_by_key(|event| event.time_ns);
+        let events = events.iter().copied();
         let of_dispatch =
-            law::dispatch_violations(&self.task_set, &self.options, &record, &stretches);
+            law::dispatch_violations(&self.task_set, &self.options, &record, events, 0);
         law::violations(&self.task_set, &record)
             .chain(of_dispatch)
             .collect()

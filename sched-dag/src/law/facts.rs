@@ -1,11 +1,10 @@
 //! From events to times: the facts that the rules are about.
 
-use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::{Precision, Record, Stretch};
+use super::{Precision, Record};
 use crate::ids::{DagId, Instance};
 use crate::journal::{Event, What};
 use crate::scheduler::JobOutcome;
@@ -141,37 +140,4 @@ fn jobs(
     }
     let ranges = jobs.into_iter().map(|(first, end)| first.min(end)..end);
     ranges.collect()
-}
-
-/// Returns when which core ran what, from events in their order. What still runs at
-/// the end has no end.
-pub fn stretches(events: impl Iterator<Item = Event>) -> Vec<Stretch> {
-    let mut open: BTreeMap<Instance, Stretch> = BTreeMap::new();
-    let mut stretches = Vec::new();
-    for event in events {
-        let Some(instance) = event.instance() else {
-            continue;
-        };
-        match event.what {
-            What::Start | What::Resume => {
-                let begun = Stretch {
-                    instance,
-                    core: event.core,
-                    from_ns: event.time_ns,
-                    to_ns: u64::MAX,
-                };
-                stretches.extend(open.insert(instance, begun));
-            }
-            What::Suspend | What::Finish | What::Ended => {
-                let ended = open.remove(&instance);
-                stretches.extend(ended.map(|begun| Stretch {
-                    to_ns: event.time_ns,
-                    ..begun
-                }));
-            }
-            _ => {}
-        }
-    }
-    stretches.extend(open.into_values());
-    stretches
 }

@@ -6,8 +6,8 @@
 //! - [`Record::of_events`]: the times of every job and instance, of the latest whole
 //!   jobs if the oldest events are lost;
 //! - [`violations`]: every breach of the model's rules R1 to R4 in a record;
-//! - [`dispatch_violations`]: every breach of R5, by the [`stretches`] in which cores
-//!   ran;
+//! - [`dispatch_violations`]: every breach of R5 that lasts for longer than a stated
+//!   bound; [`sweep`] is its core, for those who have no record;
 //! - [`Tally`]: statistics of a run of any length, in a fixed amount of memory.
 //!
 //! Times are in nanoseconds from the run's epoch.
@@ -20,6 +20,7 @@ mod check;
 mod dispatch;
 mod facts;
 mod histogram;
+pub mod sweep;
 mod tally;
 mod violation;
 
@@ -28,8 +29,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 pub use check::violations;
-pub use dispatch::{Stretch, dispatch_violations};
-pub use facts::stretches;
+pub use dispatch::dispatch_violations;
 pub use histogram::Histogram;
 pub use tally::{OfDag, OfSubtask, Tally};
 pub use violation::{Rule, Violation};

@@ -39,6 +39,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let run = machine.run()?;
 
     let violations = run.violations().count() as u64;
+    // In real time the host may take a core away for longer.
+    let passed_over = run.dispatch_violations(50_000).unwrap_or_default();
     let diverged = diverged.load(Ordering::Relaxed);
     let instances = || run.record().all_instances(run.task_set());
     json::emit("preemption", |line| {
@@ -51,6 +53,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
             )
             .number("diverged", diverged)
             .number("violations", violations)
+            .number("passed_over", passed_over.len() as u64)
             .number("cpus", machine.cores());
     });
     if diverged + violations > 0 {

@@ -226,7 +226,14 @@ pub const KINDS: &[(&str, &[&str])] = &[
     ("exception", &["cpu", "place", "message"]),
     (
         "preemption",
-        &["instances", "preemptions", "diverged", "violations", "cpus"],
+        &[
+            "instances",
+            "preemptions",
+            "diverged",
+            "violations",
+            "passed_over",
+            "cpus",
+        ],
     ),
     ("storm", &["cpus", "interrupts", "rounds", "diverged"]),
     (

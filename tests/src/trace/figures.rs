@@ -17,8 +17,8 @@
 use std::collections::BTreeMap;
 
 use sched_dag::CoreId;
+use sched_dag::law::sweep::Waits;
 
-use super::dispatch::Waits;
 use super::model::What;
 use super::view::View;
 

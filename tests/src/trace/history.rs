@@ -12,6 +12,7 @@
 //!
 //! If events were lost, the first one left tells what must have been before.
 
+use sched_dag::law::sweep::Stage;
 use sched_dag::{CoreId, Instance};
 
 use super::breach::{Breach, Rule};
@@ -40,21 +41,6 @@ pub(super) struct Slice {
     pub(super) from_ns: u64,
     /// `None`: it ran when the trace ended.
     pub(super) to_ns: Option<u64>,
-}
-
-/// What an instance is, for the dispatch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stage {
-    /// It is not ready yet, as far as is known.
-    Absent,
-    /// It waits for a core and has not started.
-    Ready,
-    /// It runs.
-    Running(CoreId),
-    /// It waits for a core and has started.
-    Suspended,
-    /// It has finished, or will never run.
-    Over,
 }
 
 impl History {

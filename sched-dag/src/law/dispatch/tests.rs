@@ -1,8 +1,8 @@
-//! Small schedules, right and wrong, as stretches on cores.
+//! Small schedules, right and wrong, as stretches of time on cores.
 
 use super::*;
 use crate::ids::{DagId, SubtaskId};
-use crate::law::InstanceRecord;
+use crate::law::Precision;
 use crate::{CommitOptions, DagSpec, Priority, SubtaskSpec, verify};
 
 /// DAGs of one subtask each, DAG 0 the most urgent; the last one's subtask
@@ -39,32 +39,41 @@ fn check(
     ready_ns: &[u64],
     ran: &[(u32, u32, u64, u64)],
 ) -> Vec<Violation> {
-    let mut record = Record::with_jobs(task_set, crate::law::Precision::Exact, |_| 0..1).unwrap();
-    for (dag, &ready_ns) in (0..).zip(ready_ns) {
-        let own = || ran.iter().filter(|stretch| stretch.0 == dag);
-        *record.instance_mut(of(dag)).unwrap() = InstanceRecord {
-            ready_ns: Some(ready_ns),
-            start_ns: own().map(|stretch| stretch.2).min(),
-            finish_ns: own().map(|stretch| stretch.3).max(),
-            ..InstanceRecord::default()
-        };
-    }
-    let stretches: Vec<Stretch> = ran
-        .iter()
-        .map(|&(dag, core, from_ns, to_ns)| Stretch {
-            instance: of(dag),
-            core: CoreId(core),
-            from_ns,
-            to_ns,
-        })
+    let record = Record::with_jobs(task_set, Precision::Exact, |_| 0..1).unwrap();
+    let event = |time_ns, what, dag, core| Event {
+        time_ns,
+        what,
+        core: CoreId(core),
+        dag: DagId(dag),
+        job: 0,
+        subtask: Some(SubtaskId(0)),
+    };
+    let ready = (0..).zip(ready_ns);
+    let mut events: Vec<Event> = ready
+        .map(|(dag, &ns)| event(ns, What::Ready, dag, 0))
         .collect();
+    for (place, &(dag, core, from_ns, to_ns)) in ran.iter().enumerate() {
+        let is_own = |stretch: &&(u32, u32, u64, u64)| stretch.0 == dag;
+        let begins = match ran[..place].iter().any(|stretch| is_own(&stretch)) {
+            true => What::Resume,
+            false => What::Start,
+        };
+        let ends = match ran[place + 1..].iter().any(|stretch| is_own(&stretch)) {
+            true => What::Suspend,
+            false => What::Finish,
+        };
+        events.push(event(from_ns, begins, dag, core));
+        events.push(event(to_ns, ends, dag, core));
+    }
+    events.sort_by_key(|event| event.time_ns);
     let found = |policy| {
         let options = SchedulerOptions {
             policy,
             preemption: Preemption::Enabled,
             cores,
         };
-        dispatch_violations(task_set, &options, &record, &stretches)
+        let events = events.iter().copied();
+        dispatch_violations(task_set, &options, &record, events, 0)
     };
     // The deadlines are in the order of the priorities.
     let by_priority = found(Policy::StaticPriority);

@@ -1,0 +1,327 @@
+//! R5: did the right instances run?
+//!
+//! At every instant the rule says which instances *should* run: with m cores, those
+//! that have started and keep their core, and of all others that are eligible those
+//! with the smallest keys, until m are reached. An eligible instance that should run
+//! and does not is *owed* a core. In virtual time that never lasts. On a machine it is
+//! never 0: the scheduler is told, decides, and interrupts a core. So it is a breach
+//! only if it lasts for longer than a stated *bound*. The blame is what was the case
+//! when the bound was exceeded: an instance of lower priority runs, or a core is idle.
+//!
+//! Besides, at the start of an instance that will keep its core: those of higher
+//! priority that have been waiting for longer than the bound must have idle cores to
+//! go to. Without that, a wrong choice would show no longer than it takes to make.
+//!
+//! The [`Sweep`] takes changes one after the other and keeps only what waits and what
+//! runs, so it judges a run of any length.
+//!
+//! Not checked: what happens within one instant. An instance that executes for no time
+//! is eligible and gone at one instant, so its order among others is not seen.
+
+use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::vec::Vec;
+
+use crate::ids::{CoreId, DagId, Instance};
+
+/// The key of R5: the smaller one goes first. No two instances have the same.
+pub type Key = (u64, Instance);
+
+/// What R5 has to know of the model.
+pub trait Ranking {
+    /// Returns an instance's place in the order of dispatch.
+    fn key(&self, instance: Instance) -> Key;
+
+    /// Reports whether a started instance keeps its core until it finishes.
+    fn keeps_its_core(&self, instance: Instance) -> bool;
+}
+
+/// What an instance is, for the dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// It is not ready yet, as far as is known.
+    Absent,
+    /// It waits for a core and has not started.
+    Ready,
+    /// It runs.
+    Running(CoreId),
+    /// It waits for a core and has started.
+    Suspended,
+    /// It has finished, or will never run.
+    Over,
+}
+
+/// What changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// From now on it is known what a core does.
+    CoreIsKnown,
+    /// The waiting instances of a DAG are owed nothing any more.
+    Stopped(DagId),
+    /// An instance enters a stage.
+    Stage(Instance, Stage),
+}
+
+/// What runs while another instance should.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blame {
+    /// An instance, on this core.
+    Runs(Instance, CoreId),
+    /// A core is idle; the first one, unless it is not known which.
+    Idle(Option<CoreId>),
+}
+
+/// A breach of R5.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// The instance was owed a core for too long.
+    Waits {
+        /// The instance.
+        waiting: Instance,
+        /// Since when.
+        since_ns: u64,
+        /// For how long.
+        length_ns: u64,
+        /// What was the case meanwhile.
+        blame: Blame,
+    },
+    /// An instance started and keeps its core, although another one went first.
+    OutOfTurn {
+        /// The instance.
+        started: Instance,
+        /// Its core.
+        core: CoreId,
+        /// When it started.
+        at_ns: u64,
+        /// The one that goes first.
+        first: Instance,
+        /// Since when that has been waiting.
+        since_ns: u64,
+    },
+}
+
+/// What R5 tells about a run besides breaches.
+#[derive(Clone, Debug, Default)]
+pub struct Waits {
+    /// The longest time for which an instance was owed a core.
+    pub longest_owed_ns: u64,
+    /// From readiness to start, where a core was idle for the instance and no
+    /// other one came first.
+    pub ready_to_start_ns: Vec<u64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Owed {
+    since_ns: u64,
+    /// Whether it has just become ready and found an idle core for it.
+    finds_idle_core: bool,
+    blame: Option<Blame>,
+}
+
+/// The state of the dispatch between two changes.
+#[derive(Debug)]
+pub struct Sweep<'r, R> {
+    ranking: &'r R,
+    bound_ns: u64,
+    known_cores: usize,
+    /// Since when each waits.
+    waiting: BTreeMap<Key, u64>,
+    running: BTreeMap<Key, CoreId>,
+    stopped: BTreeSet<DagId>,
+    owed: BTreeMap<Key, Owed>,
+    /// Became ready, or started, at this instant.
+    fresh: Vec<Key>,
+    started: Vec<(Key, CoreId)>,
+    /// What has not started yet.
+    unstarted: BTreeSet<Key>,
+    wrong: Vec<Wrong>,
+    waits: Waits,
+}
+
+impl<'r, R: Ranking> Sweep<'r, R> {
+    /// Judges changes, which are in the order of time, up to the run's end.
+    pub fn judge(
+        ranking: &'r R,
+        bound_ns: u64,
+        changes: impl IntoIterator<Item = (u64, Change)>,
+        end_ns: u64,
+    ) -> (Vec<Wrong>, Waits) {
+        let mut sweep = Self {
+            ranking,
+            bound_ns,
+            known_cores: 0,
+            waiting: BTreeMap::new(),
+            running: BTreeMap::new(),
+            stopped: BTreeSet::new(),
+            owed: BTreeMap::new(),
+            fresh: Vec::new(),
+            started: Vec::new(),
+            unstarted: BTreeSet::new(),
+            wrong: Vec::new(),
+            waits: Waits::default(),
+        };
+        let mut changes = changes.into_iter().peekable();
+        while let Some((now_ns, change)) = changes.next() {
+            sweep.apply(now_ns, change);
+            match changes.peek() {
+                Some((next_ns, _)) if *next_ns == now_ns => {}
+                next => {
+                    let until_ns = next.map_or(end_ns, |(next_ns, _)| *next_ns);
+                    sweep.settle(now_ns, until_ns);
+                }
+            }
+        }
+        for (key, owed) in core::mem::take(&mut sweep.owed) {
+            sweep.close(key, &owed, end_ns);
+        }
+        (sweep.wrong, sweep.waits)
+    }
+
+    fn apply(&mut self, now_ns: u64, change: Change) {
+        let (key, stage) = match change {
+            Change::CoreIsKnown => {
+                self.known_cores += 1;
+                return;
+            }
+            Change::Stopped(dag) => {
+                self.waiting.retain(|(_, instance), _| instance.dag != dag);
+                self.stopped.insert(dag);
+                return;
+            }
+            Change::Stage(instance, stage) => (self.ranking.key(instance), stage),
+        };
+        self.waiting.remove(&key);
+        self.running.remove(&key);
+        let is_owed_nothing = self.stopped.contains(&key.1.dag);
+        let is_first = self.unstarted.remove(&key);
+        match stage {
+            Stage::Ready | Stage::Suspended if is_owed_nothing => {}
+            Stage::Ready => {
+                self.waiting.insert(key, now_ns);
+                self.unstarted.insert(key);
+                self.fresh.push(key);
+            }
+            Stage::Suspended => {
+                self.waiting.insert(key, now_ns);
+            }
+            Stage::Running(core) => {
+                self.running.insert(key, core);
+                if is_first {
+                    self.started.push((key, core));
+                }
+            }
+            Stage::Absent | Stage::Over => {}
+        }
+    }
+
+    /// Judges what is the case from now until the next change.
+    fn settle(&mut self, now_ns: u64, until_ns: u64) {
+        let idle = self.known_cores.saturating_sub(self.running.len());
+        for place in 0..self.started.len() {
+            let (key, core) = self.started[place];
+            let wrong = self.out_of_turn(key, core, idle, now_ns);
+            self.wrong.extend(wrong);
+        }
+        let should_run = self.should_run();
+        let past = |key: &Key| !should_run.contains(key);
+        let over: Vec<Key> = self.owed.keys().copied().filter(past).collect();
+        for key in over {
+            if let Some(owed) = self.owed.remove(&key) {
+                self.close(key, &owed, now_ns);
+            }
+        }
+        for (rank, key) in should_run.iter().enumerate() {
+            let since_ns = self.owed.get(key).map_or(now_ns, |owed| owed.since_ns);
+            let has_blame = self.owed.get(key).is_some_and(|owed| owed.blame.is_some());
+            let exceeds = since_ns.saturating_add(self.bound_ns) < until_ns;
+            let blame = (exceeds && !has_blame).then(|| self.blame(rank < idle));
+            let finds_idle_core = rank < idle && self.fresh.contains(key);
+            let owed = self.owed.entry(*key).or_insert(Owed {
+                since_ns,
+                finds_idle_core,
+                blame: None,
+            });
+            owed.blame = owed.blame.or(blame);
+        }
+        self.fresh.clear();
+        self.started.clear();
+    }
+
+    /// Returns the waiting instances that should run, in the order of keys.
+    fn should_run(&self) -> Vec<Key> {
+        let (mut free, mut owed) = (self.known_cores, Vec::new());
+        let mut movable = Vec::new();
+        for key in self.running.keys() {
+            if self.ranking.keeps_its_core(key.1) {
+                free = free.saturating_sub(1);
+            } else {
+                movable.push(*key);
+            }
+        }
+        let mut movable = movable.into_iter().peekable();
+        let mut waiting = self.waiting.keys().copied().peekable();
+        for _ in 0..free {
+            match (waiting.peek(), movable.peek()) {
+                (Some(waits), Some(runs)) if runs < waits => {
+                    movable.next();
+                }
+                (Some(waits), _) => {
+                    owed.push(*waits);
+                    waiting.next();
+                }
+                (None, _) => break,
+            }
+        }
+        owed
+    }
+
+    /// Says what runs instead of an instance that is owed a core.
+    fn blame(&self, is_idle: bool) -> Blame {
+        let mut running = self.running.iter().rev();
+        let movable = running.find(|(key, _)| !self.ranking.keeps_its_core(key.1));
+        match movable {
+            Some((key, core)) if !is_idle => Blame::Runs(key.1, *core),
+            _ => {
+                let is_busy = |core: &CoreId| self.running.values().any(|busy| busy == core);
+                let mut cores = (0..).take(self.known_cores).map(CoreId);
+                Blame::Idle(cores.find(|core| !is_busy(core)))
+            }
+        }
+    }
+
+    /// Takes note that an instance is owed nothing any more.
+    fn close(&mut self, key: Key, owed: &Owed, now_ns: u64) {
+        let length_ns = now_ns.saturating_sub(owed.since_ns);
+        self.waits.longest_owed_ns = self.waits.longest_owed_ns.max(length_ns);
+        let mut started = self.started.iter();
+        if owed.finds_idle_core && started.any(|(started, _)| *started == key) {
+            self.waits.ready_to_start_ns.push(length_ns);
+        }
+        if length_ns > self.bound_ns {
+            self.wrong.push(Wrong::Waits {
+                waiting: key.1,
+                since_ns: owed.since_ns,
+                length_ns,
+                blame: owed.blame.unwrap_or(Blame::Idle(None)),
+            });
+        }
+    }
+
+    /// Judges the start of an instance that keeps its core from now on.
+    fn out_of_turn(&self, key: Key, core: CoreId, idle: usize, now_ns: u64) -> Option<Wrong> {
+        if !self.ranking.keeps_its_core(key.1) {
+            return None;
+        }
+        let mut before = self.waiting.range(..key).filter(|(_, since_ns)| {
+            let longest_ns = now_ns.saturating_sub(**since_ns);
+            longest_ns > self.bound_ns
+        });
+        let (first, since_ns) = before.nth(idle)?;
+        Some(Wrong::OutOfTurn {
+            started: key.1,
+            core,
+            at_ns: now_ns,
+            first: first.1,
+            since_ns: *since_ns,
+        })
+    }
+}
