@@ -20,7 +20,7 @@ use crate::excerpt::Excerpt;
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, this_core};
+use crate::machine::{clock, interrupt_flag, this_core};
 use crate::{contexts, execution, json, worker};
 
 /// How much of a panic's message is shown, and of a name, in bytes. With these a
@@ -38,17 +38,17 @@ struct Fault<'a> {
 
 /// Ends the instance that panics, if it is a subtask's; else returns.
 pub(crate) fn end_panicked(info: &PanicInfo<'_>) {
-    if !this_core::is_ready() || !cpu::are_interrupts_enabled() {
+    if !this_core::is_ready() || !interrupt_flag::are_enabled() {
         return;
     }
-    cpu::disable_interrupts();
+    interrupt_flag::disable();
     let core = this_core::get();
     let context = core.context();
     let Some(instance) = execution::running(core) else {
-        cpu::enable_interrupts();
+        interrupt_flag::enable();
         return;
     };
-    cpu::enable_interrupts();
+    interrupt_flag::enable();
     // The message is made into text before any lock is taken, as that is the
     // app's code once more. A panic in it comes here a second time. There may be no
     // memory left, so none is taken from here on.
@@ -65,7 +65,7 @@ pub(crate) fn end_panicked(info: &PanicInfo<'_>) {
             address: None,
         },
     );
-    cpu::disable_interrupts();
+    interrupt_flag::disable();
     execution::fail(clock::now_ns());
     contexts::lose();
     this_core::abandon_context(worker::new_context())

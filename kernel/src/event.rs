@@ -27,7 +27,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use crate::console;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, this_core};
+use crate::machine::{clock, interrupt_flag, this_core};
 
 /// Something that cores wait for.
 ///
@@ -79,10 +79,10 @@ impl Event {
         for (word, first) in self.waiting.iter().zip((0..).step_by(64)) {
             let mut left = word.swap(0, Ordering::SeqCst);
             while left != 0 {
-                let were_enabled = cpu::disable_interrupts();
+                let were_enabled = interrupt_flag::disable();
                 this_core::all()[first + left.trailing_zeros() as usize].wake_up();
                 if were_enabled {
-                    cpu::enable_interrupts();
+                    interrupt_flag::enable();
                 }
                 left &= left - 1;
             }
@@ -101,7 +101,7 @@ impl Event {
     /// See [`Event`].
     pub fn wait(&self, seen: u64, until_ns: u64) {
         loop {
-            cpu::disable_interrupts();
+            interrupt_flag::disable();
             // Read in every round: in between, the instance may have moved.
             let here = this_core::get().index;
             let word = &self.waiting[(here / 64) as usize];
@@ -109,16 +109,16 @@ impl Event {
             if self.version() != seen || clock::now_ns() >= until_ns {
                 // The bit stays, at worst for one interrupt that means nothing.
                 timer::set(Alarm::Hold, u64::MAX);
-                cpu::enable_interrupts();
+                interrupt_flag::enable();
                 return;
             }
             if console::has_pending() {
-                cpu::enable_interrupts();
+                interrupt_flag::enable();
                 console::send_pending_byte();
                 continue;
             }
             timer::set(Alarm::Hold, until_ns);
-            cpu::enable_interrupts_and_halt();
+            interrupt_flag::enable_and_halt();
         }
     }
 }

@@ -13,9 +13,9 @@ use crate::console::{write_in_emergency, write_line_in_emergency};
 use crate::containment;
 use crate::excerpt::Excerpt;
 use crate::machine::context::Registers;
-use crate::machine::fault::{self, Exception};
+use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
-use crate::machine::{cpu, exit, this_core};
+use crate::machine::{cpu, exit, interrupt_flag, non_maskable, this_core};
 use crate::{execution, journal, json};
 
 /// The most recent events of this core that a report shows.
@@ -46,7 +46,7 @@ pub(crate) fn exception(exception: &Exception<'_>, interrupted: &mut Interrupted
 }
 
 fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option<&Registers>) -> ! {
-    cpu::disable_interrupts();
+    interrupt_flag::disable();
     let core = this_core::is_ready().then(this_core::get);
     let index = core.map_or(0, |core| core.index);
     let mine = REPORTING.compare_exchange(NOBODY, index, Ordering::AcqRel, Ordering::Acquire);
@@ -65,7 +65,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         Err(_) => cpu::halt_forever(),
     }
     if core.is_some() {
-        fault::stop_others();
+        non_maskable::stop_others();
     }
     let instance = core.and_then(execution::running);
     write_in_emergency(format_args!(

@@ -18,9 +18,9 @@ use boot::BootInfo;
 
 use crate::ending::Ending;
 use crate::machine::context::Parked;
-use crate::machine::interrupt::{Handlers, Interrupted, vector};
+use crate::machine::interrupt::{Handlers, Interrupted};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, local_apic, this_core};
+use crate::machine::{clock, cpu, interrupt_flag, local_apic, this_core, vector};
 use crate::{contexts, json, panic};
 
 /// What the machine layer calls in place of the scheduler's handlers.
@@ -121,7 +121,7 @@ fn step() {
 /// What every core but core 0 does.
 fn rest() -> Parked {
     loop {
-        cpu::enable_interrupts_and_halt();
+        interrupt_flag::enable_and_halt();
     }
 }
 

@@ -12,7 +12,9 @@ use crate::bound_verdict::BoundVerdict;
 use crate::ending::Ending;
 use crate::fault_verdict::FaultVerdict;
 use crate::machine::this_core::{self, Stacks};
-use crate::machine::{clock, cpu, exit, interrupt, legacy, local_apic, processors, serial};
+use crate::machine::{
+    clock, cpu, exit, interrupt, interrupt_flag, legacy, local_apic, processors, serial,
+};
 use crate::machine_handle::Machine;
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
@@ -51,7 +53,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     // SAFETY: `memory::initialize` mapped one page of registers there.
     unsafe { local_apic::set_base(platform.local_apic) };
     this_core::create(boot_processor_first(&platform));
-    let core = this_core::become_core(local_apic::id());
+    let core = processors::become_core(local_apic::id());
     let stack = core.context().stack_top();
     let start = Start {
         info,
@@ -111,7 +113,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
     if cores > 1 {
         start_others(info, layout, cores);
     }
-    cpu::enable_interrupts();
+    interrupt_flag::enable();
     let probes = probe::is_asked_for(info);
     if !probes {
         worker::set_heartbeats(0);
@@ -191,7 +193,7 @@ fn stacks(is_boot_processor: bool) -> Result<Stacks, OutOfMemory> {
 /// Where every other core begins: it works until the machine stops.
 extern "C" fn other_core(apic_id: u32) -> ! {
     let apic_id = u8::try_from(apic_id).expect("APIC ids have 8 bits");
-    this_core::become_core(apic_id);
+    processors::become_core(apic_id);
     processors::arrive();
     interrupt::begin_work()
 }

@@ -7,10 +7,10 @@ use alloc::boxed::Box;
 use crate::background::{self, watchdog};
 use crate::execution::{self, Runner, Work};
 use crate::machine::context::{Context, Parked};
-use crate::machine::interrupt::Interrupted;
+use crate::machine::interrupt::{self, Interrupted};
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, section, turns};
+use crate::machine::{clock, cpu, interrupt_flag, section, turns};
 use crate::{console, containment, contexts};
 
 /// The time between two signs of life of core 0. Without any alarm anywhere a
@@ -21,7 +21,7 @@ pub(crate) const HEARTBEAT_NS: u64 = 1_000_000_000;
 /// Interrupts are disabled.
 pub(crate) fn new_context() -> Parked {
     let mut context = this_core::take_spare_context().unwrap_or_else(contexts::take);
-    context.restart();
+    context.restart(interrupt::work);
     context
 }
 
@@ -29,7 +29,7 @@ pub(crate) fn new_context() -> Parked {
 /// next, preempted now and then, on whatever core that may be. Returns the
 /// context that the core is to go on with instead, with interrupts disabled.
 pub(crate) fn work() -> Parked {
-    cpu::disable_interrupts();
+    interrupt_flag::disable();
     let mut work = find_work();
     loop {
         work = match work {
@@ -57,9 +57,9 @@ fn find_work() -> Work {
 
 /// Calls a subtask's function, with interrupts enabled meanwhile.
 fn run(mut runner: Box<Runner>) -> Work {
-    cpu::enable_interrupts();
+    interrupt_flag::enable();
     runner.run();
-    cpu::disable_enabled_interrupts();
+    interrupt_flag::disable_enabled();
     let finish_ns = clock::now_ns();
     execution::complete(runner, finish_ns)
 }
@@ -80,12 +80,12 @@ fn rest(core: &Core) {
     }
     while !core.wake.swap(false, Ordering::AcqRel) {
         if console::has_pending() {
-            cpu::enable_interrupts();
+            interrupt_flag::enable();
             console::send_pending_byte();
         } else {
-            cpu::enable_interrupts_and_halt();
+            interrupt_flag::enable_and_halt();
         }
-        cpu::disable_interrupts();
+        interrupt_flag::disable();
     }
 }
 
@@ -93,13 +93,13 @@ fn rest(core: &Core) {
 /// interrupt. Interrupts are disabled before and after, and enabled meanwhile.
 fn watch(core: &Core) {
     core.begin_watch();
-    cpu::enable_interrupts();
+    interrupt_flag::enable();
     while !core.wake.load(Ordering::Acquire) {
         if !console::send_pending_byte() {
             cpu::relax();
         }
     }
-    cpu::disable_interrupts();
+    interrupt_flag::disable();
     core.end_watch();
     keep_beating(core);
 }
@@ -113,11 +113,11 @@ pub(crate) fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
         if console::send_pending_byte() || has_more {
             continue;
         }
-        cpu::disable_interrupts();
+        interrupt_flag::disable();
         if execution::is_finished() {
-            cpu::enable_interrupts();
+            interrupt_flag::enable();
         } else {
-            cpu::enable_interrupts_and_halt();
+            interrupt_flag::enable_and_halt();
         }
     }
 }
@@ -220,20 +220,20 @@ pub(crate) fn wake_interrupt(interrupted: &mut Interrupted) {
 pub(crate) fn hold(ns: u64) {
     let executed = Executed::from_now();
     loop {
-        cpu::disable_interrupts();
+        interrupt_flag::disable();
         let left_ns = ns.saturating_sub(executed.ns());
         let core = this_core::get();
         if left_ns == 0 {
             timer::set(Alarm::Hold, u64::MAX);
             turns::enter();
-            cpu::enable_interrupts();
+            interrupt_flag::enable();
             return;
         }
         turns::leave(core);
         timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
         // If this is preempted it is here: it then goes round again, on whatever
         // core it continues, and sets that core's alarm.
-        cpu::enable_interrupts_and_halt();
+        interrupt_flag::enable_and_halt();
     }
 }
 
@@ -256,11 +256,11 @@ struct Executed {
 
 impl Executed {
     fn from_now() -> Self {
-        let were_enabled = cpu::disable_interrupts();
+        let were_enabled = interrupt_flag::disable();
         let context = this_core::get().context();
         let start_ns = clock::now_ns();
         if were_enabled {
-            cpu::enable_interrupts();
+            interrupt_flag::enable();
         }
         Self {
             context,

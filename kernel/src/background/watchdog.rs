@@ -13,7 +13,7 @@
 use core::sync::atomic::Ordering;
 
 use crate::execution;
-use crate::machine::fault;
+use crate::machine::non_maskable;
 use crate::machine::this_core::{self, Core};
 
 /// The time between two looks of core 1.
@@ -65,7 +65,7 @@ pub(crate) fn look(own: &Core, now_ns: u64) {
         match judge(silent_ns) {
             Doubt::None => {}
             Doubt::Ask => core.wake_up(),
-            Doubt::Accuse => fault::accuse(core),
+            Doubt::Accuse => non_maskable::accuse(core),
         }
     }
 }

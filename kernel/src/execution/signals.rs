@@ -13,7 +13,7 @@ use super::events::here;
 use super::watcher::Watcher;
 use super::{EXECUTION, Event, Execution, status};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, this_core};
+use crate::machine::{clock, interrupt_flag, this_core};
 
 /// The signals of a run that are on their way to its scheduler.
 pub(super) struct Signals {
@@ -92,13 +92,13 @@ impl Execution {
 /// If an instance does so.
 #[track_caller]
 pub(crate) fn raise(plan: u64, dag: DagId) {
-    let were_enabled = cpu::disable_interrupts();
+    let were_enabled = interrupt_flag::disable();
     let is_instance = status::running(this_core::get()).is_some();
     if !is_instance {
         raise_here(plan, dag);
     }
     if were_enabled {
-        cpu::enable_interrupts();
+        interrupt_flag::enable();
     }
     assert!(
         !is_instance,

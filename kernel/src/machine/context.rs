@@ -11,11 +11,9 @@
 
 use core::cell::UnsafeCell;
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
-
-use super::section::Sections;
 
 /// The general registers as `interrupt.s` and the processor push them.
 #[derive(Debug, Default)]
@@ -43,6 +41,15 @@ pub(crate) struct Registers {
     pub(crate) rflags: u64,
     pub(crate) rsp: u64,
     pub(crate) ss: u64,
+}
+
+impl Registers {
+    const INTERRUPTS_ENABLED: u64 = 1 << 9;
+
+    /// Reports whether interrupts were enabled where these were pushed.
+    pub(super) const fn are_interrupts_enabled(&self) -> bool {
+        self.rflags & Self::INTERRUPTS_ENABLED != 0
+    }
 }
 
 impl fmt::Display for Registers {
@@ -120,6 +127,24 @@ pub(crate) struct Context {
     /// Whether what it runs has been found at fault.
     is_at_fault: AtomicBool,
     sections: Sections,
+}
+
+/// What a context notes of the sections that it is in; see [`section`](super::section).
+#[derive(Debug)]
+pub(super) struct Sections {
+    /// How many there are, one in the other.
+    pub(super) depth: AtomicU32,
+    /// When a preemption was put off first; 0 if none was.
+    pub(super) put_off_ns: AtomicU64,
+}
+
+impl Sections {
+    const fn new() -> Self {
+        Self {
+            depth: AtomicU32::new(0),
+            put_off_ns: AtomicU64::new(0),
+        }
+    }
 }
 
 // SAFETY: everything but the save area is constant or atomic, and the save area
@@ -224,14 +249,13 @@ impl Parked {
         })))
     }
 
-    /// Lets the context begin anew, with an empty stack, when it next runs.
+    /// Lets the context begin anew with `entry`, on an empty stack, when it next runs.
     /// Whatever it did before is forgotten.
-    pub(crate) fn restart(&mut self) {
-        const INTERRUPTS_ENABLED: u64 = 1 << 9;
+    pub(crate) fn restart(&mut self, entry: extern "C" fn() -> !) {
         let registers = Registers {
-            rip: super::interrupt::work as *const () as u64,
+            rip: entry as *const () as u64,
             cs: u64::from(super::descriptors::CODE),
-            rflags: INTERRUPTS_ENABLED,
+            rflags: Registers::INTERRUPTS_ENABLED,
             // As after a call: a function expects the stack to be 8 off.
             rsp: self.0.stack_top - 8,
             ..Registers::default()

@@ -5,22 +5,36 @@
 
 use core::arch::asm;
 use core::arch::x86_64::__cpuid;
-use core::panic::Location;
 
-use super::{counted_time, interrupts_off};
-
-/// Disables interrupts on this processor and reports whether they were enabled.
-#[track_caller]
-pub(crate) fn disable_interrupts() -> bool {
+/// Clears the interrupt flag and reports whether it was set. Where the time for which
+/// interrupts stay disabled is to be measured, [`interrupt_flag`](super::interrupt_flag)
+/// does so.
+pub(super) fn clear_interrupt_flag() -> bool {
     let flags: u64;
     // SAFETY: reads the flags through the stack and clears the interrupt flag,
     // which delays interrupts and changes no memory that Rust knows of.
     unsafe { asm!("pushfq", "pop {}", "cli", out(reg) flags) };
-    let were_enabled = flags & (1 << 9) != 0;
-    if were_enabled {
-        interrupts_off::begin(Location::caller());
-    }
-    were_enabled
+    flags & (1 << 9) != 0
+}
+
+/// Clears the interrupt flag where it is known to be set.
+pub(super) fn clear_set_interrupt_flag() {
+    // SAFETY: clearing the interrupt flag delays interrupts and changes no memory.
+    unsafe { asm!("cli") };
+}
+
+/// Sets the interrupt flag.
+pub(super) fn set_interrupt_flag() {
+    // SAFETY: handlers keep all registers of what they interrupt and touch only
+    // data behind locks or atomics, so an interrupt may come anywhere.
+    unsafe { asm!("sti") };
+}
+
+/// Sets the interrupt flag and halts until an interrupt has been handled. As `sti` takes
+/// effect only after the next instruction, none can slip in between.
+pub(super) fn set_interrupt_flag_and_halt() {
+    // SAFETY: as for `set_interrupt_flag`; halting changes no state.
+    unsafe { asm!("sti", "hlt") };
 }
 
 /// Touches the stack where what comes next will not reach beyond: if it is too short for
@@ -32,43 +46,6 @@ pub(crate) fn probe_stack() {
 
 /// More than any section under a lock takes, in bytes; less than a page.
 const STACK_FOR_A_SECTION: usize = 2048;
-
-/// Disables interrupts where they are known to be enabled.
-#[track_caller]
-pub(crate) fn disable_enabled_interrupts() {
-    // SAFETY: clearing the interrupt flag delays interrupts and changes no memory.
-    unsafe { asm!("cli") };
-    interrupts_off::begin(Location::caller());
-}
-
-/// Reports whether interrupts are enabled on this processor.
-pub(crate) fn are_interrupts_enabled() -> bool {
-    let were_enabled = disable_interrupts();
-    if were_enabled {
-        enable_interrupts();
-    }
-    were_enabled
-}
-
-/// Enables interrupts on this processor.
-pub(crate) fn enable_interrupts() {
-    interrupts_off::end();
-    // SAFETY: handlers keep all registers of what they interrupt and touch only
-    // data behind locks or atomics, so an interrupt may come anywhere.
-    unsafe { asm!("sti") };
-}
-
-/// Enables interrupts and halts until one has been handled; leaves them enabled.
-///
-/// To be called with interrupts disabled: as `sti` takes effect only after the
-/// next instruction, no interrupt that the caller has checked for can slip in
-/// between and leave the processor halted with work to do.
-pub(crate) fn enable_interrupts_and_halt() {
-    interrupts_off::end();
-    counted_time::count_before_halt();
-    // SAFETY: as for `enable_interrupts`; halting changes no state.
-    unsafe { asm!("sti", "hlt") };
-}
 
 /// Continues on another stack, for good.
 ///

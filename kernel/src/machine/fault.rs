@@ -1,19 +1,14 @@
 //! Exceptions: what the processor says about code that cannot go on.
 
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use super::context::Registers;
-use super::interrupt::{Handlers, Interrupted};
-use super::this_core::{self, Core};
-use super::{cpu, local_apic};
+use super::{cpu, this_core};
 
-/// The non-maskable interrupt: another core stops this one, or the board has
-/// something terrible to say.
-const NON_MASKABLE: u64 = 2;
+/// The vector of the non-maskable interrupt: another core's message
+/// ([`non_maskable`](super::non_maskable)), or a failure of the board.
+pub(super) const NON_MASKABLE: u64 = 2;
 const DOUBLE_FAULT: u64 = 8;
-/// The interrupt flag, in the flags.
-const INTERRUPTS_ENABLED: u64 = 1 << 9;
 const PAGE_FAULT: u64 = 14;
 const MACHINE_CHECK: u64 = 18;
 
@@ -54,66 +49,6 @@ const NAMES: [&str; 22] = [
     "control protection exception",
 ];
 
-/// Whether non-maskable interrupts are this kernel's own signal to stop.
-static STOPPING: AtomicBool = AtomicBool::new(false);
-
-/// The core that has to say why it takes no interrupts: its index, or `NOBODY`.
-static ACCUSED: AtomicU32 = AtomicU32::new(NOBODY);
-const NOBODY: u32 = u32::MAX;
-
-/// Makes a core say why it takes no interrupts, and end the run; or go on, if it does.
-pub(crate) fn accuse(core: &Core) {
-    ACCUSED.store(core.index, Ordering::Release);
-    local_apic::send_non_maskable(core.apic_id());
-}
-
-/// Reports whether this is an accusation of this core, and withdraws it.
-fn is_accusation(vector: u64) -> bool {
-    let (taken, failed) = (Ordering::AcqRel, Ordering::Relaxed);
-    vector == NON_MASKABLE
-        && this_core::is_ready()
-        && (ACCUSED.compare_exchange(this_core::get().index, NOBODY, taken, failed)).is_ok()
-}
-
-/// Stops all other cores, for good.
-pub(crate) fn stop_others() {
-    STOPPING.store(true, Ordering::Release);
-    local_apic::send_stop_to_others();
-}
-
-/// Passes an exception to its handler, or stops the core if it is the signal to
-/// stop or nobody handles exceptions yet. Reports whether the code that was interrupted
-/// is to go on.
-pub(super) fn raise(
-    registers: &Registers,
-    handlers: Option<&Handlers>,
-    interrupted: &mut Interrupted,
-) -> bool {
-    let vector = registers.vector;
-    let is_stopped = vector == NON_MASKABLE && STOPPING.load(Ordering::Acquire);
-    let Some(handlers) = handlers.filter(|_| !is_stopped) else {
-        cpu::halt_forever();
-    };
-    let is_accused = is_accusation(vector);
-    if is_accused && registers.rflags & INTERRUPTS_ENABLED != 0 {
-        // The host has not let this core run. It takes its interrupts now.
-        return true;
-    }
-    let name = match is_accused {
-        true => Some(&"interrupts disabled for seconds"),
-        false => usize::try_from(vector)
-            .ok()
-            .and_then(|vector| NAMES.get(vector)),
-    };
-    let exception = Exception {
-        name: name.unwrap_or(&"reserved exception"),
-        registers,
-        address: (vector == PAGE_FAULT).then(cpu::fault_address),
-    };
-    (handlers.exception)(&exception, interrupted);
-    false
-}
-
 impl fmt::Display for Exception<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name)?;
@@ -136,6 +71,21 @@ impl fmt::Display for Exception<'_> {
     }
 }
 
+impl<'a> Exception<'a> {
+    /// Names the exception that has pushed `registers`.
+    pub(super) fn new(registers: &'a Registers) -> Self {
+        let vector = registers.vector;
+        let name = usize::try_from(vector)
+            .ok()
+            .and_then(|vector| NAMES.get(vector));
+        Self {
+            name: name.unwrap_or(&"reserved exception"),
+            registers,
+            address: (vector == PAGE_FAULT).then(cpu::fault_address),
+        }
+    }
+}
+
 impl Exception<'_> {
     /// Reports whether the page below the stack was hit: an absent page within one
     /// page of the stack pointer, as compiled code touches each page on its way down.
@@ -155,6 +105,6 @@ impl Exception<'_> {
             self.registers.vector,
             NON_MASKABLE | DOUBLE_FAULT | MACHINE_CHECK
         );
-        is_contained && self.registers.rflags & INTERRUPTS_ENABLED != 0
+        is_contained && self.registers.are_interrupts_enabled()
     }
 }

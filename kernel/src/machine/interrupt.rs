@@ -8,8 +8,12 @@ use core::arch::global_asm;
 use core::panic::Location;
 
 use super::context::{Parked, Registers};
+use super::fault::{self, Exception};
 use super::once::Once;
-use super::{cpu, descriptors, fault, interrupts_off, local_apic, this_core, timer, turns};
+use super::{
+    cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core, timer,
+    turns, vector,
+};
 
 global_asm!(
     include_str!("interrupt.s"),
@@ -22,16 +26,6 @@ unsafe extern "C" {
     safe static interrupt_stubs: u8;
 }
 
-/// The vectors in use.
-pub(crate) mod vector {
-    /// The local timer.
-    pub(crate) const TIMER: u8 = 0x40;
-    /// Another core has work for this one.
-    pub(crate) const WAKE: u8 = 0x41;
-    /// The local APIC withdrew an interrupt; needs no acknowledgement.
-    pub(crate) const SPURIOUS: u8 = 0xff;
-}
-
 /// What the machine layer calls.
 #[derive(Debug)]
 pub(crate) struct Handlers {
@@ -41,7 +35,7 @@ pub(crate) struct Handlers {
     pub(crate) wake: fn(&mut Interrupted),
     /// The code that was running cannot go on. If the handler returns, it has
     /// exchanged the context.
-    pub(crate) exception: fn(&fault::Exception<'_>, &mut Interrupted),
+    pub(crate) exception: fn(&Exception<'_>, &mut Interrupted),
     /// What a context that begins anew does; it returns, with interrupts
     /// disabled, the context to leave it for.
     pub(crate) work: fn() -> Parked,
@@ -113,10 +107,21 @@ extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
     // SAFETY: `interrupt.s` passes the registers it pushed to the exception's
     // own stack, where nobody else looks.
     let pushed = unsafe { &*registers };
-    if fault::raise(pushed, HANDLERS.get(), &mut Interrupted(())) {
-        // They lie there as in a save area, below them the vector state.
-        return registers;
+    let is_message = pushed.vector == fault::NON_MASKABLE;
+    let is_stopped = is_message && non_maskable::is_stopping();
+    let Some(handlers) = HANDLERS.get().filter(|_| !is_stopped) else {
+        cpu::halt_forever();
+    };
+    let mut exception = Exception::new(pushed);
+    if is_message && non_maskable::is_accusation() {
+        if pushed.are_interrupts_enabled() {
+            // The host has not let this core run. It takes its interrupts now. The
+            // registers lie there as in a save area, below them the vector state.
+            return registers;
+        }
+        exception.name = "interrupts disabled for seconds";
     }
+    (handlers.exception)(&exception, &mut Interrupted(()));
     this_core::get().context().registers()
 }
 
@@ -126,12 +131,12 @@ pub(crate) fn begin_work() -> ! {
 }
 
 /// Where every context begins anew.
-pub(super) extern "C" fn work() -> ! {
+pub(crate) extern "C" fn work() -> ! {
     let handlers = HANDLERS
         .get()
         .expect("handlers are installed before any context begins");
     let next = (handlers.work)();
-    cpu::disable_interrupts();
+    interrupt_flag::disable();
     if let Some(spare) = this_core::take_spare_context() {
         (handlers.release)(spare);
     }

@@ -9,32 +9,11 @@
 //! where they are enabled again; it may lead through several contexts.
 
 use core::panic::Location;
-use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::{cpu, this_core};
 
 static ENABLED: AtomicBool = AtomicBool::new(false);
-
-/// What one core has measured, in ticks of the time stamp counter.
-#[derive(Debug)]
-pub(super) struct Meter {
-    /// When the current section began; 0 if there is none.
-    began: AtomicU64,
-    began_at: AtomicPtr<Location<'static>>,
-    longest: AtomicU64,
-    longest_at: AtomicPtr<Location<'static>>,
-}
-
-impl Meter {
-    pub(super) const fn new() -> Self {
-        Self {
-            began: AtomicU64::new(0),
-            began_at: AtomicPtr::new(core::ptr::null_mut()),
-            longest: AtomicU64::new(0),
-            longest_at: AtomicPtr::new(core::ptr::null_mut()),
-        }
-    }
-}
 
 /// Begins to measure, once all cores are up.
 pub(crate) fn enable() {

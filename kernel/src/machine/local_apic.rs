@@ -5,8 +5,7 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use super::cpu;
-use super::interrupt::vector;
+use super::{cpu, vector};
 
 /// The registers' address; set once before any use.
 static BASE: AtomicU64 = AtomicU64::new(0);
@@ -141,15 +140,15 @@ pub(crate) fn send_non_maskable(apic_id: u8) {
 /// handler's command, so interrupts are disabled meanwhile.
 fn command(apic_id: u8, low: u32) {
     const PENDING: u32 = 1 << 12;
-    let were_enabled = cpu::disable_interrupts();
+    let was_set = cpu::clear_interrupt_flag();
     // Delivery takes microseconds at most; the hardware bounds the wait.
     while read(Register::CommandLow) & PENDING != 0 {
         cpu::relax();
     }
     write(Register::CommandHigh, u32::from(apic_id) << 24);
     write(Register::CommandLow, low);
-    if were_enabled {
-        cpu::enable_interrupts();
+    if was_set {
+        cpu::set_interrupt_flag();
     }
 }
 

@@ -2,7 +2,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use super::{clock, cpu, local_apic, this_core};
+use super::this_core::{self, Core};
+use super::{clock, cpu, interrupt, local_apic};
 
 /// Cores that have arrived in their entry function, the boot processor not
 /// counted.
@@ -11,6 +12,15 @@ static ARRIVED: AtomicU32 = AtomicU32::new(0);
 /// While processors start, QEMU's counted time may jump to the end of the next
 /// timer, wherever that is: a timer of ours keeps the jumps this short.
 const LONGEST_JUMP_NS: u64 = 2_000;
+
+/// Makes the processor that executes this the core with APIC id `apic_id`:
+/// segments, interrupt stacks, interrupt table and local APIC.
+pub(crate) fn become_core(apic_id: u8) -> &'static Core {
+    let core = this_core::load(apic_id);
+    interrupt::load_table();
+    local_apic::enable();
+    core
+}
 
 /// Says that the core which executes this has arrived.
 pub(crate) fn arrive() {

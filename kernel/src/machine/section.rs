@@ -11,12 +11,12 @@
 //! stays so for ever if that context is ended in its section.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicPtr, Ordering};
 
-use super::context::Context;
+use super::context::{Context, Sections};
 use super::this_core::{self, Core};
 use super::timer::{self, Alarm};
-use super::{cpu, interrupt, local_apic};
+use super::{cpu, interrupt_flag, local_apic, vector};
 
 /// For how long a section may put off its core's preemption.
 const LONGEST_NS: u64 = 1_000_000;
@@ -79,31 +79,13 @@ impl<T> Guarded<T> {
     }
 }
 
-/// What a context notes of the sections that it is in.
-#[derive(Debug)]
-pub(super) struct Sections {
-    /// How many there are, one in the other.
-    depth: AtomicU32,
-    /// When a preemption was put off first; 0 if none was.
-    put_off_ns: AtomicU64,
-}
-
-impl Sections {
-    pub(super) const fn new() -> Self {
-        Self {
-            depth: AtomicU32::new(0),
-            put_off_ns: AtomicU64::new(0),
-        }
-    }
-}
-
 /// Lets nothing preempt the caller any more, for some time.
 fn enter() -> &'static Context {
-    let were_enabled = cpu::disable_interrupts();
+    let were_enabled = interrupt_flag::disable();
     let own = this_core::get().context();
     own.sections().depth.fetch_add(1, Ordering::Relaxed);
     if were_enabled {
-        cpu::enable_interrupts();
+        interrupt_flag::enable();
     }
     own
 }
@@ -112,10 +94,10 @@ fn enter() -> &'static Context {
 fn leave(own: &Context) {
     let Sections { depth, put_off_ns } = own.sections();
     if depth.fetch_sub(1, Ordering::Relaxed) == 1 && put_off_ns.swap(0, Ordering::Relaxed) != 0 {
-        let were_enabled = cpu::disable_interrupts();
-        local_apic::send(this_core::get().apic_id(), interrupt::vector::WAKE);
+        let were_enabled = interrupt_flag::disable();
+        local_apic::send(this_core::get().apic_id(), vector::WAKE);
         if were_enabled {
-            cpu::enable_interrupts();
+            interrupt_flag::enable();
         }
     }
 }

@@ -10,7 +10,7 @@ use core::cell::UnsafeCell;
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use super::cpu;
+use super::{cpu, interrupt_flag};
 
 /// Data that one core at a time may use, with interrupts disabled.
 ///
@@ -53,7 +53,7 @@ impl<T> SpinLock<T> {
     pub(crate) fn lock(&self) -> SpinLockGuard<'_, T> {
         // An app that has used up its stack falls here, where it still can fall alone.
         cpu::probe_stack();
-        let interrupts_were_enabled = cpu::disable_interrupts();
+        let interrupts_were_enabled = interrupt_flag::disable();
         let mut guard = self.lock_uninterrupted();
         guard.interrupts_were_enabled = interrupts_were_enabled;
         guard
@@ -71,7 +71,7 @@ impl<T> SpinLock<T> {
     /// Takes the data if it is free.
     #[track_caller]
     pub(crate) fn try_lock(&self) -> Option<SpinLockGuard<'_, T>> {
-        let interrupts_were_enabled = cpu::disable_interrupts();
+        let interrupts_were_enabled = interrupt_flag::disable();
         let serving = self.serving.load(Ordering::Acquire);
         let taken = self
             .next
@@ -86,7 +86,7 @@ impl<T> SpinLock<T> {
             return Some(self.guard(interrupts_were_enabled));
         }
         if interrupts_were_enabled {
-            cpu::enable_interrupts();
+            interrupt_flag::enable();
         }
         None
     }
@@ -130,7 +130,7 @@ impl<T> Drop for SpinLockGuard<'_, T> {
             .serving
             .store(serving.wrapping_add(1), Ordering::Release);
         if self.interrupts_were_enabled {
-            cpu::enable_interrupts();
+            interrupt_flag::enable();
         }
     }
 }

@@ -10,10 +10,10 @@ use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, Ordering};
 use alloc::boxed::Box;
 
 use super::context::{Context, Parked, Registers};
+use super::cpu;
 use super::descriptors::{self, TaskState};
-use super::interrupts_off::Meter;
+use super::meter::Meter;
 use super::once::Once;
-use super::{cpu, local_apic, turns};
 
 /// What a core needs to begin: the tops of stacks, each with a guard page below,
 /// and the context that it runs first.
@@ -59,7 +59,7 @@ pub(crate) struct Core {
     /// Another core has assigned work to this one.
     pub(crate) wake: AtomicBool,
     /// This core watches `wake`: it needs no interrupt to see it.
-    watches: AtomicBool,
+    pub(super) watches: AtomicBool,
     /// Its [`Part`] in the turns.
     part: AtomicU8,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
@@ -107,9 +107,9 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
     let _ = CORES.set(cores.collect());
 }
 
-/// Makes the processor that executes this the core with APIC id `apic_id`:
-/// segments, interrupt stacks, interrupt table and local APIC.
-pub(crate) fn become_core(apic_id: u8) -> &'static Core {
+/// Makes the processor that executes this the core with APIC id `apic_id`: loads its
+/// segments and interrupt stacks.
+pub(super) fn load(apic_id: u8) -> &'static Core {
     const GS_BASE: u32 = 0xc000_0101;
     let core = all()
         .iter()
@@ -132,8 +132,6 @@ pub(crate) fn become_core(apic_id: u8) -> &'static Core {
     // SAFETY: every 64-bit processor has the register; the value establishes
     // the own-core invariant.
     unsafe { cpu::write_msr(GS_BASE, address) };
-    super::interrupt::load_table();
-    local_apic::enable();
     core
 }
 
@@ -187,7 +185,7 @@ pub(super) unsafe fn exchange_context(next: Parked) -> Parked {
 /// Leaves the context that runs where it is, for ever, for `next`. Its stack is
 /// never used again, so whatever lies on it stays valid.
 pub(crate) fn abandon_context(next: Parked) -> ! {
-    cpu::disable_interrupts();
+    cpu::clear_interrupt_flag();
     let registers = next.registers();
     get().run_next(next);
     // SAFETY: the registers are those of a context that does not run and that
@@ -226,19 +224,6 @@ pub(crate) fn take_spare_context() -> Option<Parked> {
 }
 
 impl Core {
-    /// Makes this core look for work, by an interrupt unless it watches for the
-    /// word or is the core that executes this.
-    pub(crate) fn wake_up(&self) {
-        // In one order with what `begin_watch` does: either this core sees there
-        // that it is to wake up, or this sees here that it does not watch yet.
-        self.wake.store(true, Ordering::SeqCst);
-        if self.index != get().index && !self.watches.load(Ordering::SeqCst) {
-            turns::begin_urgent();
-            local_apic::send(self.apic_id, super::interrupt::vector::WAKE);
-            turns::end_urgent();
-        }
-    }
-
     /// Returns the core's part in the turns.
     pub(super) fn part(&self) -> Part {
         const FRESH: u8 = Part::Fresh as u8;
@@ -255,16 +240,6 @@ impl Core {
     /// Notes the core's part in the turns.
     pub(super) fn set_part(&self, part: Part) {
         self.part.store(part as u8, Ordering::Relaxed);
-    }
-
-    /// Lets others know that this core watches `wake` from now on.
-    pub(crate) fn begin_watch(&self) {
-        self.watches.store(true, Ordering::SeqCst);
-    }
-
-    /// Lets others know that this core no longer watches `wake`.
-    pub(crate) fn end_watch(&self) {
-        self.watches.store(false, Ordering::SeqCst);
     }
 
     /// Returns the context that runs on this core.

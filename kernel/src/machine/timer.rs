@@ -7,7 +7,7 @@
 use core::sync::atomic::Ordering;
 
 use super::this_core::{self, Core};
-use super::{clock, counted_time, cpu, local_apic};
+use super::{clock, counted_time, interrupt_flag, local_apic};
 
 /// What an alarm is for; each core has one of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,14 +24,14 @@ pub(crate) enum Alarm {
 
 /// Sets this core's alarm to time `at_ns`, or to never if `u64::MAX`.
 pub(crate) fn set(alarm: Alarm, at_ns: u64) {
-    let were_enabled = cpu::disable_interrupts();
+    let were_enabled = interrupt_flag::disable();
     let core = this_core::get();
     // Writing the timer costs a virtual machine an exit: only if there is need.
     if core.alarms[alarm as usize].swap(at_ns, Ordering::Relaxed) != at_ns {
         arm(core);
     }
     if were_enabled {
-        cpu::enable_interrupts();
+        interrupt_flag::enable();
     }
 }
 

@@ -35,10 +35,9 @@
 use core::panic::Location;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::interrupt::vector;
 use super::this_core::{self, Core, Part};
 use super::timer::{self, Alarm};
-use super::{clock, cpu, interrupts_off, local_apic};
+use super::{clock, cpu, interrupt_flag, interrupts_off, local_apic, vector};
 
 /// How long a turn is. Its end costs some 250 instructions.
 const TURN_NS: u64 = 8_000;
@@ -138,9 +137,9 @@ fn enter_in_turn() {
         if has_turn {
             return;
         }
-        cpu::enable_interrupts();
+        interrupt_flag::enable();
         cpu::relax();
-        cpu::disable_interrupts();
+        interrupt_flag::disable();
     }
 }
 
@@ -156,18 +155,18 @@ pub(crate) fn enter_by_interrupt(core: &Core) {
 /// Does as [`leave`] for an instance that watches the clock. Interrupts are enabled.
 pub(crate) fn stand_back() {
     if is_enabled() {
-        cpu::disable_enabled_interrupts();
+        interrupt_flag::disable_enabled();
         leave(this_core::get());
-        cpu::enable_interrupts();
+        interrupt_flag::enable();
     }
 }
 
 /// Does as [`enter`] for that instance afterwards.
 pub(crate) fn come_back() {
     if is_enabled() {
-        cpu::disable_enabled_interrupts();
+        interrupt_flag::disable_enabled();
         enter();
-        cpu::enable_interrupts();
+        interrupt_flag::enable();
     }
 }
 
