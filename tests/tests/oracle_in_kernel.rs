@@ -37,6 +37,27 @@ fn the_machine_reproduces_the_public_schedules() {
 }
 
 #[test]
+fn the_machine_reproduces_schedules_of_functions_that_compute() {
+    // Each unit is a million instructions: the short cases will do, and of those with
+    // preemptions, one for each number of cores.
+    let last = |case: &Case| case.instances.iter().map(|times| times.finish_ns).max();
+    let has_preemptions = |case: &Case| case.instances.iter().any(|times| times.preemptions > 0);
+    let (cases, texts) = cases(|case| {
+        let most = if has_preemptions(case) { 600 } else { 200 };
+        [1, 2, 4, 8].contains(&case.cores) && last(case).is_some_and(|units| units <= most)
+    });
+    assert_eq!(cases.len(), 15);
+    let preempted = cases.iter().filter(|case| has_preemptions(case));
+    let preempted: Vec<u32> = preempted.map(|case| case.cores).collect();
+    assert_eq!(preempted, [1, 4, 8, 2]);
+    let settings = Settings::for_unit(2000).computing();
+    let judged = run(&cases, &texts, &settings).expect("QEMU and an image");
+    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
+    assert_eq!(judged.len(), 15);
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+#[test]
 fn events_apart_need_no_window() {
     let cases = parse(DISTINCT).expect("the file is well formed");
     for case in &cases {

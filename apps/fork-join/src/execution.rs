@@ -33,29 +33,27 @@ impl Work {
 /// How much a core that is alone computes in a time, and what comes out of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
-    stretch_ns: u64,
+    round_ns: u64,
     result: u64,
 }
 
 impl Pace {
-    /// How many rounds are done, and judged, at a stretch.
-    const STRETCH: u64 = 8;
-
+    /// Of every round.
     const SEED: u64 = 1;
 
     /// Measures this core's pace.
     #[must_use]
     pub fn measure() -> Self {
-        const STRETCHES: u64 = 16;
+        const ROUNDS: u64 = 100;
         // For the first time code and data come from further away.
-        let result = compute(Self::STRETCH, Self::SEED);
+        let result = compute(1, Self::SEED);
         let start_ns = fass::now_ns();
-        for _ in 0..STRETCHES {
-            black_box(compute(Self::STRETCH, Self::SEED));
+        for _ in 0..ROUNDS {
+            black_box(compute(1, Self::SEED));
         }
-        let stretch_ns = (fass::now_ns() - start_ns) / STRETCHES;
+        let round_ns = (fass::now_ns() - start_ns) / ROUNDS;
         Self {
-            stretch_ns: stretch_ns.max(1),
+            round_ns: round_ns.max(1),
             result,
         }
     }
@@ -63,18 +61,18 @@ impl Pace {
     /// Returns how long a round takes.
     #[must_use]
     pub const fn round_ns(self) -> u64 {
-        self.stretch_ns / Self::STRETCH
+        self.round_ns
     }
 
-    /// Computes what takes this time on a core that is alone, in whole stretches.
+    /// Computes what takes this time on a core that is alone, in whole rounds.
     ///
     /// # Panics
     ///
     /// If a result is wrong: something was lost while others had the core.
-    fn compute_for(self, time: Duration) {
+    pub fn compute_for(self, time: Duration) {
         let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        for _ in 0..ns.div_ceil(self.stretch_ns) {
-            let result = compute(Self::STRETCH, Self::SEED);
+        for _ in 0..ns.div_ceil(self.round_ns) {
+            let result = compute(1, Self::SEED);
             assert_eq!(result, self.result, "what was computed is wrong");
         }
     }
@@ -88,7 +86,7 @@ mod tests {
     #[should_panic(expected = "what was computed is wrong")]
     fn a_wrong_result_is_found() {
         let pace = Pace {
-            stretch_ns: 1000,
+            round_ns: 1000,
             result: 7,
         };
         pace.compute_for(Duration::from_nanos(1));

@@ -14,6 +14,10 @@
 //! A unit of execution further ends a *guard* before the unit of time does: in
 //! the reference, completions of an instant come before its releases, and a
 //! deadline at the instant of the completion is met.
+//!
+//! A unit of execution may begin with [`Computing`], after which the core is held for what
+//! is left of the unit. So functions that never wait are preempted in the middle of what
+//! they compute, and the schedule is still the reference's.
 
 use alloc::format;
 use alloc::string::String;
@@ -23,6 +27,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
+use fork_join::Pace;
 use sched_dag::SubtaskId;
 
 use crate::case::Case;
@@ -34,6 +39,16 @@ pub struct Scale {
     pub unit_ns: u64,
     /// How long before the end of a unit of time a unit of execution ends.
     pub guard_ns: u64,
+}
+
+/// What a core computes at the beginning of each unit of execution.
+#[derive(Clone, Copy, Debug)]
+pub struct Computing {
+    /// How fast.
+    pub pace: Pace,
+    /// For how long, if it were alone: longer than the guard, and short enough that all
+    /// cores are through before the unit ends, even if they compute one after the other.
+    pub time: Duration,
 }
 
 /// Time 0 of a run, on the clock of [`fass::now_ns`], to be set before it.
@@ -71,6 +86,23 @@ impl Scale {
         }
     }
 
+    /// Does as [`Scale::execute`], and computes at the beginning of each unit.
+    fn compute(self, units: u64, epoch: &Epoch, computing: Computing) {
+        for _ in 0..units {
+            computing.pace.compute_for(computing.time);
+            let ns = self.left_at(epoch.elapsed_ns());
+            fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
+        }
+    }
+
+    /// Returns how long a unit of execution lasts that is under way `ns` after time 0.
+    fn left_at(self, ns: u64) -> u64 {
+        // The next unit of execution begins a guard before the unit of time.
+        let unit = ns.saturating_add(self.guard_ns) / self.unit_ns;
+        let end_ns = unit.saturating_add(1).saturating_mul(self.unit_ns);
+        end_ns.saturating_sub(self.guard_ns).saturating_sub(ns)
+    }
+
     fn duration(self, units: u64) -> Result<Duration, String> {
         let ns = self.unit_ns.checked_mul(units);
         ns.map(Duration::from_nanos).ok_or_else(|| {
@@ -83,12 +115,17 @@ impl Scale {
 }
 
 /// Builds the case's DAGs, to be committed with any shape of graph allowed.
-/// `epoch` is to be set before they run.
+/// `epoch` is to be set before they run. With `computing` they compute.
 ///
 /// # Errors
 ///
 /// In words: a time of the case is too long at this scale.
-pub fn build(case: &Case, scale: Scale, epoch: &Epoch) -> Result<Vec<Dag>, String> {
+pub fn build(
+    case: &Case,
+    scale: Scale,
+    epoch: &Epoch,
+    computing: Option<Computing>,
+) -> Result<Vec<Dag>, String> {
     let dags = case.task_set.dags().iter().zip(&case.dags).enumerate();
     dags.map(|(number, (model, times))| {
         let dag = create_dag();
@@ -103,7 +140,10 @@ pub fn build(case: &Case, scale: Scale, epoch: &Epoch) -> Result<Vec<Dag>, Strin
                 let (executions, epoch) = (executions.clone(), epoch.clone());
                 let execute = move |job| {
                     let units = usize::try_from(job).map_or(0, |job| executions[job]);
-                    scale.execute(units, &epoch);
+                    match computing {
+                        None => scale.execute(units, &epoch),
+                        Some(computing) => scale.compute(units, &epoch, computing),
+                    }
                 };
                 let attributes = SubtaskAttributes::default().priority(subtask.priority().0);
                 dag.register_untyped_subtask(execute, attributes)
@@ -134,5 +174,17 @@ mod tests {
         assert_eq!(scale.unit_from(4990), 1000); // the unit before ended early
         assert_eq!(scale.unit_from(5500), 1490); // nearer to 6 than to 5
         assert_eq!(scale.unit_from(u64::MAX), 0);
+    }
+
+    #[test]
+    fn a_unit_that_has_computed_lasts_up_to_the_same_end() {
+        let scale = Scale {
+            unit_ns: 1000,
+            guard_ns: 10,
+        };
+        assert_eq!(scale.left_at(5400), 590);
+        assert_eq!(scale.left_at(5989), 1); // the last moment
+        assert_eq!(scale.left_at(5990), 1000); // the next one has begun
+        assert_eq!(scale.left_at(u64::MAX), 0);
     }
 }

@@ -29,7 +29,7 @@ mod repeated;
 pub mod shown;
 
 pub use case::{Case, CaseDag, InstanceTimes, JobTimes};
-pub use dags::{Epoch, Scale, build};
+pub use dags::{Computing, Epoch, Scale, build};
 pub use faults::of_file;
 pub use parse::parse;
 pub use repeated::repeated;

@@ -3,8 +3,9 @@
 //! Words of the command line: `unit_us` is the length of a unit of the cases'
 //! time; `guard_us` is how much before the end of a unit of time a unit of
 //! execution ends; events less than `window_us` apart count as one instant. Without the
-//! latter two they are a 500th and a 100th of a unit. Policy and preemption are
-//! the cases'; so are the cores, which have to be the machine's.
+//! latter two they are a 500th and a 100th of a unit. With `work=compute` all cores compute
+//! for a half of each unit in all. Policy and preemption are the cases'; so are the cores,
+//! which have to be the machine's.
 
 #![no_std]
 #![no_main]
@@ -17,8 +18,9 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use fass::{ConstructionPolicy, finish_create_dags_with};
+use fork_join::Pace;
 use kernel::{Ending, Machine, Run, json, println};
-use replay::{Case, Epoch, Scale, build, parse};
+use replay::{Case, Computing, Epoch, Scale, build, parse};
 use sched_dag::{DagId, JobOutcome};
 
 kernel::entry!(main);
@@ -32,14 +34,20 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let unit_us = options.number("unit_us", 1..=10_000_000, 10_000)?;
     let guard_us = options.number("guard_us", 0..=unit_us / 4, unit_us / 500)?;
     let window_us = options.number("window_us", 0..=unit_us / 4, unit_us / 100)?;
-    options.finish(&["unit_us", "guard_us", "window_us"])?;
+    let computes = options.choice("work", &[("simulate", false), ("compute", true)])?;
+    options.finish(&["unit_us", "guard_us", "window_us", "work"])?;
     let scale = Scale {
         unit_ns: unit_us * 1000,
         guard_ns: guard_us * 1000,
     };
     machine.set_coincidence(Duration::from_micros(window_us));
+    let computing = computes.then(|| Computing {
+        pace: Pace::measure(),
+        // Where instructions are counted, cores compute one after the other.
+        time: Duration::from_micros(unit_us) / (2 * machine.cores()),
+    });
     for case in &cases {
-        run(machine, case, scale)?;
+        run(machine, case, scale, computing)?;
     }
     machine.report_memory();
     Ok(())
@@ -56,7 +64,12 @@ fn cases(machine: &Machine) -> Result<Vec<Case>, Ending> {
     parse(text).map_err(|malformed| usage(format!("reference schedules: {malformed}")))
 }
 
-fn run(machine: &Machine, case: &Case, scale: Scale) -> Result<(), Ending> {
+fn run(
+    machine: &Machine,
+    case: &Case,
+    scale: Scale,
+    computing: Option<Computing>,
+) -> Result<(), Ending> {
     /// Time for the cores to get ready.
     const LEAD_NS: u64 = 1_000_000;
     let in_case = |message: String| Ending::Failure(format!("case {}: {message}", case.name));
@@ -68,7 +81,7 @@ fn run(machine: &Machine, case: &Case, scale: Scale) -> Result<(), Ending> {
     }
     machine.configure(case.policy, case.preemption);
     let epoch = Epoch::default();
-    let dags = build(case, scale, &epoch).map_err(in_case)?;
+    let dags = build(case, scale, &epoch, computing).map_err(in_case)?;
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
     let epoch_ns = fass::now_ns() + LEAD_NS;
     epoch.set(epoch_ns);

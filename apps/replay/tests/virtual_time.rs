@@ -25,7 +25,7 @@ fn runs_as_expected(case: &Case, unit_ns: u64) {
         unit_ns,
         guard_ns: 0,
     };
-    let dags = build(case, scale, &Epoch::default()).expect("short times");
+    let dags = build(case, scale, &Epoch::default(), None).expect("short times");
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
     let report = machine.run();
     assert_eq!(report.violations().len(), 0, "{}", case.name);

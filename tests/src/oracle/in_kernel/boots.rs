@@ -47,13 +47,13 @@ pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<
         let mut waiting = group;
         while let Some((first, _)) = waiting.first() {
             // What cannot be told in nanoseconds would end the whole boot.
-            if let Err(reason) = build(first, settings.scale(), &Epoch::default()) {
+            if let Err(reason) = build(first, settings.scale(), &Epoch::default(), None) {
                 judged.push(verdict(first, Err(reason)));
                 waiting = &waiting[1..];
                 continue;
             }
             let fits = |(case, _): &&(&Case, &str)| {
-                build(case, settings.scale(), &Epoch::default()).is_ok()
+                build(case, settings.scale(), &Epoch::default(), None).is_ok()
             };
             let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
             let outcome = boot_with(&image.path, &waiting[..count], settings)?;
@@ -91,15 +91,18 @@ fn boot_with(
         unit_us,
         guard_us,
         window_us,
+        computes,
         ..
     } = *settings;
+    let work = if computes { "compute" } else { "simulate" };
     let qemu = Qemu {
         mode,
         machine,
         cores: cases.first().map_or(1, |(case, _)| case.cores.into()),
         memory_mib: MEMORY_MIB,
         guest_words: format!(
-            "mode={mode} unit_us={unit_us} guard_us={guard_us} window_us={window_us}"
+            "mode={mode} unit_us={unit_us} guard_us={guard_us} window_us={window_us} \
+             work={work}"
         ),
         module: Some(module.clone()),
         ..Qemu::default()

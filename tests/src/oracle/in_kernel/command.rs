@@ -39,19 +39,27 @@ static IN_KERNEL: Command = Command {
         Opt::new(
             "window-us",
             Takes::number(0..=2_500_000),
-            "Events less than this apart count as one instant; a 100th of a unit.",
+            "Events less than this apart count as one instant; a 100th of a unit, with --work \
+             compute a 40th.",
         ),
         Opt::new(
             "guard-us",
             Takes::number(0..=2_500_000),
-            "How much before a unit's end execution in it ends; a 500th of a unit.",
+            "How much before a unit's end execution in it ends; a 500th of a unit, with --work \
+             compute a 40th.",
         ),
         Opt::new(
             "tolerance",
             Takes::number(1..=49),
-            "How far starts and finishes may be from the reference, in percent of a unit.",
+            "How far starts and finishes may be from the reference, in percent of a unit; 2, with \
+             --work compute 5.",
+        ),
+        Opt::new(
+            "work",
+            Takes::OneOf(&["simulate", "compute"]),
+            "Whether execution is simulated, or cores also compute, for half of each unit in all.",
         )
-        .or("2"),
+        .or("simulate"),
         Opt::new(
             "mode",
             Takes::OneOf(Mode::NAMES),
@@ -113,6 +121,10 @@ pub(in crate::oracle) fn command(words: &[OsString]) -> ExitCode {
 
 fn settings(options: &Parsed) -> Settings {
     let usual = Settings::for_unit(options.number("unit-us").unwrap_or(10_000));
+    let usual = match options.text("work") {
+        Some("compute") => usual.computing(),
+        _ => usual,
+    };
     let mode = options.text("mode").and_then(Mode::from_name);
     let machine = options.text("machine").and_then(Machine::from_name);
     let number = |name: &str, usual| options.number(name).unwrap_or(usual);

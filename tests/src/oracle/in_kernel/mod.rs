@@ -24,6 +24,9 @@
 //!   it does in apps; cases in which nothing coincides pass that way too.
 //! - *Completions come before releases* of the same instant, and a finish at the
 //!   deadline is no miss: execution ends a *guard* before the unit of time does.
+//! - *Functions may compute* at the beginning of each unit of execution, and only then hold
+//!   their cores (`replay::Computing`). Where cores take turns, all of them are through
+//!   after half a unit, so that the schedule stays what it is.
 
 mod boots;
 mod command;
@@ -57,6 +60,8 @@ pub struct Settings {
     pub window_us: u64,
     /// How far a start or finish may be from the reference, in percent of a unit.
     pub tolerance_percent: u64,
+    /// Whether cores really compute in each unit of execution.
+    pub computes: bool,
 }
 
 /// What became of one case.
@@ -91,6 +96,20 @@ impl Settings {
             guard_us: unit_us / 500,
             window_us: unit_us / 100,
             tolerance_percent: 2,
+            computes: false,
+        }
+    }
+
+    /// Lets cores compute. As events then wait for others' turns, guard and window are a
+    /// 40th of a unit, and the tolerance is 5 %.
+    #[must_use]
+    pub fn computing(self) -> Self {
+        Self {
+            guard_us: self.unit_us / 40,
+            window_us: self.unit_us / 40,
+            tolerance_percent: 5,
+            computes: true,
+            ..self
         }
     }
 
