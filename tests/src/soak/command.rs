@@ -25,7 +25,7 @@ static SOAK: Command = Command {
         Opt::new(
             "short",
             Takes::Nothing,
-            "7 s of guest time instead of 13 minutes, of the same kinds; the host takes longer.",
+            "8 s of guest time instead of 14 minutes, of the same kinds; the host takes longer.",
         ),
         Opt::new(
             "cores",

@@ -232,9 +232,9 @@ mod tests {
     }
 
     #[test]
-    fn the_short_form_is_seven_seconds() {
+    fn the_short_form_is_eight_seconds() {
         let plan = Plan::new(Length::SHORT, 90, 130);
-        assert_eq!(u128::from(plan.rounds()) * plan.round.as_millis(), 7000);
+        assert_eq!(u128::from(plan.rounds()) * plan.round.as_millis(), 8000);
     }
 
     #[test]
