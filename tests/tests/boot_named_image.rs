@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use harness::image;
+use harness::{Guest, image, system};
 
 fn built(app: &str) -> PathBuf {
     image::build(app).expect("it builds").path
@@ -20,7 +20,7 @@ fn run(image: &Path, words: &str) -> Output {
 #[test]
 fn an_image_of_another_app_is_2_before_it_boots() {
     let fork_join = built("fork-join");
-    let demo = harness::system::workspace().join("tests/data/demo.dag");
+    let demo = system::workspace().join("tests/data/demo.dag");
     let dag = format!("--dag {}", demo.display());
     for (words, wanted) in [(&*dag, "dag-file"), ("--app replay", "replay")] {
         let output = run(&fork_join, words);
@@ -38,6 +38,27 @@ fn an_image_alone_runs_as_what_it_is() {
     let output = run(&replay, "--plain");
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(said.starts_with("app replay, guest words: "), "{said}");
+}
+
+#[test]
+fn a_build_without_optimization_evaluates_its_run() {
+    let words = [
+        "build",
+        "--quiet",
+        "--package",
+        "fork-join",
+        "--bin",
+        "fork-join",
+    ];
+    let built = system::cargo().args(words).output().expect("cargo starts");
+    assert!(built.status.success(), "{built:?}");
+    let image = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("debug/fork-join");
+    let guest = Guest::new("fork-join").image(&image);
+    let outcome = guest.word("jobs=20").word("subtasks=6").succeed();
+    let line = outcome.transcript.of_kind("fork_join").next();
+    let line = line.expect("the app's line");
+    assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+    assert_eq!(line.number_at("joins"), Some(20), "{}", line.text);
 }
 
 #[test]

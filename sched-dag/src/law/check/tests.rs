@@ -349,3 +349,11 @@ fn reports_figures_of_joins_and_jobs() {
     assert_eq!(record.completion_ns(DAG, 1), Some(15));
     assert!(record.instances(DAG, 3).is_empty());
 }
+
+#[test]
+fn what_looks_for_violations_takes_little_of_a_stack() {
+    let task_set = chain_of_two(|_| ());
+    let record = good(&task_set, Precision::Exact);
+    let size = size_of_val(&violations(&task_set, &record));
+    assert!(size <= 512, "{size} bytes");
+}
