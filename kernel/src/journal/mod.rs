@@ -207,3 +207,6 @@ fn tally(task_set: &Arc<TaskSet>, most_bytes: usize) -> Tally {
     let bits = finest.find(|&bits| Tally::size_of(task_set, bits) <= most_bytes);
     Tally::new(task_set, bits.unwrap_or(0))
 }
+
+#[cfg(test)]
+mod tests;
