@@ -99,6 +99,7 @@ mod nearest;
 mod order;
 mod policy;
 mod priorities;
+mod recorder;
 mod scheduler;
 mod spec;
 mod task_set;
@@ -108,12 +109,12 @@ pub mod virtual_time;
 
 pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use nearest::nearest;
-pub use policy::{Activation, OverrunPolicy, Policy, Preemption, Priority};
-pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
-pub use scheduler::{
-    DagStatistics, Decision, HandOff, JobOutcome, Moment, Observer, Released, Scheduler,
-    SchedulerOptions,
+pub use policy::{
+    Activation, JobOutcome, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions,
 };
+pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
+pub use recorder::Recorder;
+pub use scheduler::{DagStatistics, Decision, HandOff, Moment, Observer, Released, Scheduler};
 pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;

@@ -1,4 +1,5 @@
-//! The choices that govern scheduling: policy, preemption, priority, overrun.
+//! The choices that govern scheduling: policy, preemption, priority, overrun; and what
+//! may become of a job.
 
 /// What releases the jobs of a DAG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -70,4 +71,29 @@ pub enum OverrunPolicy {
     /// when nothing of it is left, the job is out of flight. If all jobs in
     /// flight are aborted already, the oldest waiting release is skipped.
     Abort,
+}
+
+/// How a scheduler orders instances, and for how many cores.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SchedulerOptions {
+    /// How the ready instances are ordered.
+    pub policy: Policy,
+    /// Whether a started instance may lose its core. With
+    /// [`Preemption::Enabled`], non-preemptive subtasks still keep theirs.
+    pub preemption: Preemption,
+    /// The number of cores, at least 1.
+    pub cores: u32,
+}
+
+/// How a job ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JobOutcome {
+    /// All subtasks have finished by the deadline.
+    Met,
+    /// All subtasks have finished, the last one after the deadline.
+    Missed,
+    /// The job was aborted.
+    Aborted,
+    /// The DAG was ended while the job was in flight.
+    DagEnded,
 }

@@ -13,7 +13,8 @@ mod set;
 use std::sync::Arc;
 
 use random::Random;
-use sched_dag::journal::{Event, Recorder, What};
+use sched_dag::Recorder;
+use sched_dag::journal::{Event, What};
 use sched_dag::law::{Precision, Record, Tally, dispatch_violations, violations};
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{

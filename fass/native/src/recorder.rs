@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use sched_dag::journal::{Recorder, What};
+use sched_dag::Recorder;
+use sched_dag::journal::What;
 use sched_dag::law::{Precision, Record, dispatch_violations, violations};
 use sched_dag::{CoreId, Instance, SchedulerOptions, TaskSet};
 

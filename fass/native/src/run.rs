@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 
-use sched_dag::journal::Recorder;
+use sched_dag::Recorder;
 use sched_dag::law::Violation;
 use sched_dag::{
     CoreId, DagId, DagStatistics, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet,

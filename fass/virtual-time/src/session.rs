@@ -10,7 +10,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Body, Plan};
-use sched_dag::journal::{Recorder, What};
+use sched_dag::Recorder;
+use sched_dag::journal::What;
 use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
 use sched_dag::{
     CoreId, DagId, DagLabel, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions,

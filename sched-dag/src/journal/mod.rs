@@ -17,9 +17,7 @@
 //! of it, and another core may come between.
 
 mod event;
-mod recorder;
 mod what;
 
 pub use event::{Event, Subject};
-pub use recorder::Recorder;
 pub use what::{UnknownWord, What};

@@ -19,8 +19,8 @@ use alloc::vec::Vec;
 
 use super::{InstanceRecord, JobRecord, Precision, Record, Violation};
 use crate::ids::{DagId, Instance, SubtaskId};
+use crate::policy::JobOutcome;
 use crate::policy::OverrunPolicy;
-use crate::scheduler::JobOutcome;
 use crate::task_set::TaskSet;
 
 /// Returns every breach of R1 to R4 that a record shows, as strictly as its

@@ -7,8 +7,8 @@ use super::sweep::{Blame, Change, Key, Ranking, Stage, Sweep, Wrong};
 use super::{Record, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, What};
+use crate::policy::SchedulerOptions;
 use crate::policy::{Policy, Preemption};
-use crate::scheduler::SchedulerOptions;
 use crate::task_set::TaskSet;
 
 /// The model and the options of a run whose times are recorded.

@@ -7,7 +7,7 @@ use core::ops::Range;
 use super::{Precision, Record};
 use crate::ids::{DagId, Instance};
 use crate::journal::{Event, What};
-use crate::scheduler::JobOutcome;
+use crate::policy::JobOutcome;
 use crate::task_set::TaskSet;
 
 impl Record {

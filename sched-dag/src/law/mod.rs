@@ -35,7 +35,7 @@ pub use tally::{OfDag, OfSubtask, Tally};
 pub use violation::{Rule, Violation};
 
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
-use crate::scheduler::JobOutcome;
+use crate::policy::JobOutcome;
 use crate::task_set::TaskSet;
 
 /// The times of one instance; each `None` until it has happened.

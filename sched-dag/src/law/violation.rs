@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
-use crate::scheduler::JobOutcome;
+use crate::policy::JobOutcome;
 
 /// A rule of the task model; the [crate] states them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

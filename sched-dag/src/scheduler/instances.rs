@@ -8,8 +8,9 @@
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
-use super::{JobOutcome, OWED, Observer, Scheduler, earliest_ns};
+use super::{OWED, Observer, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
+use crate::policy::JobOutcome;
 
 impl Scheduler {
     /// Ends an instance that has started.

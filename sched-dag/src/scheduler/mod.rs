@@ -63,7 +63,7 @@ use alloc::vec::Vec;
 pub use decision::Decision;
 pub use hand_off::HandOff;
 pub use moment::{Moment, Released};
-pub use observer::{JobOutcome, Observer};
+pub use observer::Observer;
 pub use statistics::DagStatistics;
 
 use cores::Cores;
@@ -73,20 +73,8 @@ use ready_queue::ReadyQueue;
 use vertices::Vertices;
 
 use crate::ids::{CoreId, DagId, Instance, Vertex, to_u32};
-use crate::policy::{Policy, Preemption};
+use crate::policy::SchedulerOptions;
 use crate::task_set::TaskSet;
-
-/// How a scheduler orders instances, and for how many cores.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct SchedulerOptions {
-    /// How the ready instances are ordered.
-    pub policy: Policy,
-    /// Whether a started instance may lose its core. With
-    /// [`Preemption::Enabled`], non-preemptive subtasks still keep theirs.
-    pub preemption: Preemption,
-    /// The number of cores, at least 1.
-    pub cores: u32,
-}
 
 /// The state of all jobs in flight.
 #[derive(Debug)]

@@ -4,6 +4,7 @@
 //! [`Scheduler::at`](crate::Scheduler::at), so none carries a "now".
 
 use crate::ids::{DagId, Instance};
+use crate::policy::JobOutcome;
 
 /// A receiver of the scheduler's reports; every method does nothing by default.
 ///
@@ -63,19 +64,6 @@ pub trait Observer {
     fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
         let _ = (dag, job, outcome);
     }
-}
-
-/// How a job ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum JobOutcome {
-    /// All subtasks have finished by the deadline.
-    Met,
-    /// All subtasks have finished, the last one after the deadline.
-    Missed,
-    /// The job was aborted.
-    Aborted,
-    /// The DAG was ended while the job was in flight.
-    DagEnded,
 }
 
 impl Observer for () {}

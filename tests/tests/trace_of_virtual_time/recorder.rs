@@ -6,7 +6,8 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use sched_dag::journal::{Event, Recorder as Journal, What};
+use sched_dag::Recorder as Journal;
+use sched_dag::journal::{Event, What};
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Observer,

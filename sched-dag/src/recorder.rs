@@ -3,9 +3,10 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use super::{Event, Subject, What};
 use crate::ids::{CoreId, DagId, Instance};
-use crate::scheduler::{JobOutcome, Observer};
+use crate::journal::{Event, Subject, What};
+use crate::policy::JobOutcome;
+use crate::scheduler::Observer;
 use crate::task_set::TaskSet;
 
 /// Writes down what the scheduler reports, and what the driver says that cores do, at
