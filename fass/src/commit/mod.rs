@@ -15,6 +15,7 @@ pub(crate) mod fault;
 pub(crate) mod staleness;
 mod tie;
 
+use alloc::collections::BTreeSet;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::sync::Arc;
@@ -305,14 +306,14 @@ fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
 fn verify(dags: &[Dag], options: CommitOptions) -> Result<Verified, CommitError> {
     let mut faults = Vec::new();
     let mut specs = Vec::with_capacity(dags.len());
+    let mut drafts = BTreeSet::new();
     for (number, dag) in dags.iter().enumerate() {
         let draft = dag.draft.borrow();
         let label = DagLabel {
             id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
             name: draft.spec.name.clone(),
         };
-        let is_repeated = |earlier: &Dag| Rc::ptr_eq(&earlier.draft, &dag.draft);
-        if dags[..number].iter().any(is_repeated) {
+        if !drafts.insert(Rc::as_ptr(&dag.draft)) {
             faults.push(Fault::GivenTwice { dag: label });
             continue;
         }

@@ -109,18 +109,19 @@ fn analysable(
         });
         tasks.push(task.ok());
     }
-    let mut unknown: Vec<usize> = (0..dags.len())
-        .filter(|&dag| reasons[dag].is_some())
-        .collect();
+    let (mut known, mut unknown): (Vec<usize>, Vec<usize>) =
+        (0..dags.len()).partition(|&dag| reasons[dag].is_none());
     let mut seen = 0;
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
-        for (dag, reason) in reasons.iter_mut().enumerate() {
-            if reason.is_none() && relation.may_delay(other, dag) {
-                *reason = Some(Reason::DelayedBy { dag: dag_id(other) });
+        known.retain(|&dag| {
+            let is_delayed = relation.may_delay(other, dag);
+            if is_delayed {
+                reasons[dag] = Some(Reason::DelayedBy { dag: dag_id(other) });
                 unknown.push(dag);
             }
-        }
+            !is_delayed
+        });
     }
     (tasks, reasons)
 }
