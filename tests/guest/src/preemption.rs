@@ -101,8 +101,6 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, diverged: &Arc<AtomicU64>) 
 fn compute(diverged: &AtomicU64) {
     let expected = checksum();
     for _ in 0..ROUNDS {
-        // Passes the turn to the other processors where one host thread emulates all.
-        core::hint::spin_loop();
         if checksum() != expected {
             diverged.fetch_add(1, Ordering::Relaxed);
         }

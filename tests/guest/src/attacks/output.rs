@@ -1,7 +1,7 @@
 //! The serial line: text that takes long, text without end, and forged lines.
 
 use core::fmt;
-use core::hint::{black_box, spin_loop};
+use core::hint::black_box;
 
 use alloc::string::String;
 
@@ -41,7 +41,6 @@ pub(super) fn display_loops() -> Unpunished {
     let loops = Says(|f| {
         while black_box(true) {
             f.write_str("for ever ")?;
-            spin_loop(); // the next core's turn
         }
         Ok(())
     });
@@ -63,7 +62,6 @@ fn panic_with(bytes: usize) -> Unpunished {
     let mut message = String::with_capacity(bytes);
     for _ in 0..bytes / 1000 {
         message.push_str(&"x".repeat(1000));
-        spin_loop(); // the next core's turn
     }
     panic!("{message}")
 }
@@ -72,7 +70,6 @@ fn panic_with(bytes: usize) -> Unpunished {
 pub(super) fn flood() -> Unpunished {
     for number in 0..100_000 {
         println!("drop no {number:87} of a flood");
-        spin_loop(); // the next core's turn
     }
     Unpunished
 }
