@@ -7,7 +7,7 @@
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
 //! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
-//! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a third of the free memory |
+//! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
 //! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |

@@ -10,7 +10,8 @@
 //!
 //! Its memory is taken at commit: as much as the events of all jobs can need (a newly
 //! ready instance preempts at most one other, so an instance has at most six events),
-//! or a third of what is free, if that is less, or no job is the last. When it is
+//! or a quarter of what is free, if that is less, or no job is the last: the times that
+//! are computed from it after the run take up to half as much again. When it is
 //! full, the oldest event makes way for each new one. Before it goes, it is counted in
 //! the [`Tally`], so statistics remain those of the whole run.
 //!
@@ -68,15 +69,20 @@ impl Journal {
     pub(crate) fn new(task_set: &Arc<TaskSet>, free_bytes: usize) -> Self {
         let needed = most_events(task_set);
         let wished = usize::try_from(MOST_EVENTS.load(Ordering::Relaxed)).unwrap_or(usize::MAX);
-        let affordable = free_bytes / 3 / size_of::<[u64; 3]>();
+        let affordable = free_bytes / 4 / size_of::<[u64; 3]>();
         let room = needed.unwrap_or(EVENTS_WITHOUT_END);
-        let room = room.min(wished).min(affordable);
+        let mut room = room.min(wished).min(affordable);
+        let mut events = Vec::new();
+        // What is free may be in pieces.
+        while events.try_reserve_exact(room).is_err() {
+            room /= 2;
+        }
         // Nothing says how many signals are dropped.
         let has_signals = task_set.dags().iter().any(Dag::is_sporadic);
         let is_enough = needed.is_some_and(|needed| needed <= room && !has_signals);
         let tally = (!is_enough && room > 0).then(|| tally(task_set, free_bytes / 8));
         Self {
-            events: Vec::with_capacity(room),
+            events,
             put_away: Vec::new(),
             oldest: 0,
             lost: 0,

@@ -40,7 +40,7 @@ fn run(journal: &mut Journal, job: u64) {
 
 /// A journal with room for 12 events, after all jobs.
 fn small() -> Journal {
-    let mut journal = Journal::new(&task_set(Some(JOBS)), 12 * 24 * 3);
+    let mut journal = Journal::new(&task_set(Some(JOBS)), 12 * 24 * 4);
     (0..JOBS).for_each(|job| run(&mut journal, job));
     journal
 }
@@ -93,7 +93,7 @@ fn statistics_are_those_of_all_jobs() {
 #[test]
 fn a_dag_without_end_takes_no_more_than_its_room() {
     let mut journal = Journal::new(&task_set(None), 1 << 16);
-    let room = (1 << 16) / 3 / 24;
+    let room = (1 << 16) / 4 / 24;
     (0..room as u64).for_each(|job| run(&mut journal, job));
     assert_eq!(journal.events().count(), room);
     assert_eq!(journal.lost(), 4 * room as u64);

@@ -33,7 +33,7 @@ use plan::{Boot, Part, Plan};
 pub use command::soak;
 pub use figures::Figures;
 
-/// The guest's memory, up to a third of which is for journals.
+/// The guest's memory, up to a quarter of which is for journals.
 const MEMORY_MIB: u64 = 256;
 
 /// What a soak run has come to.
