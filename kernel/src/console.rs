@@ -12,14 +12,11 @@
 //! that begins with `{`.
 //!
 //! With `console=on` on the command line a person can talk to the kernel during a
-//! run; that is the module `session`.
+//! run; that is `background`'s module `session`.
 
 mod buffer;
-mod command;
 mod emergency;
-mod input;
 mod piece;
-pub(crate) mod session;
 
 use core::fmt::{self, Write};
 use core::sync::atomic::{AtomicBool, Ordering};

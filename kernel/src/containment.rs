@@ -21,7 +21,7 @@ use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, this_core};
-use crate::{contexts, execution, json, worker};
+use crate::{contexts, execution, json};
 
 /// How much of a panic's message is shown, and of a name, in bytes. With these a
 /// report's machine line stays together, see `console`.
@@ -68,7 +68,7 @@ pub(crate) fn end_panicked(info: &PanicInfo<'_>) {
     interrupt_flag::disable();
     execution::fail(clock::now_ns());
     contexts::lose();
-    this_core::abandon_context(worker::new_context())
+    this_core::abandon_context(contexts::begin())
 }
 
 /// Ends the instance that caused an exception, if it is a subtask's, and reports
@@ -128,7 +128,7 @@ fn end_interrupted(interrupted: &mut Interrupted, now_ns: u64) {
     execution::fail(now_ns);
     contexts::lose();
     // The context is leaked: what lies on its stack stays valid forever.
-    let _ = interrupted.exchange(worker::new_context());
+    let _ = interrupted.exchange(contexts::begin());
 }
 
 /// Returns where a panic was raised, as `file:line:column`.

@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
+use crate::machine::{interrupt, this_core};
 use crate::memory::{self, OutOfMemory};
 
 /// The stack of each context, in bytes.
@@ -64,12 +65,20 @@ pub(crate) fn provide(total: usize) -> Result<(), OutOfMemory> {
 /// # Panics
 ///
 /// If there is none, which [`provide`]'s rule excludes.
-pub(crate) fn take() -> Parked {
+fn take() -> Parked {
     STOCK
         .lock()
         .free
         .pop()
         .expect("contexts are provided at commit")
+}
+
+/// Makes a context that works, in place of one that is suspended or lost.
+/// Interrupts are disabled.
+pub(crate) fn begin() -> Parked {
+    let mut context = this_core::take_spare_context().unwrap_or_else(take);
+    context.restart(interrupt::work);
+    context
 }
 
 /// Puts a context that has nothing to do back into the stock.

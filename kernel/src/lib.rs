@@ -63,6 +63,8 @@ mod excerpt;
 mod execution;
 mod fault_verdict;
 mod graph;
+mod heartbeat;
+mod interrupts;
 mod journal;
 pub mod json;
 mod lock;
@@ -71,6 +73,7 @@ mod machine;
 mod machine_handle;
 #[allow(unsafe_code, reason = "the allocator hands out raw memory")]
 mod memory;
+mod occupation;
 pub mod options;
 mod panic;
 mod platform;
@@ -98,7 +101,7 @@ pub use run::Run;
 /// ```
 #[must_use]
 pub fn timer_interrupts() -> u64 {
-    worker::timer_interrupts()
+    interrupts::timer_interrupts()
 }
 
 /// The README's app, compiled.

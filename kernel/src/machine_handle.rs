@@ -10,19 +10,17 @@ use alloc::format;
 use fass::{Platform, Policy, Preemption, Signal};
 use sched_dag::DagId;
 
-use crate::background::{Background, Wishes};
+use crate::background::{Background, Wishes, session};
 use crate::bound_verdict::BoundVerdict;
-use crate::console::session;
 use crate::ending::Ending;
 use crate::fault_verdict::FaultVerdict;
 use crate::machine::interrupts_off;
 use crate::memory::heap;
 use crate::options::Options;
 use crate::platform::KERNEL;
-use crate::report::Ns;
+use crate::report::{self, Ns};
 use crate::run::Run;
-use crate::worker;
-use crate::{console, contexts, execution, journal, json, machine};
+use crate::{console, contexts, execution, heartbeat, json, machine, worker};
 
 /// The machine, lent to the app's function for the time of the run.
 ///
@@ -255,10 +253,10 @@ impl Machine {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }
         if self.dumps_times {
-            journal::times::dump(&run);
+            report::times::dump(&run);
         }
         if self.dumps_trace {
-            journal::dump(&run, self.runs.replace(self.runs.get() + 1));
+            report::trace::dump(&run, self.runs.replace(self.runs.get() + 1));
         }
         if shuts_down {
             return Err(shutdown(&run));
@@ -310,7 +308,7 @@ impl Machine {
     /// }
     /// ```
     pub fn set_heartbeat(&self, period: Duration) {
-        worker::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
+        heartbeat::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
     }
 
     /// Returns what is in use and what is free between two runs: the same after

@@ -12,6 +12,24 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+/// The kernel's own words, which every app has: `settings` takes them.
+const KERNELS: [&str; 14] = [
+    "policy",
+    "preemption",
+    "budget_factor",
+    "overheads_ns",
+    "trace",
+    "trace_events",
+    "times",
+    "graph",
+    "measure",
+    "idle",
+    "console",
+    "status",
+    "mode",
+    "probe",
+];
+
 /// The command line, with a note of which words have been taken.
 ///
 /// ```no_run
@@ -191,7 +209,7 @@ impl<'a> Options<'a> {
         let Some(word) = self.words.iter().find(|word| !word.taken.get()) else {
             return Ok(());
         };
-        let (own, kernels) = (known.join(", "), crate::settings::WORDS.join(", "));
+        let (own, kernels) = (known.join(", "), KERNELS.join(", "));
         Err(UsageError(format!(
             "`{}` is no option; there are {own}, and for every app {kernels}",
             word.key

@@ -16,7 +16,7 @@ use crate::machine::context::Registers;
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::{cpu, exit, interrupt_flag, non_maskable, this_core};
-use crate::{execution, journal, json};
+use crate::{execution, json, report};
 
 /// The most recent events of this core that a report shows.
 const EVENTS_SHOWN: usize = 16;
@@ -85,7 +85,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         write_in_emergency(format_args!("{registers}"));
     }
     if core.is_some() {
-        write_in_emergency(format_args!("{}", journal::latest::<EVENTS_SHOWN>()));
+        write_in_emergency(format_args!("{}", report::trace::latest::<EVENTS_SHOWN>()));
     }
     let line = json::line(what, |line| {
         line.number("cpu", index);

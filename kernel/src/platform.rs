@@ -6,8 +6,9 @@ use core::time::Duration;
 use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
 use sched_dag::{DagId, SchedulerOptions};
 
+use crate::execution::{self, Terms};
 use crate::machine::{clock, this_core};
-use crate::{execution, graph, worker};
+use crate::{graph, occupation};
 
 /// The one kernel, as `fass` sees it.
 pub(crate) struct Kernel {
@@ -55,21 +56,10 @@ impl Kernel {
         self.budget_factor.store(factor, Ordering::Relaxed);
     }
 
-    /// Returns the budget of a subtask that has a WCET only, if it has one.
-    pub(crate) fn budget_of_wcet(&self, wcet_ns: u64) -> Option<u64> {
-        let factor = self.budget_factor.load(Ordering::Relaxed);
-        (factor > 0).then(|| wcet_ns.saturating_mul(factor))
-    }
-
     /// Chooses how long decisions of the runs to come wait for further events of
     /// the same instant.
     pub(crate) fn set_coincidence_ns(&self, coincidence_ns: u64) {
         self.coincidence_ns.store(coincidence_ns, Ordering::Relaxed);
-    }
-
-    /// Returns how long a decision waits for further events of the same instant.
-    pub(crate) fn coincidence_ns(&self) -> u64 {
-        self.coincidence_ns.load(Ordering::Relaxed)
     }
 
     /// Chooses whether the runs to come are preemptive.
@@ -119,8 +109,8 @@ impl Platform for Kernel {
     fn execute_for(&self, duration: Duration, how: Occupation) {
         let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
         match how {
-            Occupation::Spin => worker::spin(ns),
-            Occupation::Hold => worker::hold(ns),
+            Occupation::Spin => occupation::spin(ns),
+            Occupation::Hold => occupation::hold(ns),
         }
     }
 
@@ -135,6 +125,10 @@ impl Platform for Kernel {
             cores: self.cores(),
         };
         graph::dump(&plan, options);
-        execution::prepare(plan, options)
+        let terms = Terms {
+            coincidence_ns: self.coincidence_ns.load(Ordering::Relaxed),
+            budget_factor: self.budget_factor.load(Ordering::Relaxed),
+        };
+        execution::prepare(plan, options, terms)
     }
 }

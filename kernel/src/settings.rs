@@ -28,24 +28,6 @@ use crate::options::{Options, UsageError};
 use crate::platform::KERNEL;
 use crate::worker;
 
-/// The words, for messages.
-pub(crate) const WORDS: [&str; 14] = [
-    "policy",
-    "preemption",
-    "budget_factor",
-    "overheads_ns",
-    "trace",
-    "trace_events",
-    "times",
-    "graph",
-    "measure",
-    "idle",
-    "console",
-    "status",
-    "mode",
-    "probe",
-];
-
 const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
 
 const PREEMPTIONS: [(&str, Preemption); 2] =

@@ -19,7 +19,10 @@ use crate::machine_handle::Machine;
 use crate::memory::{self, OutOfMemory};
 use crate::options::Options;
 use crate::platform::KERNEL;
-use crate::{console, contexts, journal, json, panic, println, probe, settings, worker};
+use crate::{
+    console, contexts, heartbeat, interrupts, journal, json, panic, println, probe, settings,
+    worker,
+};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -36,8 +39,8 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         probe::HANDLERS
     } else {
         interrupt::Handlers {
-            timer: worker::timer_interrupt,
-            wake: worker::wake_interrupt,
+            timer: interrupts::timer_interrupt,
+            wake: interrupts::wake_interrupt,
             exception: panic::exception,
             work: worker::work,
             release: contexts::give_back,
@@ -116,7 +119,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
     interrupt_flag::enable();
     let probes = probe::is_asked_for(info);
     if !probes {
-        worker::set_heartbeats(0);
+        heartbeat::set_heartbeats(0);
     }
     // A second installation would come from a second boot, which there is not.
     let _ = fass::install(&KERNEL);

@@ -4,26 +4,11 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use alloc::boxed::Box;
 
-use crate::background::{self, watchdog};
 use crate::execution::{self, Runner, Work};
-use crate::machine::context::{Context, Parked};
-use crate::machine::interrupt::{self, Interrupted};
+use crate::machine::context::Parked;
 use crate::machine::this_core::{self, Core};
-use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, interrupt_flag, section, turns};
-use crate::{console, containment, contexts};
-
-/// The time between two signs of life of core 0. Without any alarm anywhere a
-/// virtual machine whose time is virtual would stand still forever.
-pub(crate) const HEARTBEAT_NS: u64 = 1_000_000_000;
-
-/// Makes a context that works, in place of one that is suspended or lost.
-/// Interrupts are disabled.
-pub(crate) fn new_context() -> Parked {
-    let mut context = this_core::take_spare_context().unwrap_or_else(contexts::take);
-    context.restart(interrupt::work);
-    context
-}
+use crate::machine::{clock, cpu, interrupt_flag, turns};
+use crate::{console, heartbeat};
 
 /// Runs what is assigned to the core that it is on, from one instance to the
 /// next, preempted now and then, on whatever core that may be. Returns the
@@ -101,7 +86,7 @@ fn watch(core: &Core) {
     }
     interrupt_flag::disable();
     core.end_watch();
-    keep_beating(core);
+    heartbeat::keep_beating(core);
 }
 
 /// Waits until the run has ended, as the background of core 0: whenever there is
@@ -119,161 +104,5 @@ pub(crate) fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
         } else {
             interrupt_flag::enable_and_halt();
         }
-    }
-}
-
-/// Handles this core's timer interrupt.
-pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {
-    let core = this_core::get();
-    core.timer_interrupts.fetch_add(1, Ordering::Relaxed);
-    let now_ns = clock::now_ns();
-    core.interrupted_ns.store(now_ns, Ordering::Relaxed);
-    // The instance that holds the core watches the clock: waking it is enough.
-    timer::take_due(Alarm::Hold, now_ns);
-    if timer::take_due(Alarm::Heartbeat, now_ns) {
-        beat(core, now_ns);
-        watchdog::look(core, now_ns);
-        if core.index == 0 {
-            background::beat(now_ns);
-        }
-    }
-    if timer::take_due(Alarm::Schedule, now_ns) {
-        execution::interrupt(interrupted, now_ns, true);
-    }
-    if timer::take_due(Alarm::Budget, now_ns) {
-        containment::end_overrun(interrupted, now_ns);
-    }
-    if section::has_put_off(core) {
-        execution::interrupt(interrupted, now_ns, false);
-    }
-    timer::arm_earliest();
-}
-
-/// Gives every core a heartbeat each `period_ns`; if 0, core 0 its ordinary one
-/// and the others none.
-pub(crate) fn set_heartbeats(period_ns: u64) {
-    for core in this_core::all() {
-        let ordinary_ns = match core.index {
-            0 => HEARTBEAT_NS,
-            1 => watchdog::LOOK_NS,
-            _ => 0,
-        };
-        let own_ns = if period_ns == 0 {
-            ordinary_ns
-        } else {
-            period_ns
-        };
-        core.heartbeat_ns.store(own_ns, Ordering::Relaxed);
-        core.wake_up();
-    }
-    beat(this_core::get(), clock::now_ns());
-}
-
-/// Returns the time between two heartbeats of core 0, which executes this.
-pub(crate) fn own_heartbeat_ns() -> u64 {
-    this_core::get().heartbeat_ns.load(Ordering::Relaxed)
-}
-
-/// Gives core 0, which executes this outside any instance, a heartbeat each
-/// `period_ns`.
-pub(crate) fn set_own_heartbeat(period_ns: u64) {
-    let core = this_core::get();
-    core.heartbeat_ns.store(period_ns, Ordering::Relaxed);
-    beat(core, clock::now_ns());
-}
-
-/// Returns the timer interrupts that all cores have taken since boot.
-pub(crate) fn timer_interrupts() -> u64 {
-    let counts = this_core::all().iter().map(|core| &core.timer_interrupts);
-    counts.map(|count| count.load(Ordering::Relaxed)).sum()
-}
-
-/// Begins the core's heartbeat if it has one now and had none before.
-fn keep_beating(core: &Core) {
-    if !timer::is_set(Alarm::Heartbeat) {
-        beat(core, clock::now_ns());
-    }
-}
-
-fn beat(core: &Core, now_ns: u64) {
-    let next_ns = match core.heartbeat_ns.load(Ordering::Relaxed) {
-        0 => u64::MAX,
-        period_ns => now_ns.saturating_add(period_ns),
-    };
-    timer::set(Alarm::Heartbeat, next_ns);
-}
-
-/// Handles another core's wake-up: there is work, an earlier event to wait for,
-/// or another heartbeat.
-pub(crate) fn wake_interrupt(interrupted: &mut Interrupted) {
-    let core = this_core::get();
-    let now_ns = clock::now_ns();
-    core.interrupted_ns.store(now_ns, Ordering::Relaxed);
-    if core.index == 0 {
-        execution::arm_next_event();
-    }
-    keep_beating(core);
-    execution::interrupt(interrupted, now_ns, false);
-}
-
-/// Occupies the calling instance's core for `ns` of execution, halted in between.
-pub(crate) fn hold(ns: u64) {
-    let executed = Executed::from_now();
-    loop {
-        interrupt_flag::disable();
-        let left_ns = ns.saturating_sub(executed.ns());
-        let core = this_core::get();
-        if left_ns == 0 {
-            timer::set(Alarm::Hold, u64::MAX);
-            turns::enter();
-            interrupt_flag::enable();
-            return;
-        }
-        turns::leave(core);
-        timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
-        // If this is preempted it is here: it then goes round again, on whatever
-        // core it continues, and sets that core's alarm.
-        interrupt_flag::enable_and_halt();
-    }
-}
-
-/// Occupies the calling instance's core for `ns` of execution, computing.
-pub(crate) fn spin(ns: u64) {
-    let executed = Executed::from_now();
-    while executed.ns() < ns {
-        turns::stand_back();
-        cpu::relax();
-    }
-    turns::come_back();
-}
-
-/// A stopwatch that stands still while its context is suspended.
-struct Executed {
-    context: &'static Context,
-    start_ns: u64,
-    suspended_before_ns: u64,
-}
-
-impl Executed {
-    fn from_now() -> Self {
-        let were_enabled = interrupt_flag::disable();
-        let context = this_core::get().context();
-        let start_ns = clock::now_ns();
-        if were_enabled {
-            interrupt_flag::enable();
-        }
-        Self {
-            context,
-            start_ns,
-            suspended_before_ns: context.suspended_ns(),
-        }
-    }
-
-    fn ns(&self) -> u64 {
-        // The clock first: a suspension in between then counts too much in the next
-        // line, which the next look sets right, and not too little, as execution.
-        let elapsed_ns = clock::now_ns().saturating_sub(self.start_ns);
-        let suspended_ns = self.context.suspended_ns() - self.suspended_before_ns;
-        elapsed_ns.saturating_sub(suspended_ns)
     }
 }

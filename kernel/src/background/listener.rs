@@ -5,7 +5,7 @@
 //! idle. What the byte is does not matter. How fast the bytes come does not either:
 //! the DAG's minimum inter-arrival time is enforced by the scheduler.
 //!
-//! [`session::PERIOD_NS`]: crate::console::session::PERIOD_NS
+//! [`session::PERIOD_NS`]: super::session::PERIOD_NS
 
 use sched_dag::DagId;
 

@@ -10,22 +10,26 @@
 //! instead: one line, a few microseconds. The heartbeat is also what notices that an
 //! instance keeps its core for long ([`stall`]).
 
+mod command;
+mod input;
 mod listener;
+mod load;
 mod patience;
 mod progress;
+pub(crate) mod session;
 mod stall;
 mod status;
 pub(crate) mod watchdog;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use crate::console::session::{self, Session};
 use crate::machine::clock;
 use crate::machine::spinlock::SpinLock;
-use crate::{console, worker};
+use crate::{console, heartbeat};
 use listener::Listener;
 use progress::Progress;
 use sched_dag::DagId;
+use session::Session;
 use status::Status;
 
 /// What the command line says about the background.
@@ -110,13 +114,13 @@ pub(crate) struct Background {
 impl Background {
     /// Begins the background of a run of `total` jobs; 0: no one knows how many.
     pub(crate) fn begin(wishes: Wishes, total: u64) -> Self {
-        let before_ns = worker::own_heartbeat_ns();
+        let before_ns = heartbeat::own_heartbeat_ns();
         let periods = [
             (wishes.console.is_some() || wishes.input.is_some()).then_some(session::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
         ];
         let periods = periods.into_iter().flatten();
-        worker::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
+        heartbeat::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
         let is_sliced = wishes.console.is_some() || wishes.status_ns > 0;
         if is_sliced {
             *SLICED.lock() = Sliced {
@@ -150,7 +154,7 @@ impl Background {
 
     /// Ends it. Reports whether a person has asked for the machine to shut down.
     pub(crate) fn end(self) -> bool {
-        worker::set_own_heartbeat(self.heartbeat_before_ns);
+        heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
         stall::end();
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();

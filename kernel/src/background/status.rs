@@ -6,9 +6,10 @@
 
 use sched_dag::DagId;
 
+use super::load;
 use super::patience::Patience;
 use crate::machine::clock;
-use crate::{execution, journal, json};
+use crate::{execution, json};
 
 /// So many events are read where time is short.
 const FEW_EVENTS: u64 = 128;
@@ -52,7 +53,7 @@ impl Status {
             .sum::<u64>();
         // In an interrupt's handler there is no time to read many events.
         let most = if is_starved { FEW_EVENTS } else { MOST_EVENTS };
-        let loads = || journal::loads_permille(from_ns, to_ns, most);
+        let loads = || load::loads_permille(from_ns, to_ns, most);
         json::emit("status", |line| {
             line.number("time_ns", to_ns)
                 .number("done", execution::jobs_ended())

@@ -13,11 +13,9 @@
 use core::sync::atomic::Ordering;
 
 use crate::execution;
+use crate::heartbeat::SECOND_NS;
 use crate::machine::non_maskable;
 use crate::machine::this_core::{self, Core};
-
-/// The time between two looks of core 1.
-pub(crate) const LOOK_NS: u64 = 2_000_000_000;
 
 /// After this time without an interrupt a core is sent one. Core 0 gets its own.
 const QUIET_NS: u64 = 1_500_000_000;
@@ -26,7 +24,7 @@ const QUIET_NS: u64 = 1_500_000_000;
 const SILENT_NS: u64 = 4_000_000_000;
 
 const _: () = assert!(
-    QUIET_NS + LOOK_NS < SILENT_NS,
+    QUIET_NS + SECOND_NS < SILENT_NS,
     "core 1 asks core 0 before it accuses it"
 );
 

@@ -5,8 +5,6 @@
 //! there is something to decide, and wakes the other cores after the lock is
 //! free again.
 
-use core::sync::atomic::Ordering;
-
 use alloc::boxed::Box;
 
 use sched_dag::CoreId;
@@ -16,11 +14,10 @@ use super::core_set::CoreSet;
 use super::runner::Runner;
 use super::status::note_running;
 use super::step::Ended;
-use super::{EPOCH_NS, EXECUTION, Event, NEXT_EVENT_NS, Work};
-use crate::journal::Journal;
+use super::time::{instance_time_ns, since_epoch};
+use super::{EXECUTION, Event, Work};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
-use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, section, this_core, turns};
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
@@ -43,42 +40,6 @@ fn take_turns(core: &Core, work: Work) -> Work {
         Work::Continue(_) | Work::Rest => turns::rest(core),
     }
     work
-}
-
-/// Stamps the start of the instance that this core begins as soon as the lock is free.
-/// Start and finish are stamped with interrupts disabled, so that no preemption can
-/// stand between a stamp and what it says.
-#[inline]
-pub(super) fn begin(core: &Core, journal: &mut Journal, runner: &Runner) {
-    let now_ns = clock::now_ns();
-    let budget_end_ns = match runner.budget_ns {
-        u64::MAX => u64::MAX,
-        budget_ns => {
-            let end_ns = now_ns.saturating_add(budget_ns);
-            timer::set_no_later(core, Alarm::Budget, end_ns);
-            end_ns
-        }
-    };
-    core.context().set_budget_end(budget_end_ns);
-    let start_ns = instance_time_ns(now_ns);
-    let here = CoreId(core.index);
-    journal.write(here, What::Start, start_ns, runner.subject());
-}
-
-/// Converts a time on the clock to the run's time; one before time 0 becomes that.
-pub(crate) fn since_epoch(time_ns: u64) -> u64 {
-    time_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
-}
-
-/// Does the same for when something happened to an instance: none before time 0.
-#[inline]
-pub(super) fn instance_time_ns(time_ns: u64) -> u64 {
-    time_ns.wrapping_sub(EPOCH_NS.load(Ordering::Relaxed))
-}
-
-/// Returns the core that executes this. Interrupts are disabled.
-pub(super) fn here() -> CoreId {
-    CoreId(this_core::get().index)
 }
 
 /// Reports that this core has run its instance, and finds what it is to do
@@ -158,9 +119,4 @@ pub(crate) fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bo
     }
     drop(place);
     woken.wake();
-}
-
-/// Sets core 0's alarm for the next event.
-pub(crate) fn arm_next_event() {
-    timer::set(Alarm::Schedule, NEXT_EVENT_NS.load(Ordering::Acquire));
 }

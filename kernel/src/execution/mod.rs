@@ -15,6 +15,7 @@ mod runner;
 mod signals;
 mod status;
 mod step;
+mod time;
 mod watcher;
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -30,9 +31,8 @@ use crate::contexts;
 use crate::journal::Journal;
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
-use crate::platform::KERNEL;
 pub(crate) use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
-pub(crate) use events::{arm_next_event, complete, fail, find_work, interrupt, since_epoch};
+pub(crate) use events::{complete, fail, find_work, interrupt};
 use placement::Placement;
 pub(crate) use runner::Runner;
 use signals::Signals;
@@ -41,6 +41,7 @@ pub(crate) use status::{
     budget_ns, is_finished, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
     try_names, with_journal,
 };
+pub(crate) use time::{arm_next_event, since_epoch};
 
 /// What a core is to do next.
 pub(crate) enum Work {
@@ -80,6 +81,10 @@ pub(crate) struct Execution {
     /// When the next dispatch is due, on the clock, if it waits for further events
     /// of the instant in hand.
     dispatch_due_ns: Option<u64>,
+    /// How long a dispatch waits for further events of the same instant.
+    coincidence_ns: u64,
+    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
+    budget_factor: u64,
     /// Whether a completion may be all of a step: no dispatch is owed, nor ever
     /// waits.
     may_hand_off: bool,
@@ -103,8 +108,21 @@ static FINISHED: AtomicBool = AtomicBool::new(false);
 /// Jobs of DAGs with a limit that have ended in this run.
 static JOBS_ENDED: AtomicU64 = AtomicU64::new(0);
 
+/// What the platform says about a run, besides the scheduler's options.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Terms {
+    /// How long a dispatch waits for further events of the same instant.
+    pub(crate) coincidence_ns: u64,
+    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
+    pub(crate) budget_factor: u64,
+}
+
 /// Prepares a plan to be run. Takes all memory that the run will need.
-pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), LaunchError> {
+pub(crate) fn prepare(
+    plan: Plan,
+    options: SchedulerOptions,
+    terms: Terms,
+) -> Result<(), LaunchError> {
     if EXECUTION.lock().is_some() {
         return Err(LaunchError::new(
             "other DAGs are committed already; run them first, or commit all in one call",
@@ -122,7 +140,7 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
     })?;
     let signals = Signals::new(&plan);
     let task_set = Arc::new(plan.task_set);
-    let runners = runner::runners(&task_set, plan.bodies);
+    let runners = runner::runners(&task_set, plan.bodies, terms.budget_factor);
     let placement = Placement::new(runners, cores);
     let heap = crate::memory::heap::usage();
     let execution = Execution {
@@ -132,7 +150,9 @@ pub(crate) fn prepare(plan: Plan, options: SchedulerOptions) -> Result<(), Launc
         task_set,
         background: None,
         dispatch_due_ns: None,
-        may_hand_off: KERNEL.coincidence_ns() == 0,
+        coincidence_ns: terms.coincidence_ns,
+        budget_factor: terms.budget_factor,
+        may_hand_off: terms.coincidence_ns == 0,
         signals,
         bounds_ns: plan.bounds_ns.into(),
     };

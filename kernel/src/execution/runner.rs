@@ -7,8 +7,6 @@ use fass::Body;
 use sched_dag::journal::Subject;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
 
-use crate::platform::KERNEL;
-
 /// A subtask's body, and what running an instance of it takes.
 ///
 /// There is one for each subtask, as a subtask has one started instance at a time
@@ -55,6 +53,7 @@ impl Runner {
 pub(super) fn runners(
     task_set: &TaskSet,
     bodies: Vec<Vec<Body>>,
+    budget_factor: u64,
 ) -> impl Iterator<Item = Box<Runner>> {
     let of_dags = (0..).map(DagId).zip(bodies);
     of_dags.flat_map(move |(dag, bodies)| {
@@ -62,18 +61,21 @@ pub(super) fn runners(
         of_subtasks.map(move |(subtask, body)| {
             let job = 0;
             let first = Instance { dag, job, subtask };
-            let budget_ns = budget_ns(task_set, first);
+            let budget_ns = budget_ns(task_set, first, budget_factor);
             Box::new(Runner::new(body, task_set.vertex(first), first, budget_ns))
         })
     })
 }
 
-/// Returns how long an instance of a subtask may execute for, `u64::MAX` if for
-/// ever.
-pub(super) fn budget_ns(task_set: &TaskSet, instance: Instance) -> u64 {
+/// Returns how long an instance of a subtask may execute for, `u64::MAX` if forever:
+/// as long as its budget says, else so many WCETs, or forever if that is 0.
+pub(super) fn budget_ns(task_set: &TaskSet, instance: Instance, budget_factor: u64) -> u64 {
     let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
     subtask
         .budget_ns()
-        .or_else(|| KERNEL.budget_of_wcet(subtask.wcet_ns()?))
+        .or_else(|| {
+            let wcet_ns = subtask.wcet_ns().filter(|_| budget_factor > 0)?;
+            Some(wcet_ns.saturating_mul(budget_factor))
+        })
         .unwrap_or(u64::MAX)
 }

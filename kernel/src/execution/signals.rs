@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use fass::{Body, Plan};
 use sched_dag::{DagId, Moment, Observer};
 
-use super::events::here;
+use super::time::here;
 use super::watcher::Watcher;
 use super::{EXECUTION, Event, Execution, status};
 use crate::machine::timer::{self, Alarm};

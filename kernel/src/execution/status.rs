@@ -65,7 +65,7 @@ pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
 pub(crate) fn budget_ns(instance: Instance) -> u64 {
     let place = EXECUTION.lock();
     place.as_ref().map_or(u64::MAX, |execution| {
-        runner::budget_ns(execution.task_set(), instance)
+        runner::budget_ns(execution.task_set(), instance, execution.budget_factor)
     })
 }
 

@@ -8,19 +8,19 @@ use sched_dag::journal::{Subject, What};
 use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
 
 use super::core_set::CoreSet;
-use super::events::{arm_next_event, begin, here, since_epoch};
 use super::placement::Next;
 use super::runner::Runner;
 use super::status::{is_finished, note_running};
+use super::time::{arm_next_event, here, instance_time_ns, since_epoch};
 use super::watcher::Watcher;
 use super::{EPOCH_NS, Event, Execution, FINISHED, NEXT_EVENT_NS, Work};
+use crate::contexts;
+use crate::journal::Journal;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, this_core, turns};
-use crate::platform::KERNEL;
-use crate::worker;
 
 /// What comes of [`Execution::hand_off`].
 pub(super) enum Ended {
@@ -96,6 +96,7 @@ impl Execution {
             placement,
             journal,
             dispatch_due_ns,
+            coincidence_ns,
             may_hand_off,
             signals,
             ..
@@ -119,7 +120,7 @@ impl Execution {
             Event::Control(control) => control.apply(&mut moment, &mut watcher),
         }
         // What happens before time 0 releases nothing yet.
-        let waits_until_ns = now_ns.saturating_add(KERNEL.coincidence_ns());
+        let waits_until_ns = now_ns.saturating_add(*coincidence_ns);
         let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
         let due_ns = *dispatch_due_ns.get_or_insert(waits_until_ns.max(epoch_ns));
         if now_ns < due_ns {
@@ -127,7 +128,7 @@ impl Execution {
             return self.announce();
         }
         *dispatch_due_ns = None;
-        *may_hand_off = KERNEL.coincidence_ns() == 0;
+        *may_hand_off = *coincidence_ns == 0;
         let mut woken = CoreSet::default();
         let mut preempted = None;
         for decision in moment.release_due(&mut watcher).dispatch() {
@@ -236,7 +237,7 @@ impl Execution {
                 self.note_resumed(core, &context, now_ns);
                 context
             }
-            None => worker::new_context(),
+            None => contexts::begin(),
         };
         note_running(core, self.current(here).map(Subject::of));
         let last = interrupted.exchange(next);
@@ -264,4 +265,24 @@ impl Execution {
                 .write(here, What::Resume, time_ns, Subject::of(instance));
         }
     }
+}
+
+/// Stamps the start of the instance that this core begins as soon as the lock is free.
+/// Start and finish are stamped with interrupts disabled, so that no preemption can
+/// stand between a stamp and what it says.
+#[inline]
+fn begin(core: &Core, journal: &mut Journal, runner: &Runner) {
+    let now_ns = clock::now_ns();
+    let budget_end_ns = match runner.budget_ns {
+        u64::MAX => u64::MAX,
+        budget_ns => {
+            let end_ns = now_ns.saturating_add(budget_ns);
+            timer::set_no_later(core, Alarm::Budget, end_ns);
+            end_ns
+        }
+    };
+    core.context().set_budget_end(budget_end_ns);
+    let start_ns = instance_time_ns(now_ns);
+    let here = CoreId(core.index);
+    journal.write(here, What::Start, start_ns, runner.subject());
 }

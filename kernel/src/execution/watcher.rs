@@ -7,7 +7,7 @@ use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, TaskSet};
 
 use super::Bodies;
 use super::JOBS_ENDED;
-use super::events::{instance_time_ns, since_epoch};
+use super::time::{instance_time_ns, since_epoch};
 use crate::journal::Journal;
 use crate::machine::clock;
 

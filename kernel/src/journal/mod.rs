@@ -17,10 +17,6 @@
 //!
 //! Times are nanoseconds since the run's epoch.
 
-mod dump;
-mod load;
-pub(crate) mod times;
-
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -28,9 +24,6 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use sched_dag::journal::{Event, Subject, What};
 use sched_dag::law::Tally;
 use sched_dag::{CoreId, Dag, TaskSet};
-
-pub(crate) use dump::{dump, latest};
-pub(crate) use load::loads_permille;
 
 /// The most events that a journal has room for, as the command line says;
 /// `u64::MAX`: as many as make sense.

@@ -1,0 +1,67 @@
+//! How an instance that only stands for work occupies its core.
+
+use crate::machine::context::Context;
+use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, cpu, interrupt_flag, this_core, turns};
+
+/// Occupies the calling instance's core for `ns` of execution, halted in between.
+pub(crate) fn hold(ns: u64) {
+    let executed = Executed::from_now();
+    loop {
+        interrupt_flag::disable();
+        let left_ns = ns.saturating_sub(executed.ns());
+        let core = this_core::get();
+        if left_ns == 0 {
+            timer::set(Alarm::Hold, u64::MAX);
+            turns::enter();
+            interrupt_flag::enable();
+            return;
+        }
+        turns::leave(core);
+        timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
+        // If this is preempted it is here: it then goes round again, on whatever
+        // core it continues, and sets that core's alarm.
+        interrupt_flag::enable_and_halt();
+    }
+}
+
+/// Occupies the calling instance's core for `ns` of execution, computing.
+pub(crate) fn spin(ns: u64) {
+    let executed = Executed::from_now();
+    while executed.ns() < ns {
+        turns::stand_back();
+        cpu::relax();
+    }
+    turns::come_back();
+}
+
+/// A stopwatch that stands still while its context is suspended.
+struct Executed {
+    context: &'static Context,
+    start_ns: u64,
+    suspended_before_ns: u64,
+}
+
+impl Executed {
+    fn from_now() -> Self {
+        let were_enabled = interrupt_flag::disable();
+        let context = this_core::get().context();
+        let start_ns = clock::now_ns();
+        if were_enabled {
+            interrupt_flag::enable();
+        }
+        Self {
+            context,
+            start_ns,
+            suspended_before_ns: context.suspended_ns(),
+        }
+    }
+
+    fn ns(&self) -> u64 {
+        // The clock first: a suspension in between then counts too much in the next
+        // line, which the next look sets right, and not too little, as execution.
+        let elapsed_ns = clock::now_ns().saturating_sub(self.start_ns);
+        let suspended_ns = self.context.suspended_ns() - self.suspended_before_ns;
+        elapsed_ns.saturating_sub(suspended_ns)
+    }
+}
