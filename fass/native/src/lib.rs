@@ -45,6 +45,7 @@ mod pin;
 mod platform;
 mod recorder;
 mod relax;
+mod report;
 mod reports;
 mod run;
 mod team;
@@ -52,4 +53,5 @@ mod watch;
 
 pub use pin::{Pinning, processors};
 pub use platform::Native;
-pub use run::{Closure, Recorded, Report, Setting, run, run_recorded, worker};
+pub use report::{Recorded, Report};
+pub use run::{Closure, Setting, run, run_recorded, worker};

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
 
-use crate::run::{Recorded, Report, Setting, run_bodies, run_bodies_recorded};
+use crate::report::{Recorded, Report};
+use crate::run::{Setting, run_bodies, run_bodies_recorded};
 
 /// A machine of host threads, belonging to the thread that makes it.
 ///

@@ -7,7 +7,7 @@ use sched_dag::journal::What;
 use sched_dag::law::{Precision, Record, dispatch_violations, violations};
 use sched_dag::{CoreId, Instance, SchedulerOptions, TaskSet};
 
-use crate::run::{Recorded, Report};
+use crate::report::{Recorded, Report};
 use crate::watch::Watch;
 
 impl Watch for Recorder {

@@ -6,15 +6,13 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 
 use sched_dag::Recorder;
-use sched_dag::law::Violation;
-use sched_dag::{
-    CoreId, DagId, DagStatistics, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet,
-};
+use sched_dag::{CoreId, DagId, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::execute::Execute;
 use crate::pin::{Pinning, pin, processors};
 use crate::recorder::judge;
 use crate::relax::poll;
+use crate::report::{Recorded, Report};
 use crate::reports::Reports;
 use crate::watch::Watch;
 use crate::{alone, team};
@@ -29,28 +27,6 @@ pub struct Setting {
     pub policy: Policy,
     /// The number of workers, at least 1.
     pub workers: u32,
-}
-
-/// What came of a run.
-#[derive(Clone, Debug)]
-pub struct Report {
-    /// The counters of each DAG.
-    pub statistics: Vec<DagStatistics>,
-    /// Whether the workers were pinned.
-    pub pinning: Pinning,
-}
-
-/// What came of a run that was written down.
-#[derive(Clone, Debug)]
-pub struct Recorded {
-    /// The report of the run.
-    pub report: Report,
-    /// All breaches of rules R1 to R5, on the scheduler's clock.
-    pub violations: Vec<Violation>,
-    /// How many instances have finished.
-    pub instances: u64,
-    /// How many of them finished on each worker.
-    pub by_worker: Vec<u64>,
 }
 
 thread_local! {

@@ -36,6 +36,7 @@ mod platform;
 mod record;
 mod report;
 mod session;
+mod surroundings;
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -195,7 +196,7 @@ impl VirtualTime {
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn contain_panics(self) -> Self {
-        self.machine.contains_panics.set(true);
+        self.machine.surroundings.contains_panics.set(true);
         self
     }
 

@@ -6,18 +6,18 @@
 //! that a function's calls into the platform meet nothing borrowed.
 
 use std::cell::{Cell, RefCell};
-use std::collections::BTreeMap;
 use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::Duration;
 
 use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
 
-use sched_dag::DagId;
+use sched_dag::{DagId, SchedulerOptions};
 
 use crate::error::RunError;
 use crate::report::Report;
 use crate::session::Session;
+use crate::surroundings::Surroundings;
 
 /// What one thread's virtual machine is and does.
 #[derive(Debug)]
@@ -26,15 +26,8 @@ pub(crate) struct Machine {
     pub(crate) policy: Cell<Policy>,
     pub(crate) preemption: Cell<Preemption>,
     pub(crate) overheads: Cell<Overheads>,
-    /// Whether a panic of a function ends its DAG only.
-    pub(crate) contains_panics: Cell<bool>,
-    /// The time that functions are told: the start of the instance and what it
-    /// has executed.
-    pub(crate) now_ns: Cell<u64>,
-    /// What the running function has executed; `None` outside functions.
-    pub(crate) executed_ns: Cell<Option<u64>>,
-    /// The signals to come, by time and in the order of their raising.
-    signals: RefCell<BTreeMap<(u64, usize), DagId>>,
+    /// What it shares with its run.
+    pub(crate) surroundings: Surroundings,
     session: RefCell<Option<Session>>,
     /// The number of the launched plan.
     plan: Cell<Option<u64>>,
@@ -57,10 +50,7 @@ pub(crate) fn make_current() -> Rc<Machine> {
         policy: Cell::new(Policy::Edf),
         preemption: Cell::new(Preemption::Enabled),
         overheads: Cell::new(Overheads::default()),
-        contains_panics: Cell::new(false),
-        now_ns: Cell::new(0),
-        executed_ns: Cell::new(None),
-        signals: RefCell::default(),
+        surroundings: Surroundings::default(),
         session: RefCell::new(None),
         plan: Cell::new(None),
         has_launched: Cell::new(false),
@@ -73,30 +63,8 @@ impl Machine {
     /// Notes a signal of a plan; one of another plan does nothing.
     pub(crate) fn raise_at(&self, time_ns: u64, (plan, dag): (u64, DagId)) {
         if self.plan.get() == Some(plan) {
-            self.signal_at(time_ns, dag);
+            self.surroundings.signal_at(time_ns, dag);
         }
-    }
-
-    /// Notes a signal to a DAG of the launched plan.
-    pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
-        let mut signals = self.signals.borrow_mut();
-        let mut of_this_time = signals.range((time_ns, 0)..=(time_ns, usize::MAX));
-        let place = of_this_time
-            .next_back()
-            .map_or(0, |(&(_, last), _)| last + 1);
-        signals.insert((time_ns, place), dag);
-    }
-
-    /// Returns the time of the next signal.
-    pub(crate) fn next_signal_ns(&self) -> Option<u64> {
-        let signals = self.signals.borrow();
-        signals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
-    }
-
-    /// Takes the next signal that is due by `now_ns`.
-    pub(crate) fn take_signal(&self, now_ns: u64) -> Option<DagId> {
-        self.next_signal_ns().filter(|&at_ns| at_ns <= now_ns)?;
-        self.signals.borrow_mut().pop_first().map(|(_, dag)| dag)
     }
 
     /// Steps the session to its end or for a duration. Meanwhile this machine
@@ -104,7 +72,7 @@ impl Machine {
     pub(crate) fn run(self: &Rc<Self>, duration: Option<Duration>) -> Result<Report, RunError> {
         let mut session = self.session.take().ok_or(RunError::NothingToRun)?;
         let newest = CURRENT.replace(Rc::downgrade(self));
-        let result = session.run(self, duration);
+        let result = session.run(&self.surroundings, duration);
         CURRENT.set(newest);
         // A failed session is not put back: its functions cannot continue.
         if matches!(result, Ok(_) | Err(RunError::Endless { .. })) {
@@ -135,31 +103,32 @@ impl Platform for HostPlatform {
     }
 
     fn now_ns(&self) -> u64 {
-        expect_current().now_ns.get()
+        expect_current().surroundings.now_ns.get()
     }
 
     fn execute_for(&self, duration: Duration, _how: Occupation) {
         let machine = expect_current();
-        let Some(executed_ns) = machine.executed_ns.get() else {
+        let surroundings = &machine.surroundings;
+        let Some(executed_ns) = surroundings.executed_ns.get() else {
             panic!("`execute_for` is called outside a subtask; call it in a subtask's function");
         };
         // A sum that does not fit is reported by the driver as a finish beyond
         // the last time there is.
         let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
-        machine
-            .executed_ns
-            .set(Some(executed_ns.saturating_add(ns)));
-        machine.now_ns.set(machine.now_ns.get().saturating_add(ns));
+        let executed_ns = Some(executed_ns.saturating_add(ns));
+        surroundings.executed_ns.set(executed_ns);
+        let now_ns = &surroundings.now_ns;
+        now_ns.set(now_ns.get().saturating_add(ns));
     }
 
     fn raise(&self, plan: u64, dag: DagId) {
         let machine = expect_current();
         assert!(
-            machine.executed_ns.get().is_none(),
+            machine.surroundings.executed_ns.get().is_none(),
             "a subtask raises a signal that it was not registered with; register it by \
              `dag.using(signal.raising())`"
         );
-        machine.raise_at(machine.now_ns.get(), (plan, dag));
+        machine.raise_at(machine.surroundings.now_ns.get(), (plan, dag));
     }
 
     fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
@@ -175,7 +144,12 @@ impl Platform for HostPlatform {
             ));
         }
         machine.plan.set(Some(plan.number));
-        let session = Session::new(plan, &machine);
+        let options = SchedulerOptions {
+            policy: machine.policy.get(),
+            preemption: machine.preemption.get(),
+            cores: machine.cores.get(),
+        };
+        let session = Session::new(plan, options);
         machine.session.replace(Some(session));
         Ok(())
     }

@@ -19,9 +19,9 @@ use sched_dag::{
 };
 
 use crate::error::RunError;
-use crate::platform::Machine;
 use crate::record::PanicRecord;
 use crate::report::Report;
+use crate::surroundings::Surroundings;
 
 /// A plan that runs, or can go on running.
 #[derive(Debug)]
@@ -33,13 +33,8 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    pub(crate) fn new(plan: Plan, machine: &Machine) -> Self {
+    pub(crate) fn new(plan: Plan, options: SchedulerOptions) -> Self {
         let task_set = Arc::new(plan.task_set);
-        let options = SchedulerOptions {
-            policy: machine.policy.get(),
-            preemption: machine.preemption.get(),
-            cores: machine.cores.get(),
-        };
         Self {
             driver: Driver::new(Scheduler::new(Arc::clone(&task_set), options)),
             recording: Recording {
@@ -56,7 +51,7 @@ impl Session {
     /// Runs for a duration, or to the end.
     pub(crate) fn run(
         &mut self,
-        machine: &Machine,
+        machine: &Surroundings,
         duration: Option<Duration>,
     ) -> Result<Report, RunError> {
         let until_ns = match duration {
@@ -162,7 +157,7 @@ struct Recording {
 
 /// The workload of the driver: runs bodies, and passes all else to the recorder.
 struct Runner<'s> {
-    machine: &'s Machine,
+    machine: &'s Surroundings,
     bodies: &'s mut [Vec<Body>],
     recording: &'s mut Recording,
     /// The panic that fails the run and stops it. In what is left of its instant

@@ -1,0 +1,44 @@
+//! What a run and the machine that it runs on tell each other.
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+
+use sched_dag::DagId;
+
+/// The time, the signals to come, and what is to become of a panic.
+#[derive(Debug, Default)]
+pub(crate) struct Surroundings {
+    /// Whether a panic of a function ends its DAG only.
+    pub(crate) contains_panics: Cell<bool>,
+    /// The time that functions are told: the start of the instance and what it
+    /// has executed.
+    pub(crate) now_ns: Cell<u64>,
+    /// What the running function has executed; `None` outside functions.
+    pub(crate) executed_ns: Cell<Option<u64>>,
+    /// The signals to come, by time and in the order of their raising.
+    signals: RefCell<BTreeMap<(u64, usize), DagId>>,
+}
+
+impl Surroundings {
+    /// Notes a signal to a DAG of the launched plan.
+    pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
+        let mut signals = self.signals.borrow_mut();
+        let mut of_this_time = signals.range((time_ns, 0)..=(time_ns, usize::MAX));
+        let place = of_this_time
+            .next_back()
+            .map_or(0, |(&(_, last), _)| last + 1);
+        signals.insert((time_ns, place), dag);
+    }
+
+    /// Returns the time of the next signal.
+    pub(crate) fn next_signal_ns(&self) -> Option<u64> {
+        let signals = self.signals.borrow();
+        signals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
+    }
+
+    /// Takes the next signal that is due by `now_ns`.
+    pub(crate) fn take_signal(&self, now_ns: u64) -> Option<DagId> {
+        self.next_signal_ns().filter(|&at_ns| at_ns <= now_ns)?;
+        self.signals.borrow_mut().pop_first().map(|(_, dag)| dag)
+    }
+}
