@@ -111,7 +111,6 @@ pub use api::uses::Uses;
 pub use api::using::Using;
 pub use commit::answer::{Answer, Unproven, Verdict};
 pub use commit::fault::{CommitError, Fault};
-pub use commit::staleness::Staleness;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
 pub use platform::{
@@ -119,6 +118,7 @@ pub use platform::{
 };
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan};
+pub use run::staleness::Staleness;
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use sched_dag::analysis::{Overheads, Reason, Test};

@@ -12,7 +12,7 @@
 
 pub(crate) mod answer;
 pub(crate) mod fault;
-pub(crate) mod staleness;
+mod staleness;
 mod tie;
 
 use alloc::collections::BTreeSet;
@@ -26,9 +26,9 @@ use sched_dag::{Policy, Verified, Warning};
 use crate::api::dag::Dag;
 use crate::platform;
 use crate::run::signal::Target;
+use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
 use fault::{CommitError, Fault};
-use staleness::Staleness;
 use tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.

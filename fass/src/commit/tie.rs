@@ -8,9 +8,9 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::{DagId, DagSpec, SubtaskSpec, TaskSet};
 
-use super::staleness::Staleness;
 use crate::api::dag::Dag;
 use crate::run::plan::{Body, Plan};
+use crate::run::staleness::Staleness;
 use crate::run::subtask::MakeBody;
 use crate::run::topic::Wiring;
 

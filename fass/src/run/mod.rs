@@ -13,6 +13,7 @@ pub(crate) mod latest;
 pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod signal;
+pub(crate) mod staleness;
 pub(crate) mod subtask;
 pub(crate) mod topic;
 pub(crate) mod tuple;

@@ -13,7 +13,7 @@ use sched_dag::{DagId, TaskSet};
 
 use super::effect::Effect;
 use super::gate::Gate;
-use crate::commit::staleness::Staleness;
+use super::staleness::Staleness;
 
 /// A committed set of DAGs, ready to be scheduled.
 ///
