@@ -19,6 +19,8 @@ pub(crate) struct Figures {
     deadline_misses: u64,
     allocations: u64,
     first_release_ns: u64,
+    /// The first job of which the times are left.
+    first_recorded_job: u64,
     /// From the last parallel subtask's finish to the sink being ready.
     join_latency: Distribution,
     /// From the last parallel subtask's finish to the sink's first instruction.
@@ -59,6 +61,7 @@ impl Figures {
             deadline_misses: statistics.misses,
             allocations: run.allocations(),
             first_release_ns: run.epoch_ns(),
+            first_recorded_job: record.first_job(FORK_JOIN),
             join_latency: Distribution::new(
                 sinks
                     .clone()
@@ -112,6 +115,12 @@ impl Figures {
             self.deadline_misses,
             self.allocations
         );
+        if self.first_recorded_job > 0 {
+            println!(
+                "  of the jobs from {} on; `times=dump` prints statistics of all",
+                self.first_recorded_job
+            );
+        }
         println!(
             "  {:<16}{:>12}{:>12}{:>12}{:>12}",
             "", "min", "median", "p99", "max"

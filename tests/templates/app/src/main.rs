@@ -51,7 +51,7 @@ fn report(run: &Run, id: DagId, name: &str) {
         statistics.completed, statistics.misses
     );
     let record = run.record();
-    let jobs = (0..).zip(record.jobs(id));
+    let jobs = record.numbered(id);
     let response_times = Distribution::new(
         jobs.filter_map(|(job, times)| Some(record.completion_ns(id, job)? - times.release_ns?)),
     );
