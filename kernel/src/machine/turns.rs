@@ -18,6 +18,7 @@
 //!   have had a turn. If others are fresh, too, its first turn is a short one
 //!   ([`FIRST_TURN_NS`]): what takes no longer need not wait for what does.
 //! - No turn begins while any core handles an interrupt or wakes others.
+//! - A core that has the turn and takes no interrupts keeps it for some milliseconds only.
 //!
 //! What follows: at any time all cores but one are soon through with a visit, and that one
 //! is after [`TURN_NS`] at the latest. Then all are visited before the next turn begins. So
@@ -43,7 +44,11 @@ use super::{clock, cpu, interrupt_flag, interrupts_off, local_apic, vector};
 const TURN_NS: u64 = 8_000;
 
 /// How long the first turn of a fresh core is, if others are fresh, too.
-const FIRST_TURN_NS: u64 = 1_000;
+const FIRST_TURN_NS: u64 = 2_000;
+
+/// How often a core that waits looks for the turn before it takes it from a core that
+/// has it and does not pass it: one that takes no interrupts. Some milliseconds.
+const MOST_LOOKS: u32 = 100_000;
 
 static IS_ENABLED: AtomicBool = AtomicBool::new(false);
 
@@ -205,10 +210,12 @@ fn pass(core: &Core) {
 /// it has the turn.
 fn wait(core: &Core) -> bool {
     let since_ns = clock::now_ns();
+    let mut looks = 0;
     let has_turn = loop {
         // One visit for all others, before anything begins.
         cpu::relax();
-        if let Some(length_ns) = begin(core) {
+        looks += 1;
+        if let Some(length_ns) = begin(core, looks > MOST_LOOKS) {
             set_part(core, Part::Computes);
             timer::set(Alarm::Hold, clock::now_ns().saturating_add(length_ns));
             break true;
@@ -221,14 +228,16 @@ fn wait(core: &Core) -> bool {
     has_turn
 }
 
-/// Begins this core's turn, if it may. Returns how long that is.
-fn begin(core: &Core) -> Option<u64> {
-    if HAS_TURN.load(Ordering::Relaxed) != NONE || URGENT.load(Ordering::Relaxed) != 0 {
+/// Begins this core's turn, if it may, or if it `takes_over` that of another. Returns how
+/// long it is.
+fn begin(core: &Core, takes_over: bool) -> Option<u64> {
+    let holder = HAS_TURN.load(Ordering::Relaxed);
+    if (holder != NONE && !takes_over) || URGENT.load(Ordering::Relaxed) != 0 {
         return None;
     }
     let length_ns = length_of_turn(core)?;
     let (mine, order) = (core.index, Ordering::Relaxed);
-    let begun = HAS_TURN.compare_exchange(NONE, mine, order, order);
+    let begun = HAS_TURN.compare_exchange(holder, mine, order, order);
     begun.is_ok().then_some(length_ns)
 }
 
@@ -248,7 +257,9 @@ fn length_of_turn(core: &Core) -> Option<u64> {
 fn set_part(core: &Core, part: Part) {
     let before = core.part();
     if before == Part::Computes && part != Part::Computes {
-        HAS_TURN.store(NONE, Ordering::Relaxed);
+        // Unless the turn has been taken over.
+        let (mine, order) = (core.index, Ordering::Relaxed);
+        let _ = HAS_TURN.compare_exchange(mine, NONE, order, order);
     }
     match (before == Part::Fresh, part == Part::Fresh) {
         (false, true) => FRESH.fetch_add(1, Ordering::Relaxed),
