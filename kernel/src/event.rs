@@ -27,7 +27,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use crate::console;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, interrupt_flag, this_core};
+use crate::machine::{clock, interrupt_flag, this_core, turns};
 
 /// Something that cores wait for.
 ///
@@ -103,12 +103,14 @@ impl Event {
         loop {
             interrupt_flag::disable();
             // Read in every round: in between, the instance may have moved.
-            let here = this_core::get().index;
+            let core = this_core::get();
+            let here = core.index;
             let word = &self.waiting[(here / 64) as usize];
             word.fetch_or(1 << (here % 64), Ordering::SeqCst);
             if self.version() != seen || clock::now_ns() >= until_ns {
                 // The bit stays, at worst for one interrupt that means nothing.
                 timer::set(Alarm::Hold, u64::MAX);
+                turns::enter();
                 interrupt_flag::enable();
                 return;
             }
@@ -117,6 +119,7 @@ impl Event {
                 console::send_pending_byte();
                 continue;
             }
+            turns::leave(core);
             timer::set(Alarm::Hold, until_ns);
             interrupt_flag::enable_and_halt();
         }

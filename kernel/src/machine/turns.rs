@@ -28,7 +28,7 @@
 //! The time for which an instance waits for its turn does not count as its execution: it
 //! uses up no budget. It does pass on the clock, for all.
 //!
-//! A core that halts or watches the clock for an instance (`occupation`)
+//! A core that halts for an instance or watches the clock (`occupation`, `Event::wait`)
 //! takes no part. All this is off unless [`enable`] is called: real cores compute at the
 //! same time, and a core that is alone need not share. The statics here need no order
 //! among each other: instructions of one core at a time are executed.
