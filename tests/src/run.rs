@@ -145,7 +145,7 @@ fn boot_app(
             screen.show(translated.as_deref().unwrap_or(line));
         }
     };
-    let talk = seeing::relay(options);
+    let talk = seeing::relay(options, &log.path);
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;

@@ -7,8 +7,10 @@
 
 use std::fs;
 use std::io::{ErrorKind, IsTerminal, Read, Write, stdin, stdout};
+use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
 use std::thread;
+use std::time::Duration;
 
 use crate::dot;
 use crate::files;
@@ -57,23 +59,31 @@ pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<Option<St
 /// Hands standard input on to the guest's serial port, until either ends. At its end the
 /// last line is ended, too; a run without end is shut down then, for nobody can do so
 /// any more.
-pub(super) fn relay(options: &Parsed) -> impl FnOnce(Option<ChildStdin>) + use<> {
+///
+/// Begins when the guest has written into `log`: its serial port loses what comes before
+/// it is set up.
+pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
+    let log = log.to_path_buf();
     let farewell = match options.number("jobs") {
         Some(0) => "\nshutdown\n",
         _ => "\n",
     };
     move |input| {
         if let Some(input) = input {
-            hand_on(input, farewell);
+            hand_on(input, log, farewell);
         }
     }
 }
 
-fn hand_on(mut input: ChildStdin, farewell: &'static str) {
+fn hand_on(mut input: ChildStdin, log: PathBuf, farewell: &'static str) {
     // The thread is not waited for: it may stand in a read for ever, and ends with
     // the tool.
     thread::spawn(move || {
         let mut bytes = [0; 256];
+        // A log that is gone is that of a guest that has ended.
+        while fs::metadata(&log).is_ok_and(|log| log.len() == 0) {
+            thread::sleep(Duration::from_millis(10));
+        }
         loop {
             match stdin().read(&mut bytes) {
                 Ok(0) => {
