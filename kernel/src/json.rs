@@ -3,8 +3,8 @@
 //! `docs/serial-protocol.md` lists the kinds. An object is described by a
 //! closure that names its fields, so printing one allocates nothing.
 //!
-//! A run is judged by some of the kinds ([`KERNELS`]). Those are the kernel's to print:
-//! it [`report`]s, apps [`emit`].
+//! A run is judged by some of the kinds (`KERNELS`). Those are the kernel's to print:
+//! it `report`s, apps [`emit`].
 
 use core::fmt::{self, Display, Formatter};
 

@@ -66,12 +66,12 @@ pub fn boot(
     boot_with_input(qemu, image, log, limit, drop, show)
 }
 
-/// Works like [`boot`], and hands `talk` the way to the guest's serial port, if the
+/// Works like [`boot()`], and hands `talk` the way to the guest's serial port, if the
 /// guest has one, as soon as it runs.
 ///
 /// # Errors
 ///
-/// As [`boot`].
+/// As [`boot()`].
 pub fn boot_with_input(
     qemu: &Qemu,
     image: &Path,

@@ -9,7 +9,7 @@
 //! - [`lines`]: words and numbers of a reference file, with line numbers;
 //! - [`shown`]: words of a file, or of a person, in messages;
 //! - [`of_file`]: what a commit would refuse, in the words of a file;
-//! - [`repeated`]: what stands twice;
+//! - [`repeated()`]: what stands twice;
 //! - [`Case`], [`parse()`]: what a case says, read strictly;
 //! - [`build`]: DAGs that execute for its times.
 //!
