@@ -45,6 +45,9 @@ pub(crate) fn create(is_background: bool) -> Result<Parked, OutOfMemory> {
 pub(crate) fn provide(total: usize) -> Result<(), OutOfMemory> {
     let existing = STOCK.lock().total;
     let missing = total.saturating_sub(existing);
+    if missing == 0 {
+        return Ok(());
+    }
     // Room for all that can ever be free, so that giving back never allocates.
     let mut grown = Vec::with_capacity(total.max(existing));
     for _ in 0..missing {
