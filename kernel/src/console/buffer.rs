@@ -20,8 +20,9 @@ pub(super) struct Buffer<const N: usize> {
     /// The place of the oldest byte.
     start: usize,
     length: usize,
-    /// Whether the next byte stands in column 0.
-    is_at_line_start: bool,
+    /// Whether the next byte stands behind another one of its line. (So said, an empty
+    /// buffer is nothing but zeros, and takes no place in the image.)
+    is_within_line: bool,
     /// How many bytes have been refused for good.
     pub(super) dropped: u64,
 }
@@ -32,7 +33,7 @@ impl<const N: usize> Buffer<N> {
             bytes: [0; N],
             start: 0,
             length: 0,
-            is_at_line_start: true,
+            is_within_line: false,
             dropped: 0,
         }
     }
@@ -44,8 +45,8 @@ impl<const N: usize> Buffer<N> {
             return true;
         };
         let before: &[u8] = match kind {
-            Kind::Text if self.is_at_line_start && piece[0] == b'{' => b" ",
-            Kind::Line | Kind::KernelLine if begins && !self.is_at_line_start => b"\n",
+            Kind::Text if !self.is_within_line && piece[0] == b'{' => b" ",
+            Kind::Line | Kind::KernelLine if begins && self.is_within_line => b"\n",
             _ => b"",
         };
         let kept = if kind == Kind::KernelLine { 0 } else { RESERVE };
@@ -54,7 +55,7 @@ impl<const N: usize> Buffer<N> {
         }
         self.copy(before);
         self.copy(piece);
-        self.is_at_line_start = *last == b'\n';
+        self.is_within_line = *last != b'\n';
         true
     }
 

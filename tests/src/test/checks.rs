@@ -12,7 +12,7 @@ use super::libtest::Plan;
 use super::tally::Tally;
 use super::{layers, lint, own};
 use crate::bench::hand_off;
-use crate::image::{self, MOST_STRIPPED_BYTES};
+use crate::image;
 use crate::probe;
 use crate::qemu::Qemu;
 use crate::system;
@@ -54,7 +54,7 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     for app in image::apps().into_iter().filter(|app| own.contains(app)) {
         let name = format!(
             "image of {app} weighs at most {} KiB",
-            MOST_STRIPPED_BYTES >> 10
+            image::most_stripped_bytes(&app) >> 10
         );
         if plan.wants(&name) {
             tally.run(&name, || image_is_light(&app));
@@ -135,12 +135,11 @@ fn image_is_light(app: &str) -> Result<(), String> {
     let image = image::build(app).map_err(|error| error.to_string())?;
     let bytes = image.stripped_bytes()?;
     println!("image of {app}: {bytes} bytes stripped");
-    if bytes <= MOST_STRIPPED_BYTES {
+    let most = image::most_stripped_bytes(app);
+    if bytes <= most {
         return Ok(());
     }
-    Err(format!(
-        "it weighs {bytes} bytes, {MOST_STRIPPED_BYTES} are allowed"
-    ))
+    Err(format!("it weighs {bytes} bytes, {most} are allowed"))
 }
 
 #[cfg(test)]
