@@ -145,7 +145,7 @@ pub fn start(
 
 /// Runs the image's panic handler.
 pub fn panic(info: &PanicInfo<'_>) -> ! {
-    crate::panic::panic(info)
+    crate::watch::panic::panic(info)
 }
 
 /// Copies bytes in ascending order.

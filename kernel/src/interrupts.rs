@@ -2,11 +2,11 @@
 
 use core::sync::atomic::Ordering;
 
-use crate::background::{self, watchdog};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, section, this_core};
-use crate::{containment, execution, heartbeat};
+use crate::run::{containment, execution, heartbeat};
+use crate::watch::background::{self, watchdog};
 
 /// Handles this core's timer interrupt.
 pub(crate) fn timer_interrupt(interrupted: &mut Interrupted) {

@@ -36,61 +36,40 @@
 //!    each block with the invariant that it relies on.
 //! 6. **Apps are not trusted**: what they say is verified at commit.
 //!
-//! # From bottom to top
+//! # Rooms, from top to bottom
 //!
-//! `machine` (processor, interrupts, time) and `memory` know nothing of what is
-//! above. `contexts` keeps stacks, `trace` what has happened. `execution` holds the
-//! scheduler, `containment` decides what a fault ends, `worker` is the loop of each core,
-//! `background` what core 0 does besides. `platform` answers `fass`, [`Machine`] is what
-//! an app sees, [`Run`] what it gets from a run. [`console`], [`json`], [`options`] and
-//! [`report`] serve input and output.
+//! `entry` and `start` bring an image up, `app` is what an app sees of the kernel,
+//! `interrupts` what a core's timer and wake-ups do. `watch` looks in on a run, [`report`] tells
+//! of it afterwards, and `run` executes it. `text` serves input and output, with [`console`],
+//! [`json`] and [`options`]; `memory` and `machine` (processor, interrupts, time) know nothing of
+//! what is above. `docs/architecture.md` has the table that the tests hold this to.
 
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
 
-mod background;
-mod bound_verdict;
-pub mod console;
-mod containment;
-mod contexts;
-mod ending;
+mod app;
 #[allow(unsafe_code, reason = "the symbols that an image must define")]
 #[doc(hidden)]
 pub mod entry;
-mod event;
-mod excerpt;
-mod execution;
-mod fault_verdict;
-mod graph;
-mod heartbeat;
 mod interrupts;
-mod journal;
-pub mod json;
-mod lock;
 #[allow(unsafe_code, reason = "registers, ports, interrupts, page tables")]
 mod machine;
-mod machine_handle;
 #[allow(unsafe_code, reason = "the allocator hands out raw memory")]
 mod memory;
-mod occupation;
-pub mod options;
-mod panic;
-mod platform;
-mod probe;
 pub mod report;
 mod run;
-mod settings;
-#[allow(unsafe_code, reason = "the way up to the first safe state")]
 mod start;
-mod worker;
+mod text;
+mod watch;
 
-pub use ending::Ending;
-pub use event::Event;
-pub use lock::Lock;
-pub use machine_handle::{Machine, Resources};
+pub use app::ending::Ending;
+pub use app::event::Event;
+pub use app::lock::Lock;
+pub use app::machine_handle::{Machine, Resources};
 pub use memory::heap::KernelHeap;
-pub use run::Run;
+pub use report::run::Run;
+pub use text::{console, json, options};
 
 /// Returns the number of timer interrupts that all cores have taken since boot.
 ///

@@ -4,7 +4,7 @@
 //! behind it, or hardware that runs a guest of a few instructions and no kernel. So the
 //! image that is to be booted is booted first with the word `probe=on`, on the machine
 //! that it is to have: it then only shows that its cores come up, take interrupts and
-//! calculate (`kernel/src/probe.rs`).
+//! calculate (`kernel/src/start/probe.rs`).
 //!
 //! Every command that boots takes its mode from [`choose`].
 

@@ -20,13 +20,13 @@ const FOLDERS: [&str; 6] = [
 ];
 const FILES: [&str; 10] = [
     "kernel/src/lib.rs",
-    "kernel/src/machine_handle.rs",
-    "kernel/src/run.rs",
-    "kernel/src/options.rs",
-    "kernel/src/json.rs",
-    "kernel/src/console.rs",
-    "kernel/src/event.rs",
-    "kernel/src/lock.rs",
+    "kernel/src/app/machine_handle.rs",
+    "kernel/src/report/run.rs",
+    "kernel/src/text/options.rs",
+    "kernel/src/text/json.rs",
+    "kernel/src/text/console/mod.rs",
+    "kernel/src/app/event.rs",
+    "kernel/src/app/lock.rs",
     "kernel/src/report/distribution.rs",
     "kernel/src/report/time.rs",
 ];

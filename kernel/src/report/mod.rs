@@ -1,6 +1,11 @@
-//! What is told of a run: its trace, its statistics, and figures over many samples.
+//! What is told of a run when it is over: the [`Run`](crate::Run) that an app gets, its trace,
+//! its statistics, and figures over many samples.
+//!
+//! All of it is computed from the journal, with the words of `text`. Nothing here is called
+//! while a run goes on.
 
 mod distribution;
+pub(crate) mod run;
 mod time;
 pub(crate) mod times;
 pub(crate) mod trace;

@@ -3,8 +3,8 @@
 use sched_dag::law::Histogram;
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use crate::json::{self, Object};
-use crate::run::Run;
+use super::run::Run;
+use crate::text::json::{self, Object};
 
 /// Prints the statistics of a run: a line for each DAG, and one for each subtask.
 pub(crate) fn dump(run: &Run) {

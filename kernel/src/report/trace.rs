@@ -5,9 +5,10 @@ use core::fmt;
 use sched_dag::journal::Event;
 use sched_dag::{Dag, SubtaskId};
 
-use crate::platform::KERNEL;
-use crate::run::Run;
-use crate::{execution, graph, json};
+use super::run::Run;
+use crate::run::execution;
+use crate::run::platform::KERNEL;
+use crate::text::{graph, json};
 use fass::{Platform, Policy, Preemption};
 
 /// The most events on one line.

@@ -1,0 +1,394 @@
+//! The three cells in which the crate's `unsafe` lives: a job slot, a shared value
+//! and a set-once.
+//!
+//! # The slot ring
+//!
+//! For our purposes an *edge* is a topic as one of its readers sees it. Each
+//! edge is a ring of J *slots*, J being the number of jobs that the DAG may
+//! have in flight, up to the next power of two; so a job always finds a free slot. A
+//! ring has exactly one
+//! [`Writer`] and one [`Reader`]. Neither can be cloned, and everything they do
+//! takes `&mut self`; so at any time at most one thread acts for each side.
+//!
+//! Which slot a job gets carries no meaning; what identifies a value is its job
+//! number. Both ends go round the ring in the order of jobs, so that each looks
+//! at the right slot at once; after a job was cancelled they may look at all of
+//! them. (A slot could be chosen by `k mod J` only if jobs in flight were
+//! consecutive. They are not where an overrun skips releases: with J = 2, jobs
+//! 1 and 3 can be in flight together.)
+//!
+//! A slot holds a value and one atomic word, its *turn*: 0 while the slot is
+//! empty, `2k + 1` (modulo 2^64) while it holds the value of job k, and 2 while it holds
+//! one that was given up. (Job k + 2^63 has the turn of job k, but no run gets there in
+//! 292 years.) One soundness argument, cited below by its name, covers the ring:
+//!
+//! > **Turn invariant.** While a slot's turn is even, only the ring's writer may
+//! > touch the slot's value; while it is odd, only the ring's reader. The value is
+//! > uninitialised if the turn is 0, and initialised otherwise.
+//! > Only the side whose turn it is changes the turn: the writer from 0 to
+//! > `2k + 1` once the value is written, the reader back to 0 once the value is
+//! > moved out, or to 2 to leave it to the writer, which makes that 0 before it drops the
+//! > value. A change of sides is a `Release` store and the other side's look at
+//! > it an `Acquire` load, so all that one side did to the value
+//! > happens before all that the other does.
+//!
+//! The reader *gives up* the value of a cancelled job, which takes a few instructions,
+//! and the writer drops it in its place once it needs the slot. Dropping is the app's
+//! code: it may panic, take long or never end. A job is cancelled by the scheduler in
+//! mid-step, while the writer runs as a subtask of that DAG: preempted and contained.
+//!
+//! Because there is one thread a side, a load and a store suffice: nothing here
+//! is a locked read-modify-write. The invariant does not lean on the scheduler:
+//! a platform that runs instances in a wrong order gets its value refused
+//! ([`Writer::put`]) or finds none ([`Reader::take`]), but never a data race.
+//!
+//! # The shared value
+//!
+//! A [`Shared`] value is changed by one user or looked at by several, never both. A
+//! user *claims* it for that time. Nobody ever waits: the schedule is such that
+//! every claim succeeds, and one that does not is refused.
+//!
+//! > **Claim invariant.** The word `claims` counts the users that look at the value, or
+//! > is `CHANGING` while one may change it. Nobody touches the value without a
+//! > claim. A claim is made by an `Acquire` exchange that moves `claims` from 0 to
+//! > `CHANGING`, or from any smaller count to the next; it is given back by a
+//! > `Release` change. So all that one holder did happens before all that the next
+//! > conflicting one does.
+//!
+//! # The set-once
+//!
+//! [`SetOnce`] holds the installed platform: empty, then set for good.
+//!
+//! > **Set-once invariant.** The caller that moves the state from `EMPTY` to
+//! > `WRITING` is the only one that ever writes the value, and does so before it stores
+//! > `SET` with `Release`. After `SET` nobody writes. Readers read only after
+//! > an `Acquire` load gave `SET`.
+
+use alloc::sync::Arc;
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+use core::ops::{Deref, DerefMut};
+use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
+
+/// The turn of a slot that holds no value.
+const EMPTY_SLOT: u64 = 0;
+
+/// The turn of a slot whose value was given up.
+const GIVEN_UP: u64 = 2;
+
+/// Returns the turn of a slot that holds the value of a job.
+#[inline]
+const fn turn_of(job: u64) -> u64 {
+    job << 1 | 1
+}
+
+/// Makes the ring of one edge with at least `slots` slots and returns its two ends.
+/// They are a power of two, so that going round takes no comparison.
+///
+/// # Panics
+///
+/// If `slots` is 0.
+pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
+    assert!(slots > 0, "an edge needs at least one slot");
+    let slots: Arc<[Slot<T>]> = (0..slots.next_power_of_two())
+        .map(|_| Slot::empty())
+        .collect();
+    let writer = Writer {
+        slots: Arc::clone(&slots),
+        next: 0,
+    };
+    (writer, Reader { slots, next: 0 })
+}
+
+/// The writing end of an edge. There is one, and it cannot be cloned.
+pub(crate) struct Writer<T> {
+    slots: Arc<[Slot<T>]>,
+    /// The slot to look at first, counted on and on.
+    next: usize,
+}
+
+/// The reading end of an edge. There is one, and it cannot be cloned.
+pub(crate) struct Reader<T> {
+    slots: Arc<[Slot<T>]>,
+    /// The slot to look at first, counted on and on.
+    next: usize,
+}
+
+impl<T> Writer<T> {
+    /// Puts the value of `job` into a free slot, or gives the value back if all
+    /// are taken. Drops the value in a slot that was given up, if it takes that.
+    #[inline]
+    pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
+        let slot = match first(&self.slots, &mut self.next, EMPTY_SLOT) {
+            Some(slot) => slot,
+            None => match self.make_room() {
+                Some(slot) => slot,
+                None => return Err(value),
+            },
+        };
+        let place = slot.value.get().cast::<T>();
+        // SAFETY: by the turn invariant an empty slot is the writer's alone,
+        // and `&mut self` makes us the only thread that acts as the writer.
+        unsafe { place.write(value) };
+        slot.turn.store(turn_of(job), Ordering::Release);
+        Ok(())
+    }
+
+    /// Finds an empty slot, or makes one so that was given up.
+    #[cold]
+    fn make_room(&mut self) -> Option<&Slot<T>> {
+        let slot = search(&self.slots, &mut self.next, |turn| turn & 1 == 0)?;
+        if slot.turn.load(Ordering::Relaxed) == GIVEN_UP {
+            // First, so that the value is not dropped again should its `drop` panic.
+            slot.turn.store(EMPTY_SLOT, Ordering::Relaxed);
+            let place = slot.value.get().cast::<T>();
+            // SAFETY: by the turn invariant the value of a slot that was given up is
+            // initialised and the writer's alone, and `&mut self` makes us the only
+            // thread that acts as the writer. The turn says already that it is gone.
+            unsafe { place.drop_in_place() };
+        }
+        Some(slot)
+    }
+}
+
+impl<T> Reader<T> {
+    /// Moves the value of `job` out of its slot, or returns `None` if no slot
+    /// holds that very job's value.
+    #[inline]
+    pub(crate) fn take(&mut self, job: u64) -> Option<T> {
+        let slot = self.slot_of(job)?;
+        let place = slot.value.get().cast::<T>();
+        // SAFETY: by the turn invariant a slot with a turn other than 0 is
+        // initialised and the reader's alone, and `&mut self` makes us the only
+        // thread that acts as the reader. The store below ends our turn, so the
+        // value is not read twice.
+        let value = unsafe { place.read() };
+        slot.turn.store(EMPTY_SLOT, Ordering::Release);
+        Some(value)
+    }
+
+    /// Leaves the value of `job`, if some slot holds it, to the writer.
+    pub(crate) fn give_up(&mut self, job: u64) {
+        if let Some(slot) = self.slot_of(job) {
+            slot.turn.store(GIVEN_UP, Ordering::Release);
+        }
+    }
+
+    #[inline]
+    fn slot_of(&mut self, job: u64) -> Option<&Slot<T>> {
+        let turn = turn_of(job);
+        match first(&self.slots, &mut self.next, turn) {
+            Some(slot) => Some(slot),
+            None => search(&self.slots, &mut self.next, |other| other == turn),
+        }
+    }
+}
+
+/// A slot, which the two ends share.
+struct Slot<T> {
+    turn: AtomicU64,
+    value: UnsafeCell<MaybeUninit<T>>,
+}
+
+// SAFETY: the value is reached through the two ends only, which follow the turn
+// invariant; a value is thereby handed from one thread to another but never
+// shared, which is why `T: Send` is enough.
+unsafe impl<T: Send> Sync for Slot<T> {}
+
+/// Returns slot `next` if it has the given turn, as it nearly always does, and moves
+/// `next` behind it. Its look at the turn is an `Acquire`.
+#[inline]
+fn first<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
+    let slot = at(slots, *next)?;
+    if slot.turn.load(Ordering::Acquire) != turn {
+        return None;
+    }
+    *next = next.wrapping_add(1);
+    Some(slot)
+}
+
+/// Finds a slot whose turn is meant as [`first`] does, from slot `next` on and round
+/// the ring once.
+#[cold]
+fn search<'s, T>(
+    slots: &'s [Slot<T>],
+    next: &mut usize,
+    is_meant: impl Fn(u64) -> bool,
+) -> Option<&'s Slot<T>> {
+    for _ in 0..slots.len() {
+        let slot = at(slots, *next)?;
+        *next = next.wrapping_add(1);
+        if is_meant(slot.turn.load(Ordering::Acquire)) {
+            return Some(slot);
+        }
+    }
+    None
+}
+
+/// Returns the slot that a count gets to, round and round the ring.
+#[inline]
+fn at<T>(slots: &[Slot<T>], count: usize) -> Option<&Slot<T>> {
+    slots.get(count & slots.len().wrapping_sub(1))
+}
+
+impl<T> Slot<T> {
+    const fn empty() -> Self {
+        Self {
+            turn: AtomicU64::new(EMPTY_SLOT),
+            value: UnsafeCell::new(MaybeUninit::uninit()),
+        }
+    }
+}
+
+impl<T> Drop for Slot<T> {
+    fn drop(&mut self) {
+        if *self.turn.get_mut() != EMPTY_SLOT {
+            // SAFETY: by the turn invariant a slot with a turn other than 0 is
+            // initialised; `&mut self` shows that both ends are gone.
+            unsafe { self.value.get_mut().assume_init_drop() };
+        }
+    }
+}
+
+/// The claims of a value that is being changed; also more than can ever look.
+const CHANGING: u32 = u32::MAX;
+
+/// A value that one may change or several look at.
+pub struct Shared<T> {
+    claims: AtomicU32,
+    value: UnsafeCell<T>,
+}
+
+// SAFETY: by the claim invariant threads have either one `&mut T` or several `&T`
+// between them. `T: Send` because the value is changed, and moved out of and into
+// its place, by one thread after another; `T: Sync` because several look at it.
+unsafe impl<T: Send + Sync> Sync for Shared<T> {}
+
+/// The claim of a user that may change the value.
+pub struct Changing<'a, T>(&'a Shared<T>);
+
+/// The claim of a user that looks at the value.
+pub struct Looking<'a, T>(&'a Shared<T>);
+
+impl<T> Shared<T> {
+    pub(crate) const fn new(value: T) -> Self {
+        Self {
+            claims: AtomicU32::new(0),
+            value: UnsafeCell::new(value),
+        }
+    }
+
+    /// Claims the value for a change, unless somebody else has a claim.
+    pub(crate) fn change(&self) -> Option<Changing<'_, T>> {
+        let claim = self
+            .claims
+            .compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed);
+        claim.ok().map(|_| Changing(self))
+    }
+
+    /// Claims the value for a look, unless somebody may change it.
+    pub(crate) fn look(&self) -> Option<Looking<'_, T>> {
+        let one_more = |claims| (claims < CHANGING - 1).then(|| claims + 1);
+        let claim = self
+            .claims
+            .fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more);
+        claim.ok().map(|_| Looking(self))
+    }
+}
+
+impl<T> Deref for Changing<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: by the claim invariant this claim is the only one, and `&self`
+        // keeps it from giving out `&mut T` meanwhile.
+        unsafe { &*self.0.value.get() }
+    }
+}
+
+impl<T> DerefMut for Changing<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        // SAFETY: by the claim invariant this claim is the only one, and `&mut self`
+        // keeps it from giving out another reference meanwhile.
+        unsafe { &mut *self.0.value.get() }
+    }
+}
+
+impl<T> Deref for Looking<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: by the claim invariant nobody may change the value while this
+        // claim exists.
+        unsafe { &*self.0.value.get() }
+    }
+}
+
+impl<T> Drop for Changing<'_, T> {
+    fn drop(&mut self) {
+        self.0.claims.store(0, Ordering::Release);
+    }
+}
+
+impl<T> Drop for Looking<'_, T> {
+    fn drop(&mut self) {
+        self.0.claims.fetch_sub(1, Ordering::Release);
+    }
+}
+
+const EMPTY: u8 = 0;
+const WRITING: u8 = 1;
+const SET: u8 = 2;
+
+/// A value that is set at most once and then read by everybody.
+///
+/// `T: Copy`, so that nothing needs to be dropped and reads are by value.
+pub(crate) struct SetOnce<T: Copy> {
+    state: AtomicU8,
+    value: UnsafeCell<MaybeUninit<T>>,
+}
+
+// SAFETY: by the set-once invariant the value is written by one thread before
+// any thread reads it. `T: Send` because the setter hands it to the readers,
+// `T: Sync` because they hold copies at the same time.
+unsafe impl<T: Copy + Send + Sync> Sync for SetOnce<T> {}
+
+impl<T: Copy> SetOnce<T> {
+    pub(crate) const fn new() -> Self {
+        Self {
+            state: AtomicU8::new(EMPTY),
+            value: UnsafeCell::new(MaybeUninit::uninit()),
+        }
+    }
+
+    /// Sets the value, and reports whether this call was the one that did.
+    pub(crate) fn set(&self, value: T) -> bool {
+        let claim =
+            self.state
+                .compare_exchange(EMPTY, WRITING, Ordering::Relaxed, Ordering::Relaxed);
+        if claim.is_err() {
+            return false;
+        }
+        let place = self.value.get().cast::<T>();
+        // SAFETY: we moved the state from `EMPTY` to `WRITING`, so by the
+        // set-once invariant we alone may write, and nobody reads yet.
+        unsafe { place.write(value) };
+        self.state.store(SET, Ordering::Release);
+        true
+    }
+
+    /// Returns the value, or `None` while none is set.
+    #[inline]
+    pub(crate) fn get(&self) -> Option<T> {
+        if self.state.load(Ordering::Acquire) != SET {
+            return None;
+        }
+        let place = self.value.get().cast::<T>();
+        // SAFETY: the state is `SET`, so by the set-once invariant the value is
+        // initialised and no longer written; `T: Copy` allows many reads.
+        Some(unsafe { place.read() })
+    }
+}
+
+#[cfg(test)]
+mod tests;

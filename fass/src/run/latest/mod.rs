@@ -1,0 +1,200 @@
+//! What carries a latest value from its writer to a subtask that samples it.
+//!
+//! Each sampling subtask has three slots for itself: one that the writer fills, one
+//! that the reader looks at, and one in the middle. The writer, when complete, swaps
+//! its slot for the middle one; the reader does so if that is fresh (a triple buffer).
+//! So neither waits for the other, and a value shows as a whole or not at all.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::any::Any;
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+
+use sched_dag::{DagId, TopicPort};
+
+use super::cell::{Looking, Shared};
+use super::effect::Effect;
+use super::message::{Message, MessageType};
+
+/// A latest value while DAGs are built.
+pub(crate) struct SharedLatest<T> {
+    pub(crate) topic: String,
+    /// One for each sampling subtask.
+    triples: RefCell<Vec<Arc<Triple<T>>>>,
+}
+
+impl<T> SharedLatest<T> {
+    pub(crate) fn new(topic: &str) -> Self {
+        Self {
+            topic: topic.into(),
+            triples: RefCell::default(),
+        }
+    }
+
+    /// Adds a sampling subtask and returns its reading end.
+    pub(crate) fn sampler(&self) -> Sampler<T> {
+        let triple = Arc::new(Triple::new());
+        self.triples.borrow_mut().push(Arc::clone(&triple));
+        Sampler { triple, front: 2 }
+    }
+}
+
+/// A latest value of whatever type.
+pub(crate) trait AnyLatest {
+    fn topic(&self) -> &str;
+
+    /// Returns the topic with the type that is read.
+    fn port(&self) -> TopicPort;
+
+    /// Returns the number of subtasks that sample it.
+    fn samplers(&self) -> usize;
+
+    /// Returns the writing ends: a `Vec<Box<dyn Stage<T>>>`.
+    fn stages(&self) -> Box<dyn Any>;
+
+    /// Returns what the writer's completion does.
+    fn effects(&self) -> Vec<Box<dyn Effect>>;
+}
+
+impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
+    fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    fn port(&self) -> TopicPort {
+        MessageType::of::<T>().port(&self.topic)
+    }
+
+    fn samplers(&self) -> usize {
+        self.triples.borrow().len()
+    }
+
+    fn stages(&self) -> Box<dyn Any> {
+        let triples = self.triples.borrow();
+        let stages: Vec<Box<dyn Stage<T>>> = (triples.iter())
+            .map(|triple| -> Box<dyn Stage<T>> { Box::new(Arc::clone(triple)) })
+            .collect();
+        Box::new(stages)
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect>> {
+        let triples = self.triples.borrow();
+        (triples.iter())
+            .map(|triple| -> Box<dyn Effect> { Box::new(Arc::clone(triple)) })
+            .collect()
+    }
+}
+
+/// Where a writer puts what shall show at its completion.
+pub(crate) trait Stage<T>: Send {
+    fn stage(&mut self, job: u64, value: T);
+}
+
+/// The slots of one sampling subtask.
+struct Triple<T> {
+    slots: [Shared<Option<Entry<T>>>; 3],
+    /// The slot in the middle, with [`FRESH`] if the reader has not had it.
+    middle: AtomicU8,
+    /// The writer's slot. Only the writer's body uses it, which is `&mut` there.
+    back: AtomicU8,
+    /// Whether the writer's slot has a value that shall show at its completion.
+    staged: AtomicBool,
+}
+
+/// A value, the job that it is of, and when its writer was complete.
+pub(crate) struct Entry<T> {
+    pub(crate) value: T,
+    pub(crate) job: u64,
+    pub(crate) completed_ns: u64,
+}
+
+const FRESH: u8 = 0b100;
+const SLOT: u8 = 0b011;
+
+impl<T> Triple<T> {
+    fn new() -> Self {
+        Self {
+            slots: [const { Shared::new(None) }; 3],
+            back: AtomicU8::new(0),
+            middle: AtomicU8::new(1),
+            staged: AtomicBool::new(false),
+        }
+    }
+
+    /// Changes the writer's slot.
+    fn write(&self, change: impl FnOnce(&mut Option<Entry<T>>)) {
+        let back = usize::from(self.back.load(Ordering::Relaxed));
+        let Some(mut slot) = self.slots[back].change() else {
+            panic!("a topic has two writers at one time: the platform runs a subtask twice");
+        };
+        change(&mut slot);
+    }
+}
+
+impl<T: Send + Sync> Stage<T> for Arc<Triple<T>> {
+    fn stage(&mut self, job: u64, value: T) {
+        self.write(|slot| {
+            *slot = Some(Entry {
+                value,
+                job,
+                completed_ns: 0,
+            });
+        });
+        self.staged.store(true, Ordering::Relaxed);
+    }
+}
+
+impl<T: Send + Sync> Effect for Arc<Triple<T>> {
+    fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
+        if !self.staged.load(Ordering::Relaxed) {
+            return;
+        }
+        self.staged.store(false, Ordering::Relaxed);
+        self.write(|slot| {
+            if let Some(entry) = slot {
+                entry.completed_ns = completed_ns;
+            }
+        });
+        let back = self.back.load(Ordering::Relaxed);
+        let middle = self.middle.swap(back | FRESH, Ordering::AcqRel);
+        self.back.store(middle & SLOT, Ordering::Relaxed);
+    }
+}
+
+/// The reading end, kept by the sampling subtask.
+#[doc(hidden)]
+pub struct Sampler<T> {
+    triple: Arc<Triple<T>>,
+    front: u8,
+}
+
+/// The reader's slot for the time of an instance.
+#[doc(hidden)]
+pub struct Looked<'a, T>(Looking<'a, Option<Entry<T>>>);
+
+impl<T> Sampler<T> {
+    /// Takes the slot of the latest complete instance, for the time of the guard.
+    pub(crate) fn look(&mut self) -> Looked<'_, T> {
+        let Self { triple, front } = self;
+        if triple.middle.load(Ordering::Relaxed) & FRESH != 0 {
+            *front = triple.middle.swap(*front, Ordering::AcqRel) & SLOT;
+        }
+        match triple.slots[usize::from(*front)].look() {
+            Some(slot) => Looked(slot),
+            None => unreachable!("the writer has another slot"),
+        }
+    }
+}
+
+impl<T> Looked<'_, T> {
+    /// Returns what is in the slot; nothing before the writer's first completion.
+    pub(crate) fn entry(&self) -> Option<&Entry<T>> {
+        self.0.as_ref()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+//! Whether a response time beyond its proven bound makes the app fail.
+//!
+//! A bound holds as long as no instance takes longer than its WCET, and the machine no
+//! longer than the overheads that the commit was told. So a job that took longer shows
+//! that something was stated too small, and that what the commit has proven is not so:
+//! such a run is no success, whatever its deadlines. An app whose WCETs are not meant
+//! for this machine says so
+//! ([`Machine::accept_exceeded_bounds`](crate::Machine::accept_exceeded_bounds)).
+//!
+//! In mode `threads` a line says it, and the verdict does not: there emulated
+//! processors wait for the host's, which no overhead can state.
+
+use alloc::format;
+use alloc::string::String;
+use core::cell::{Cell, RefCell};
+
+use sched_dag::DagId;
+
+use super::ending::Ending;
+use crate::report::Ns;
+use crate::report::run::Run;
+use crate::text::json;
+
+/// What is known of bounds in the runs so far.
+#[derive(Debug)]
+pub(crate) struct BoundVerdict {
+    are_judged: Cell<bool>,
+    /// Why the app fails, if it does.
+    complaint: RefCell<Option<String>>,
+}
+
+/// The jobs of a DAG that took longer than is proven.
+struct Exceeded {
+    dag: DagId,
+    jobs: u64,
+    /// The longest of them.
+    job: u64,
+    response_ns: u64,
+    bound_ns: u64,
+}
+
+impl BoundVerdict {
+    pub(crate) const fn new(are_judged: bool) -> Self {
+        Self {
+            are_judged: Cell::new(are_judged),
+            complaint: RefCell::new(None),
+        }
+    }
+
+    /// Leaves the bounds of all runs to the app.
+    pub(crate) fn accept(&self) {
+        self.are_judged.set(false);
+    }
+
+    /// Says which DAGs of a run took longer than is proven, and notes it. Allocates
+    /// only if there are any.
+    pub(crate) fn note(&self, run: &Run) {
+        let dags = (0..).map(DagId).take(run.task_set().dags().len());
+        for exceeded in dags.filter_map(|dag| Exceeded::find(run, dag)) {
+            let text = exceeded.report(run.task_set().dag(exceeded.dag).name());
+            self.complaint.borrow_mut().get_or_insert(text);
+        }
+    }
+
+    /// Returns how an app ends whose function has returned `result`.
+    pub(crate) fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
+        let complaint = self.complaint.take().filter(|_| self.are_judged.get());
+        Ending::or_complaint(result, complaint)
+    }
+}
+
+impl Exceeded {
+    /// Looks at a DAG's jobs that are complete.
+    fn find(run: &Run, dag: DagId) -> Option<Self> {
+        let bound_ns = run.bound_ns(dag)?;
+        let record = run.record();
+        let complete = |(job, times): (u64, &sched_dag::law::JobRecord)| {
+            times.outcome?;
+            Some((
+                record
+                    .completion_ns(dag, job)?
+                    .saturating_sub(times.release_ns?),
+                job,
+            ))
+        };
+        let responses = record.numbered(dag).filter_map(complete);
+        let late = responses.filter(|(response_ns, _)| *response_ns > bound_ns);
+        let (mut jobs, mut longest) = late.fold((0, (0, 0)), |(jobs, longest), of_job| {
+            (jobs + 1, of_job.max(longest))
+        });
+        // Of jobs that are not recorded any more, the longest one is known.
+        if record.first_job(dag) > 0
+            && let Some(times) = run.times()
+            && times.dag(dag).longest().0 > bound_ns
+        {
+            jobs = jobs.max(1);
+            longest = times.dag(dag).longest();
+        }
+        let (response_ns, job) = longest;
+        (jobs > 0).then_some(Self {
+            dag,
+            jobs,
+            job,
+            response_ns,
+            bound_ns,
+        })
+    }
+
+    /// Prints it, and returns it in words.
+    fn report(&self, name: &str) -> String {
+        let text = format!(
+            "dag `{name}` took {} in job {}, beyond its proven bound of {}; a WCET, or \
+             `overheads_ns`, is stated too small",
+            Ns(self.response_ns),
+            self.job,
+            Ns(self.bound_ns)
+        );
+        crate::println!("bound exceeded: {text}");
+        json::emit("bound_exceeded", |line| {
+            line.number("dag", self.dag.0)
+                .text("dag_name", name)
+                .number("jobs", self.jobs)
+                .number("job", self.job)
+                .number("response_ns", self.response_ns)
+                .number("bound_ns", self.bound_ns);
+        });
+        text
+    }
+}

@@ -1,0 +1,67 @@
+//! How an app's function may end, besides well.
+
+use core::fmt;
+
+use alloc::string::String;
+
+use fass::CommitError;
+
+use crate::text::options::UsageError;
+
+/// Why an app ends other than by success.
+///
+/// ```no_run
+/// use kernel::{Ending, options::UsageError};
+///
+/// let ending = Ending::from(UsageError::new("`jobs=0`: give at least 1"));
+/// assert!(matches!(ending, Ending::Usage(_)));
+/// assert_eq!(ending.to_string(), "`jobs=0`: give at least 1");
+/// ```
+#[derive(Debug)]
+pub enum Ending {
+    /// The command line is wrong; QEMU exits with 37.
+    Usage(UsageError),
+    /// The DAGs could not be committed; QEMU exits with 35.
+    Commit(CommitError),
+    /// Something else went wrong, in words; QEMU exits with 35.
+    Failure(String),
+    /// A person has ended the run at the console; QEMU exits with 33.
+    Shutdown,
+}
+
+impl Ending {
+    /// Lets a complaint of the kernel's be the ending of an app that ends well, or as a
+    /// person wants it. The app's own error takes precedence.
+    pub(crate) fn or_complaint(
+        result: Result<(), Self>,
+        complaint: Option<String>,
+    ) -> Result<(), Self> {
+        match (result, complaint) {
+            (Ok(()) | Err(Self::Shutdown), Some(text)) => Err(Self::Failure(text)),
+            (result, _) => result,
+        }
+    }
+}
+
+impl From<UsageError> for Ending {
+    fn from(error: UsageError) -> Self {
+        Self::Usage(error)
+    }
+}
+
+impl From<CommitError> for Ending {
+    fn from(error: CommitError) -> Self {
+        Self::Commit(error)
+    }
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(error) => error.fmt(f),
+            Self::Commit(error) => error.fmt(f),
+            Self::Failure(message) => f.write_str(message),
+            Self::Shutdown => f.write_str("shut down at the console"),
+        }
+    }
+}

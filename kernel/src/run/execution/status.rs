@@ -1,0 +1,83 @@
+//! What the rest of the kernel may ask about the run.
+
+use core::sync::atomic::Ordering;
+
+use sched_dag::Instance;
+use sched_dag::journal::Subject;
+
+use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS, runner};
+use crate::machine::this_core::Core;
+use crate::run::journal::Journal;
+
+/// Stands where the ids of an instance do, for none.
+const NOTHING: u64 = u64::MAX;
+
+/// Reports whether all jobs of the run have ended.
+pub(crate) fn is_finished() -> bool {
+    FINISHED.load(Ordering::Acquire)
+}
+
+/// Returns how many jobs have ended in this run, of DAGs with a limit of jobs.
+pub(crate) fn jobs_ended() -> u64 {
+    JOBS_ENDED.load(Ordering::Relaxed)
+}
+
+/// Returns how often the scheduler's lock has been taken since boot, modulo 2^32.
+pub(crate) fn lock_acquisitions() -> u32 {
+    EXECUTION.acquisitions()
+}
+
+/// Returns when core 0's timer shall next step the scheduler.
+pub(crate) fn next_event_ns() -> u64 {
+    NEXT_EVENT_NS.load(Ordering::Acquire)
+}
+
+/// Calls `with` with the names of an instance's DAG and subtask, if they can be
+/// had without waiting.
+pub(crate) fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
+    let place = EXECUTION.try_lock();
+    let Some(execution) = place.as_ref().and_then(|execution| execution.as_ref()) else {
+        return;
+    };
+    let dag = execution.task_set().dags().get(instance.dag.index());
+    let subtask = dag.and_then(|dag| dag.subtasks().get(instance.subtask.index()));
+    if let (Some(dag), Some(subtask)) = (dag, subtask) {
+        with(dag.name(), subtask.name());
+    }
+}
+
+/// Returns the instance that a core runs, without the lock.
+pub(crate) fn running(core: &Core) -> Option<Instance> {
+    let [ids, job] = core
+        .running
+        .each_ref()
+        .map(|field| field.load(Ordering::Relaxed));
+    (ids != NOTHING).then(|| Subject { ids, job }.instance())
+}
+
+/// Notes which instance a core runs, for [`running`].
+pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
+    let (ids, job) = subject.map_or((NOTHING, 0), |subject| (subject.ids, subject.job));
+    core.note_running([ids, job]);
+}
+
+/// Returns how long an instance may execute for, `u64::MAX` if for ever.
+pub(crate) fn budget_ns(instance: Instance) -> u64 {
+    let place = EXECUTION.lock();
+    place.as_ref().map_or(u64::MAX, |execution| {
+        runner::budget_ns(execution.task_set(), instance, execution.budget_factor)
+    })
+}
+
+/// Looks at the journal of the run, or changes what it records, if a run goes on. To
+/// be done shortly: nothing is completed meanwhile.
+pub(crate) fn with_journal<R>(look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+    let mut place = EXECUTION.lock();
+    place.as_mut().map(|execution| look(&mut execution.journal))
+}
+
+/// Looks at the journal of the run, if there is one and nobody is at work on it.
+pub(crate) fn try_journal<R>(look: impl FnOnce(&Journal) -> R) -> Option<R> {
+    let place = EXECUTION.try_lock()?;
+    place.as_ref().map(|execution| look(&execution.journal))
+}

@@ -1,0 +1,288 @@
+//! One step of the scheduler, and following what it decides.
+
+use core::sync::atomic::Ordering;
+
+use alloc::boxed::Box;
+
+use sched_dag::journal::{Subject, What};
+use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
+
+use super::core_set::CoreSet;
+use super::placement::Next;
+use super::runner::Runner;
+use super::status::{is_finished, note_running};
+use super::time::{arm_next_event, here, instance_time_ns, since_epoch};
+use super::watcher::Watcher;
+use super::{EPOCH_NS, Event, Execution, FINISHED, NEXT_EVENT_NS, Work};
+use crate::machine::context::Parked;
+use crate::machine::interrupt::Interrupted;
+use crate::machine::this_core::Core;
+use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, this_core, turns};
+use crate::run::contexts;
+use crate::run::journal::Journal;
+
+/// What comes of [`Execution::hand_off`].
+pub(super) enum Ended {
+    /// The core has its next instance, and nothing else is to do.
+    HandedOff(Box<Runner>),
+    /// The scheduler's step is not over.
+    Open,
+    /// When the next event is due may have changed; then the core may have a
+    /// target.
+    WithNews,
+    /// The core may have a target.
+    Quiet,
+}
+
+impl Execution {
+    /// Notes that this core has finished its instance.
+    #[inline]
+    pub(super) fn note_finish(&mut self, here: CoreId, finished: Box<Runner>, finish_ns: u64) {
+        self.journal
+            .write(here, What::Finish, finish_ns, finished.subject());
+        let vertex = finished.vertex;
+        self.placement.finish(here.index(), vertex, finished);
+    }
+
+    /// Lets the scheduler know that this core has finished an instance, and gives
+    /// the core the next one at once if nothing else is to be decided.
+    #[inline]
+    pub(super) fn hand_off(&mut self, core: &Core, finished: Vertex, finish_ns: u64) -> Ended {
+        let here = CoreId(core.index);
+        let Self {
+            task_set,
+            scheduler,
+            placement,
+            journal,
+            ..
+        } = self;
+        let mut watcher = Watcher {
+            journal,
+            placement,
+            task_set,
+            here,
+            has_job_news: false,
+        };
+        let done = scheduler.hand_off(finish_ns, here, finished, &mut watcher);
+        let has_job_news = watcher.has_job_news;
+        match done {
+            HandOff::Open => return Ended::Open,
+            HandOff::To(vertex, decision) => {
+                if !has_job_news && let Some(mut runner) = placement.start(here, vertex) {
+                    runner.instance.job = decision.instance().job;
+                    note_running(core, Some(runner.subject()));
+                    begin(core, journal, &runner);
+                    return Ended::HandedOff(runner);
+                }
+                placement.set_target(here, Some(vertex));
+            }
+            HandOff::Idle => {}
+        }
+        if has_job_news {
+            Ended::WithNews
+        } else {
+            Ended::Quiet
+        }
+    }
+
+    /// Makes one step of the scheduler and returns which other cores have to
+    /// look at what they should run.
+    pub(super) fn step(&mut self, now_ns: u64, event: Event) -> CoreSet {
+        let here = here();
+        let Self {
+            task_set,
+            scheduler,
+            placement,
+            journal,
+            dispatch_due_ns,
+            coincidence_ns,
+            may_hand_off,
+            signals,
+            ..
+        } = self;
+        let mut watcher = Watcher {
+            journal,
+            placement,
+            task_set,
+            here,
+            has_job_news: false,
+        };
+        let mut moment = scheduler.at(since_epoch(now_ns));
+        match event {
+            Event::Time => {}
+            Event::Completed(instance) => {
+                moment.complete(instance, &mut watcher);
+                signals.send(&mut moment, &mut watcher);
+            }
+            Event::Failed(instance) => moment.fail(instance, &mut watcher),
+            Event::Signalled(dag) => moment.signal(dag, &mut watcher),
+            Event::Control(control) => control.apply(&mut moment, &mut watcher),
+        }
+        // What happens before time 0 releases nothing yet.
+        let waits_until_ns = now_ns.saturating_add(*coincidence_ns);
+        let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
+        let due_ns = *dispatch_due_ns.get_or_insert(waits_until_ns.max(epoch_ns));
+        if now_ns < due_ns {
+            self.may_hand_off = false;
+            return self.announce();
+        }
+        *dispatch_due_ns = None;
+        *may_hand_off = *coincidence_ns == 0;
+        let mut woken = CoreSet::default();
+        let mut preempted = None;
+        for decision in moment.release_due(&mut watcher).dispatch() {
+            let (core, instance) = (decision.core(), decision.instance());
+            let vertex = task_set.vertex(instance);
+            if let Decision::Preempt { .. } = decision {
+                placement.set_target(core, None);
+                preempted = Some(core);
+            } else {
+                placement.set_target(core, Some(vertex));
+                if preempted == Some(core) {
+                    let time_ns = since_epoch(clock::now_ns());
+                    journal.write(core, What::Request, time_ns, Subject::of(instance));
+                }
+            }
+            if core != here {
+                woken.insert(core.0);
+            }
+        }
+        woken.insert_all(&self.announce());
+        woken
+    }
+
+    /// Publishes the next event, and sees to it that core 0 waits for it: returns
+    /// it if it has to be woken for that.
+    pub(super) fn announce(&self) -> CoreSet {
+        let mut woken = CoreSet::default();
+        let earlier = NEXT_EVENT_NS.load(Ordering::Relaxed);
+        self.publish();
+        if this_core::get().index == 0 {
+            arm_next_event();
+        } else if NEXT_EVENT_NS.load(Ordering::Relaxed) < earlier || is_finished() {
+            woken.insert(0);
+        }
+        woken
+    }
+
+    /// Lets everyone see when the next event is, and whether there is any.
+    pub(super) fn publish(&self) {
+        let next = self.scheduler.next_event_ns();
+        let next = next.map_or(u64::MAX, |next| {
+            next.saturating_add(EPOCH_NS.load(Ordering::Relaxed))
+        });
+        let next = self.dispatch_due_ns.unwrap_or(next);
+        NEXT_EVENT_NS.store(next, Ordering::Release);
+        FINISHED.store(self.scheduler.is_finished(), Ordering::Release);
+    }
+
+    /// Finds what this core, which runs nothing, is to do.
+    pub(super) fn find_work(&mut self, core: &Core) -> Work {
+        let here = core.index as usize;
+        match self.placement.next(here) {
+            Next::Start(vertex, mut runner) => {
+                runner.instance.job = self.scheduler.instance_of(vertex).job;
+                note_running(core, Some(runner.subject()));
+                begin(core, &mut self.journal, &runner);
+                Work::Run(runner)
+            }
+            Next::Continue(context) => {
+                self.note_resumed(core, &context, clock::now_ns());
+                note_running(core, self.current(here).map(Subject::of));
+                Work::Continue(context)
+            }
+            // Only core 0 has a background, and only while it does other work.
+            Next::Nothing => {
+                note_running(core, None);
+                let background = self.background.take_if(|_| here == 0);
+                background.map_or(Work::Rest, Work::Continue)
+            }
+        }
+    }
+
+    /// Returns the instance that a core has.
+    pub(super) fn current(&self, core: usize) -> Option<Instance> {
+        let vertex = self.placement.current(core)?;
+        Some(self.scheduler.instance_of(vertex))
+    }
+
+    /// Makes the core whose interrupt is being handled leave what it should no
+    /// longer run. Returns the core that waits for that, if there is one.
+    pub(super) fn follow(&mut self, interrupted: &mut Interrupted, now_ns: u64) -> Option<CoreId> {
+        let core = this_core::get();
+        let here = core.index as usize;
+        let is_background = core.context().is_background();
+        let leaves_background = is_background && self.placement.is_wanted(here);
+        if !self.placement.must_suspend(here) && !leaves_background {
+            return None;
+        }
+        let suspended = self.placement.detach(here);
+        if let Some(vertex) = suspended {
+            // Not when the interrupt came: its step has left events since then.
+            let time_ns = since_epoch(clock::now_ns());
+            let instance = self.scheduler.instance_of(vertex);
+            self.journal.write(
+                CoreId(core.index),
+                What::Suspend,
+                time_ns,
+                Subject::of(instance),
+            );
+            // The hold, or the turn, was the instance's.
+            turns::leave(core);
+            timer::set(Alarm::Hold, u64::MAX);
+        }
+        let next = match self.placement.take_suspended(here) {
+            Some(context) => {
+                self.note_resumed(core, &context, now_ns);
+                context
+            }
+            None => contexts::begin(),
+        };
+        note_running(core, self.current(here).map(Subject::of));
+        let last = interrupted.exchange(next);
+        match suspended {
+            Some(vertex) => {
+                last.note_suspended(now_ns);
+                self.placement.suspend(vertex, last)
+            }
+            None => {
+                self.background = Some(last);
+                None
+            }
+        }
+    }
+
+    /// Notes that this core's current instance continues in `context`.
+    fn note_resumed(&mut self, core: &Core, context: &Parked, now_ns: u64) {
+        context.note_resumed(now_ns);
+        timer::set_no_later(core, Alarm::Budget, context.budget_end_ns());
+        turns::join(core);
+        let here = CoreId(core.index);
+        if let Some(instance) = self.current(here.index()) {
+            let time_ns = since_epoch(clock::now_ns());
+            self.journal
+                .write(here, What::Resume, time_ns, Subject::of(instance));
+        }
+    }
+}
+
+/// Stamps the start of the instance that this core begins as soon as the lock is free.
+/// Start and finish are stamped with interrupts disabled, so that no preemption can
+/// stand between a stamp and what it says.
+#[inline]
+fn begin(core: &Core, journal: &mut Journal, runner: &Runner) {
+    let now_ns = clock::now_ns();
+    let budget_end_ns = match runner.budget_ns {
+        u64::MAX => u64::MAX,
+        budget_ns => {
+            let end_ns = now_ns.saturating_add(budget_ns);
+            timer::set_no_later(core, Alarm::Budget, end_ns);
+            end_ns
+        }
+    };
+    core.context().set_budget_end(budget_end_ns);
+    let start_ns = instance_time_ns(now_ns);
+    let here = CoreId(core.index);
+    journal.write(here, What::Start, start_ns, runner.subject());
+}

@@ -1,0 +1,135 @@
+//! The kernel as the platform that `fass` runs on.
+
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use core::time::Duration;
+
+use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+use sched_dag::{DagId, SchedulerOptions};
+
+use super::execution::{self, Terms};
+use super::occupation;
+use crate::machine::{clock, this_core};
+use crate::text::graph;
+
+/// The one kernel, as `fass` sees it.
+pub(crate) struct Kernel {
+    /// Whether instances are ordered by deadline rather than by priority.
+    edf: AtomicBool,
+    /// Whether a started instance may lose its core.
+    preemptive: AtomicBool,
+    /// How long a decision waits for further events of the same instant.
+    coincidence_ns: AtomicU64,
+    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
+    budget_factor: AtomicU64,
+    /// What a commit adds to WCETs: context switch, dispatch, interrupt.
+    overheads_ns: [AtomicU64; 3],
+}
+
+pub(crate) static KERNEL: Kernel = Kernel {
+    edf: AtomicBool::new(false),
+    preemptive: AtomicBool::new(true),
+    coincidence_ns: AtomicU64::new(0),
+    budget_factor: AtomicU64::new(0),
+    overheads_ns: [const { AtomicU64::new(0) }; 3],
+};
+
+impl Kernel {
+    /// Chooses the policy of the commits to come.
+    pub(crate) fn set_policy(&self, policy: Policy) {
+        self.edf.store(policy == Policy::Edf, Ordering::Relaxed);
+    }
+
+    /// Chooses what the commits to come add to WCETs.
+    pub(crate) fn set_overheads(&self, overheads: Overheads) {
+        let Overheads {
+            context_switch_ns,
+            dispatch_ns,
+            interrupt_ns,
+        } = overheads;
+        let values = [context_switch_ns, dispatch_ns, interrupt_ns];
+        for (place, value) in self.overheads_ns.iter().zip(values) {
+            place.store(value, Ordering::Relaxed);
+        }
+    }
+
+    /// Chooses the budget of subtasks that have a WCET only, in WCETs; 0 for none.
+    pub(crate) fn set_budget_factor(&self, factor: u64) {
+        self.budget_factor.store(factor, Ordering::Relaxed);
+    }
+
+    /// Chooses how long decisions of the runs to come wait for further events of
+    /// the same instant.
+    pub(crate) fn set_coincidence_ns(&self, coincidence_ns: u64) {
+        self.coincidence_ns.store(coincidence_ns, Ordering::Relaxed);
+    }
+
+    /// Chooses whether the runs to come are preemptive.
+    pub(crate) fn set_preemption(&self, preemption: Preemption) {
+        self.preemptive
+            .store(preemption == Preemption::Enabled, Ordering::Relaxed);
+    }
+}
+
+impl Platform for Kernel {
+    fn policy(&self) -> Policy {
+        if self.edf.load(Ordering::Relaxed) {
+            Policy::Edf
+        } else {
+            Policy::StaticPriority
+        }
+    }
+
+    fn preemption(&self) -> Preemption {
+        if self.preemptive.load(Ordering::Relaxed) {
+            Preemption::Enabled
+        } else {
+            Preemption::Disabled
+        }
+    }
+
+    fn cores(&self) -> u32 {
+        u32::try_from(this_core::all().len()).unwrap_or(u32::MAX)
+    }
+
+    fn overheads(&self) -> Overheads {
+        let [context_switch_ns, dispatch_ns, interrupt_ns] = self
+            .overheads_ns
+            .each_ref()
+            .map(|value| value.load(Ordering::Relaxed));
+        Overheads {
+            context_switch_ns,
+            dispatch_ns,
+            interrupt_ns,
+        }
+    }
+
+    fn now_ns(&self) -> u64 {
+        clock::now_ns()
+    }
+
+    fn execute_for(&self, duration: Duration, how: Occupation) {
+        let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        match how {
+            Occupation::Spin => occupation::spin(ns),
+            Occupation::Hold => occupation::hold(ns),
+        }
+    }
+
+    fn raise(&self, plan: u64, dag: DagId) {
+        execution::raise(plan, dag);
+    }
+
+    fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
+        let options = SchedulerOptions {
+            policy: self.policy(),
+            preemption: self.preemption(),
+            cores: self.cores(),
+        };
+        graph::dump(&plan, options);
+        let terms = Terms {
+            coincidence_ns: self.coincidence_ns.load(Ordering::Relaxed),
+            budget_factor: self.budget_factor.load(Ordering::Relaxed),
+        };
+        execution::prepare(plan, options, terms)
+    }
+}

@@ -1,0 +1,263 @@
+//! From the handover by `boot` to the app's function, and its end.
+
+use alloc::format;
+use alloc::vec::Vec;
+use core::cell::Cell;
+
+use boot::acpi::{self, Platform};
+use boot::physical::IdentityMap;
+use boot::{BootInfo, Module};
+
+use super::{probe, settings};
+use crate::app::bound_verdict::BoundVerdict;
+use crate::app::ending::Ending;
+use crate::app::fault_verdict::FaultVerdict;
+use crate::app::machine_handle::Machine;
+use crate::interrupts;
+use crate::machine::this_core::{self, Stacks};
+use crate::machine::{
+    clock, cpu, exit, interrupt, interrupt_flag, legacy, local_apic, processors, serial,
+};
+use crate::memory::{self, OutOfMemory};
+use crate::println;
+use crate::run::platform::KERNEL;
+use crate::run::{contexts, heartbeat, journal, worker};
+use crate::text::options::Options;
+use crate::text::{console, json};
+use crate::watch::panic;
+
+/// An app: sets up its DAGs, runs them and reports.
+pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
+
+/// The stack of an interrupt handler, or of an exception's report, in bytes.
+const HANDLER_STACK: u64 = 16 * 1024;
+
+/// Brings up memory and interrupts, then goes on on the core's own stack: the
+/// boot stack has no guard page.
+pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
+    serial::initialize();
+    legacy::silence_interrupt_controllers();
+    interrupt::install(if probe::is_asked_for(info) {
+        probe::HANDLERS
+    } else {
+        interrupt::Handlers {
+            timer: interrupts::timer_interrupt,
+            wake: interrupts::wake_interrupt,
+            exception: panic::exception,
+            work: worker::work,
+            release: contexts::give_back,
+        }
+    });
+    let platform = read_platform(info);
+    let module = module(info);
+    // SAFETY: 1. `boot` handed over with its table in use and the machine's
+    // map. 2. This is the boot processor's only way, and nothing was allocated.
+    // 3. `module` made sure of it.
+    let layout = unsafe { memory::initialize(info.memory.as_slice(), module, platform.local_apic) };
+    let layout = layout.expect("the machine has too little memory: give it 16 MiB or more");
+    // SAFETY: `memory::initialize` mapped one page of registers there.
+    unsafe { local_apic::set_base(platform.local_apic) };
+    this_core::create(boot_processor_first(&platform));
+    let core = processors::become_core(local_apic::id());
+    let stack = core.context().stack_top();
+    let start = Start {
+        info,
+        name,
+        app,
+        platform,
+        layout,
+    };
+    // SAFETY: the stack is that of the context which this core runs first.
+    unsafe { cpu::continue_on_stack(stack, &start, start_cores) }
+}
+
+/// Returns the first module that the loader left in memory.
+fn module(info: &BootInfo) -> Option<Module> {
+    let module = *info.modules.as_slice().first()?;
+    let (map, image) = (info.memory.as_slice(), boot_entry::image::whole());
+    assert!(
+        memory::lies_in_memory(module, map, &image),
+        "the loader's module at {:#x}..{:#x} is not in free memory; give the machine more memory",
+        module.start,
+        module.end
+    );
+    Some(module)
+}
+
+/// Returns the bytes of the loader's module, once it is mapped.
+fn module_bytes(info: &'static BootInfo) -> Option<&'static [u8]> {
+    let Module { start, end } = module(info)?;
+    let length = usize::try_from(end - start).ok()?;
+    // SAFETY: `memory::initialize` mapped the module as constant at its physical
+    // address, for good, and kept its pages from the frames: nobody writes there.
+    Some(unsafe { core::slice::from_raw_parts(start as *const u8, length) })
+}
+
+/// What the boot processor takes along to its own stack.
+struct Start {
+    info: &'static BootInfo,
+    name: &'static str,
+    app: App,
+    platform: Platform,
+    layout: memory::Layout,
+}
+
+/// Measures time, starts the other cores and runs the app.
+extern "C" fn start_cores(start: &Start) -> ! {
+    let Start {
+        info,
+        name,
+        app,
+        platform,
+        layout,
+    } = start;
+    let clock = clock::calibrate(info.entry_tsc, platform.pm_timer).unwrap_or_else(|_| {
+        panic!("no clock of known rate: the machine has neither an ACPI timer nor QEMU's APIC")
+    });
+    let cores = this_core::all().len();
+    if cores > 1 {
+        start_others(info, layout, cores);
+    }
+    interrupt_flag::enable();
+    let probes = probe::is_asked_for(info);
+    if !probes {
+        heartbeat::set_heartbeats(0);
+    }
+    // A second installation would come from a second boot, which there is not.
+    let _ = fass::install(&KERNEL);
+    let command_line = info.command_line().unwrap_or("(not UTF-8)");
+    json::report("boot", |line| {
+        line.text("version", env!("CARGO_PKG_VERSION"))
+            .text("app", name)
+            .number("cpus", cores as u64)
+            .number("memory_kib", layout.total_bytes / 1024)
+            .text("clock", clock)
+            .number("ready_ns", clock::now_ns())
+            .text("command_line", command_line);
+    });
+    end(if probes {
+        probe::run()
+    } else {
+        run_app(info, *app)
+    })
+}
+
+/// Starts the other cores, all of which have to come up.
+fn start_others(info: &BootInfo, layout: &memory::Layout, cores: usize) {
+    let page = memory::trampoline_page(info.memory.as_slice(), info.modules.as_slice());
+    let page = page.expect("no page below 640 KiB is free for processors to start at");
+    // SAFETY: 1. The table identity-maps the image, and all stacks are mapped
+    // in it. 2. `trampoline_page` returns usable memory, which is mapped, and which
+    // frames are not taken from.
+    let others = unsafe { processors::start_others(layout.root_table, page, other_core) };
+    assert!(
+        others as usize + 1 == cores,
+        "only {} of {cores} processors came up within {} s; give the machine fewer, or the \
+         host less to do",
+        others + 1,
+        processors::PATIENCE_NS / 1_000_000_000
+    );
+}
+
+fn read_platform(info: &BootInfo) -> Platform {
+    // SAFETY: 1. Until `memory::initialize` the boot table is in use, which
+    // identity-maps the first 4 GiB, and the view ends with this function.
+    // 2. Nothing writes to the firmware's tables.
+    let memory = unsafe { IdentityMap::new() };
+    acpi::read(&memory, info.rsdp).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Returns what each core needs, the boot processor's first.
+fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u8, Stacks)> {
+    let own = local_apic::id();
+    let others = platform
+        .apic_ids
+        .as_slice()
+        .iter()
+        .copied()
+        .filter(move |id| *id != own);
+    let ids: Vec<u8> = core::iter::once(own).chain(others).collect();
+    ids.into_iter().zip(0..).map(|(id, index)| {
+        let stacks = stacks(index == 0);
+        (
+            id,
+            stacks.expect("each core needs 144 KiB of memory for stacks, the first one 336 KiB"),
+        )
+    })
+}
+
+fn stacks(is_boot_processor: bool) -> Result<Stacks, OutOfMemory> {
+    let small = || memory::new_stack(HANDLER_STACK);
+    Ok(Stacks {
+        first_context: contexts::create(is_boot_processor)?,
+        handler: small()?,
+        exceptions: [small()?, small()?, small()?, small()?],
+    })
+}
+
+/// Where every other core begins: it works until the machine stops.
+extern "C" fn other_core(apic_id: u32) -> ! {
+    let apic_id = u8::try_from(apic_id).expect("APIC ids have 8 bits");
+    processors::become_core(apic_id);
+    processors::arrive();
+    interrupt::begin_work()
+}
+
+fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
+    let usage = |message: &str| Ending::Usage(crate::text::options::UsageError::new(message));
+    if info.is_command_line_cut {
+        return Err(usage(&format!(
+            "the command line is longer than {} bytes and was cut; give fewer words",
+            boot::MOST_COMMAND_LINE_BYTES
+        )));
+    }
+    let line = info
+        .command_line()
+        .map_err(|_| usage("the command line is not UTF-8"))?;
+    let options = Options::parse(line)?;
+    let settings = settings::apply(&options)?;
+    journal::limit(settings.events);
+    let machine = Machine {
+        options,
+        module: module_bytes(info),
+        dumps_trace: settings.dump,
+        dumps_times: settings.dumps_times,
+        wishes: settings.wishes,
+        input: Cell::new(None),
+        runs: Cell::new(0),
+        fault_verdict: FaultVerdict::default(),
+        bound_verdict: BoundVerdict::new(settings.judges_bounds),
+    };
+    let result = app(&machine);
+    let result = machine.fault_verdict.judge(result);
+    machine.bound_verdict.judge(result)
+}
+
+/// Prints how the app ended, as the last line, and stops the machine.
+fn end(result: Result<(), Ending>) -> ! {
+    let (status, word) = match &result {
+        Ok(()) | Err(Ending::Shutdown) => (exit::Status::Success, "success"),
+        Err(Ending::Usage(_)) => (exit::Status::Usage, "usage"),
+        Err(_) => (exit::Status::Failure, "failure"),
+    };
+    if let Err(Ending::Commit(error)) = &result {
+        for fault in error.faults() {
+            json::report("commit_fault", |line| {
+                line.text("fault", fault.code()).text("message", fault);
+            });
+        }
+    }
+    if let Err(ending) = &result {
+        println!("{ending}");
+    }
+    json::report("verdict", |line| {
+        line.text("status", word);
+        if let Err(ending) = &result
+            && status != exit::Status::Success
+        {
+            line.text("reason", ending);
+        }
+    });
+    console::resume();
+    exit::exit(status)
+}

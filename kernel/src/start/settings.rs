@@ -1,0 +1,107 @@
+//! The kernel's own words of the command line, which every app has.
+//!
+//! | word | meaning | default |
+//! | --- | --- | --- |
+//! | `policy=static\|edf` | how ready instances are ordered | `static` |
+//! | `preemption=on\|off` | whether a started instance may lose its core | `on` |
+//! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
+//! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
+//! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
+//! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
+//! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
+//! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
+//! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
+//! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
+//! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
+//! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
+//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
+//! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
+
+use alloc::format;
+
+use fass::{Overheads, Policy, Preemption};
+
+use crate::machine::{counted_time, interrupts_off, turns};
+use crate::run::platform::KERNEL;
+use crate::run::worker;
+use crate::text::graph;
+use crate::text::options::{Options, UsageError};
+use crate::watch::background::{Echo, Wishes};
+
+const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
+
+const PREEMPTIONS: [(&str, Preemption); 2] =
+    [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
+
+/// What the words say about tracing and the background; all else is set where it
+/// belongs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Settings {
+    /// The most events that a journal keeps.
+    pub(crate) events: u64,
+    /// Whether each run's trace is printed after it.
+    pub(crate) dump: bool,
+    /// Whether each run's statistics are printed after it.
+    pub(crate) dumps_times: bool,
+    /// What else people want to see, and say.
+    pub(crate) wishes: Wishes,
+    /// Whether a response time beyond its bound is the app's fault.
+    pub(crate) judges_bounds: bool,
+}
+
+/// Takes the kernel's words and does what they say.
+pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
+    KERNEL.set_policy(options.choice("policy", &POLICIES)?);
+    KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
+    KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
+    KERNEL.set_overheads(overheads(options)?);
+    if options.choice("graph", &[("keep", false), ("dump", true)])? {
+        graph::enable();
+    }
+    if options.choice("idle", &[("halt", false), ("poll", true)])? {
+        worker::watch_when_idle();
+    }
+    if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
+        interrupts_off::enable();
+    }
+    // What time means is the host's choice.
+    if options.text("mode") == Some("deterministic") {
+        counted_time::enable();
+        turns::enable();
+    }
+    // `on` never comes here: the probe runs in place of all this.
+    options.choice("probe", &[("off", ()), ("on", ())])?;
+    let events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
+    let status_s = options.number("status", 0..=86_400, 0)?;
+    let consoles = [
+        ("off", None),
+        ("on", Some(Echo::Off)),
+        ("echo", Some(Echo::On)),
+    ];
+    Ok(Settings {
+        events,
+        dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
+        dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,
+        wishes: Wishes {
+            input: None,
+            console: options.choice("console", &consoles)?,
+            status_ns: status_s * 1_000_000_000,
+        },
+        judges_bounds: options.text("mode") != Some("threads"),
+    })
+}
+
+fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {
+    let numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
+    let [context_switch_ns, dispatch_ns, interrupt_ns] = numbers[..] else {
+        return Err(UsageError::new(format!(
+            "`overheads_ns` has {} numbers; give three: context switch, dispatch, interrupt",
+            numbers.len()
+        )));
+    };
+    Ok(Overheads {
+        context_switch_ns,
+        dispatch_ns,
+        interrupt_ns,
+    })
+}

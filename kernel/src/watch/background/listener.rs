@@ -1,0 +1,39 @@
+//! Bytes from the serial port as events: each raises the signal of a sporadic DAG.
+//!
+//! The port is looked at by core 0's background, each time that the core wakes up
+//! and has nothing else to do, and at least every [`session::PERIOD_NS`] if it is
+//! idle. What the byte is does not matter. How fast the bytes come does not either:
+//! the DAG's minimum inter-arrival time is enforced by the scheduler.
+//!
+//! [`session::PERIOD_NS`]: super::session::PERIOD_NS
+
+use sched_dag::DagId;
+
+use crate::machine::serial;
+use crate::run::execution;
+
+/// The most bytes that are taken at a time: the port may not end to have some.
+const MOST_BYTES: usize = 256;
+
+/// Whom bytes are for.
+#[derive(Debug)]
+pub(super) struct Listener {
+    plan: u64,
+    dag: DagId,
+}
+
+impl Listener {
+    pub(super) const fn new((plan, dag): (u64, DagId)) -> Self {
+        Self { plan, dag }
+    }
+
+    /// Raises the signal for each byte that has come.
+    pub(super) fn step(&self) {
+        for _ in 0..MOST_BYTES {
+            if serial::receive().is_none() {
+                return;
+            }
+            execution::raise(self.plan, self.dag);
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! What core 0 does for people while a run goes on, when it has nothing else to do.
+//!
+//! It prints progress, the status if the command line asks for it, and holds the
+//! console's conversation. All this is core 0's background, which is suspended
+//! whenever the core has an instance to run: it delays nothing but itself.
+//!
+//! Under overload that may be for ever, and then a person wants most to see what
+//! goes on, and to stop it. So if the background has not come to run for
+//! [`STARVED_NS`], core 0's heartbeat does a *slice* of the status and the console
+//! instead: one line, a few microseconds. The heartbeat is also what notices that an
+//! instance keeps its core for long ([`stall`]).
+
+mod command;
+mod input;
+mod listener;
+mod load;
+mod patience;
+mod progress;
+pub(crate) mod session;
+mod stall;
+mod status;
+pub(crate) mod watchdog;
+
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use crate::machine::clock;
+use crate::machine::spinlock::SpinLock;
+use crate::run::heartbeat;
+use crate::text::console;
+use listener::Listener;
+use progress::Progress;
+use sched_dag::DagId;
+use session::Session;
+use status::Status;
+
+/// What the command line says about the background.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Wishes {
+    /// Whether there is a console, and whether it sends back what is typed.
+    pub(crate) console: Option<Echo>,
+    /// The time between two lines of kind `status`; 0: none.
+    pub(crate) status_ns: u64,
+    /// What each byte of input raises: a plan's number and a sporadic DAG of it.
+    pub(crate) input: Option<(u64, DagId)>,
+}
+
+impl Wishes {
+    /// Adds what bytes of input raise.
+    pub(crate) const fn with_input(self, input: Option<(u64, DagId)>) -> Self {
+        Self { input, ..self }
+    }
+}
+
+/// Whether the console sends back what is typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Echo {
+    /// It does, for a terminal that does not show it by itself.
+    On,
+    /// It does not.
+    Off,
+}
+
+/// For how long the background may not run before the heartbeat helps out.
+const STARVED_NS: u64 = 200_000_000;
+
+/// What is done in slices, by the background or by the heartbeat.
+#[derive(Debug)]
+struct Sliced {
+    status: Option<Status>,
+    session: Option<Session>,
+}
+
+static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {
+    status: None,
+    session: None,
+});
+
+/// When the background ran last, on the clock; `u64::MAX` if there are no slices.
+static RAN_NS: AtomicU64 = AtomicU64::new(u64::MAX);
+
+impl Sliced {
+    /// Does a slice. Reports whether there is more to do at once.
+    fn slice(&mut self, is_starved: bool) -> bool {
+        if let Some(status) = &mut self.status {
+            status.print_when_due(is_starved);
+        }
+        self.session.as_mut().is_some_and(Session::slice)
+    }
+}
+
+/// Does in core 0's heartbeat what is its own, and a slice if the background does not
+/// come to it.
+pub(crate) fn beat(now_ns: u64) {
+    stall::beat(now_ns);
+    if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
+        return;
+    }
+    if let Some(mut sliced) = SLICED.try_lock() {
+        sliced.slice(true);
+    }
+    console::send_what_goes_at_once();
+}
+
+/// The background of one run.
+#[derive(Debug)]
+pub(crate) struct Background {
+    progress: Progress,
+    listener: Option<Listener>,
+    /// Whether [`SLICED`] has something to do.
+    is_sliced: bool,
+    /// The heartbeat that the core had before.
+    heartbeat_before_ns: u64,
+}
+
+impl Background {
+    /// Begins the background of a run of `total` jobs; 0: no one knows how many.
+    pub(crate) fn begin(wishes: Wishes, total: u64) -> Self {
+        let before_ns = heartbeat::own_heartbeat_ns();
+        let periods = [
+            (wishes.console.is_some() || wishes.input.is_some()).then_some(session::PERIOD_NS),
+            Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
+        ];
+        let periods = periods.into_iter().flatten();
+        heartbeat::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
+        let is_sliced = wishes.console.is_some() || wishes.status_ns > 0;
+        if is_sliced {
+            *SLICED.lock() = Sliced {
+                status: (wishes.status_ns > 0).then(|| Status::begin(wishes.status_ns, total)),
+                session: wishes.console.map(|echo| Session::new(echo == Echo::On)),
+            };
+            RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
+        }
+        stall::begin();
+        Self {
+            heartbeat_before_ns: before_ns,
+            progress: Progress::new(total),
+            is_sliced,
+            // What a person says to the console is no event.
+            listener: (wishes.input.filter(|_| wishes.console.is_none())).map(Listener::new),
+        }
+    }
+
+    /// Does what is due. Reports whether there is more to do at once.
+    pub(crate) fn step(&mut self) -> bool {
+        self.progress.print_when_due();
+        if let Some(listener) = &self.listener {
+            listener.step();
+        }
+        if !self.is_sliced {
+            return false;
+        }
+        RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
+        SLICED.lock().slice(false)
+    }
+
+    /// Ends it. Reports whether a person has asked for the machine to shut down.
+    pub(crate) fn end(self) -> bool {
+        heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
+        stall::end();
+        RAN_NS.store(u64::MAX, Ordering::Relaxed);
+        let mut sliced = SLICED.lock();
+        sliced.status = None;
+        let session = sliced.session.take();
+        session.is_some_and(|session| session.is_shutting_down())
+    }
+}

@@ -1,0 +1,207 @@
+//! Who keeps a core for long: named once, before the host loses patience.
+//!
+//! A subtask that never returns and has no budget keeps its core, whether it loops or
+//! waits for a lock of the app's own, and a run may not end because of it. So core 0's
+//! heartbeat looks now and then at what the cores have noted for reports anyway: which
+//! instance each runs. If a core has run the same one for [`STALLED_NS`], and for
+//! longer than its WCET if that is known, a line says so, whatever the other cores do.
+//! The run goes on: it may be no more than a long computation.
+//!
+//! Between two looks nothing is counted, so this costs a run nothing. It also sees
+//! less: an instance that was preempted in between counts as if it had not been.
+
+use sched_dag::Instance;
+
+use crate::machine::clock;
+use crate::machine::spinlock::SpinLock;
+use crate::machine::this_core;
+use crate::run::execution;
+use crate::text::{console, json};
+
+/// The time between two looks. Heartbeats may come more often.
+pub(super) const LOOK_NS: u64 = 250_000_000;
+
+/// For how long an instance may run without a word. In an emulated processor whose
+/// clock counts instructions this may take some ten seconds of the host's time.
+const STALLED_NS: u64 = 500_000_000;
+
+/// The most cores that are looked at.
+const MOST_CORES: usize = 64;
+
+/// The most instances that are named in a run.
+const MOST_NAMED: usize = 16;
+
+/// What was seen in this run.
+#[derive(Debug)]
+struct Watch {
+    /// When to look again, on the clock; `u64::MAX` if there is no run.
+    next_look_ns: u64,
+    cores: [Seen; MOST_CORES],
+    named: usize,
+}
+
+/// What a core was seen to run.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    instance: Option<Instance>,
+    since_ns: u64,
+    is_named: bool,
+}
+
+static WATCH: SpinLock<Watch> = SpinLock::new(Watch::from(u64::MAX));
+
+impl Watch {
+    const fn from(now_ns: u64) -> Self {
+        Self {
+            next_look_ns: now_ns,
+            cores: [Seen::NOTHING; MOST_CORES],
+            named: 0,
+        }
+    }
+}
+
+impl Seen {
+    const NOTHING: Self = Self {
+        instance: None,
+        since_ns: 0,
+        is_named: false,
+    };
+
+    /// Takes a look at what the core runs. Returns it, and for how long it has run, if
+    /// it is to be named: by then it has, longer than `least_ns` says.
+    fn look(
+        &mut self,
+        now_ns: u64,
+        running: Option<Instance>,
+        least_ns: impl Fn(Instance) -> u64,
+    ) -> Option<(Instance, u64)> {
+        if running != self.instance {
+            *self = Self {
+                instance: running,
+                since_ns: now_ns,
+                is_named: false,
+            };
+        }
+        let instance = running.filter(|_| !self.is_named)?;
+        let still_ns = now_ns.saturating_sub(self.since_ns);
+        if still_ns < STALLED_NS || still_ns < least_ns(instance) {
+            return None;
+        }
+        self.is_named = true;
+        Some((instance, still_ns))
+    }
+}
+
+/// Begins to look, at a run that begins now.
+pub(super) fn begin() {
+    *WATCH.lock() = Watch::from(clock::now_ns());
+}
+
+/// Looks no longer.
+pub(super) fn end() {
+    *WATCH.lock() = Watch::from(u64::MAX);
+}
+
+/// Takes a look if one is due. In core 0's heartbeat.
+pub(super) fn beat(now_ns: u64) {
+    let Some(mut watch) = WATCH.try_lock() else {
+        return;
+    };
+    if now_ns < watch.next_look_ns {
+        return;
+    }
+    watch.next_look_ns = now_ns.saturating_add(LOOK_NS);
+    let Watch { cores, named, .. } = &mut *watch;
+    for (core, seen) in this_core::all().iter().zip(cores) {
+        if *named == MOST_NAMED {
+            break;
+        }
+        let running = execution::running(core);
+        if let Some((instance, still_ns)) = seen.look(now_ns, running, wcet_ns) {
+            *named += 1;
+            report(core.index, instance, still_ns);
+        }
+    }
+    if *named > 0 {
+        // No core may ever be idle to send it.
+        console::send_what_goes_at_once();
+    }
+}
+
+/// Returns the WCET of an instance, 0 if it is not known.
+fn wcet_ns(instance: Instance) -> u64 {
+    let task_set = execution::task_set();
+    let wcet_ns = task_set.and_then(|task_set| {
+        let dag = task_set.dag(instance.dag);
+        dag.subtask(instance.subtask).wcet_ns()
+    });
+    wcet_ns.unwrap_or(0)
+}
+
+/// Says which instance keeps a core.
+fn report(core: u32, instance: Instance, still_ns: u64) {
+    let Some(task_set) = execution::task_set() else {
+        return;
+    };
+    let dag = task_set.dag(instance.dag);
+    let subtask = dag.subtask(instance.subtask).name();
+    crate::println!(
+        "stalled: subtask `{subtask}` of DAG `{}`, job {}, has kept core {core} for {} ms, \
+         and goes on",
+        dag.name(),
+        instance.job,
+        still_ns / 1_000_000
+    );
+    json::report("stalled", |line| {
+        line.number("dag", instance.dag.0)
+            .text("dag_name", dag.name())
+            .number("subtask", instance.subtask.0)
+            .text("subtask_name", subtask)
+            .number("job", instance.job)
+            .number("cpu", core)
+            .number("still_ns", still_ns);
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sched_dag::{DagId, SubtaskId};
+
+    /// Looks at a core that runs instances of these jobs; returns at which looks one
+    /// was named.
+    fn named(jobs: &[Option<u64>], wcet_ns: u64) -> Vec<usize> {
+        let mut seen = Seen::NOTHING;
+        let looks = (0..).zip(jobs).filter(|&(look, &job)| {
+            let running = job.map(|job| Instance {
+                dag: DagId(0),
+                job,
+                subtask: SubtaskId(0),
+            });
+            seen.look(look * LOOK_NS, running, |_| wcet_ns).is_some()
+        });
+        looks
+            .map(|(look, _)| usize::try_from(look).expect("few"))
+            .collect()
+    }
+
+    #[test]
+    fn what_runs_on_and_on_is_named_once() {
+        assert_eq!(named(&[Some(1); 20], 0), [2]);
+        let moves = [1, 2, 2, 3, 3, 1, 1, 1, 1].map(Some);
+        assert_eq!(named(&moves, 0), [7]);
+        assert_eq!(named(&moves[..7], 0), []);
+    }
+
+    #[test]
+    fn a_core_that_waits_is_not_stalled() {
+        assert_eq!(named(&[None; 20], 0), []);
+        let jobs = [Some(1), Some(1), None, Some(1), Some(1), None, None, None];
+        assert_eq!(named(&jobs, 0), []);
+    }
+
+    #[test]
+    fn up_to_its_wcet_an_instance_may_run_without_a_word() {
+        assert_eq!(named(&[Some(1); 20], 5 * LOOK_NS), [5]);
+    }
+}

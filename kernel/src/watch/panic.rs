@@ -1,0 +1,112 @@
+//! The end of a kernel that cannot go on: what happened, where, to whom.
+//!
+//! The core that panics stops all others first, so the report is not torn
+//! apart and nothing runs on with broken data. A panic during the report ends
+//! the run with what was said so far. Faults of subtasks do not get here:
+//! `containment` ends their DAG instead.
+
+use core::fmt::{self, Display};
+use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use crate::machine::context::Registers;
+use crate::machine::fault::Exception;
+use crate::machine::interrupt::Interrupted;
+use crate::machine::{cpu, exit, interrupt_flag, non_maskable, this_core};
+use crate::report;
+use crate::run::containment;
+use crate::run::execution;
+use crate::text::console::{write_in_emergency, write_line_in_emergency};
+use crate::text::excerpt::Excerpt;
+use crate::text::json;
+
+/// The most recent events of this core that a report shows.
+const EVENTS_SHOWN: usize = 16;
+
+/// How much of the message is shown, in bytes.
+const MESSAGE_BYTES: usize = 2048;
+
+/// The core whose report this is, `NOBODY` before there is one.
+static REPORTING: AtomicU32 = AtomicU32::new(NOBODY);
+const NOBODY: u32 = u32::MAX;
+/// Stands for a core whose report has failed.
+const FAILED: u32 = NOBODY - 1;
+
+/// Ends the subtask that panics, or else the run.
+pub(crate) fn panic(info: &PanicInfo<'_>) -> ! {
+    containment::end_panicked(info);
+    die("panic", &info.message(), &containment::place_of(info), None)
+}
+
+/// Ends the subtask that caused an exception, or else the run.
+pub(crate) fn exception(exception: &Exception<'_>, interrupted: &mut Interrupted) {
+    if !containment::end_faulty(exception, interrupted) {
+        let registers = exception.registers;
+        let place = fmt::from_fn(|f| write!(f, "{:#x}", registers.rip));
+        die("exception", exception, &place, Some(registers))
+    }
+}
+
+fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option<&Registers>) -> ! {
+    interrupt_flag::disable();
+    let core = this_core::is_ready().then(this_core::get);
+    let index = core.map_or(0, |core| core.index);
+    let mine = REPORTING.compare_exchange(NOBODY, index, Ordering::AcqRel, Ordering::Acquire);
+    match mine {
+        Ok(_) => {}
+        // What the message is made of panics itself.
+        Err(reporting) if reporting == index => {
+            REPORTING.store(FAILED, Ordering::Release);
+            write_in_emergency(format_args!(
+                "(a second {what} in the report)\n  at {place}\n"
+            ));
+            give_verdict(what)
+        }
+        Err(FAILED) => exit::exit(exit::Status::Failure),
+        // Another core reports, and is about to stop this one.
+        Err(_) => cpu::halt_forever(),
+    }
+    if core.is_some() {
+        non_maskable::stop_others();
+    }
+    let instance = core.and_then(execution::running);
+    write_in_emergency(format_args!(
+        "\nkernel {what} on core {index}\n  at {place}\n"
+    ));
+    let message = Excerpt::<MESSAGE_BYTES>::of(message);
+    write_in_emergency(format_args!("  {message}\n"));
+    if let Some(instance) = instance {
+        write_in_emergency(format_args!("  in {instance}\n"));
+        execution::try_names(instance, |dag, subtask| {
+            write_in_emergency(format_args!(
+                "  that is subtask `{subtask}` of DAG `{dag}`\n"
+            ));
+        });
+    }
+    if let Some(registers) = registers {
+        write_in_emergency(format_args!("{registers}"));
+    }
+    if core.is_some() {
+        write_in_emergency(format_args!("{}", report::trace::latest::<EVENTS_SHOWN>()));
+    }
+    let line = json::line(what, |line| {
+        line.number("cpu", index);
+        if let Some(instance) = instance {
+            line.number("dag", instance.dag.0)
+                .number("subtask", instance.subtask.0)
+                .number("job", instance.job);
+        }
+        line.text("place", place).text("message", &message);
+    });
+    write_line_in_emergency(&line);
+    give_verdict(what)
+}
+
+/// Says that the run has failed, and ends it.
+fn give_verdict(what: &str) -> ! {
+    let verdict = json::line("verdict", |line| {
+        line.text("status", "failure").text("reason", what);
+    });
+    write_line_in_emergency(&verdict);
+    exit::exit(exit::Status::Failure)
+}
