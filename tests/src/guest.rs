@@ -23,12 +23,12 @@ use std::rc::Rc;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::image::{self, Image};
-use crate::install;
-use crate::outcome::{Outcome, boot_with_input};
-use crate::protocol::Status;
-use crate::qemu::{Machine, Mode, Qemu};
-use crate::system;
+use tool::image::{self, Image};
+use tool::install;
+use tool::outcome::{Outcome, boot_with_input};
+use tool::protocol::Status;
+use tool::qemu::{Machine, Mode, Qemu};
+use tool::system;
 
 /// How long a guest may take in wall time if the test does not say: many times what
 /// any takes, so that it ends what hangs and nothing that a busy host makes slow.
@@ -203,7 +203,7 @@ impl Guest {
         let outcome = self.boot();
         let verdict = outcome.transcript.verdict().map(|verdict| verdict.status);
         let exit = &outcome.ending;
-        if *exit != crate::qemu::Ending::Guest(status) || verdict != Ok(status) {
+        if *exit != tool::qemu::Ending::Guest(status) || verdict != Ok(status) {
             let tail = outcome.tail();
             panic!("wanted the end {status:?}, got: {exit}; verdict {verdict:?}\n{tail}");
         }

@@ -7,45 +7,11 @@
 //! - their commands are parsed by the tables of the scripts that they name;
 //! - what the guide says a new app prints is compared with a boot of one;
 //! - a block of any other kind is refused, as is Rust that would not be tested.
-//!
-//! A *block* is what stands between two fences; its *info* is what the first fence
-//! says of it, such as `rust` or `text output-new-app`.
 
 use std::fs;
 
-use crate::system;
-
-/// A block of a page.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// What the opening fence says.
-    pub info: String,
-    /// Its lines, each with its newline.
-    pub text: String,
-}
-
-/// Takes the blocks out of a page.
-#[must_use]
-pub fn blocks(page: &str) -> Vec<Block> {
-    let mut blocks = Vec::new();
-    let mut open: Option<Block> = None;
-    for line in page.lines() {
-        match (line.strip_prefix("```"), open.as_mut()) {
-            (Some(_), Some(_)) => blocks.extend(open.take()),
-            (Some(info), None) => {
-                open = Some(Block {
-                    info: info.into(),
-                    text: String::new(),
-                });
-            }
-            (None, Some(block)) => block.text += &format!("{line}\n"),
-            (None, None) => {}
-        }
-    }
-    // A fence without end would hide the rest of the page.
-    blocks.extend(open);
-    blocks
-}
+use tool::markdown::blocks;
+use tool::system;
 
 /// The tutorials.
 pub const PAGES: [&str; 2] = ["docs/guide.md", "docs/from-ros-2.md"];

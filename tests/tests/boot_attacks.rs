@@ -2,8 +2,9 @@
 //! what a run is judged by, misuse a lock. The guest is the image `guest-tests`, which
 //! commits one attack in a boot, beside a healthy DAG (`attack=NAME`).
 
-use harness::protocol::{MachineLine, Status};
-use harness::{Guest, Outcome};
+use harness::Guest;
+use tool::Outcome;
+use tool::protocol::{MachineLine, Status};
 
 /// Commits the attack on 1 and 4 cores. The healthy DAG must meet every deadline, and the
 /// doomed one end by so many faults. Hands over what came of it, and the fault if any.

@@ -1,9 +1,10 @@
 //! Functions that really compute, in counted time: no core waits long for another's turn,
 //! and no function answers for the time in which others compute.
 
-use harness::protocol::MachineLine;
-use harness::trace::{bound, check, read};
-use harness::{Guest, Outcome};
+use harness::Guest;
+use tool::Outcome;
+use tool::protocol::MachineLine;
+use tool::trace::{bound, check, read};
 
 fn computing(cores: u64) -> Guest {
     let guest = Guest::new("guest-tests").cores(cores);

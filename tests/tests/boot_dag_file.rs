@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use dag_file::Length;
-use harness::dag_file::{Import, load};
-use harness::protocol::Status;
-use harness::{Guest, Outcome, guide, system};
+use harness::Guest;
+use tool::dag_file::{Import, load};
+use tool::protocol::Status;
+use tool::{Outcome, system};
 
 const GOOD: &str = "dag x period 10ms\nsubtask a wcet 2ms\nsubtask b wcet 3ms\nedge a -> b\nend\n";
 
@@ -30,7 +31,9 @@ fn refusal(content: &[u8], words: &str) -> String {
 
 /// A generated file as the guest gets it.
 fn generated(name: &str) -> String {
-    let path: PathBuf = system::workspace().join("tests/data/rd-gen").join(name);
+    let path: PathBuf = system::workspace()
+        .join("apps/dag-file/examples/rd-gen")
+        .join(name);
     let import = Import {
         unit_ns: 1_000_000,
         graph: None,
@@ -141,8 +144,8 @@ fn what_only_the_guest_finds_has_the_line_of_the_persons_file() {
     let text = "# a period of six days\nnodes:\n- id: 0\n  execution_time: 1\n  period: 584000\n";
     fs::write(&file, text).expect("a file in it");
     let path = file.to_str().expect("UTF-8");
-    let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
-    run.args(["run", "--mode", "deterministic", "--timeout", "100"]);
+    let mut run = Command::new(system::workspace().join("scripts/run"));
+    run.args(["--mode", "deterministic", "--timeout", "100"]);
     run.args(["--dag", path, "--unit", "1s", "--append", "jobs=1000000"]);
     let output = run.output().expect("the tool can be started");
     let said = String::from_utf8_lossy(&output.stderr);
@@ -192,7 +195,7 @@ fn more_subtasks_than_memory_are_refused() {
 #[test]
 fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
     let page = system::workspace().join("docs/dag-file.md");
-    let blocks = guide::blocks(&fs::read_to_string(page).expect("the page"));
+    let blocks = tool::markdown::blocks(&fs::read_to_string(page).expect("the page"));
     let of_info = |info: &str| blocks.iter().find(|block| block.info == info);
     let commands = &of_info("console").expect("commands").text;
     let words = |line: &str| -> Vec<String> {
@@ -220,8 +223,8 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
             file.to_str().expect("UTF-8").to_string(),
         )
     });
-    let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
-    run.current_dir(system::workspace()).arg("run");
+    let mut run = Command::new(system::workspace().join("scripts/run"));
+    run.current_dir(system::workspace());
     run.args(&commands[0]).args(["--mode", "deterministic"]);
     for (option, file) in &written {
         run.args([option, file]);

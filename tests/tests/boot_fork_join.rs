@@ -2,9 +2,12 @@
 //! predecessors; nothing allocates while jobs run; and a deterministic run is
 //! the same run every time.
 
-use harness::protocol::{MachineLine, Status};
-use harness::trace::{bound, check, read};
-use harness::{Guest, Outcome};
+use std::path::Path;
+
+use harness::Guest;
+use tool::protocol::{MachineLine, Status};
+use tool::trace::{bound, check, read};
+use tool::{Outcome, system};
 
 const JOBS: u64 = 60;
 
@@ -164,4 +167,25 @@ fn a_wrong_guest_command_line_ends_in_a_usage_error() {
             "half-run"
         );
     }
+}
+
+#[test]
+fn a_build_without_optimization_evaluates_its_run() {
+    let words = [
+        "build",
+        "--quiet",
+        "--package",
+        "fork-join",
+        "--bin",
+        "fork-join",
+    ];
+    let built = system::cargo().args(words).output().expect("cargo starts");
+    assert!(built.status.success(), "{built:?}");
+    let image = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("debug/fork-join");
+    let guest = Guest::new("fork-join").image(&image);
+    let outcome = guest.word("jobs=20").word("subtasks=6").succeed();
+    let line = outcome.transcript.of_kind("fork_join").next();
+    let line = line.expect("the app's line");
+    assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+    assert_eq!(line.number_at("joins"), Some(20), "{}", line.text);
 }

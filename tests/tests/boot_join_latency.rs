@@ -2,12 +2,13 @@
 //! what its rules say of the same execution times, and a run is the same every time.
 
 use fork_join::ExecutionTimes;
-use harness::protocol::{MachineLine, Status};
-use harness::{Guest, Outcome};
+use harness::Guest;
 use pub_sub::workload::{self, Stamping};
 use pub_sub::{ApproximateTime, Parameters};
 use std::num::NonZeroUsize;
 use std::thread;
+use tool::Outcome;
+use tool::protocol::{MachineLine, Status};
 
 const JOBS: u64 = 150;
 

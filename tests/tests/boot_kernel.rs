@@ -4,9 +4,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use harness::fault_page::documented_faults;
-use harness::protocol::Status;
-use harness::{Guest, Mode, Outcome};
+use harness::Guest;
+use tool::fault_page::documented_faults;
+use tool::protocol::Status;
+use tool::{Mode, Outcome};
 
 fn guest(test: &str) -> Guest {
     Guest::new("guest-tests").word(&format!("test={test}"))
@@ -279,10 +280,10 @@ fn preemption(mode: Mode, cores: u64, policy: &str, least_preemptions: u64) -> O
 /// processors' taking turns explains.
 fn keeps_the_rules(outcome: &Outcome) {
     const BOUND_NS: u64 = 200_000;
-    let runs = harness::trace::read(&outcome.serial)
+    let runs = tool::trace::read(&outcome.serial)
         .unwrap_or_else(|fault| panic!("line {}: {}", fault.line, fault.reason));
     assert_eq!(runs.len(), 1);
-    let findings = harness::trace::check(&runs[0], BOUND_NS);
+    let findings = tool::trace::check(&runs[0], BOUND_NS);
     assert_eq!(runs[0].lost, 0);
     let breaches: Vec<String> = findings.breaches.iter().map(ToString::to_string).collect();
     assert!(breaches.is_empty(), "{}", breaches.join("\n"));

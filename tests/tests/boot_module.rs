@@ -2,8 +2,9 @@
 
 use std::fs;
 
-use harness::protocol::Status;
-use harness::{Guest, Machine, Outcome, system};
+use harness::Guest;
+use tool::protocol::Status;
+use tool::{Machine, Outcome, system};
 
 const MIB: usize = 1 << 20;
 

@@ -8,12 +8,14 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 use std::sync::OnceLock;
 
-use harness::guide::{blocks, documented_output, without_numbers};
-use harness::system::{self, workspace};
-use harness::{Guest, Outcome, new_app};
+use harness::Guest;
+use harness::guide::{documented_output, without_numbers};
+use tool::markdown::blocks;
+use tool::system::{self, workspace};
+use tool::{Outcome, new_app};
 
 /// The guide's app.
 const NAME: &str = "first-steps";
@@ -170,45 +172,4 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
         let is_said = outcome.serial.lines().any(|said| said == line);
         assert!(is_said, "`{line}` is not in:\n{}", outcome.serial);
     }
-}
-
-#[test]
-fn refused_command_lines_are_2_and_help_is_0() {
-    let run = |words: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-        let output = command.arg("new-app").args(words).output();
-        output.expect("the tool can be started")
-    };
-    let help = run(&["--help"]);
-    assert_eq!(help.status.code(), Some(0));
-    let help = String::from_utf8_lossy(&help.stdout).into_owned();
-    assert!(
-        help.contains("usage: ./scripts/new-app [NAME] [options]"),
-        "{help}"
-    );
-    for (words, line) in [
-        (
-            &[][..],
-            "new-app: which name? give one, such as `./scripts/new-app brake-assist`\n",
-        ),
-        (
-            &["fork-join"],
-            "new-app: there is an app `fork-join` already; choose another name, or edit \
-             apps/fork-join\n",
-        ),
-        (
-            &["Fork Join"],
-            "new-app: `Fork Join` cannot be an app's name: 'F' is in it; use small letters, digits \
-             and hyphens, as in `fork-join`\n",
-        ),
-        (
-            &["one", "two"],
-            "new-app: `two`: only one NAME is allowed, and `one` is one\n",
-        ),
-    ] {
-        let output = run(words);
-        assert_eq!(output.status.code(), Some(2), "{words:?}");
-        assert_eq!(String::from_utf8_lossy(&output.stderr), line);
-    }
-    assert!(!workspace().join("apps/one").exists());
 }

@@ -3,8 +3,9 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-use harness::protocol::Status;
-use harness::{Guest, Machine, system};
+use harness::Guest;
+use tool::protocol::Status;
+use tool::{Machine, Mode, system};
 
 /// Boots the demo, short, and checks that all processors came up.
 fn boots_with(guest: Guest, cores: u64) {
@@ -75,4 +76,34 @@ fn a_machine_without_a_clock_of_known_rate_is_refused() {
         .expect("a report");
     let message = panic.text_at("message").unwrap_or_default();
     assert!(message.starts_with("no clock of known rate: "), "{message}");
+}
+
+#[test]
+fn the_probe_passes_in_every_emulated_mode() {
+    for (mode, machine, cores) in [
+        (Mode::Deterministic, Machine::Microvm, 1),
+        (Mode::Deterministic, Machine::Q35, 2),
+        (Mode::Deterministic, Machine::Microvm, 4),
+        (Mode::Threads, Machine::Microvm, 1),
+        (Mode::Threads, Machine::Q35, 2),
+        (Mode::Threads, Machine::Microvm, 4),
+    ] {
+        let outcome = Guest::new("fork-join")
+            .mode(mode)
+            .machine(machine)
+            .cores(cores)
+            .word("probe=on")
+            .succeed();
+        let line = outcome
+            .transcript
+            .of_kind("probe")
+            .next()
+            .expect("a probe line");
+        assert_eq!(
+            line.number_at("steps"),
+            Some(2 * cores),
+            "{mode}, {machine}"
+        );
+        assert_eq!(outcome.transcript.of_kind("fork_join").count(), 0);
+    }
 }

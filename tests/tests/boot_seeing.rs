@@ -1,11 +1,10 @@
 //! What people see of a guest and say to it: a conversation at the console with a
 //! guest that runs until it is told to end, its status, and its graph.
 
-use std::process::Command;
-
-use harness::json::Value;
-use harness::protocol::MachineLine;
-use harness::{Guest, Outcome};
+use harness::Guest;
+use tool::Outcome;
+use tool::json::Value;
+use tool::protocol::MachineLine;
 
 /// Waits until virtual time has gone on by asking again and again.
 const PAUSE: [(&str, &str); 3] = [("console\",\"command\"", "help"); 3];
@@ -123,13 +122,13 @@ fn a_trace_that_was_off_for_a_while_holds_what_came_after() {
     for (guest, bound_ns) in guests {
         let guest = guest.word("trace=dump");
         let outcome = guest.conversation(&conversation).succeed();
-        let runs = harness::trace::read(&outcome.serial).expect("a trace");
+        let runs = tool::trace::read(&outcome.serial).expect("a trace");
         let [run] = &runs[..] else {
             panic!("{} runs\n{}", runs.len(), outcome.tail());
         };
         assert!(run.lost > 0, "what came before is lost");
         assert!(run.events.len() > 20, "{}", run.events.len());
-        let findings = harness::trace::check(run, bound_ns);
+        let findings = tool::trace::check(run, bound_ns);
         let texts: Vec<String> = findings.breaches.iter().map(ToString::to_string).collect();
         assert_eq!(texts, [""; 0], "{}", outcome.tail());
     }
@@ -178,10 +177,10 @@ fn each_commit_prints_its_dags_if_asked() {
     );
     assert_eq!(names("topics"), ["job", "part-0", "part-1"]);
     let topics = first.value.get("topics").expect("topics").elements();
-    let expected = harness::json::parse(r#"["job","u64",0,[1,2],0]"#).expect("JSON");
+    let expected = tool::json::parse(r#"["job","u64",0,[1,2],0]"#).expect("JSON");
     assert_eq!(topics[0], expected);
 
-    let dot = harness::dot::text(&outcome.transcript).expect("good lines");
+    let dot = tool::dot::text(&outcome.transcript).expect("good lines");
     assert!(
         dot.contains("c0_d0_s0 -> c0_d0_s2 [label=\"job: u64\"];"),
         "{dot}"
@@ -197,7 +196,7 @@ fn each_commit_prints_its_dags_if_asked() {
 fn dags_that_sample_each_other_are_joined_by_dashed_arrows() {
     let guest = Guest::new("autoware").cores(4).word("jobs=1");
     let outcome = guest.word("graph=dump").succeed();
-    let dot = harness::dot::text(&outcome.transcript).expect("good lines");
+    let dot = tool::dot::text(&outcome.transcript).expect("good lines");
     let lines: Vec<_> = outcome.transcript.of_kind("graph").collect();
     let name = |dag: u64, list: &str, index: u64| -> String {
         let line = lines.iter().find(|line| line.number_at("dag") == Some(dag));
@@ -235,28 +234,6 @@ fn dags_that_sample_each_other_are_joined_by_dashed_arrows() {
             "ParkingPlanner BehaviorPlanner",
             "LanePlanner BehaviorPlanner",
         ]
-    );
-}
-
-#[test]
-fn a_run_whose_output_goes_to_a_program_is_not_asked_for_its_status() {
-    let mut run = Command::new(env!("CARGO_BIN_EXE_harness"));
-    let words = [
-        "run",
-        "--mode",
-        "deterministic",
-        "--jobs",
-        "2",
-        "--subtasks",
-        "2",
-    ];
-    let output = run.args(words).output().expect("the tool starts");
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{said}");
-    let words = said.lines().find(|line| line.contains("guest words: "));
-    assert!(
-        words.is_some_and(|line| !line.contains("status=")),
-        "{said}"
     );
 }
 
@@ -312,11 +289,11 @@ fn a_run_longer_than_its_journal_keeps_its_latest_jobs_and_all_statistics() {
         let joins = if number == 0 { 0 } else { 300 };
         assert_eq!(count(line, "join_latency_ns"), Some(joins));
     }
-    let runs = harness::trace::read(&outcome.serial).expect("a trace");
+    let runs = tool::trace::read(&outcome.serial).expect("a trace");
     let events = runs[0].events.len();
     assert_eq!(events, 1000);
     assert!(runs[0].lost > 1000, "{}", runs[0].lost);
-    let findings = harness::trace::check(&runs[0], 1_000_000);
+    let findings = tool::trace::check(&runs[0], 1_000_000);
     let texts: Vec<String> = findings.breaches.iter().map(ToString::to_string).collect();
     assert_eq!(texts, [""; 0], "{}", outcome.tail());
 }

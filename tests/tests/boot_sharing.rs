@@ -1,7 +1,8 @@
 //! States, latest values and signals on the machine.
 
-use harness::protocol::MachineLine;
-use harness::{Guest, Outcome};
+use harness::Guest;
+use tool::Outcome;
+use tool::protocol::MachineLine;
 
 fn sharing(policy: &str) -> Guest {
     let policy = format!("policy={policy}");
@@ -33,8 +34,8 @@ fn samples_are_whole_and_signals_keep_their_distance() {
         let (answers, dropped) = (number(&outcome, "answers"), number(&outcome, "dropped"));
         assert!((31..=33).contains(&answers), "{answers}");
         assert_eq!(answers + dropped, 90);
-        let runs = harness::trace::read(&outcome.serial).expect("a trace");
-        let findings = harness::trace::check(&runs[0], 1_000_000);
+        let runs = tool::trace::read(&outcome.serial).expect("a trace");
+        let findings = tool::trace::check(&runs[0], 1_000_000);
         assert_eq!(findings.breaches, [], "{policy}");
     }
 }

@@ -10,13 +10,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use fass::finish_create_dags;
-use harness::fault_page::{documented_faults, function_bodies, is_said_by, table};
-use harness::system::workspace;
 use sched_dag::analysis::{Reason, TaskError};
 use sched_dag::{
     CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
 };
+use tool::fault_page::{documented_faults, function_bodies, is_said_by, table};
+use tool::system::workspace;
 
 /// The files whose functions the page shows, each named as its fault.
 const EXAMPLES: [&str; 5] = [

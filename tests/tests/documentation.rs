@@ -7,7 +7,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use harness::system::workspace;
+use tool::system::workspace;
 
 /// Files with items that apps use: all of a folder, or these.
 const FOLDERS: [&str; 6] = [

@@ -4,8 +4,8 @@
 //! completion and release, fall on the same instant run so without a window,
 //! too: with each event decided at once, as in apps.
 
-use harness::oracle::in_kernel::{Settings, run, texts_of_cases};
-use harness::oracle::schedules::{Case, check, parse};
+use tool::oracle::in_kernel::{Settings, run, texts_of_cases};
+use tool::oracle::schedules::{Case, check, parse};
 
 const PUBLIC: &str = include_str!("../oracle/schedules.txt");
 
@@ -90,7 +90,7 @@ fn a_schedule_that_is_not_the_reference_s_is_found_out() {
 
 #[test]
 fn a_guest_without_cases_is_refused() {
-    let outcome = harness::Guest::new("replay").end_in(harness::protocol::Status::Usage);
+    let outcome = harness::Guest::new("replay").end_in(tool::protocol::Status::Usage);
     let verdict = outcome.transcript.verdict().expect("checked before");
     assert!(
         verdict.reason.contains("-initrd FILE"),

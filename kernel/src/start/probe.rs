@@ -8,7 +8,7 @@
 //! from the core before it (on one core: from itself). At each step a sum is made in
 //! floating point, in the SSE registers that all compiled code uses.
 //!
-//! The host boots this before it chooses KVM (`tests/src/probe.rs`): there are hosts
+//! The host boots this before it chooses KVM (`scripts/tool/src/probe.rs`): there are hosts
 //! where a guest of a few instructions runs and a kernel does not.
 
 use alloc::format;

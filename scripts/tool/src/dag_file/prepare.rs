@@ -1,0 +1,327 @@
+//! What `./scripts/run --dag FILE` boots: the file as a boot module, words for the
+//! guest, and enough memory and time.
+
+use std::fmt::{self, Write};
+use std::fs;
+use std::path::PathBuf;
+
+use dag_file::time::parse_ns;
+use dag_file::{DagFile, Execution, FileDag, Length, Set};
+
+use super::load::{Import, load};
+use super::source_lines;
+use crate::files;
+use crate::options::Parsed;
+use crate::system;
+
+/// The options that only mean something together with `--dag`.
+const COMPANIONS: [&str; 6] = [
+    "graph",
+    "unit",
+    "print-dag",
+    "execution",
+    "seconds",
+    "strict-deadlines",
+];
+
+/// The jobs of each DAG if nobody says how many.
+const JOBS: u64 = 50;
+
+/// Returns the word for what the kernel costs at most, as measured in deterministic
+/// mode: a context switch, a dispatch, an interrupt. The commit adds it to WCETs before
+/// it bounds anything. A dispatch may wait for those of all cores, which take turns.
+fn overheads(cores: u64) -> String {
+    format!("overheads_ns=1000,{},4000", 2500 * cores)
+}
+
+/// A file that is ready to be booted.
+#[derive(Debug)]
+pub struct Prepared {
+    /// Its name.
+    pub path: PathBuf,
+    /// What it says.
+    pub file: DagFile,
+    /// Where the boot module lies, once it is written. It is removed with this value.
+    pub module: Option<PathBuf>,
+    /// The least memory for it, in MiB.
+    pub memory_mib: u64,
+    /// Words for the guest beside those that options become.
+    pub words: Vec<String>,
+    /// A limit that is generous also where a job takes its real time, in seconds.
+    pub limit_s: u64,
+}
+
+impl Prepared {
+    /// Writes the boot module.
+    ///
+    /// # Errors
+    ///
+    /// In words: it cannot be written.
+    pub fn write_module(&mut self) -> Result<(), String> {
+        let module = system::new_log("dag-file")?.with_extension("dag");
+        let written = fs::write(&module, self.file.to_string());
+        let written =
+            written.map_err(|error| format!("cannot write `{}`: {error}", module.display()));
+        self.module = Some(module);
+        written
+    }
+
+    /// Returns what the guest says of the file as [`load`] would have said it, one line a
+    /// fault; `None` if it speaks of something else.
+    #[must_use]
+    pub fn translate(&self, said: &str) -> Option<String> {
+        source_lines::translate(said, &self.path, &self.file)
+    }
+}
+
+impl Drop for Prepared {
+    fn drop(&mut self) {
+        if let Some(module) = &self.module {
+            // It is ours, and in the way of no one if it cannot be removed.
+            let _ = fs::remove_file(module);
+        }
+    }
+}
+
+/// Reads the file that `--dag` names, if it is given.
+///
+/// # Errors
+///
+/// Lines for people: what is wrong with the options or with the file.
+pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
+    let Some(path) = options.path("dag") else {
+        let lonely = COMPANIONS.iter().find(|name| options.is_given(name));
+        return lonely.map_or(Ok(None), |name| {
+            Err(vec![format!(
+                "`--{name}` needs `--dag FILE`; give that, too"
+            )])
+        });
+    };
+    let refuse = |line: String| vec![line];
+    if options.is_given("app") {
+        let line = "`--app` and `--dag` exclude each other; give one".to_string();
+        return Err(refuse(line));
+    }
+    if options.is_given("jobs") && options.is_given("seconds") {
+        let line = "`--jobs` and `--seconds` exclude each other; give one".to_string();
+        return Err(refuse(line));
+    }
+    if options.number("jobs") == Some(0) {
+        let line = "`--jobs 0` has no end, which is for fork-join; with `--dag` give at least 1";
+        return Err(refuse(line.into()));
+    }
+    if let Some(text) = options.text("execution") {
+        Execution::parse(text).map_err(|why| refuse(format!("`--execution`: {why}")))?;
+    }
+    let unit_ns = match parse_ns(options.text("unit").unwrap_or("1ms")) {
+        Ok(0) => Err("a unit of 0; give at least 1ns".into()),
+        other => other,
+    };
+    let unit_ns = unit_ns.map_err(|why| refuse(format!("`--unit`: {why}")))?;
+    let length = length(options);
+    let cores = options.number("cores").unwrap_or(1);
+    let import = Import {
+        unit_ns,
+        graph: options.text("graph").map(String::from),
+        cores: u32::try_from(cores).unwrap_or(u32::MAX),
+        length,
+    };
+    let file = load(path, &import)?;
+    let memory_mib = memory_mib(&file, length, cores);
+    if memory_mib > MOST_MEMORY_MIB && !options.is_given("memory") {
+        return Err(refuse(format!(
+            "{}: its {} subtasks, their jobs and the file itself need {memory_mib} MiB, and a \
+             guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
+            files::place(path),
+            file.most_subtasks()
+        )));
+    }
+    let limit_s = limit_s(&file, length);
+    let has_limit = options.is_given("timeout") || options.is_given("print-dag");
+    if limit_s > MOST_S && !has_limit {
+        return Err(refuse(format!(
+            "{}: its jobs take {} hours or more, and a run has {} if nobody says how long; give \
+             fewer jobs by --jobs, or a limit by --timeout",
+            files::place(path),
+            limit_s / 3600,
+            MOST_S / 3600
+        )));
+    }
+    let mut words = Vec::new();
+    if options.is_given("strict-deadlines") {
+        words.push("deadlines=strict".into());
+    }
+    if !options
+        .text("append")
+        .is_some_and(|words| words.contains("overheads_ns="))
+    {
+        words.push(overheads(cores));
+    }
+    Ok(Some(Prepared {
+        memory_mib,
+        limit_s: limit_s.min(MOST_S),
+        path: path.into(),
+        file,
+        module: None,
+        words,
+    }))
+}
+
+fn length(options: &Parsed) -> Length {
+    match options.number("seconds") {
+        Some(seconds) => Length::Span(seconds.saturating_mul(1_000_000_000)),
+        None => Length::Jobs(options.number("jobs").unwrap_or(JOBS)),
+    }
+}
+
+/// Returns the jobs and instances of a set that a run has in all: its records.
+fn records(set: &Set, length: Length) -> u64 {
+    let of = |dag: &FileDag| {
+        let jobs = length.jobs(&dag.spec);
+        jobs.saturating_mul(dag.subtasks.len() as u64 + 1)
+    };
+    set.dags.iter().map(of).fold(0, u64::saturating_add)
+}
+
+/// The most memory in MiB: a guest has its stacks and its heap below 3 GiB.
+const MOST_MEMORY_MIB: u64 = 3072;
+
+/// Returns how much memory a file needs. A quarter of it becomes stacks, of which
+/// each subtask has one and each core a few, and the rest the heap, of which records may take half.
+///
+/// The guest has the file as text, and in the heap what it says: measured, an edge takes
+/// some 210 bytes and a sample some 17, while a line has 12 bytes and a sample 4. So the
+/// heap has 20 bytes for each of the text, and three quarters of the memory are the heap.
+fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
+    const OF_A_CORE: u64 = 4 * (336 << 10);
+    const OF_A_SUBTASK: u64 = 4 * (65 << 10);
+    const OF_A_RECORD: u64 = 256;
+    const OF_A_BYTE: u64 = 1 + 20 * 4 / 3;
+    const MIB: u64 = 1 << 20;
+    let subtasks = file.most_subtasks() as u64;
+    let records = file.sets.iter().map(|set| records(set, length));
+    let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
+        .saturating_add(records.max().unwrap_or(0).saturating_mul(OF_A_RECORD))
+        .saturating_add(cores.saturating_mul(OF_A_CORE))
+        .saturating_add(length_of_text(file).saturating_mul(OF_A_BYTE));
+    12 + bytes.div_ceil(MIB)
+}
+
+/// Returns how many bytes the boot module has, without writing it anywhere.
+fn length_of_text(file: &DagFile) -> u64 {
+    struct Counter(u64);
+    impl Write for Counter {
+        fn write_str(&mut self, text: &str) -> fmt::Result {
+            self.0 += text.len() as u64;
+            Ok(())
+        }
+    }
+    let mut counter = Counter(0);
+    // Counting cannot fail.
+    let _ = write!(counter, "{file}");
+    counter.0
+}
+
+/// The longest that a run may take if nobody says how long, in seconds: a day.
+const MOST_S: u64 = 86_400;
+
+/// Returns for how long a run may take, in seconds: two minutes, the time from the first
+/// release to the last, the time that all jobs would take on one core, and a second for
+/// every 500 records.
+fn limit_s(file: &DagFile, length: Length) -> u64 {
+    const NS_PER_S: u128 = 1_000_000_000;
+    let mut seconds = 120_u128;
+    for set in &file.sets {
+        seconds += u128::from(records(set, length) / 500);
+        let (mut span_ns, mut busy_ns) = (0_u128, 0_u128);
+        for FileDag { spec, .. } in &set.dags {
+            let jobs = u128::from(length.jobs(spec));
+            let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
+            let of_job_ns: u128 = wcets.map(u128::from).sum();
+            let period_ns = u128::from(spec.period_ns.unwrap_or(0));
+            let last_ns =
+                period_ns.saturating_mul(jobs.saturating_sub(1)) + u128::from(spec.offset_ns);
+            span_ns = span_ns.max(last_ns);
+            busy_ns = busy_ns.saturating_add(of_job_ns.saturating_mul(jobs));
+        }
+        seconds = seconds.saturating_add(span_ns.saturating_add(busy_ns) / NS_PER_S);
+    }
+    u64::try_from(seconds).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MOST_S, limit_s, memory_mib, prepare};
+    use crate::run::RUN;
+    use crate::system::workspace;
+    use dag_file::{DagFile, Length, parse};
+
+    fn file(subtasks: usize) -> DagFile {
+        let subtasks = (0..subtasks).map(|number| format!("subtask s{number} wcet 1ms\n"));
+        let subtasks: String = subtasks.collect();
+        parse(&format!("dag x period 1s\n{subtasks}end")).unwrap()
+    }
+
+    #[test]
+    fn a_file_is_read_without_a_write() {
+        let demo = workspace().join("apps/dag-file/examples/demo.dag");
+        let options = RUN.right("--print-dag --jobs 3").with("dag", demo);
+        let mut prepared = prepare(&options).unwrap().unwrap();
+        assert_eq!(prepared.module, None);
+        prepared.write_module().unwrap();
+        let module = prepared.module.clone().unwrap();
+        assert!(module.is_file());
+        drop(prepared);
+        assert!(!module.exists());
+    }
+
+    #[test]
+    fn memory_grows_with_subtasks_records_and_cores() {
+        let usual = memory_mib(&file(20), Length::Jobs(50), 8);
+        assert!(usual <= 32, "{usual}");
+        // A quarter of it holds 10,000 stacks of 64 KiB.
+        assert!(memory_mib(&file(10_000), Length::Jobs(1), 1) >= 4 * 625);
+        let long = memory_mib(&file(20), Length::Jobs(1_000_000), 8);
+        assert!(long > 21 * 200, "{long}");
+        assert!(memory_mib(&file(20), Length::Jobs(50), 64) > 2 * usual);
+        assert!(memory_mib(&file(1), Length::Jobs(u64::MAX), 8) > long);
+    }
+
+    #[test]
+    fn the_limit_has_room_for_real_time() {
+        assert_eq!(limit_s(&file(1), Length::Jobs(101)), 120 + 100);
+        assert!(limit_s(&file(1), Length::Jobs(u64::MAX)) > MOST_S);
+        // DAGs of a set run side by side, sets one after the other.
+        let dag = |name: &str| format!("dag {name} period 10s\nsubtask a wcet 1s\n");
+        let text = format!("set one\n{}{}set two\n{}end", dag("x"), dag("y"), dag("z"));
+        let file = parse(&text).unwrap();
+        assert_eq!(
+            limit_s(&file, Length::Jobs(11)),
+            120 + (100 + 22) + (100 + 11)
+        );
+    }
+
+    #[test]
+    fn a_run_of_more_than_a_day_is_refused_if_nobody_says_how_long() {
+        let name = format!("century-{}.dag", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, "dag x period 3153600000s\nsubtask a wcet 1ms\nend\n").unwrap();
+        let prepared = |line: &str| prepare(&RUN.right(line).with("dag", path.clone()));
+        let said = prepared("--jobs 2").unwrap_err().join("\n");
+        let words = "its jobs take 876000 hours or more, and a run has 24 if nobody says how long";
+        assert!(said.contains(words), "{said}");
+        assert_eq!(prepared("--jobs 1").unwrap().unwrap().limit_s, 120);
+        assert!(prepared("--jobs 2 --timeout 60").is_ok());
+        assert!(prepared("--jobs 2 --print-dag").is_ok());
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn memory_grows_with_the_file_itself() {
+        let samples = vec!["1us"; 2_000_000].join(",");
+        let text = format!("dag x period 1s\nsubtask a wcet 1ms samples {samples}\nend");
+        let many = memory_mib(&parse(&text).unwrap(), Length::Jobs(1), 8);
+        // Measured: a heap of 34 MB at its peak, beside the text of 8 MB.
+        assert!((64..512).contains(&many), "{many}");
+    }
+}

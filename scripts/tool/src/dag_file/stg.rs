@@ -1,0 +1,358 @@
+//! Reading task graphs with published makespans, as `apps/dag-file/examples/stg50.json` has
+//! them: Kasahara's Standard Task Graph Set.
+//!
+//! A graph has a `name`, the costs `c` of its vertices, `edges` and, by number of
+//! processors, the `optimal` length of a schedule without preemption. Vertices
+//! without cost are the format's own entry and exit; they take no time and order
+//! nothing that the others do not, so they are left out. In the middle of a graph
+//! such a vertex would order others, and is refused. What else is stated, such as
+//! where the graphs come from, is not needed here.
+//!
+//! A graph becomes a DAG of one job at a time: its period and its deadline are the
+//! sum of its costs.
+
+use std::collections::BTreeMap;
+
+use dag_file::{DagFile, FileDag, FileSubtask, Malformed, Set, is_name, no_name, quoted, repeated};
+use sched_dag::{DagSpec, SubtaskSpec};
+
+use crate::json::{Value, parse_with_places};
+use crate::options::nearest;
+
+/// The most vertices of a graph; a guest holds some 12,000.
+const MOST_VERTICES: usize = 100_000;
+
+/// A task graph.
+#[derive(Clone, Debug)]
+pub struct TaskGraph {
+    /// Its name.
+    pub name: String,
+    /// The line on which it stands.
+    pub line: usize,
+    /// The cost of each vertex, in units of time.
+    pub costs: Vec<u64>,
+    /// The edges between vertices.
+    pub edges: Vec<(usize, usize)>,
+    /// The shortest makespan known to be possible, by the number of processors.
+    pub optimal: BTreeMap<u64, u64>,
+}
+
+/// Reads a file into one set a graph, or the one that is named.
+///
+/// # Errors
+///
+/// Everything that is not as described, with its line.
+pub fn read(text: &str, graph: Option<&str>, unit_ns: u64) -> Result<DagFile, Malformed> {
+    let mut graphs = read_graphs(text)?;
+    if let Some(wanted) = graph {
+        let names: Vec<String> = graphs.iter().map(|graph| graph.name.clone()).collect();
+        graphs.retain(|graph| graph.name == wanted);
+        if graphs.is_empty() {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let near = nearest(wanted, &names).or(names.first().copied());
+            let hint = near.map_or(String::new(), |near| format!(", such as `{near}`"));
+            let reason = format!(
+                "there is no graph {}; name one of the {} there are{hint}",
+                quoted(wanted),
+                names.len()
+            );
+            return Err(Malformed { line: 1, reason });
+        }
+    }
+    let sets = graphs.iter().map(|graph| {
+        let dags = vec![graph.dag(unit_ns)?];
+        let name = graph.name.clone();
+        Ok(Set { name, dags })
+    });
+    let sets = sets.collect::<Result<_, _>>()?;
+    Ok(DagFile { sets })
+}
+
+/// Reads all graphs of a file.
+///
+/// # Errors
+///
+/// The first thing that is not as described, with its line.
+pub fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
+    let (document, places) = parse_with_places(text, "graphs").map_err(|error| {
+        let line = line_at(text, error.column.saturating_sub(1));
+        let reason = format!("this is no JSON: {}", error.message);
+        Malformed { line, reason }
+    })?;
+    let graphs = document
+        .get("graphs")
+        .map(Value::elements)
+        .unwrap_or_default();
+    if graphs.is_empty() {
+        let reason = "the file has no `graphs`; of JSON a task graph set is read, \
+                      {\"graphs\":[{\"name\":\"a\",\"c\":[3,4],\"edges\":[[0,1]]}]}; RD-Gen's graphs are \
+                      read from .yaml, and others can be written in the format of docs/dag-file.md";
+        let reason = reason.into();
+        return Err(Malformed { line: 1, reason });
+    }
+    let (mut line, mut before) = (1, 0);
+    let mut read: Vec<TaskGraph> = Vec::new();
+    for (graph, place) in graphs.iter().zip(places) {
+        line += line_at(&text[before..place], place - before) - 1;
+        before = place;
+        read.push(Graph { value: graph, line }.read(read.len())?);
+    }
+    match repeated(read.iter().map(|graph| &graph.name)) {
+        None => Ok(read),
+        Some((first, second)) => Err(Malformed {
+            line: read[second].line,
+            reason: format!(
+                "graph {} stands here twice, first on line {}; rename one",
+                quoted(&read[second].name),
+                read[first].line
+            ),
+        }),
+    }
+}
+
+/// Returns the line of a byte.
+fn line_at(text: &str, byte: usize) -> usize {
+    let before = text.as_bytes().iter().take(byte);
+    1 + before.filter(|byte| **byte == b'\n').count()
+}
+
+/// A graph as it stands in the file.
+struct Graph<'v> {
+    value: &'v Value,
+    line: usize,
+}
+
+impl Graph<'_> {
+    /// Reads the graph, which is the one of that number.
+    fn read(&self, number: usize) -> Result<TaskGraph, Malformed> {
+        let Value::Object(members) = self.value else {
+            let kind = self.value.type_name();
+            let reason =
+                format!("graph {number} of the list is no object but a value of type {kind}");
+            return Err(self.malformed(reason));
+        };
+        let Some(Value::Text(name)) = self.value.get("name") else {
+            let reason = format!("graph {number} of the list has no `name`; give it a word");
+            return Err(self.malformed(reason));
+        };
+        if !is_name(name) {
+            return Err(self.malformed(no_name(name)));
+        }
+        for (key, _) in members {
+            if !["name", "c", "edges", "optimal", "check"].contains(&key.as_str()) {
+                let known = "name, c, edges, optimal";
+                let key = quoted(key);
+                return Err(self.malformed(format!("unknown key {key}; a graph has {known}")));
+            }
+        }
+        let costs = self.costs(name)?;
+        let edges = self.edges(name, costs.len())?;
+        let graph = TaskGraph {
+            name: name.into(),
+            line: self.line,
+            optimal: self.optimal(name)?,
+            costs,
+            edges,
+        };
+        graph.check().map_err(|reason| self.malformed(reason))?;
+        Ok(graph)
+    }
+
+    fn malformed(&self, reason: String) -> Malformed {
+        let line = self.line;
+        Malformed { line, reason }
+    }
+
+    /// Returns a member that must be a list, if it is there.
+    fn list(&self, name: &str, member: &str) -> Result<&[Value], Malformed> {
+        match self.value.get(member) {
+            None => Ok(&[]),
+            Some(Value::Array(elements)) => Ok(elements),
+            Some(other) => {
+                let kind = other.type_name();
+                let reason =
+                    format!("graph `{name}`: `{member}` is no list but a value of type {kind}");
+                Err(self.malformed(reason))
+            }
+        }
+    }
+
+    fn costs(&self, name: &str) -> Result<Vec<u64>, Malformed> {
+        let costs = self.list(name, "c")?;
+        if costs.len() > MOST_VERTICES {
+            let (count, most) = (costs.len(), MOST_VERTICES);
+            let reason =
+                format!("graph `{name}` has {count} vertices, and {most} at most are read");
+            return Err(self.malformed(reason));
+        }
+        let number = |value: &Value| {
+            value.as_u64().ok_or_else(|| {
+                self.malformed(format!(
+                    "graph `{name}`: a cost is no whole number from 0 on; give one"
+                ))
+            })
+        };
+        let costs: Vec<u64> = costs.iter().map(number).collect::<Result<_, _>>()?;
+        match costs.iter().all(|cost| *cost == 0) {
+            true => Err(self.malformed(format!("graph `{name}` has no cost above 0; give `c`"))),
+            false => Ok(costs),
+        }
+    }
+
+    fn edges(&self, name: &str, vertices: usize) -> Result<Vec<(usize, usize)>, Malformed> {
+        let end = |value: &Value| {
+            let end = usize::try_from(value.as_u64()?).ok();
+            end.filter(|end| *end < vertices)
+        };
+        let edge = |edge: &Value| {
+            let [earlier, later] = edge.elements() else {
+                return None;
+            };
+            Some((end(earlier)?, end(later)?))
+        };
+        let edges = self.list(name, "edges")?;
+        let edges: Option<Vec<(usize, usize)>> = edges.iter().map(edge).collect();
+        let edges = edges.ok_or_else(|| {
+            let last = vertices - 1;
+            self.malformed(format!(
+                "graph `{name}`: an edge must be two vertices from 0 to {last}"
+            ))
+        })?;
+        match repeated(&edges) {
+            None => Ok(edges),
+            Some((_, second)) => {
+                let (earlier, later) = edges[second];
+                let reason =
+                    format!("graph `{name}`: edge [{earlier},{later}] stands twice; drop one");
+                Err(self.malformed(reason))
+            }
+        }
+    }
+
+    fn optimal(&self, name: &str) -> Result<BTreeMap<u64, u64>, Malformed> {
+        let members = match self.value.get("optimal") {
+            None => &[][..],
+            Some(Value::Object(members)) => members,
+            Some(_) => return Err(self.no_optimal(name)),
+        };
+        let pairs = members.iter().map(|(cores, length)| {
+            let cores = cores.parse().ok().filter(|&cores| cores > 0);
+            cores.zip(length.as_u64())
+        });
+        let pairs: Option<BTreeMap<u64, u64>> = pairs.collect();
+        pairs.ok_or_else(|| self.no_optimal(name))
+    }
+
+    fn no_optimal(&self, name: &str) -> Malformed {
+        self.malformed(format!(
+            "graph `{name}`: `optimal` must map numbers of processors from 1 on to lengths, as in \
+             {{\"2\":9}}"
+        ))
+    }
+}
+
+impl TaskGraph {
+    /// Makes sure that every vertex without cost is an entry or an exit, and that no
+    /// optimum is impossible.
+    fn check(&self) -> Result<(), String> {
+        let name = &self.name;
+        let mut has = vec![(false, false); self.costs.len()];
+        let mut waits_for = vec![0_usize; self.costs.len()];
+        let mut after = vec![Vec::new(); self.costs.len()];
+        for &(earlier, later) in &self.edges {
+            has[later].0 = true;
+            has[earlier].1 = true;
+            waits_for[later] += 1;
+            after[earlier].push(later);
+        }
+        let is_amid = |vertex: &usize| self.costs[*vertex] == 0 && has[*vertex] == (true, true);
+        if let Some(vertex) = (0..self.costs.len()).find(is_amid) {
+            return Err(format!(
+                "graph `{name}`: vertex {vertex} has cost 0 and stands between others, which only \
+                 an entry or an exit may; give it a cost of at least 1, or join its edges"
+            ));
+        }
+        // Each free vertex ends the longest path to it; what a cycle keeps from being
+        // free is for the commit to tell.
+        let mut ends = vec![0_u128; self.costs.len()];
+        let is_free = |vertex: &usize| waits_for[*vertex] == 0;
+        let mut free: Vec<usize> = (0..self.costs.len()).filter(is_free).collect();
+        let mut longest = 0;
+        while let Some(vertex) = free.pop() {
+            let end = ends[vertex] + u128::from(self.costs[vertex]);
+            longest = longest.max(end);
+            for &later in &after[vertex] {
+                ends[later] = ends[later].max(end);
+                waits_for[later] -= 1;
+                if waits_for[later] == 0 {
+                    free.push(later);
+                }
+            }
+        }
+        let volume: u128 = self.costs.iter().map(|cost| u128::from(*cost)).sum();
+        for (&cores, &length) in &self.optimal {
+            let least = longest.max(volume.div_ceil(u128::from(cores)));
+            if u128::from(length) < least {
+                return Err(format!(
+                    "graph `{name}`: its optimum of {length} on {cores} processors is less than \
+                     {least}, which its longest path and its costs take"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes a DAG of it, with units of so many nanoseconds.
+    ///
+    /// # Errors
+    ///
+    /// Its times do not fit 64 bits.
+    pub fn dag(&self, unit_ns: u64) -> Result<FileDag, Malformed> {
+        let total: u128 = self.costs.iter().map(|cost| u128::from(*cost)).sum();
+        let volume_ns = total.checked_mul(u128::from(unit_ns));
+        let volume_ns = volume_ns.and_then(|ns| u64::try_from(ns).ok());
+        let volume_ns = volume_ns.ok_or_else(|| Malformed {
+            line: self.line,
+            reason: format!(
+                "graph `{}`: its costs are more than 64 bits of nanoseconds; choose a shorter unit",
+                self.name
+            ),
+        })?;
+        let mut positions: Vec<Option<usize>> = Vec::new();
+        let mut dag = FileDag {
+            spec: DagSpec {
+                name: self.name.clone(),
+                period_ns: Some(volume_ns),
+                relative_deadline_ns: Some(volume_ns),
+                ..DagSpec::default()
+            },
+            line: self.line,
+            ..FileDag::default()
+        };
+        for (vertex, &cost) in self.costs.iter().enumerate() {
+            positions.push((cost > 0).then_some(dag.subtasks.len()));
+            if cost == 0 {
+                continue;
+            }
+            dag.spec.subtasks.push(SubtaskSpec {
+                name: vertex.to_string(),
+                wcet_ns: Some(cost * unit_ns),
+                ..SubtaskSpec::default()
+            });
+            dag.subtasks.push(FileSubtask {
+                line: self.line,
+                ..FileSubtask::default()
+            });
+        }
+        for &(earlier, later) in &self.edges {
+            if let (Some(earlier), Some(later)) = (positions[earlier], positions[later]) {
+                dag.spec.edges.push((earlier, later));
+                dag.edge_lines.push(self.line);
+            }
+        }
+        Ok(dag)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,67 @@
+//! The host tool: one place that starts QEMU (besides `scripts/hot-path`, which logs
+//! instructions), one that reads the serial protocol.
+//!
+//! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is
+//! all it printed, lines for people and machine lines mixed. Its *ending* is
+//! how QEMU's process ended; its *verdict* is its own last line. The tool's
+//! *subcommands* (`run`, `test`, ...) are what the scripts in `scripts/` call.
+//!
+//! The library serves two callers: the program (`main.rs`), and the tests, its own and
+//! the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
+//!
+//! - [`json`], [`protocol`]: what a guest prints, read strictly;
+//! - [`elf`], [`image`], [`places`], [`tiny`]: what is booted;
+//! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
+//! - [`install`], [`probe`], [`system`]: what the host has;
+//! - [`options`]: command lines by a table; [`files`]: what they name;
+//!   [`output`], [`progress`]: printing without a panic, and while it takes long;
+//! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
+//! - [`markdown`], [`fault_page`], [`promises`]: pages that tests hold to their word;
+//! - [`trace`]: what happened in a run, held against the model's rules;
+//! - [`dot`]: committed DAGs as a picture;
+//! - [`mod@bench`]: what is measured, and compared with a baseline;
+//! - [`oracle`]: reference schedules, bounds and synchronizers;
+//! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
+//!   [`new_app`](mod@new_app): the subcommands.
+//!
+//! It guarantees that no guest runs without a limit, and that no run counts
+//! as good that did not say so twice. It uses the standard library only, and
+//! no `unsafe`.
+
+#![forbid(unsafe_code)]
+
+// First, for its macros are in force in the modules after it.
+#[macro_use]
+pub mod output;
+
+pub mod bench;
+pub mod child;
+pub mod dag_file;
+pub mod dot;
+pub mod elf;
+pub mod fault_page;
+pub mod files;
+pub mod image;
+pub mod install;
+pub mod json;
+pub mod markdown;
+pub mod new_app;
+pub mod options;
+pub mod oracle;
+pub mod outcome;
+pub mod places;
+pub mod probe;
+pub mod progress;
+pub mod promises;
+pub mod protocol;
+pub mod qemu;
+pub mod run;
+pub mod soak;
+pub mod system;
+pub mod tail;
+pub mod test;
+pub mod tiny;
+pub mod trace;
+
+pub use outcome::Outcome;
+pub use qemu::{Machine, Mode};

@@ -1,0 +1,51 @@
+//! The blocks of a page in Markdown.
+//!
+//! A *block* is what stands between two fences; its *info* is what the first fence
+//! says of it, such as `rust` or `text output-new-app`.
+
+/// A block of a page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// What the opening fence says.
+    pub info: String,
+    /// Its lines, each with its newline.
+    pub text: String,
+}
+
+/// Takes the blocks out of a page.
+#[must_use]
+pub fn blocks(page: &str) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    let mut open: Option<Block> = None;
+    for line in page.lines() {
+        match (line.strip_prefix("```"), open.as_mut()) {
+            (Some(_), Some(_)) => blocks.extend(open.take()),
+            (Some(info), None) => {
+                open = Some(Block {
+                    info: info.into(),
+                    text: String::new(),
+                });
+            }
+            (None, Some(block)) => block.text += &format!("{line}\n"),
+            (None, None) => {}
+        }
+    }
+    // A fence without end would hide the rest of the page.
+    blocks.extend(open);
+    blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Block, blocks};
+
+    #[test]
+    fn blocks_are_read_and_what_stands_between_them_is_not() {
+        let page = "# A\n```rust\nlet a = 1;\n```\nwords\n```text x-y\nb\n```\n";
+        let expected = [("rust", "let a = 1;\n"), ("text x-y", "b\n")].map(|(info, text)| Block {
+            info: info.into(),
+            text: text.into(),
+        });
+        assert_eq!(blocks(page), expected);
+    }
+}

@@ -1,0 +1,190 @@
+//! The subcommand `new-app`: an app of one's own under `apps/`.
+//!
+//! The *template* is an app that is complete: a library with the functions and
+//! their DAG, a program that boots it, and a test that runs it on the host in
+//! virtual time. A new app is a copy in which the template's name is replaced;
+//! cargo finds it by the workspace's `apps/*`, so nothing else changes.
+//!
+//! A name that cannot be a package's, or is taken, is refused before anything is
+//! written. If writing fails in the middle, what was written is removed.
+//!
+//! Exit codes: 0 the app is there, 1 its files could not be written, 2 a refused
+//! command line.
+
+mod name;
+mod table;
+
+use std::ffi::OsString;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use crate::system;
+
+pub use name::check;
+pub use table::NEW_APP;
+
+/// The template's name, as a package and as a crate.
+const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
+
+/// The template's files: where each goes in the app's folder, and its text.
+const FILES: &[(&str, &str)] = &[
+    ("Cargo.toml", include_str!("../template/manifest.toml")),
+    ("build.rs", include_str!("../template/build.rs")),
+    ("src/lib.rs", include_str!("../template/src/lib.rs")),
+    ("src/main.rs", include_str!("../template/src/main.rs")),
+    (
+        "tests/virtual_time.rs",
+        include_str!("../template/tests/virtual_time.rs"),
+    ),
+];
+
+/// Why there is no new app.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NewAppError {
+    /// The name cannot be used: exit code 2.
+    Name(String),
+    /// The files cannot be written: exit code 1.
+    Files(String),
+}
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn new_app(words: &[OsString]) -> ExitCode {
+    let options = match NEW_APP.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    let Some(name) = options.positional() else {
+        return NEW_APP.refuse("which name? give one, such as `./scripts/new-app brake-assist`");
+    };
+    match create(system::workspace(), name) {
+        Ok(_) => {
+            print!("{}", next_steps(name));
+            ExitCode::SUCCESS
+        }
+        Err(NewAppError::Name(line)) => NEW_APP.refuse(&line),
+        Err(NewAppError::Files(line)) => NEW_APP.fail(&line),
+    }
+}
+
+/// Writes a new app into a workspace, and returns its folder.
+///
+/// # Errors
+///
+/// The name is refused, or a file cannot be written; nothing is left then.
+pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, NewAppError> {
+    check(workspace, name).map_err(NewAppError::Name)?;
+    let apps = workspace.join("apps");
+    let folder = apps.join(name);
+    let failed = |error| format!("cannot write `{}`: {error}", folder.display());
+    fs::create_dir_all(&apps).map_err(|error| NewAppError::Files(failed(error)))?;
+    fs::create_dir(&folder).map_err(|error| match error.kind() {
+        // Another command has been as quick.
+        ErrorKind::AlreadyExists => NewAppError::Name(name::taken(name)),
+        _ => NewAppError::Files(failed(error)),
+    })?;
+    write_all(&folder, name).map_err(|line| {
+        // What cannot be written can perhaps not be removed either; the line
+        // names the place.
+        let _ = fs::remove_dir_all(&folder);
+        NewAppError::Files(line)
+    })?;
+    Ok(folder)
+}
+
+fn write_all(folder: &Path, name: &str) -> Result<(), String> {
+    let crate_name = name.replace('-', "_");
+    for (place, text) in FILES {
+        let path = folder.join(place);
+        let text = text
+            .replace(PLACEHOLDER.0, name)
+            .replace(PLACEHOLDER.1, &crate_name);
+        let parent = path.parent().unwrap_or(folder);
+        let written = fs::create_dir_all(parent).and_then(|()| fs::write(&path, text));
+        written.map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
+    }
+    Ok(())
+}
+
+fn next_steps(name: &str) -> String {
+    let boot = format!("./scripts/run --app {name}");
+    let test = format!("cargo test -p {name}");
+    format!(
+        "\
+apps/{name} is there:
+  src/lib.rs             the functions and their DAG: begin here
+  src/main.rs            boots it and reports
+  tests/virtual_time.rs  runs it on the host, in virtual time
+
+{boot:width$}  boots it in QEMU
+{test:width$}  tests it on the host
+{:width$}  goes on from here
+",
+        "docs/guide.md",
+        width = boot.len()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FILES, NewAppError, PLACEHOLDER, create};
+    use std::fs;
+
+    #[test]
+    fn the_template_names_itself_and_nothing_of_its_name_is_left_in_a_copy() {
+        let workspace = std::env::temp_dir().join(format!("new-app-{}", std::process::id()));
+        let folder = create(&workspace, "brake-assist").unwrap();
+        let mut named = 0;
+        for (place, template) in FILES {
+            let text = fs::read_to_string(folder.join(place)).unwrap();
+            assert!(!text.contains(PLACEHOLDER.0), "{place}");
+            assert!(!text.contains(PLACEHOLDER.1), "{place}");
+            named += usize::from(*template != text);
+        }
+        assert_eq!(named, 4, "all but build.rs have the app's name");
+        let again = create(&workspace, "brake-assist").unwrap_err();
+        let NewAppError::Name(line) = again else {
+            panic!("{again:?}");
+        };
+        assert_eq!(
+            line,
+            "there is an app `brake-assist` already; choose another name, or edit \
+             apps/brake-assist"
+        );
+        fs::remove_dir_all(workspace).unwrap();
+    }
+
+    #[test]
+    fn of_two_at_once_one_makes_the_app() {
+        let workspace = std::env::temp_dir().join(format!("two-apps-{}", std::process::id()));
+        for number in 0..50 {
+            let name = format!("app-{number}");
+            let barrier = std::sync::Barrier::new(2);
+            let make = || {
+                barrier.wait();
+                create(&workspace, &name).is_ok()
+            };
+            let made = std::thread::scope(|scope| {
+                [scope.spawn(make), scope.spawn(make)].map(|thread| thread.join().unwrap())
+            });
+            assert!(made[0] != made[1], "{name}: {made:?}");
+        }
+        fs::remove_dir_all(workspace).unwrap();
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_and_leaves_nothing() {
+        let workspace = std::env::temp_dir().join(format!("no-app-{}", std::process::id()));
+        fs::create_dir_all(&workspace).unwrap();
+        // A file where a folder has to be.
+        fs::write(workspace.join("apps"), "").unwrap();
+        let NewAppError::Files(line) = create(&workspace, "brake-assist").unwrap_err() else {
+            panic!("a file has become a folder");
+        };
+        assert!(line.starts_with("cannot write `"), "{line}");
+        assert!(line.contains("apps/brake-assist`: "), "{line}");
+        fs::remove_dir_all(workspace).unwrap();
+    }
+}

@@ -1,0 +1,201 @@
+//! The public cases, and files and expectations that are wrong.
+
+use super::{check, parse};
+
+const PUBLIC: &str = include_str!("../../../../../tests/oracle/synchronizer.txt");
+
+/// One set of equal stamps, one stamp that is overtaken.
+const EXACT: &str = "case e exact 2 5
+a 0 7 1
+a 0 8 2
+a 1 4 2
+s 2 8 4
+r 2 0 7
+end
+";
+
+/// A set that only a later message proves best, with a penalty of 0.
+const APPROXIMATE: &str = "case a approximate 2 5
+approximate 100 1 0 0 0
+a 0 0 0
+a 1 0 10
+a 0 1 19
+s 2 1 0
+r 2 0 0
+end
+";
+
+#[test]
+fn all_public_traces_agree() {
+    let cases = parse(PUBLIC).unwrap();
+    assert_eq!(cases.len(), 40);
+    for case in &cases {
+        assert_eq!(check(case), Ok(()), "{}", case.name);
+    }
+}
+
+#[test]
+fn the_first_difference_is_named() {
+    for (text, from, to, difference) in [
+        (
+            EXACT,
+            "s 2 8 4",
+            "s 2 7 4",
+            "arrival 2 (topic 1, message 4): set 0: expected 7 4, emitted 8 4",
+        ),
+        (
+            EXACT,
+            "s 2 8 4\n",
+            "",
+            "arrival 2 (topic 1, message 4): set 0: expected none, emitted 8 4",
+        ),
+        (
+            EXACT,
+            "s 2 8 4",
+            "s 2 8 4\ns 2 8 999",
+            "arrival 2 (topic 1, message 4): set 1: expected 8 999, emitted none",
+        ),
+        (
+            EXACT,
+            "s 2 8 4",
+            "s 1 8 4",
+            "arrival 1 (topic 0, message 8): set 0: expected 8 4, emitted none",
+        ),
+        (
+            APPROXIMATE,
+            "r 2 0 0\n",
+            "",
+            "arrival 2 (topic 0, message 1): message 0 of topic 0: \
+             dropped, but expected not to leave",
+        ),
+        (
+            APPROXIMATE,
+            "r 2 0 0",
+            "r 1 0 0",
+            "arrival 1 (topic 1, message 0): message 0 of topic 0: \
+             expected to leave, but was not dropped",
+        ),
+        (
+            APPROXIMATE,
+            "a 0 1 19",
+            "a 0 1 20",
+            "arrival 2 (topic 0, message 1): set 0: expected 1 0, emitted 0 0",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let cases = parse(&text.replacen(from, to, 1)).expect("still well formed");
+        assert_eq!(check(&cases[0]), Err(difference.to_owned()));
+    }
+}
+
+#[test]
+fn the_order_of_what_leaves_in_no_set_means_nothing() {
+    let text = "case e exact 2 5\na 0 0 1\na 0 1 1\na 0 2 2\na 0 3 3\na 1 0 3\n\
+                s 4 3 0\nr 4 0 2\nr 1 0 0\nr 4 0 1\nend\n";
+    assert_eq!(check(&parse(text).unwrap()[0]), Ok(()));
+}
+
+#[test]
+fn a_queue_of_any_size_costs_no_more_than_the_arrivals() {
+    let largest = usize::MAX.to_string();
+    for (text, from) in [(EXACT, "exact 2 5"), (APPROXIMATE, "approximate 2 5")] {
+        let to = from.replace('5', &largest);
+        let cases = parse(&text.replacen(from, &to, 1)).unwrap();
+        assert_eq!(check(&cases[0]), Ok(()));
+    }
+    let unlimited = EXACT.replacen("exact 2 5", "exact 2 0", 1);
+    assert_eq!(check(&parse(&unlimited).unwrap()[0]), Ok(()));
+}
+
+#[test]
+fn malformed_files_are_refused_with_their_line() {
+    for (text, from, to, line, reason) in [
+        (EXACT, "case e", "kase e", 1, "expected a `case` record"),
+        (EXACT, "exact 2 5", "exact 2", 1, "takes 4 words, found 3"),
+        (EXACT, "exact 2 5", "exactly 2 5", 1, "found `exactly`"),
+        (EXACT, "exact 2 5", "exact 0 5", 1, "1 to 1024 topics"),
+        (EXACT, "exact 2 5", "exact 1025 5", 1, "1 to 1024 topics"),
+        (EXACT, "exact 2 5", "exact 2 -5", 1, "not a whole number"),
+        (EXACT, "a 0 7 1", "a 2 7 1", 2, "there is no topic 2"),
+        (
+            EXACT,
+            "a 0 8 2",
+            "a 0 7 2",
+            3,
+            "message 7 of topic 0 arrives twice",
+        ),
+        (EXACT, "a 1 4 2", "a 1 4 2.5", 4, "not a whole number"),
+        (EXACT, "a 1 4 2", "a 1 4", 4, "takes 3 words, found 2"),
+        (
+            EXACT,
+            "a 1 4 2",
+            "a 1 4 18446744073709551616",
+            4,
+            "too large",
+        ),
+        (EXACT, "s 2 8 4", "s 3 8 4", 5, "there is no arrival 3"),
+        (EXACT, "s 2 8 4", "s 2 8", 5, "takes 3 words, found 2"),
+        (EXACT, "s 2 8 4", "s 2 8 x", 5, "not a whole number"),
+        (
+            EXACT,
+            "s 2 8 4",
+            "t 2 8 4",
+            5,
+            "expected `a`, `s`, `r` or `end`",
+        ),
+        (EXACT, "r 2 0 7", "r 2 2 7", 6, "there is no topic 2"),
+        (EXACT, "r 2 0 7", "r 9 0 7", 6, "there is no arrival 9"),
+        (EXACT, "r 2 0 7", "r 2 0 7\nr 2 0 7", 7, "leaves twice"),
+        (EXACT, "end", "end 1", 7, "takes 0 words, found 1"),
+        (EXACT, "end\n", "", 7, "the file ends where `end` should be"),
+        (
+            APPROXIMATE,
+            "approximate 2 5",
+            "approximate 2 0",
+            1,
+            "at least 1",
+        ),
+        (
+            APPROXIMATE,
+            "approximate 2 5",
+            "exact 2 5",
+            2,
+            "found `approximate`",
+        ),
+        (
+            APPROXIMATE,
+            "100 1 0 0 0",
+            "100 1 0 0",
+            2,
+            "takes 5 words, found 4",
+        ),
+        (
+            APPROXIMATE,
+            "100 1 0 0 0",
+            "1e2 1 0 0 0",
+            2,
+            "not a whole number",
+        ),
+        (APPROXIMATE, "100 1 0 0 0", "100 0 0 0 0", 2, "out of range"),
+        (
+            APPROXIMATE,
+            "100 1 0 0 0",
+            "100 1 128 0 0",
+            2,
+            "out of range",
+        ),
+        (
+            APPROXIMATE,
+            "approximate 100 1 0 0 0\n",
+            "",
+            2,
+            "expected a `approximate` record",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let malformed = parse(&text.replacen(from, to, 1)).expect_err(to);
+        assert_eq!(malformed.line, line, "{to}: {malformed}");
+        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
+    }
+    assert_eq!(parse("").expect_err("no case").line, 1);
+}

@@ -1,0 +1,218 @@
+//! Places in code: the function of an image that an address lies in.
+//!
+//! A guest that reports a fault knows the address of the instruction, and its
+//! image has no names in it that it could read. So wherever the tool shows a line
+//! of kind `panic`, `exception` or `fault` whose `place` is an address, it adds one
+//! line that names the function, and the app's line there, if there is one. What the
+//! guest printed stays as it is.
+//!
+//! Names and lines are found by `addr2line`, which reads the image's symbols and
+//! debugging information and knows both ways in which the compiler writes names. It
+//! is part of binutils, which C compilers bring along; where it is missing, one
+//! sentence says so. An image that cannot be read adds nothing: the report of a fault
+//! is no place for another one.
+
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::protocol::{MachineLine, read_line};
+use crate::system;
+
+/// The program that finds names and lines.
+const PROGRAM: &str = "addr2line";
+
+/// The kinds whose `place` may be an address.
+const KINDS: [&str; 3] = ["panic", "exception", "fault"];
+
+/// Folders of the workspace whose code is not the app's.
+const OF_OTHERS: [&str; 4] = ["boot/", "fass/", "kernel/", "sched-dag/"];
+
+/// The names for addresses in one image.
+#[derive(Debug)]
+pub struct Places {
+    image: PathBuf,
+    program: &'static str,
+    /// Whether it has been said that the program is missing.
+    is_missed: Cell<bool>,
+}
+
+impl Places {
+    /// Begins with an image that need not be there, or be an ELF file.
+    #[must_use]
+    pub fn new(image: &Path) -> Places {
+        Places {
+            image: image.to_path_buf(),
+            program: PROGRAM,
+            is_missed: Cell::new(false),
+        }
+    }
+
+    /// Returns what to add to a line of the serial log, if anything, such as
+    /// `0x20e0b8 is faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`.
+    #[must_use]
+    pub fn explain(&self, line: &str) -> Option<String> {
+        let address = address(&read_line(0, line)?.ok()?)?;
+        let Some(program) = system::find_program(self.program) else {
+            return (!self.is_missed.replace(true)).then(|| missed(address, self.program));
+        };
+        // `-i` names the inlined calls that contain the address, the innermost first,
+        // each in two lines (`-f`: function, file and line); `-C` makes names readable.
+        let output = Command::new(program)
+            .args(["-ifC", "-e"])
+            .arg(&self.image)
+            .arg(format!("{address:#x}"))
+            .stdin(Stdio::null())
+            .stderr(Stdio::null())
+            .output();
+        let output = output.ok().filter(|output| output.status.success())?;
+        Some(sentence(address, &String::from_utf8_lossy(&output.stdout)))
+    }
+}
+
+/// Returns the address at which a line says that something happened.
+fn address(line: &MachineLine) -> Option<u64> {
+    let place = line.text_at("place")?;
+    let digits = place.strip_prefix("0x")?;
+    KINDS
+        .contains(&line.kind.as_str())
+        .then(|| u64::from_str_radix(digits, 16).ok())?
+}
+
+fn missed(address: u64, program: &str) -> String {
+    format!(
+        "the function at {address:#x} is not named, as `{program}` is not installed; install \
+         the package binutils"
+    )
+}
+
+/// Says in our words what the program has found.
+fn sentence(address: u64, found: &str) -> String {
+    let function = found.lines().next().unwrap_or("??");
+    if function == "??" {
+        return format!("{address:#x} is in no function of the image");
+    }
+    let lines = found.lines().skip(1).step_by(2);
+    let line = lines.filter_map(line_of_app).next();
+    let line = line.map_or_else(String::new, |line| format!(", of {line}"));
+    format!("{address:#x} is {function}{line}")
+}
+
+/// Returns a file and line from the workspace on, if it is the app's.
+fn line_of_app(place: &str) -> Option<&str> {
+    // ` (discriminator 2)` after the line tells copies of it apart; a path may have spaces.
+    let place = place.split(" (discriminator ").next()?;
+    let path = place.strip_prefix(system::workspace().to_str()?)?;
+    let path = path.strip_prefix('/')?;
+    let is_known = !path.ends_with(":?") && !path.ends_with(":0");
+    (is_known && !OF_OTHERS.iter().any(|of| path.starts_with(of))).then_some(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Places, sentence};
+    use crate::system::workspace;
+    use std::fs;
+    use std::path::Path;
+
+    fn line(kind: &str, place: &str) -> String {
+        format!("{{\"kind\":\"{kind}\",\"cpu\":0,\"place\":\"{place}\",\"message\":\"m\"}}")
+    }
+
+    /// Returns where an address of this program is in its file: programs of the host
+    /// are loaded anywhere.
+    fn in_file(address: usize) -> String {
+        let program = std::env::current_exe().unwrap();
+        let maps = fs::read_to_string("/proc/self/maps").unwrap();
+        let first = maps
+            .lines()
+            .find(|map| map.ends_with(program.to_str().unwrap()));
+        let (base, _) = first.unwrap().split_once('-').unwrap();
+        format!("{:#x}", address - usize::from_str_radix(base, 16).unwrap())
+    }
+
+    #[rustfmt::skip]
+    #[inline(never)]
+    fn fuse() -> u32 { line!() }
+
+    fn own_places() -> Places {
+        Places::new(&std::env::current_exe().unwrap())
+    }
+
+    #[test]
+    fn an_address_of_a_fault_is_named_with_the_apps_line() {
+        let inside = in_file(fuse as *const () as usize);
+        let explained = own_places().explain(&line("exception", &inside)).unwrap();
+        assert_eq!(
+            explained,
+            format!(
+                "{inside} is tool::places::tests::fuse, of scripts/tool/src/places.rs:{}",
+                fuse()
+            )
+        );
+    }
+
+    #[test]
+    fn names_of_the_library_are_readable_and_its_lines_are_not_the_apps() {
+        let inside = in_file(std::fmt::write as *const () as usize);
+        assert_eq!(
+            own_places().explain(&line("panic", &inside)),
+            Some(format!("{inside} is core::fmt::write"))
+        );
+    }
+
+    #[test]
+    fn only_addresses_of_faults_are_explained() {
+        let places = own_places();
+        assert_eq!(
+            places.explain(&line("panic", "0x10")),
+            Some("0x10 is in no function of the image".into())
+        );
+        let inside = in_file(fuse as *const () as usize);
+        assert_eq!(places.explain(&line("panic", "main.rs:3:1")), None);
+        assert_eq!(places.explain(&line("own", &inside)), None);
+        assert_eq!(places.explain("  at 0x200004"), None);
+    }
+
+    #[test]
+    fn the_innermost_line_of_the_app_is_chosen() {
+        let root = workspace().display();
+        let found = format!(
+            "<fass::subtask::Turns as core::future::Future>::poll\n\
+             /rustc/59807616e1fa/library/core/src/hint.rs:491\n\
+             {{closure#0}}\n{root}/apps/vision/src/lib.rs:?\n\
+             edges\n{root}/apps/my vision/src/lib.rs:7 (discriminator 2)\n\
+             {{closure#1}}\n{root}/apps/vision/src/lib.rs:9\n\
+             poll\n{root}/fass/src/run/subtask.rs:81\n"
+        );
+        assert_eq!(
+            sentence(0x20_e0b8, &found),
+            "0x20e0b8 is <fass::subtask::Turns as core::future::Future>::poll, \
+             of apps/my vision/src/lib.rs:7"
+        );
+        let label = "interrupt_common\nfaults.2b61-cgu.0:?\n";
+        assert_eq!(sentence(0x20_70e9, label), "0x2070e9 is interrupt_common");
+    }
+
+    #[test]
+    fn without_an_image_nothing_is_added() {
+        let places = Places::new(Path::new("no such image"));
+        assert_eq!(places.explain(&line("panic", "0x200000")), None);
+    }
+
+    #[test]
+    fn without_the_program_its_package_is_named_once() {
+        let places = Places {
+            program: "no-such-addr2line",
+            ..own_places()
+        };
+        assert_eq!(
+            places.explain(&line("panic", "0x200000")).as_deref(),
+            Some(
+                "the function at 0x200000 is not named, as `no-such-addr2line` is not installed; \
+                 install the package binutils"
+            )
+        );
+        assert_eq!(places.explain(&line("panic", "0x200000")), None);
+    }
+}

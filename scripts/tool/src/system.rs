@@ -1,0 +1,158 @@
+//! What the tool needs to know of the system it runs on: which programs are
+//! there, where the workspace lies, and where logs go.
+
+use std::env;
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{self, IsTerminal};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Returns the root of the workspace: as `scripts/tool/start` says, or else where this tool
+/// was built, which is another place once the workspace has been moved.
+#[must_use]
+pub fn workspace() -> &'static Path {
+    static ROOT: OnceLock<PathBuf> = OnceLock::new();
+    ROOT.get_or_init(|| match env::var_os("TOOL_WORKSPACE") {
+        Some(root) => root.into(),
+        None => {
+            let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+            package.ancestors().nth(2).unwrap_or(package).into()
+        }
+    })
+}
+
+/// Reports whether standard error is a terminal on which a line can renew itself.
+#[must_use]
+pub fn stderr_moves() -> bool {
+    io::stderr().is_terminal() && can_move(env::var_os("TERM").as_deref())
+}
+
+/// Reports whether a terminal of this type can erase a line.
+fn can_move(term: Option<&OsStr>) -> bool {
+    term.is_some_and(|term| !term.is_empty() && term != "dumb")
+}
+
+/// Returns a command for the cargo that built us, or else the one on `PATH`,
+/// in the workspace's root.
+#[must_use]
+pub fn cargo() -> Command {
+    let program = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(program);
+    command.current_dir(workspace());
+    command
+}
+
+/// Returns where a program lies: a path that is one itself, or a name found
+/// on the `PATH`.
+#[must_use]
+pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
+    let name = name.as_ref();
+    if name.as_bytes().contains(&b'/') {
+        return is_program(Path::new(name)).then(|| name.into());
+    }
+    let path = env::var_os("PATH")?;
+    let candidates = env::split_paths(&path).map(|folder| folder.join(name));
+    candidates.into_iter().find(|file| is_program(file))
+}
+
+fn is_program(file: &Path) -> bool {
+    use std::os::unix::fs::PermissionsExt;
+    fs::metadata(file).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
+}
+
+/// Says how busy the host is, and what to do about it: for what did not end in time.
+#[must_use]
+pub fn host_load() -> String {
+    let averages = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let load = averages.split(' ').next().unwrap_or_default();
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    format!(
+        "the host's load was {load} on {processors} processors: if that is more than it has, \
+         try again when it is less"
+    )
+}
+
+/// Returns a path for a new log, unique to this process and call.
+///
+/// # Errors
+///
+/// In words: the folder for logs, `target/serial`, could not be made.
+pub fn new_log(name: &str) -> Result<PathBuf, String> {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    let folder = workspace().join("target/serial");
+    fs::create_dir_all(&folder)
+        .map_err(|error| format!("cannot make the folder `{}`: {error}", folder.display()))?;
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    if number == 0 {
+        clear(&folder);
+    }
+    Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
+}
+
+/// Removes what processes that were ended from outside have left: boot modules, contents
+/// of logs from before, and logs of guests that were running. The log of a guest that
+/// failed stays, for it was shown to a person.
+fn clear(folder: &Path) {
+    let is_alive = |process: &str| Path::new("/proc").join(process).exists();
+    if !is_alive("self") {
+        return;
+    }
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
+        let process = stem.rsplit('-').nth(1).unwrap_or("self");
+        let is_process = process.bytes().all(|byte| byte.is_ascii_digit());
+        if !is_process || is_alive(process) || !["dag", "before", "log.qemu"].contains(&ending) {
+            continue;
+        }
+        // It is ours, and in the way of no one if it cannot be removed.
+        let _ = fs::remove_file(&path);
+        if ending == "log.qemu" {
+            let _ = fs::remove_file(path.with_extension(""));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{can_move, clear};
+    use std::ffi::OsStr;
+    use std::fs;
+    use std::process::{Command, id};
+
+    #[test]
+    fn a_dumb_terminal_renews_no_line() {
+        assert!(can_move(Some(OsStr::new("xterm"))));
+        assert!(!can_move(Some(OsStr::new("dumb"))));
+        assert!(!can_move(Some(OsStr::new(""))));
+        assert!(!can_move(None));
+    }
+
+    #[test]
+    fn what_killed_processes_left_is_removed() {
+        let folder = std::env::temp_dir().join(format!("leavings-{}", id()));
+        fs::create_dir_all(&folder).unwrap();
+        let mut gone = Command::new("true").spawn().unwrap();
+        let (dead, alive) = (gone.id(), id());
+        gone.wait().unwrap();
+        let endings = ["dag", "before", "log", "log.qemu"];
+        let names = |process| endings.map(|ending| format!("dag-file-{process}-3.{ending}"));
+        let shown = format!("soak-{dead}-7.log");
+        let mut all = [names(dead), names(alive)].concat();
+        all.extend([shown.clone(), "notes.dag".into(), "a-b-c.dag".into()]);
+        all.iter()
+            .for_each(|name| fs::write(folder.join(name), "").unwrap());
+        clear(&folder);
+        all.retain(|name| folder.join(name).exists());
+        let mut expected = names(alive).to_vec();
+        expected.extend([shown, "notes.dag".into(), "a-b-c.dag".into()]);
+        assert_eq!(all, expected);
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,109 @@
+//! Which packages the checks judge: the project's own.
+//!
+//! An app that somebody makes here need not follow the project's rules on lints, format
+//! and files, only pass its tests. A package takes the rules on itself by one thing: by
+//! taking the workspace's lints.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::system;
+
+/// Returns the names of the project's own packages, sorted.
+pub(super) fn packages() -> Vec<String> {
+    let (mut names, _) = read(system::workspace());
+    names.sort();
+    names
+}
+
+/// Returns all Rust files of the workspace but the generated ones, and but those of
+/// packages that are not the project's own; sorted.
+pub(super) fn sources() -> Vec<PathBuf> {
+    let (_, mut sources) = read(system::workspace());
+    sources.sort();
+    sources
+}
+
+fn read(root: &Path) -> (Vec<String>, Vec<PathBuf>) {
+    let (mut names, mut sources) = (Vec::new(), Vec::new());
+    let mut folders = vec![root.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        if let Ok(manifest) = fs::read_to_string(folder.join("Cargo.toml"))
+            && let Some(name) = package_name(&manifest)
+        {
+            if !takes_lints(&manifest) {
+                continue;
+            }
+            names.push(name);
+        }
+        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if path.is_dir() && !name.starts_with('.') && name != "target" {
+                folders.push(path);
+            } else if name.ends_with(".rs") {
+                sources.push(path);
+            }
+        }
+    }
+    (names, sources)
+}
+
+/// Reads the name of a package; a manifest may be of a workspace alone.
+fn package_name(manifest: &str) -> Option<String> {
+    let package = manifest.split("[package]").nth(1)?;
+    let line = package.lines().find(|line| line.starts_with("name"))?;
+    Some(line.split('"').nth(1)?.into())
+}
+
+fn takes_lints(manifest: &str) -> bool {
+    let lints = manifest.split("\n[lints]").nth(1);
+    let lines = lints.into_iter().flat_map(str::lines);
+    let mut of_lints = lines.skip(1).take_while(|line| !line.starts_with('['));
+    of_lints.any(|line| line.replace(' ', "") == "workspace=true")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{packages, read};
+    use std::fs;
+
+    #[test]
+    fn an_app_of_ones_own_is_not_judged() {
+        let root = std::env::temp_dir().join(format!("own-{}", std::process::id()));
+        for (folder, lints) in [("ours", "[lints]\nworkspace = true\n"), ("theirs", "")] {
+            let folder = root.join("apps").join(folder);
+            fs::create_dir_all(folder.join("src")).unwrap();
+            let name = folder.file_name().unwrap().display();
+            let manifest = format!("[package]\nname = \"{name}\"\n\n{lints}");
+            fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+            fs::write(folder.join("src/lib.rs"), "").unwrap();
+        }
+        let (names, sources) = read(&root);
+        assert_eq!(names, ["ours"]);
+        assert_eq!(sources, [root.join("apps/ours/src/lib.rs")]);
+        fs::remove_dir_all(root).unwrap();
+    }
+
+    #[test]
+    fn all_packages_of_the_project_are() {
+        let packages = packages();
+        for name in [
+            "sched-dag",
+            "fass",
+            "kernel",
+            "boot-link",
+            "tool",
+            "harness",
+            "fork-join",
+        ] {
+            assert!(
+                packages.iter().any(|own| own == name),
+                "{name}: {packages:?}"
+            );
+        }
+        let template = include_str!("../../template/manifest.toml");
+        assert!(!super::takes_lints(template));
+    }
+}

@@ -1,0 +1,191 @@
+//! The scheduler against reference schedules, and the refusal of broken files.
+
+use tool::oracle::schedules::{check, parse};
+
+const PUBLIC: &str = include_str!("../../../tests/oracle/schedules.txt");
+
+/// One core, a chain of two, two jobs that overlap.
+const SMALL: &str = "case small 1 0 1 1
+dag 4 4 0 2 2 1
+sub 1 0 1 1
+sub 4 0 4 4
+edge 0 1
+x 0 0 0 0 1 0
+x 0 0 1 1 5 0
+x 0 1 0 5 6 0
+x 0 1 1 6 10 0
+j 0 0 0 5 5 1
+j 0 1 4 10 6 1
+end
+";
+
+#[test]
+fn all_public_schedules_agree() {
+    let cases = parse(PUBLIC).expect("the file is well formed");
+    assert_eq!(cases.len(), 40);
+    for case in &cases {
+        assert_eq!(check(case), Ok(()), "{}", case.name);
+    }
+}
+
+#[test]
+fn the_first_difference_is_named() {
+    for (from, to, difference) in [
+        (
+            "x 0 1 0 5 6 0",
+            "x 0 1 0 4 6 0",
+            "dag 0 job 1 subtask 0: start: expected 4, replayed 5",
+        ),
+        (
+            "x 0 1 1 6 10 0",
+            "x 0 1 1 6 10 1",
+            "dag 0 job 1 subtask 1: preemptions: expected 1, replayed 0",
+        ),
+        (
+            "j 0 0 0 5 5 1",
+            "j 0 0 0 5 5 0",
+            "dag 0 job 0: missed: expected 0, replayed 1",
+        ),
+        (
+            "j 0 1 4 10 6 1",
+            "j 0 1 4 10 7 1",
+            "dag 0 job 1: response: expected 7, replayed 6",
+        ),
+    ] {
+        let cases = parse(&SMALL.replace(from, to)).expect("still well formed");
+        assert_eq!(check(&cases[0]), Err(difference.to_owned()));
+    }
+}
+
+#[test]
+fn malformed_files_are_refused_with_their_line() {
+    for (from, to, line, reason) in [
+        (
+            "case small 1 0 1 1",
+            "case small 0 0 1 1",
+            1,
+            "expected 1 to 64 cores, found 0",
+        ),
+        (
+            "case small 1 0 1 1",
+            "case small 4294967295 0 1 1",
+            1,
+            "expected 1 to 64 cores, found 4294967295",
+        ),
+        (
+            "case small 1 0 1 1",
+            "case small 1 2 1 1",
+            1,
+            "expected 0 or 1",
+        ),
+        ("case small 1 0 1 1", "case small 1 0 1", 1, "takes 5 words"),
+        (
+            "case small 1 0 1 1",
+            "case small 1 0 1 2",
+            6,
+            "expected a `dag` record",
+        ),
+        ("dag 4 4 0 2 2 1", "dag 0 4 0 2 2 1", 2, "period of 0"),
+        ("dag 4 4 0 2 2 1", "dag 4 0 0 2 2 1", 2, "deadline of 0"),
+        ("dag 4 4 0 2 2 1", "dag 4 4 0 0 2 1", 2, "needs at least 1"),
+        (
+            "dag 4 4 0 2 2 1",
+            "dag 4 4 0 4294967296 2 1",
+            2,
+            "too large",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "dag 4 4 0 2 2 2",
+            6,
+            "expected a `edge` record",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "dag 4 4 18446744073709551615 2 2 1",
+            2,
+            "exceeds 18446744073709551615",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "dag 4 4 18446744073709551616 2 2 1",
+            2,
+            "too large",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "dag 4 4 18446744073709551605 2 2 1",
+            1,
+            "may end after",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "dag 4 -4 0 2 2 1",
+            2,
+            "not a whole number",
+        ),
+        ("sub 1 0 1 1", "sub 1 0 1", 3, "for each of 2 jobs, found 1"),
+        (
+            "sub 1 0 1 1",
+            "sub 1 0 1 2",
+            3,
+            "not between 1 and the WCET 1",
+        ),
+        (
+            "sub 1 0 1 1",
+            "sub 1 0 0 1",
+            3,
+            "not between 1 and the WCET 1",
+        ),
+        ("sub 1 0 1 1", "sub 1 4294967296 1 1", 3, "too large"),
+        ("edge 0 1", "edge 0 2", 5, "no subtask 2"),
+        ("edge 0 1", "edge 1 1", 2, "precedes itself"),
+        ("x 0 0 1 1 5 0\n", "", 11, "without 1 `x` records"),
+        ("x 0 0 1 1 5 0", "x 0 0 0 1 5 0", 7, "twice"),
+        ("x 0 0 1 1 5 0", "x 0 2 1 1 5 0", 7, "no job 2"),
+        ("x 0 0 1 1 5 0", "x 1 0 1 1 5 0", 7, "no dag 1"),
+        ("j 0 1 4 10 6 1", "j 0 1 4 10 6 2", 11, "expected 0 or 1"),
+        (
+            "j 0 1 4 10 6 1",
+            "k 0 1 4 10 6 1",
+            11,
+            "expected `x`, `j` or `end`",
+        ),
+        ("end\n", "", 12, "the file ends"),
+    ] {
+        let malformed = parse(&SMALL.replacen(from, to, 1)).expect_err(to);
+        assert_eq!(malformed.line, line, "{to}: {malformed}");
+        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
+    }
+    assert_eq!(parse("").expect_err("no case").line, 1);
+}
+
+#[test]
+fn a_cycle_is_refused_hop_by_hop() {
+    let text = SMALL
+        .replace("dag 4 4 0 2 2 1", "dag 4 4 0 2 2 2")
+        .replace("edge 0 1", "edge 0 1\nedge 1 0");
+    let malformed = parse(&text).expect_err("a cycle");
+    assert_eq!(malformed.line, 2);
+    assert!(
+        malformed
+            .reason
+            .contains("subtask 0 -> subtask 1 -> subtask 0"),
+        "{malformed}"
+    );
+}
+
+#[test]
+fn far_apart_times_and_as_many_cores_as_there_can_be_are_no_trouble() {
+    let text = "case far 64 1 1 1
+dag 9000000000000000000 9000000000000000000 5 2 1 0
+sub 3 0 1 3
+x 0 0 0 5 6 0
+x 0 1 0 9000000000000000005 9000000000000000008 0
+j 0 0 5 6 1 0
+j 0 1 9000000000000000005 9000000000000000008 3 0
+end
+";
+    let cases = parse(text).expect("well formed");
+    assert_eq!(check(&cases[0]), Ok(()));
+}

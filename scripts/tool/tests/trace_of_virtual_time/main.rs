@@ -1,0 +1,130 @@
+//! The trace checker on traces of the real scheduler in virtual time.
+//!
+//! Random sets of DAGs run in virtual time, under all policies, and leave the
+//! trace that a kernel without any latency would leave. Three properties:
+//!
+//! - such a trace has no breach, at a bound of 0;
+//! - nor has it when the oldest events of some cores are lost;
+//! - with one lie in it, it has a breach.
+//!
+//! More or other sets: `TRACES=100000 TRACE_SEED=7 cargo test -p tool --test
+//! trace_of_virtual_time`.
+
+mod lies;
+#[path = "../../../../sched-dag/tests/support/random.rs"]
+mod random;
+mod recorder;
+#[allow(dead_code, reason = "its own test uses all of it")]
+#[path = "../../../../sched-dag/tests/properties/set.rs"]
+mod set;
+
+use random::Random;
+use recorder::Recorder;
+use set::Overruns;
+use tool::trace::model::Run;
+use tool::trace::{check, read};
+
+fn number(variable: &str, default: u64) -> u64 {
+    let given = std::env::var(variable).ok();
+    given.map_or(default, |text| text.parse().expect("a whole number"))
+}
+
+/// Draws a set from each seed, runs it, and hands its trace on.
+fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, &Recorder)) {
+    let count = number("TRACES", count);
+    let first_seed = number("TRACE_SEED", 1);
+    println!("{count} sets from seed {first_seed} on");
+    for seed in (first_seed..).take(usize::try_from(count).expect("a count")) {
+        let mut random = Random::new(seed);
+        let overruns = match random.chance(50) {
+            true => Overruns::Often,
+            false => Overruns::Never,
+        };
+        let mut set = set::draw(&mut random, overruns);
+        for subtask in set.dags.iter_mut().flat_map(|dag| &mut dag.subtasks) {
+            for execution_ns in &mut subtask.executions_ns {
+                // An instance of no length has all its events in one instant.
+                *execution_ns *= u64::from(!random.chance(10));
+            }
+        }
+        let recorder = Recorder::run(&set);
+        with(seed, &mut random, &recorder);
+    }
+}
+
+/// Reads a log of one run.
+fn read_one(log: &str) -> Run {
+    let mut runs = read(log).unwrap_or_else(|fault| panic!("{fault}\n{log}"));
+    assert_eq!(runs.len(), 1);
+    runs.remove(0)
+}
+
+/// Fails if a run has a breach.
+fn assert_right(seed: u64, run: &Run, log: &str) {
+    let breaches = check(run, 0).breaches;
+    let texts: Vec<String> = breaches.iter().map(ToString::to_string).collect();
+    assert!(
+        texts.is_empty(),
+        "seed {seed}:\n{}\n{log}",
+        texts.join("\n")
+    );
+}
+
+#[test]
+fn a_right_trace_has_no_breach() {
+    let (mut preemptions, mut instances) = (0, 0);
+    for_each_trace(1000, |seed, _, recorder| {
+        let log = recorder.log();
+        let run = read_one(&log);
+        assert_right(seed, &run, &log);
+        let figures = check(&run, 0).figures;
+        assert_eq!(figures.finish_to_ready_max_ns, 0);
+        assert_eq!(figures.preemption.max_ns, 0);
+        assert_eq!(figures.longest_inversion_ns, 0);
+        preemptions += figures.preemptions;
+        instances += figures.instances;
+    });
+    // The sets were worth checking.
+    println!("{instances} instances, {preemptions} preemptions");
+    assert!(instances > 1000 && preemptions > 300);
+}
+
+#[test]
+fn a_right_trace_whose_oldest_events_are_lost_has_no_breach() {
+    for_each_trace(1000, |seed, random, recorder| {
+        let mut recorder = recorder.clone();
+        recorder.lose(random);
+        let log = recorder.log();
+        let run = read_one(&log);
+        if !run.events.is_empty() {
+            assert_right(seed, &run, &log);
+        }
+    });
+}
+
+#[test]
+fn a_trace_with_a_lie_has_a_breach() {
+    let mut told = vec![0; lies::LIES.len()];
+    for_each_trace(500, |seed, random, recorder| {
+        let log = recorder.log();
+        let truth = read_one(&log);
+        for (count, (name, lie)) in told.iter_mut().zip(lies::LIES) {
+            let mut run = truth.clone();
+            if !lie(&mut run, random) {
+                continue;
+            }
+            *count += 1;
+            lies::order(&mut run);
+            let findings = check(&run, 0);
+            assert!(
+                !findings.breaches.is_empty(),
+                "seed {seed}: `{name}` is not found\n{:#?}\n{log}",
+                run.events
+            );
+        }
+    });
+    for (count, (name, _)) in told.iter().zip(lies::LIES) {
+        println!("{name}: {count}");
+        assert!(*count > 50, "`{name}` was told {count} times only");
+    }
+}
