@@ -5,7 +5,7 @@
 //! tool itself is killed, so nothing is left behind in any case.
 
 use std::io;
-use std::process::{self, ChildStdin, Command, ExitStatus};
+use std::process::{self, ChildStdin, ChildStdout, Command, ExitStatus};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -69,6 +69,11 @@ impl Child {
     /// Takes the child's standard input, if that is a pipe and was not taken.
     pub fn input(&mut self) -> Option<ChildStdin> {
         self.process.stdin.take()
+    }
+
+    /// Takes what the child prints, if that is a pipe and was not taken.
+    pub fn output(&mut self) -> Option<ChildStdout> {
+        self.process.stdout.take()
     }
 
     /// Returns the time since the start.

@@ -1,5 +1,4 @@
-//! The host tool: one place that starts QEMU (besides `scripts/hot-path`, which logs
-//! instructions), one that reads the serial protocol.
+//! The host tool: one place that starts QEMU, one that reads the serial protocol.
 //!
 //! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is
 //! all it printed, lines for people and machine lines mixed. Its *ending* is

@@ -13,6 +13,7 @@
 //! is no place for another one.
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -56,18 +57,63 @@ impl Places {
         let Some(program) = system::find_program(self.program) else {
             return (!self.is_missed.replace(true)).then(|| missed(address, self.program));
         };
-        // `-i` names the inlined calls that contain the address, the innermost first,
-        // each in two lines (`-f`: function, file and line); `-C` makes names readable.
-        let output = Command::new(program)
-            .args(["-ifC", "-e"])
-            .arg(&self.image)
-            .arg(format!("{address:#x}"))
-            .stdin(Stdio::null())
-            .stderr(Stdio::null())
-            .output();
-        let output = output.ok().filter(|output| output.status.success())?;
-        Some(sentence(address, &String::from_utf8_lossy(&output.stdout)))
+        let frames = frames(&program, &self.image, &[address])?;
+        Some(sentence(address, frames.get(&address)?))
     }
+}
+
+/// A function that contains an address, called or inlined there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// The function, `??` if it is not known.
+    pub function: String,
+    /// File and line, as `FILE:LINE`; `?` or 0 for a line that is not known.
+    pub line: String,
+}
+
+/// Returns what contains each of the addresses in an image, the innermost first, as
+/// `addr2line` (`program`) tells; nothing if it fails.
+#[must_use]
+pub fn frames(
+    program: &Path,
+    image: &Path,
+    addresses: &[u64],
+) -> Option<BTreeMap<u64, Vec<Frame>>> {
+    // `-a` repeats each address; `-i` names the inlined calls that contain it, each in two
+    // lines (`-f`: function, file and line); `-C` makes names readable.
+    let output = Command::new(program)
+        .args(["-aifC", "-e"])
+        .arg(image)
+        .args(addresses.iter().map(|address| format!("{address:#x}")))
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .output();
+    let output = output.ok().filter(|output| output.status.success())?;
+    Some(read_frames(&String::from_utf8_lossy(&output.stdout)))
+}
+
+fn read_frames(found: &str) -> BTreeMap<u64, Vec<Frame>> {
+    let mut all = BTreeMap::new();
+    let mut lines = found.lines();
+    let mut frames: &mut Vec<Frame> = &mut Vec::new();
+    while let Some(line) = lines.next() {
+        let digits = line.strip_prefix("0x").filter(|digits| digits.len() == 16);
+        if let Some(address) = digits.and_then(|digits| u64::from_str_radix(digits, 16).ok()) {
+            frames = all.entry(address).or_default();
+            continue;
+        }
+        // ` (discriminator 2)` after the line tells copies of it apart; a path may have spaces.
+        let place = lines.next().unwrap_or("??:?");
+        frames.push(Frame {
+            function: line.into(),
+            line: place
+                .split(" (discriminator ")
+                .next()
+                .unwrap_or(place)
+                .into(),
+        });
+    }
+    all
 }
 
 /// Returns the address at which a line says that something happened.
@@ -87,22 +133,19 @@ fn missed(address: u64, program: &str) -> String {
 }
 
 /// Says in our words what the program has found.
-fn sentence(address: u64, found: &str) -> String {
-    let function = found.lines().next().unwrap_or("??");
+fn sentence(address: u64, frames: &[Frame]) -> String {
+    let function = frames.first().map_or("??", |frame| &frame.function);
     if function == "??" {
         return format!("{address:#x} is in no function of the image");
     }
-    let lines = found.lines().skip(1).step_by(2);
-    let line = lines.filter_map(line_of_app).next();
+    let line = frames.iter().find_map(line_of_app);
     let line = line.map_or_else(String::new, |line| format!(", of {line}"));
     format!("{address:#x} is {function}{line}")
 }
 
 /// Returns a file and line from the workspace on, if it is the app's.
-fn line_of_app(place: &str) -> Option<&str> {
-    // ` (discriminator 2)` after the line tells copies of it apart; a path may have spaces.
-    let place = place.split(" (discriminator ").next()?;
-    let path = place.strip_prefix(system::workspace().to_str()?)?;
+fn line_of_app(frame: &Frame) -> Option<&str> {
+    let path = frame.line.strip_prefix(system::workspace().to_str()?)?;
     let path = path.strip_prefix('/')?;
     let is_known = !path.ends_with(":?") && !path.ends_with(":0");
     (is_known && !OF_OTHERS.iter().any(|of| path.starts_with(of))).then_some(path)
@@ -110,7 +153,7 @@ fn line_of_app(place: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Places, sentence};
+    use super::{Places, read_frames, sentence};
     use crate::system::workspace;
     use std::fs;
     use std::path::Path;
@@ -178,7 +221,7 @@ mod tests {
     fn the_innermost_line_of_the_app_is_chosen() {
         let root = workspace().display();
         let found = format!(
-            "<fass::subtask::Turns as core::future::Future>::poll\n\
+            "0x000000000020e0b8\n<fass::subtask::Turns as core::future::Future>::poll\n\
              /rustc/59807616e1fa/library/core/src/hint.rs:491\n\
              {{closure#0}}\n{root}/apps/vision/src/lib.rs:?\n\
              edges\n{root}/apps/my vision/src/lib.rs:7 (discriminator 2)\n\
@@ -186,12 +229,15 @@ mod tests {
              poll\n{root}/fass/src/run/subtask.rs:81\n"
         );
         assert_eq!(
-            sentence(0x20_e0b8, &found),
+            sentence(0x20_e0b8, &read_frames(&found)[&0x20_e0b8]),
             "0x20e0b8 is <fass::subtask::Turns as core::future::Future>::poll, \
              of apps/my vision/src/lib.rs:7"
         );
-        let label = "interrupt_common\nfaults.2b61-cgu.0:?\n";
-        assert_eq!(sentence(0x20_70e9, label), "0x2070e9 is interrupt_common");
+        let label = "0x00000000002070e9\ninterrupt_common\nfaults.2b61-cgu.0:?\n";
+        assert_eq!(
+            sentence(0x20_70e9, &read_frames(label)[&0x20_70e9]),
+            "0x2070e9 is interrupt_common"
+        );
     }
 
     #[test]

@@ -17,6 +17,7 @@ use std::ffi::OsString;
 use std::fmt;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use boot::MOST_COMMAND_LINE_BYTES;
 
@@ -162,6 +163,8 @@ pub struct Qemu {
     pub module: Option<PathBuf>,
     /// Hand what is written to [`Running::input`] to the guest's serial port.
     pub has_input: bool,
+    /// Write the address of each instruction that is executed to [`Running::log`].
+    pub logs_instructions: bool,
     /// Wait for a debugger on TCP port 1234 before the first instruction.
     pub wait_for_debugger: bool,
 }
@@ -178,6 +181,7 @@ impl Default for Qemu {
             guest_words: String::new(),
             module: None,
             has_input: false,
+            logs_instructions: false,
             wait_for_debugger: false,
         }
     }
@@ -249,9 +253,31 @@ impl Qemu {
             format!("there is no program `{name}`; install QEMU or name another")
         })?;
         let mut command = crate::child::bound_to_us(&program);
-        command.args(self.arguments(image, serial));
-        Running::start(command, serial, self.has_input)
+        let mut arguments = self.arguments(image, serial);
+        if self.logs_instructions {
+            log_instructions(&program, &mut arguments);
+        }
+        command.args(arguments);
+        Running::start(command, serial, self.has_input, self.logs_instructions)
     }
+}
+
+/// Makes QEMU translate, and so log, each instruction by itself. From version 8.1 on
+/// that is an option of the accelerator.
+fn log_instructions(program: &Path, arguments: &mut Vec<OsString>) {
+    let said = Command::new(program).arg("--version").output();
+    let said = said.map_or_else(|_| Vec::new(), |output| output.stdout);
+    let said = String::from_utf8_lossy(&said);
+    let version = said.split_once("version ").map_or("", |(_, rest)| rest);
+    let mut numbers = version.split(|c: char| !c.is_ascii_digit());
+    let mut number = || numbers.next()?.parse::<u32>().ok();
+    if (number(), number()) >= (Some(8), Some(1)) {
+        let accelerators = arguments.iter_mut().filter(|word| *word == "tcg");
+        accelerators.for_each(|word| word.push(",one-insn-per-tb=on"));
+    } else {
+        arguments.push("-singlestep".into());
+    }
+    arguments.extend(["-d", "exec,nochain", "-D", "/dev/stdout"].map(OsString::from));
 }
 
 fn with_doubled_commas(path: &Path) -> OsString {

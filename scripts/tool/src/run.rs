@@ -257,6 +257,7 @@ fn describe(
         guest_words: words.join(" "),
         module: dags.and_then(|dags| dags.module.clone()),
         has_input: options.is_given("console"),
+        logs_instructions: false,
         wait_for_debugger: options.is_given("gdb"),
     }
 }

@@ -165,32 +165,6 @@ fn that_another_command_builds_is_said() {
 }
 
 #[test]
-fn the_hot_paths_script_refuses_before_the_work() {
-    for (words, said) in [
-        ("--app x", "unknown option `--app`; see"),
-        (
-            "--append=a --append=b",
-            "option `--append` stands twice; give it once; see",
-        ),
-        (
-            "--listing /none/x",
-            "`--listing /none/x`: cannot be written: No such file",
-        ),
-        (
-            "--listing /tmp",
-            "`--listing /tmp`: cannot be written: Is a directory",
-        ),
-    ] {
-        let mut command = Command::new(workspace().join("scripts/hot-path"));
-        let output = command.args(words.split(' ')).output();
-        let output = output.expect("the script can be started");
-        let found = String::from_utf8(output.stderr).expect("UTF-8");
-        assert_eq!(output.status.code(), Some(2), "{found}");
-        assert!(found.starts_with(&format!("hot-path: {said}")), "{found}");
-    }
-}
-
-#[test]
 fn what_cannot_be_written_is_1_and_said() {
     let demo = workspace().join("apps/dag-file/examples/demo.dag");
     let cases = workspace().join("tests/oracle/synchronizer.txt");

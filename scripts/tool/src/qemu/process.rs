@@ -12,7 +12,7 @@ use std::ffi::OsString;
 use std::fmt;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{ChildStdin, Command, ExitStatus, Stdio};
+use std::process::{ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use crate::child::{Child, Waited};
@@ -95,6 +95,7 @@ impl Running {
         mut command: Command,
         serial: &Path,
         has_input: bool,
+        has_log: bool,
     ) -> Result<Running, String> {
         let file_error = |path: &Path| {
             let path = path.display().to_string();
@@ -112,7 +113,11 @@ impl Running {
             } else {
                 Stdio::null()
             })
-            .stdout(Stdio::null())
+            .stdout(if has_log {
+                Stdio::piped()
+            } else {
+                Stdio::null()
+            })
             .stderr(errors);
         let child = Child::start(&mut command)
             .map_err(|error| format!("cannot start QEMU: {error}; is it for this machine?"))?;
@@ -149,6 +154,11 @@ impl Running {
     /// Takes the way to the guest's serial port, if it has one and it was not taken.
     pub fn input(&mut self) -> Option<ChildStdin> {
         self.child.input()
+    }
+
+    /// Takes the log of instructions, if there is one and it was not taken.
+    pub fn log(&mut self) -> Option<ChildStdout> {
+        self.child.output()
     }
 
     /// Returns the time since the start.

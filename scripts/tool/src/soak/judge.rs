@@ -1,14 +1,13 @@
-//! Judging one boot: the guest's own checks, and its trace.
+//! Judging one boot by the guest's own checks.
 //!
-//! A round passes if the guest says so, in its line of kind `soak`, and if the
-//! round's trace is whole and breaks no rule. A round that left no line has
-//! failed: a boot that ends early fails for all rounds that are missing.
+//! A round passes if the guest says so, in its line of kind `soak`, and if `trace` finds
+//! no fault with its trace. A round that left no line has failed: a boot that ends early
+//! fails for all rounds that are missing.
 
 use std::collections::BTreeMap;
 
 use super::figures::Figures;
 use super::plan::Boot;
-use super::trace;
 use crate::outcome::Outcome;
 use crate::protocol::MachineLine;
 
@@ -28,8 +27,8 @@ impl Judged {
     }
 }
 
-/// Judges a boot. Nothing may wait longer than `bound_ns` for what it is owed.
-pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64) -> Judged {
+/// Judges a boot by its lines and its end.
+pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome) -> Judged {
     let mut judged = Judged::default();
     let mut rounds = boot.first..boot.first + boot.rounds;
     for line in outcome.transcript.of_kind("soak") {
@@ -52,7 +51,6 @@ pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64) -> Judged
     if let Some(reason) = ending.filter(|_| judged.failures.is_empty()) {
         judged.fail(boot.first, reason);
     }
-    trace::judge(boot, outcome, bound_ns, &mut judged);
     judged
 }
 

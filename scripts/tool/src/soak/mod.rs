@@ -120,7 +120,8 @@ fn run_boot(plan: &Plan, boot: &Boot<'_>, image: &Path) -> Result<Judged, String
         ..Qemu::default()
     };
     let outcome: Outcome = outcome::boot(&qemu, image, &log, limit(plan, boot), |_| {})?;
-    let mut judged = judge(boot, &outcome, plan.bound_ns);
+    let mut judged = judge(boot, &outcome);
+    trace::judge(boot, &outcome, plan.bound_ns, &mut judged);
     if judged.failures.is_empty() {
         let _ = fs::remove_file(&log);
     } else {

@@ -12,7 +12,8 @@ use crate::trace::{check, read};
 /// How many breaches of a round are told in words.
 const SHOWN: usize = 5;
 
-/// Judges the traces of all rounds that have left one.
+/// Judges the traces of all rounds that have left one, in which nothing may wait longer
+/// than `bound_ns` for what it is owed.
 pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64, judged: &mut Judged) {
     let runs = match read(&outcome.serial) {
         Ok(runs) => runs,

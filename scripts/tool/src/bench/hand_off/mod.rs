@@ -8,10 +8,12 @@
 //! - `table`, `plan`: what is to be measured;
 //! - `figure`, `baseline`: what was, and what it was before;
 //! - `traced`: what only the trace can tell;
-//! - `report`, `scale`: the tables.
+//! - `report`, `scale`: the tables;
+//! - `listing`: one hop, instruction by instruction.
 
 mod baseline;
 mod figure;
+mod listing;
 mod plan;
 mod report;
 mod scale;
@@ -71,6 +73,9 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
         return measure_scale(scale).map(|()| true);
     }
     let image = image::build("hand-off").map_err(|error| error.to_string())?;
+    if let Some((boot, file)) = &plan.listing {
+        return listing::list(boot, &image.path, file).map(|()| true);
+    }
     let mut measured = Vec::new();
     for mode in modes(plan, &image.path)? {
         let figures = measure_mode(plan, mode, &image.path)?;

@@ -36,6 +36,8 @@ pub(super) struct Plan {
     pub(super) boots: Vec<Boot>,
     /// Numbers of cores and of subtasks to count the cost of, instead.
     pub(super) scale: Option<Scale>,
+    /// What to log instead, instruction by instruction, and where to write it.
+    pub(super) listing: Option<(Boot, PathBuf)>,
     /// The figures of the baseline, if they are to be compared.
     pub(super) before: Option<Vec<Figure>>,
     pub(super) saves: bool,
@@ -100,37 +102,44 @@ impl Plan {
             || system::workspace().join("tests/baselines/hand-off.json"),
             PathBuf::from,
         );
-        if saves.is_some() {
-            let output = Named {
-                option: "baseline",
-                path: &baseline,
-            };
-            files::check(&[], &[output])?;
+        let listing = options.path("listing").map(PathBuf::from);
+        let outputs = [
+            ("baseline", saves.map(|_| &baseline)),
+            ("listing", listing.as_ref()),
+        ];
+        for (option, path) in outputs {
+            if let Some(path) = path {
+                files::check(&[], &[Named { option, path }])?;
+            }
         }
         let scale = options.is_given("scale").then(|| Scale::new(options));
-        let (idle, reason) = if scale.is_some() {
-            let others = ["compare", "save-baseline", "baseline", "mode", "append"];
-            let idle = others
-                .iter()
-                .chain(SIZES.iter().filter(|size| **size != "jobs"));
-            let idle: Vec<&str> = idle.copied().collect();
+        let others = ["compare", "save-baseline", "baseline", "mode"];
+        let others = others.iter().chain(SIZES);
+        let (idle, reason): (Vec<&str>, _) = if listing.is_some() {
+            let others = others.chain(&["scale", "cores", "subtasks"]);
             (
-                idle,
-                "it counts instructions at sizes of its own, for no baseline",
+                others.copied().filter(|name| *name != "append").collect(),
+                "with `--listing`: it logs a run of its own",
+            )
+        } else if scale.is_some() {
+            (
+                others.copied().filter(|name| *name != "jobs").collect(),
+                "with `--scale`: it counts instructions at sizes of its own, for no baseline",
             )
         } else {
-            (vec!["cores", "subtasks"], "these are sizes for `--scale`")
+            (
+                vec!["cores", "subtasks"],
+                "without `--scale`: these are sizes for it",
+            )
         };
         if let Some(name) = idle.iter().find(|name| options.is_given(name)) {
-            let with = if scale.is_some() { "with" } else { "without" };
-            return Err(format!(
-                "`--{name}` {with} `--scale`: {reason}; leave `--{name}` out"
-            ));
+            return Err(format!("`--{name}` {reason}; leave `--{name}` out"));
         }
         Ok(Plan {
             mode,
             scale,
             boots: boots(options),
+            listing: listing.map(|file| (Boot::of_listing(options), file)),
             before: match compares {
                 Some(_) => Some(baseline::read(&baseline)?),
                 None => None,
@@ -178,6 +187,15 @@ impl Boot {
         }
     }
 
+    /// Returns the boot whose hops are logged: a chain, and few jobs, as a log is long.
+    fn of_listing(options: &Parsed) -> Boot {
+        let sizes = format!(
+            "chain=64 branches=1 layered=3 {}",
+            options.text("append").unwrap_or_default()
+        );
+        Boot::of_scale(1, 5, 64, &sizes)
+    }
+
     /// Returns the machine for this boot.
     pub(super) fn qemu(&self, mode: Mode) -> Qemu {
         Qemu {
@@ -216,6 +234,9 @@ mod tests {
         assert!(refused("--scale --compare").contains("leave `--compare` out"));
         assert!(refused("--scale --chain 5").contains("leave `--chain` out"));
         assert!(refused("--cores 5").contains("without `--scale`"));
+        assert!(refused("--listing x --chain 5").contains("leave `--chain` out"));
+        assert!(refused("--listing x --scale").contains("a run of its own"));
+        assert!(refused("--listing /none/x").contains("cannot be written"));
         assert!(refused("--scale --cores 2,2").contains("`2` stands twice"));
         assert!(refused("--baseline x").contains("without `--compare`"));
         let missing = refused("--compare --baseline /none/x --mode deterministic");
@@ -223,5 +244,6 @@ mod tests {
         let unwritable = refused("--save-baseline --baseline /none/x --mode deterministic");
         assert!(unwritable.contains("cannot be written"), "{unwritable}");
         assert!(plan("--scale --cores 5 --jobs 9").is_ok());
+        assert!(plan("--listing /dev/null --append trace_events=0").is_ok());
     }
 }

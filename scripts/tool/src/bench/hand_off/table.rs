@@ -73,6 +73,12 @@ pub(super) static TABLE: Command = Command {
         )
         .or("10,100,1000,10000"),
         Opt::new(
+            "listing",
+            Takes::File("FILE"),
+            "Instead, log each instruction of one hop, count them by parts of the code, and \
+             write them to FILE. Needs objdump and addr2line (binutils).",
+        ),
+        Opt::new(
             "append",
             Takes::Text("WORDS"),
             "More words for the guest's command line, such as trace_events=0.",

@@ -1,0 +1,261 @@
+//! The instructions of one hop: from one subtask's call to its successor's.
+//!
+//! A chain of 64 empty bodies is booted with every instruction logged. The log is cut at
+//! the calls of subtasks' functions, which are where `Body::run` of `fass` polls a future.
+//! A *hop* is what lies between two of them; told is the one whose length occurs most
+//! often. Each of its instructions belongs to a *step* of the way: of the functions that it
+//! was inlined from, the innermost that is in a file of ours decides.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::plan::Boot;
+use crate::places::{self, Frame};
+use crate::qemu::{Ending, Mode};
+use crate::{protocol::Status, system};
+
+/// The steps of the way, by a part of the file's or the function's name; the first that
+/// fits counts.
+const STEPS: [(&str, &[&str]); 11] = [
+    (
+        "clock: three readings",
+        &["machine/clock.rs", "time_stamp", "rdtsc"],
+    ),
+    (
+        "interrupts off and on",
+        &["machine/cpu.rs", "interrupts_off.rs"],
+    ),
+    ("the lock", &["spinlock.rs"]),
+    (
+        "journal: finish, ready, start",
+        &["kernel/src/run/journal/", "sched-dag/src/journal/"],
+    ),
+    ("body: inputs, call, outputs", &["fass/src/", "poll_fn.rs"]),
+    (
+        "scheduler: completion, join, line",
+        &["sched-dag/src/scheduler/"],
+    ),
+    ("places of bodies", &["execution/placement.rs"]),
+    (
+        "budget and alarm",
+        &[
+            "execution/runner.rs",
+            "machine/timer.rs",
+            "machine/context.rs",
+        ],
+    ),
+    ("execution: the rest", &["kernel/src/run/execution/"]),
+    ("worker's loop", &["kernel/src/run/worker.rs"]),
+    ("the app's function", &["apps/"]),
+];
+
+/// Everything in the image that contains an address, the innermost first.
+type Frames = BTreeMap<u64, Vec<Frame>>;
+
+/// Boots, prints how many instructions each step takes, and writes all of them to a file.
+///
+/// # Errors
+///
+/// In words: a program is missing, the guest failed, or the file cannot be written.
+pub(super) fn list(boot: &Boot, image: &Path, file: &Path) -> Result<(), String> {
+    let [objdump, addr2line] = ["objdump", "addr2line"].map(program);
+    let (objdump, addr2line) = (objdump?, addr2line?);
+    let executed = executed(boot, image)?;
+    let instructions = instructions(&objdump, image)?;
+    let frames = |addresses: BTreeSet<u64>| {
+        let addresses: Vec<u64> = addresses.into_iter().collect();
+        places::frames(&addr2line, image, &addresses)
+            .ok_or_else(|| format!("`{}` failed", addr2line.display()))
+    };
+    let is_call = |address: &u64| {
+        let text = instructions.get(address);
+        text.is_some_and(|text| text.starts_with("call") && text.contains('*'))
+    };
+    let call = the_call(&frames(executed.iter().copied().filter(is_call).collect())?)?;
+    let hop = usual_hop(&executed, call).ok_or("no subtask's call is in the log")?;
+    let frames = frames(hop.iter().copied().collect())?;
+    print!("{}", table(hop, &frames));
+    let listing = listing(hop, &frames, &instructions);
+    fs::write(file, listing).map_err(|error| format!("`{}`: {error}", file.display()))
+}
+
+fn program(name: &str) -> Result<PathBuf, String> {
+    let missing = || format!("`{name}` is not installed; install the package binutils");
+    system::find_program(name).ok_or_else(missing)
+}
+
+/// Boots the image and returns the addresses of all instructions that it executes.
+fn executed(boot: &Boot, image: &Path) -> Result<Vec<u64>, String> {
+    let mut qemu = boot.qemu(Mode::Deterministic);
+    qemu.logs_instructions = true;
+    let serial = system::new_log("listing")?;
+    let mut running = qemu.start(image, &serial)?;
+    let log = running.log();
+    let (ending, addresses) = std::thread::scope(|scope| {
+        let reader =
+            scope.spawn(|| log.map_or_else(Vec::new, |log| addresses(BufReader::new(log))));
+        let ending = running.wait(super::LIMIT, || ());
+        (ending, reader.join().unwrap_or_default())
+    });
+    if ending != Ending::Guest(Status::Success) {
+        let (said, log) = (running.complaints(), serial.display());
+        return Err(format!("{ending} {said}; its serial log is {log}"));
+    }
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_file(&serial);
+    Ok(addresses)
+}
+
+/// Reads QEMU's log, of which a line has the address between slashes, in 16 digits.
+fn addresses(mut log: impl BufRead) -> Vec<u64> {
+    let mut addresses = Vec::new();
+    let mut line = Vec::new();
+    while log
+        .read_until(b'\n', &mut line)
+        .is_ok_and(|bytes| bytes > 0)
+    {
+        let parts = line.split(|byte| *byte == b'/');
+        let numbers = parts.filter(|part| part.len() == 16).filter_map(|part| {
+            let digits = std::str::from_utf8(part).ok()?;
+            u64::from_str_radix(digits, 16).ok()
+        });
+        addresses.extend(numbers.take(1));
+        line.clear();
+    }
+    addresses
+}
+
+/// Returns the instructions of the image by their addresses.
+fn instructions(objdump: &Path, image: &Path) -> Result<BTreeMap<u64, String>, String> {
+    let output = Command::new(objdump)
+        .args(["-d", "-C", "--no-show-raw-insn"])
+        .arg(image)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| format!("`{}`: {error}", objdump.display()))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let instruction = |line: &str| {
+        let (address, text) = line.trim().split_once(":\t")?;
+        Some((u64::from_str_radix(address, 16).ok()?, text.to_string()))
+    };
+    Ok(text.lines().filter_map(instruction).collect())
+}
+
+/// Returns where subtasks' futures are polled: the one indirect call of `plan.rs` that was
+/// executed, whatever it is inlined into.
+fn the_call(calls: &Frames) -> Result<u64, String> {
+    let is_poll = |frames: &Vec<Frame>| {
+        let line = frames.first().map_or("", |frame| &frame.line);
+        line.contains("fass/src/") && line.contains("plan.rs")
+    };
+    let polls: Vec<u64> = (calls.iter().filter(|(_, frames)| is_poll(frames)))
+        .map(|(address, _)| *address)
+        .collect();
+    match polls[..] {
+        [call] => Ok(call),
+        _ => Err(format!(
+            "{} calls of subtasks' futures instead of one are in the log",
+            polls.len()
+        )),
+    }
+}
+
+/// Returns the first hop of the length that occurs most often.
+fn usual_hop(executed: &[u64], call: u64) -> Option<&[u64]> {
+    let calls = (0..executed.len()).filter(|&at| executed[at] == call);
+    let calls: Vec<usize> = calls.collect();
+    let hops: Vec<&[u64]> = calls
+        .windows(2)
+        .map(|pair| &executed[pair[0]..pair[1]])
+        .collect();
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    for hop in &hops {
+        *counts.entry(hop.len()).or_default() += 1;
+    }
+    let usual = counts.into_iter().max_by_key(|&(_, count)| count)?.0;
+    hops.into_iter().find(|hop| hop.len() == usual)
+}
+
+fn step(frames: &[Frame]) -> &'static str {
+    let step_of = |frame: &Frame| {
+        let names = [&frame.line, &frame.function];
+        let is_in = |part: &str| names.iter().any(|name| name.contains(part));
+        let step = STEPS
+            .iter()
+            .find(|(_, parts)| parts.iter().any(|part| is_in(part)));
+        step.map(|(step, _)| *step)
+    };
+    frames.iter().find_map(step_of).unwrap_or("elsewhere")
+}
+
+fn table(hop: &[u64], frames: &Frames) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for address in hop {
+        *counts.entry(step(&frames[address])).or_default() += 1;
+    }
+    let mut counts: Vec<_> = counts.into_iter().collect();
+    counts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
+    counts.push((
+        "instructions from one subtask's call to its successor's",
+        hop.len(),
+    ));
+    let row = |(step, count): (&str, usize)| format!("{count:6} {step}\n");
+    counts.into_iter().map(row).collect()
+}
+
+/// Returns the hop, an instruction a line: address, text, step, and its innermost line of ours.
+fn listing(hop: &[u64], frames: &Frames, instructions: &BTreeMap<u64, String>) -> String {
+    let root = format!("{}/", system::workspace().display());
+    let mut text = String::new();
+    for address in hop {
+        let frames = &frames[address];
+        let ours = frames.iter().find(|frame| frame.line.starts_with(&root));
+        let place = ours.or(frames.first()).map_or_else(
+            || "?".into(),
+            |Frame { function, line }| format!("{}: {function}", line.trim_start_matches(&root)),
+        );
+        let instruction = instructions.get(address).map_or("?", |text| text);
+        let step = step(frames);
+        // Writing into a text cannot fail.
+        let _ = writeln!(text, "{address:x}  {instruction:60} {step}; {place}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{addresses, step, usual_hop};
+    use crate::places::Frame;
+
+    #[test]
+    fn an_address_is_read_from_each_line_that_has_one() {
+        let log = "Trace 0: 0x7f0001 [0000000000000000/0000000000204a10/0x40c0b0/0xff]\nother\n";
+        assert_eq!(addresses(log.as_bytes()), [0x20_4a10]);
+    }
+
+    #[test]
+    fn the_usual_hop_is_the_first_of_the_commonest_length() {
+        let executed = [9, 1, 2, 3, 1, 4, 1, 5, 1];
+        assert_eq!(usual_hop(&executed, 1), Some(&[1, 4][..]));
+        assert_eq!(usual_hop(&executed, 7), None);
+    }
+
+    #[test]
+    fn the_innermost_file_of_ours_decides() {
+        let frame = |line: &str| Frame {
+            function: "f".into(),
+            line: line.into(),
+        };
+        let inlined = [
+            "/rustc/x/core/src/ptr.rs:1",
+            "/w/kernel/src/machine/spinlock.rs:3",
+            "/w/kernel/src/run/worker.rs:4",
+        ];
+        assert_eq!(step(&inlined.map(frame)), "the lock");
+        assert_eq!(step(&[]), "elsewhere");
+    }
+}
