@@ -2,8 +2,9 @@
 //!
 //! A crate's folders (and single files) right below `src` are its *layers*. The page
 //! docs/architecture.md lists them from top to bottom, and nowhere else are they listed; a
-//! layer may name those that stand after it. Below that, no file may lead back to itself
-//! through files that name each other, but for a file and those it contains.
+//! layer may name those that stand after it. A folder may have a row of its own, which
+//! orders what is right below it. Everywhere, no file may lead back to itself through files
+//! that name each other, but for a file and those it contains.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -15,7 +16,8 @@ use crate::system;
 const PAGE: &str = "docs/architecture.md";
 const HEADING: &str = "## Layers inside the crates";
 
-/// A row of the table: the folder of a crate's sources, and its layers from top to bottom.
+/// A row of the table: the folder of a crate's sources, or one in it, and the layers there
+/// from top to bottom.
 #[derive(Debug, PartialEq, Eq)]
 struct Row {
     src: String,
@@ -32,16 +34,20 @@ pub(super) fn check() -> Result<(), String> {
     }
     let mut faults = Vec::new();
     for row in &rows {
-        let names = imports::read(&system::workspace().join(&row.src))?;
+        let (src, folder) = match row.src.split_once("/src/") {
+            Some((above, folder)) => (format!("{above}/src"), folder),
+            None => (row.src.clone(), ""),
+        };
+        let names = imports::read(&system::workspace().join(&src))?;
+        if folder.is_empty() {
+            for circle in circles(&names) {
+                let files = circle.join(", ");
+                faults.push(format!("{src}: {files} name each other in a circle"));
+            }
+        }
+        let names = within(folder, &names);
         faults.extend(strangers(row, &names));
         faults.extend(upward(row, &names));
-        faults.extend(circles(&names).map(|circle| {
-            format!(
-                "{}: {} name each other in a circle",
-                row.src,
-                circle.join(", ")
-            )
-        }));
     }
     if faults.is_empty() {
         return Ok(());
@@ -71,7 +77,21 @@ fn rows(page: &str) -> Vec<Row> {
     section.lines().filter_map(row).collect()
 }
 
-/// Layers that only the table or only the crate has.
+/// What the files of a folder name of each other, by their paths from there.
+fn within(folder: &str, names: &Names) -> Names {
+    let above: Vec<&str> = folder.split_terminator('/').collect();
+    let inside = |module: &Module| {
+        let is_inside =
+            module.len() >= above.len() && module.iter().zip(&above).all(|(a, b)| a == b);
+        is_inside.then(|| module[above.len()..].to_vec())
+    };
+    let files = names.iter().filter_map(|(module, named)| {
+        Some((inside(module)?, named.iter().filter_map(inside).collect()))
+    });
+    files.collect()
+}
+
+/// Layers that only the table or only the folder has.
 fn strangers(row: &Row, names: &Names) -> Vec<String> {
     let there: BTreeSet<&String> = names.keys().filter_map(|module| module.first()).collect();
     let listed: BTreeSet<&String> = row.layers.iter().collect();
@@ -150,7 +170,7 @@ fn reached_from<'n>(module: &'n Module, names: &'n Names) -> BTreeSet<&'n Module
 
 #[cfg(test)]
 mod tests {
-    use super::{HEADING, Names, Row, circles, rows, strangers, upward};
+    use super::{HEADING, Names, Row, circles, rows, strangers, upward, within};
 
     fn module(path: &str) -> Vec<String> {
         path.split('/').map(String::from).collect()
@@ -180,6 +200,19 @@ mod tests {
         assert_eq!(upward(&row, &names(&[("top/a", "low")])), [""; 0]);
         assert_eq!(
             upward(&row, &names(&[("low/b", "top/a")])),
+            ["x/src/low/b names `top::a`, a layer above its own"]
+        );
+    }
+
+    #[test]
+    fn a_folder_has_an_order_of_its_own() {
+        let all = names(&[
+            ("x/top/a", "low"),
+            ("x/low/b", "x/top/a"),
+            ("x/low/b", "top"),
+        ]);
+        assert_eq!(
+            upward(&row(), &within("x", &all)),
             ["x/src/low/b names `top::a`, a layer above its own"]
         );
     }
