@@ -3,7 +3,7 @@
 //! A bound holds as long as no instance takes longer than its WCET, and the machine no
 //! longer than the overheads that the commit was told. So a job that took longer shows
 //! that something was stated too small, and that what the commit has proven is not so:
-//! such a run is no success, whatever its deadlines. An app whose WCETs are not meant
+//! such a run is no success, even if it meets its deadlines. An app whose WCETs are not meant
 //! for this machine says so
 //! ([`Machine::accept_exceeded_bounds`](crate::Machine::accept_exceeded_bounds)).
 //!

@@ -30,7 +30,7 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// Lets a complaint of the kernel's be the ending of an app that ends well, or as a
+    /// Returns a complaint of the kernel's as the ending of an app that ends well, or as a
     /// person wants it. The app's own error takes precedence.
     pub(crate) fn or_complaint(
         result: Result<(), Self>,

@@ -5,7 +5,7 @@
 //! several cores change one state.
 //!
 //! The holder is not preempted, or else it would block every core that wants the lock.
-//! So a section delays whatever its core should do next: keep it short. One that takes
+//! So a section delays all that its core should do next: keep it short. One that takes
 //! longer than 1 ms is preempted all the same.
 //!
 //! A fault in a section ends the holder's DAG, as anywhere, and the lock is lost with

@@ -34,7 +34,7 @@ use crate::watch::background::{Background, Wishes, session};
 /// fn app(machine: &Machine) -> Result<(), Ending> {
 ///     let jobs = machine.options().number("jobs", 1..=100_000, 100)?;
 ///     machine.options().finish(&["jobs"])?;
-///     // build DAGs of so many jobs and commit them
+///     // build DAGs with that number of jobs and commit them
 ///     let run = machine.run()?;
 ///     machine.report_memory();
 ///     println!("{} cores, {} allocations", machine.cores(), run.allocations());
@@ -86,7 +86,7 @@ impl Machine {
 
     /// Returns the file that the loader left in memory (`qemu -initrd FILE`), if
     /// there is one. It is not copied: memory and the boot's time are the same
-    /// whatever its size.
+    /// for files of any size.
     ///
     /// ```no_run
     /// fn size(machine: &kernel::Machine) -> usize {

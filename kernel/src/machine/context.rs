@@ -179,7 +179,7 @@ impl Context {
         self.is_background
     }
 
-    /// Lets what the context runs execute until `end_ns`, and no longer.
+    /// Sets the time at which the budget of what the context runs ends.
     pub(crate) fn set_budget_end(&self, end_ns: u64) {
         self.budget_end_ns.store(end_ns, Ordering::Relaxed);
     }
@@ -217,7 +217,7 @@ impl Context {
     }
 }
 
-/// A context that does not run. Whoever holds it may let it run.
+/// A context that does not run. Its owner may have it run.
 #[derive(Debug)]
 pub(crate) struct Parked(&'static Context);
 
@@ -249,8 +249,8 @@ impl Parked {
         })))
     }
 
-    /// Lets the context begin anew with `entry`, on an empty stack, when it next runs.
-    /// Whatever it did before is forgotten.
+    /// Has the context begin anew with `entry`, on an empty stack, when it next runs.
+    /// All that it did before is forgotten.
     pub(crate) fn restart(&mut self, entry: extern "C" fn() -> !) {
         let registers = Registers {
             rip: entry as *const () as u64,

@@ -55,7 +55,7 @@ pub(crate) fn enable() {
 }
 
 /// Returns [`GRACE_NS`] after `at_ns`, the time for which this core's timer was
-/// armed; at once if that is past, or if the timer is early. Lets all other cores have
+/// armed; at once if that is past, or if the timer is early. All other cores have
 /// a turn before.
 #[inline]
 pub(super) fn settle(at_ns: u64) {

@@ -1,4 +1,4 @@
-//! The end of the run: telling QEMU, or whoever runs the machine.
+//! The end of the run: telling QEMU, or another host.
 
 use super::{cpu, port};
 

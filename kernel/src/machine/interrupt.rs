@@ -1,6 +1,6 @@
 //! From an interrupt's vector to the function that handles it.
 //!
-//! The machine layer knows nothing of scheduling: whoever boots it [`install`]s
+//! The machine layer knows nothing of scheduling: the start of the kernel [`install`]s
 //! the functions to call. They run with interrupts disabled, on the core's
 //! handler stack, and may use locks but must not wait for anything else.
 
@@ -56,7 +56,7 @@ impl Interrupted {
         unsafe { (*registers).rip }
     }
 
-    /// Lets this core go on with `next` when the handler returns, and returns
+    /// Has this core go on with `next` when the handler returns, and returns
     /// the context that was interrupted.
     pub(crate) fn exchange(&mut self, next: Parked) -> Parked {
         // SAFETY: an `Interrupted` exists in handlers only.
@@ -125,7 +125,7 @@ extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
     this_core::get().context().registers()
 }
 
-/// Lets a core begin with its first context.
+/// Begins a core's first context.
 pub(crate) fn begin_work() -> ! {
     work()
 }

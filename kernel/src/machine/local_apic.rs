@@ -63,8 +63,8 @@ pub(crate) fn id() -> u8 {
 const SOFTWARE_ENABLE: u32 = 1 << 8;
 
 /// What turns a local APIC on, with only its timer unmasked. The software enable comes
-/// first: until then each entry of the local vector table stays masked, whatever is written
-/// to it (Intel SDM volume 3, 11.4.7.2), and so it is after an INIT.
+/// first: until then, and after an INIT, each entry of the local vector table stays masked,
+/// even if it is written (Intel SDM volume 3, 11.4.7.2).
 const TURN_ON: [(Register, u32); 7] = [
     (
         Register::SpuriousVector,

@@ -1,8 +1,8 @@
 //! The machine layer: everything that is particular to x86_64 and a PC.
 //!
 //! With `memory` and the `entry!` macro it is the only part of the kernel that
-//! contains `unsafe`. It names nothing above it: whoever uses it passes the
-//! functions that it shall call. Each module states the invariant that its
+//! contains `unsafe`. It names nothing above it: its users pass it the
+//! functions that it is to call. Each module states the invariant that its
 //! SAFETY comments cite.
 
 pub(crate) mod clock;

@@ -5,10 +5,10 @@
 //! app's: a fault is contained, a budget ends it. Only preemption is put off until the
 //! section ends, as a holder that were preempted would block every core that wants the
 //! lock. It is put off for [`LONGEST_NS`] at most: the section of a holder that never
-//! returns delays other instances so long, and no longer.
+//! returns delays other instances for that time, and no longer.
 //!
 //! **Holder invariant**: `holder` is null, or the context that alone touches `data`. It
-//! stays so for ever if that context is ended in its section.
+//! remains so for good if that context is ended in its section.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicPtr, Ordering};
@@ -79,7 +79,7 @@ impl<T> Guarded<T> {
     }
 }
 
-/// Lets nothing preempt the caller any more, for some time.
+/// Keeps the caller from being preempted, for [`LONGEST_NS`] at most.
 fn enter() -> &'static Context {
     let were_enabled = interrupt_flag::disable();
     let own = this_core::get().context();
@@ -90,7 +90,7 @@ fn enter() -> &'static Context {
     own
 }
 
-/// Ends what `enter` has begun, and lets happen what was put off.
+/// Ends what `enter` has begun, and does what was put off.
 fn leave(own: &Context) {
     let Sections { depth, put_off_ns } = own.sections();
     if depth.fetch_sub(1, Ordering::Relaxed) == 1 && put_off_ns.swap(0, Ordering::Relaxed) != 0 {

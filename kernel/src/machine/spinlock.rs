@@ -59,7 +59,7 @@ impl<T> SpinLock<T> {
         guard
     }
 
-    /// Does as [`lock`](Self::lock) where interrupts are disabled, and leaves them so.
+    /// Like [`lock`](Self::lock), where interrupts are disabled, and leaves them so.
     pub(crate) fn lock_uninterrupted(&self) -> SpinLockGuard<'_, T> {
         let ticket = self.next.fetch_add(1, Ordering::Relaxed);
         while self.serving.load(Ordering::Acquire) != ticket {

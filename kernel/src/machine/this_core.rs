@@ -71,7 +71,7 @@ pub(crate) struct Core {
     /// The time between two heartbeats of this core, 0 if it has none.
     pub(crate) heartbeat_ns: AtomicU64,
     interrupts_off: Meter,
-    /// What runs here, in the words of whoever sets it; for reports of panics.
+    /// What runs here, in two words that the layer above chooses; for reports of panics.
     pub(crate) running: [AtomicU64; 2],
 }
 
@@ -169,7 +169,7 @@ unsafe extern "C" {
     fn resume_context(registers: *mut Registers) -> !;
 }
 
-/// Lets this core go on with `next` when the current interrupt's handler
+/// Has this core go on with `next` when the current interrupt's handler
 /// returns, and returns the context that was interrupted.
 ///
 /// # Safety
@@ -182,8 +182,8 @@ pub(super) unsafe fn exchange_context(next: Parked) -> Parked {
     unsafe { Parked::from_context(last) }
 }
 
-/// Leaves the context that runs where it is, for ever, for `next`. Its stack is
-/// never used again, so whatever lies on it stays valid.
+/// Leaves the context that runs where it is, for good, for `next`. Its stack is
+/// never used again, so all that lies on it stays valid.
 pub(crate) fn abandon_context(next: Parked) -> ! {
     cpu::clear_interrupt_flag();
     let registers = next.registers();

@@ -101,8 +101,8 @@ pub(crate) fn join(core: &Core) {
     }
 }
 
-/// Lets this core take part no longer: it has nothing to compute. Its alarm is left as it
-/// is. Interrupts are disabled.
+/// Ends this core's part: it has nothing to compute. Its alarm is left as it is.
+/// Interrupts are disabled.
 #[inline]
 pub(crate) fn leave(core: &Core) {
     if is_enabled() {
@@ -110,7 +110,7 @@ pub(crate) fn leave(core: &Core) {
     }
 }
 
-/// Does as [`leave`], and sees to it that the core is not interrupted for a turn's end.
+/// Like [`leave`], and sees to it that the core is not interrupted for a turn's end.
 #[inline]
 pub(crate) fn rest(core: &Core) {
     if is_enabled() && core.part() != Part::None {
@@ -119,8 +119,8 @@ pub(crate) fn rest(core: &Core) {
     }
 }
 
-/// Lets an instance compute, on whatever core it then is: waits for a turn, and handles
-/// what interrupts come meanwhile. Interrupts are disabled before and after.
+/// Returns when the instance may compute, on any core: waits for a turn, and handles the
+/// interrupts that come meanwhile. Interrupts are disabled before and after.
 #[inline]
 pub(crate) fn enter() {
     if is_enabled() && !this_core::get().context().is_background() {
@@ -148,8 +148,8 @@ fn enter_in_turn() {
     }
 }
 
-/// Lets an instance compute that this core goes on with outside any interrupt: as soon as
-/// interrupts are enabled, it waits for its turn as after one.
+/// Like [`enter`], for an instance that this core goes on with outside any interrupt: as
+/// soon as interrupts are enabled, it waits for its turn as after one.
 #[inline]
 pub(crate) fn enter_by_interrupt(core: &Core) {
     if is_enabled() && core.part() == Part::Fresh {
@@ -157,7 +157,7 @@ pub(crate) fn enter_by_interrupt(core: &Core) {
     }
 }
 
-/// Does as [`leave`] for an instance that watches the clock. Interrupts are enabled.
+/// Like [`leave`], for an instance that watches the clock. Interrupts are enabled.
 pub(crate) fn stand_back() {
     if is_enabled() {
         interrupt_flag::disable_enabled();
@@ -166,7 +166,7 @@ pub(crate) fn stand_back() {
     }
 }
 
-/// Does as [`enter`] for that instance afterwards.
+/// Like [`enter`], for that instance afterwards.
 pub(crate) fn come_back() {
     if is_enabled() {
         interrupt_flag::disable_enabled();

@@ -19,12 +19,12 @@ impl Core {
         }
     }
 
-    /// Lets others know that this core watches `wake` from now on.
+    /// Tells the others that this core watches `wake` from now on.
     pub(crate) fn begin_watch(&self) {
         self.watches.store(true, Ordering::SeqCst);
     }
 
-    /// Lets others know that this core no longer watches `wake`.
+    /// Tells the others that this core no longer watches `wake`.
     pub(crate) fn end_watch(&self) {
         self.watches.store(false, Ordering::SeqCst);
     }

@@ -96,7 +96,7 @@ fn pages_of(module: Option<Module>) -> Range<u64> {
 /// Returns the number of the page that processors are to start at: the highest one of
 /// usable memory that they can reach from real mode, and that no module lies in.
 pub(crate) fn trampoline_page(map: &[MemoryRegion], modules: &[Module]) -> Option<u8> {
-    /// Here a PC's firmware and adapters begin, whatever the map says.
+    /// Here a PC's firmware and adapters begin, even where the map says otherwise.
     const END: u64 = 640 << 10;
     let is_free = |page: &Range<u64>| {
         let lies = |region: &MemoryRegion| {

@@ -1,4 +1,4 @@
-//! Signs of life: interrupts that a core takes now and then, whatever else is due.
+//! Signs of life: interrupts that a core takes now and then, also when nothing else is due.
 
 use core::sync::atomic::Ordering;
 

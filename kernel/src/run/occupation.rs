@@ -19,8 +19,8 @@ pub(crate) fn hold(ns: u64) {
         }
         turns::leave(core);
         timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
-        // If this is preempted it is here: it then goes round again, on whatever
-        // core it continues, and sets that core's alarm.
+        // If this is preempted it is here: it then goes round again, on the
+        // core where it continues, and sets that core's alarm.
         interrupt_flag::enable_and_halt();
     }
 }

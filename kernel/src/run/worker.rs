@@ -12,7 +12,7 @@ use crate::machine::{clock, cpu, interrupt_flag, turns};
 use crate::text::console;
 
 /// Runs what is assigned to the core that it is on, from one instance to the
-/// next, preempted now and then, on whatever core that may be. Returns the
+/// next, preempted now and then and resumed on any core. Returns the
 /// context that the core is to go on with instead, with interrupts disabled.
 pub(crate) fn work() -> Parked {
     interrupt_flag::disable();

@@ -1,7 +1,7 @@
 //! What happens on a core, reported by that core: it finds work, starts it,
 //! completes it, is interrupted, or ends it because of a fault.
 //!
-//! Each of these takes the one lock once, lets the scheduler take a step where
+//! Each of these takes the one lock once, makes a step of the scheduler where
 //! there is something to decide, and wakes the other cores after the lock is
 //! free again.
 
@@ -101,8 +101,8 @@ pub(crate) fn fail(now_ns: u64) {
     woken.wake();
 }
 
-/// Lets the scheduler take a step if `is_event`, and lets this core follow its
-/// decisions. In an interrupt handler.
+/// Makes a step of the scheduler if `is_event`, and follows its decisions on this
+/// core. In an interrupt handler.
 pub(crate) fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     let mut place = EXECUTION.lock();
     let Some(execution) = place.as_mut() else {

@@ -61,7 +61,7 @@ struct Seat {
     target: Vertex,
 }
 
-/// Stands where there is no vertex; so many subtasks do not fit into memory.
+/// Stands where there is no vertex; no task set has that many subtasks.
 const NOTHING: Vertex = Vertex(u32::MAX);
 
 const EMPTY_SEAT: Seat = Seat {
@@ -82,12 +82,12 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Takes note of what the scheduler wants a core to run.
+    /// Notes what the scheduler wants a core to run.
     pub(super) fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
         self.seats[core.index()].target = target.unwrap_or(NOTHING);
     }
 
-    /// Takes note that core `core` has finished its current instance.
+    /// Notes that core `core` has finished its current instance.
     #[inline]
     pub(super) fn finish(&mut self, core: usize, vertex: Vertex, body: Body) {
         self.seats[core].current = NOTHING;
@@ -98,7 +98,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         self.forget_target(core, vertex);
     }
 
-    /// Takes note that core `core`'s current instance was ended, and returns its
+    /// Notes that core `core`'s current instance was ended, and returns its
     /// vertex. Its body stays on the stack of a context that is never resumed.
     pub(super) fn lose(&mut self, core: usize) -> Option<Vertex> {
         let vertex = self.detach(core)?;
@@ -138,7 +138,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         some(core::mem::replace(&mut self.seats[core].current, NOTHING))
     }
 
-    /// Takes note that `context` holds a detached instance. Returns the core
+    /// Notes that `context` holds a detached instance. Returns the core
     /// that has been waiting for it, if there is one.
     pub(super) fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
         *self.place(vertex) = Place::Suspended(context);
@@ -183,8 +183,8 @@ impl<Body, Parked> Placement<Body, Parked> {
         next
     }
 
-    /// Lets a core, which has no current instance, have one of this subtask and
-    /// start it. `None`, and nothing is changed, if it is suspended.
+    /// Gives a core, which has no current instance, one of this subtask to
+    /// start. `None`, and nothing is changed, if it is suspended.
     #[inline]
     pub(super) fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
         let place = self.place(vertex);
@@ -231,7 +231,7 @@ mod tests {
     const Y: Vertex = Vertex(1);
 
     impl Cores {
-        /// Takes note of a decision to run, or to preempt if `target` is `None`.
+        /// Notes a decision to run, or to preempt if `target` is `None`.
         fn decide(&mut self, core: u32, target: Option<Vertex>) {
             self.set_target(CoreId(core), target);
         }

@@ -14,7 +14,7 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
 pub(crate) struct Runner {
     pub(super) body: Body,
     pub(super) vertex: Vertex,
-    /// The time that an instance may execute for, `u64::MAX` if for ever.
+    /// The time that an instance may execute for, `u64::MAX` if there is no limit.
     pub(super) budget_ns: u64,
     /// The instance that it runs, or ran last.
     pub(super) instance: Instance,
@@ -67,8 +67,8 @@ pub(super) fn runners(
     })
 }
 
-/// Returns how long an instance of a subtask may execute for, `u64::MAX` if forever:
-/// as long as its budget says, else so many WCETs, or forever if that is 0.
+/// Returns how long an instance of a subtask may execute for, `u64::MAX` if there is no
+/// limit: its budget, else its WCET times the factor, or no limit if that is 0.
 pub(super) fn budget_ns(task_set: &TaskSet, instance: Instance, budget_factor: u64) -> u64 {
     let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
     subtask

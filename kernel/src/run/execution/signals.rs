@@ -34,7 +34,7 @@ impl Signals {
         }
     }
 
-    /// Lets what the body has prepared happen, and takes its signals. Apart, as most
+    /// Publishes what the body has prepared, and takes its signals. Apart, as most
     /// bodies never have any.
     #[inline(never)]
     pub(super) fn take(&mut self, body: &mut Body, completed_ns: u64) {

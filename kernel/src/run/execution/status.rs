@@ -61,7 +61,7 @@ pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
     core.note_running([ids, job]);
 }
 
-/// Returns how long an instance may execute for, `u64::MAX` if for ever.
+/// Returns how long an instance may execute for, `u64::MAX` if there is no limit.
 pub(crate) fn budget_ns(instance: Instance) -> u64 {
     let place = EXECUTION.lock();
     place.as_ref().map_or(u64::MAX, |execution| {

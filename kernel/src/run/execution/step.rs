@@ -45,7 +45,7 @@ impl Execution {
         self.placement.finish(here.index(), vertex, finished);
     }
 
-    /// Lets the scheduler know that this core has finished an instance, and gives
+    /// Tells the scheduler that this core has finished an instance, and gives
     /// the core the next one at once if nothing else is to be decided.
     #[inline]
     pub(super) fn hand_off(&mut self, core: &Core, finished: Vertex, finish_ns: u64) -> Ended {
@@ -166,7 +166,7 @@ impl Execution {
         woken
     }
 
-    /// Lets everyone see when the next event is, and whether there is any.
+    /// Shows all cores when the next event is, and whether there is any.
     pub(super) fn publish(&self) {
         let next = self.scheduler.next_event_ns();
         let next = next.map_or(u64::MAX, |next| {

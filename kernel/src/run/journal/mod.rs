@@ -35,7 +35,7 @@ const EVENTS_WITHOUT_END: usize = 1 << 18;
 /// The finest resolution of statistics: 32 buckets a doubling.
 const FINEST: u32 = 5;
 
-/// Lets journals from now on have room for at most so many events.
+/// Sets the most events that journals have room for, from now on.
 pub(crate) fn limit(most: u64) {
     MOST_EVENTS.store(most, Ordering::Relaxed);
 }
@@ -200,7 +200,7 @@ fn most_events(task_set: &TaskSet) -> Option<usize> {
     dags.try_fold(0usize, |sum, dag| sum.checked_add(of_dag(dag)?))
 }
 
-/// Makes a tally that takes at most so many bytes, if there is one.
+/// Makes the finest tally that takes at most `most_bytes`, or else the coarsest.
 fn tally(task_set: &Arc<TaskSet>, most_bytes: usize) -> Tally {
     let mut finest = (0..=FINEST).rev();
     let bits = finest.find(|&bits| Tally::size_of(task_set, bits) <= most_bytes);

@@ -5,7 +5,7 @@
 //!
 //! Two promises are kept here, because only the ring knows what came before:
 //!
-//! - A *machine line* begins in column 0, whatever was printed before it.
+//! - A *machine line* begins in column 0, even if a line was begun before it.
 //! - *Text* never has a `{` in column 0; it gets a blank before it. So no text can be
 //!   taken for a machine line.
 

@@ -1,7 +1,7 @@
 //! The last words of a kernel that cannot go on, straight to the port.
 //!
 //! To be used only when all other cores are stopped: one of them, or the caller
-//! itself, may hold the buffer's lock for ever. Nothing said here has a lock, and all
+//! itself, may hold the buffer's lock and never release it. Nothing said here has a lock, and all
 //! of it is bounded: a message of megabytes is cut off.
 
 use core::fmt::{self, Display, Write};
@@ -37,7 +37,7 @@ fn send(kind: Kind, text: fmt::Arguments<'_>) {
     pieces.end();
 }
 
-/// Passes on so many bytes, and then fails.
+/// Passes on a number of bytes, and then fails.
 struct AtMost<W>(W, usize);
 
 impl<W: Write> Write for AtMost<W> {

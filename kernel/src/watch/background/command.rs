@@ -1,4 +1,4 @@
-//! The commands: what may be typed, and what is said if it is none.
+//! The commands, and the answer to anything else.
 
 use core::fmt;
 

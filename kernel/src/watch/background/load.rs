@@ -8,7 +8,7 @@ use sched_dag::journal::{Event, What};
 use crate::machine::this_core;
 use crate::run::execution;
 
-/// So many events are copied under the lock at a time.
+/// How many events are copied under the lock at a time.
 const AT_ONCE: usize = 64;
 
 /// The most cores.

@@ -2,13 +2,17 @@
 //!
 //! It prints progress, the status if the command line asks for it, and holds the
 //! console's conversation. All this is core 0's background, which is suspended
-//! whenever the core has an instance to run: it delays nothing but itself.
+//! whenever the core has an instance to run.
 //!
-//! Under overload that may be for ever, and then a person wants most to see what
-//! goes on, and to stop it. So if the background has not come to run for
-//! [`STARVED_NS`], core 0's heartbeat does a *slice* of the status and the console
-//! instead: one line, a few microseconds. The heartbeat is also what notices that an
-//! instance keeps its core for long ([`stall`]).
+//! It is not suspended within a *slice* of the status or the console, which holds a lock, with
+//! interrupts off: one line, and for the status a look at what the journal has of the time
+//! since the last one, 65,536 events at most. A release, or an instance that another core
+//! hands over, may come later by that; [`patience`] waits for a time at which no event is near.
+//!
+//! Under overload the background may never run again, and then a person wants most to see
+//! what goes on, and to stop it. So if it has not run for [`STARVED_NS`], core 0's heartbeat
+//! does the slices instead. The heartbeat also notices that an instance keeps its core for
+//! long ([`stall`]).
 
 mod command;
 mod input;
@@ -113,7 +117,7 @@ pub(crate) struct Background {
 }
 
 impl Background {
-    /// Begins the background of a run of `total` jobs; 0: no one knows how many.
+    /// Begins the background of a run of `total` jobs; 0 if their number is not known.
     pub(crate) fn begin(wishes: Wishes, total: u64) -> Self {
         let before_ns = heartbeat::own_heartbeat_ns();
         let periods = [

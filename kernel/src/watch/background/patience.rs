@@ -2,7 +2,7 @@
 //!
 //! To print takes core 0 some microseconds, of which a few have interrupts disabled,
 //! and a release that falls on these is late. So a line waits until the scheduler's next
-//! event leaves time for it. Where events come without a gap it would wait for ever:
+//! event leaves time for it. Where events come without a gap it would never be over:
 //! then it is printed all the same, and may cost a release those microseconds.
 
 use crate::machine::clock;

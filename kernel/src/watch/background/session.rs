@@ -182,7 +182,7 @@ fn end_what_is_idle(task_set: &TaskSet) {
     }
 }
 
-/// Lets each DAG be listed, or the one that is named.
+/// Begins a list of all DAGs, or of the one that is named.
 fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Dag, &Snapshot)) -> Answer {
     let chosen = match name.map(|name| find(task_set, name).ok_or(name)) {
         None => None,

@@ -1,10 +1,10 @@
-//! Who keeps a core for long: named once, before the host loses patience.
+//! Names an instance that keeps a core for long, once, before the host's timeout.
 //!
 //! A subtask that never returns and has no budget keeps its core, whether it loops or
 //! waits for a lock of the app's own, and a run may not end because of it. So core 0's
 //! heartbeat looks now and then at what the cores have noted for reports anyway: which
 //! instance each runs. If a core has run the same one for [`STALLED_NS`], and for
-//! longer than its WCET if that is known, a line says so, whatever the other cores do.
+//! longer than its WCET if that is known, a line says so, even if the other cores are idle.
 //! The run goes on: it may be no more than a long computation.
 //!
 //! Between two looks nothing is counted, so this costs a run nothing. It also sees

@@ -12,10 +12,10 @@ use crate::machine::clock;
 use crate::run::execution;
 use crate::text::json;
 
-/// So many events are read where time is short.
+/// How many events are read where time is short.
 const FEW_EVENTS: u64 = 128;
 
-/// So many are read else.
+/// How many are read otherwise.
 const MOST_EVENTS: u64 = 1 << 16;
 
 /// When and what to print.
