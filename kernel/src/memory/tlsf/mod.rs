@@ -52,10 +52,6 @@ mod free_lists;
 mod usage;
 
 #[cfg(test)]
-mod random_tests;
-#[cfg(test)]
-mod test_heap;
-#[cfg(test)]
 mod tests;
 
 use core::alloc::Layout;

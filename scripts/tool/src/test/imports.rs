@@ -36,7 +36,7 @@ fn read_folder(
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        if is_for_tests(&stem) {
+        if stem == "tests" {
             continue;
         }
         let mut module = above.to_vec();
@@ -51,10 +51,6 @@ fn read_folder(
         }
     }
     Ok(())
-}
-
-fn is_for_tests(stem: &str) -> bool {
-    stem == "tests" || stem.ends_with("_tests") || stem.starts_with("test_")
 }
 
 /// Cuts the module of unit tests off, which stands last in each of our files.

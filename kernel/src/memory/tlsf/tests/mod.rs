@@ -1,9 +1,12 @@
 //! What one or a few operations do, case by case.
 
+mod heap;
+mod random;
+
 use core::ptr::NonNull;
 
-use super::test_heap::TestHeap;
 use super::{Tlsf, Usage};
+use heap::TestHeap;
 
 /// Bytes of a test region whose one block has `WHOLE` bytes.
 const LENGTH: usize = 64 * 1024;

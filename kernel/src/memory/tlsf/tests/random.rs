@@ -8,7 +8,7 @@
 use core::ptr::NonNull;
 use std::collections::BTreeMap;
 
-use super::test_heap::TestHeap;
+use super::heap::TestHeap;
 
 const REGIONS: [usize; 3] = [256 * 1024, 64 * 1024, 5000];
 const STEPS: usize = 3000;

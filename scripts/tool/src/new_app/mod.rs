@@ -30,13 +30,13 @@ const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
 
 /// The template's files: where each goes in the app's folder, and its text.
 const FILES: &[(&str, &str)] = &[
-    ("Cargo.toml", include_str!("../template/manifest.toml")),
-    ("build.rs", include_str!("../template/build.rs")),
-    ("src/lib.rs", include_str!("../template/src/lib.rs")),
-    ("src/main.rs", include_str!("../template/src/main.rs")),
+    ("Cargo.toml", include_str!("../../template/manifest.toml")),
+    ("build.rs", include_str!("../../template/build.rs")),
+    ("src/lib.rs", include_str!("../../template/src/lib.rs")),
+    ("src/main.rs", include_str!("../../template/src/main.rs")),
     (
         "tests/virtual_time.rs",
-        include_str!("../template/tests/virtual_time.rs"),
+        include_str!("../../template/tests/virtual_time.rs"),
     ),
 ];
 

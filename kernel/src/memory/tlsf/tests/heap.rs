@@ -6,9 +6,9 @@
 use core::alloc::Layout;
 use core::ptr::NonNull;
 
-use super::block::{Block, HEADER_SIZE, MIN_BLOCK_SIZE};
-use super::class::{Class, FIRST_LEVEL, SECOND_LEVEL};
-use super::{GRANULE, Tlsf, Usage};
+use super::super::block::{Block, HEADER_SIZE, MIN_BLOCK_SIZE};
+use super::super::class::{Class, FIRST_LEVEL, SECOND_LEVEL};
+use super::super::{GRANULE, Tlsf, Usage};
 
 /// Owns the memory of a heap, and frees it.
 pub(super) struct TestHeap {

@@ -260,9 +260,9 @@ ok
     #[test]
     fn the_documents_describe_every_kind_and_member() {
         let document = concat!(
-            include_str!("../../../docs/serial-protocol.md"),
-            include_str!("../../../docs/app-lines.md"),
-            include_str!("../../../docs/trace-format.md"),
+            include_str!("../../../../docs/serial-protocol.md"),
+            include_str!("../../../../docs/app-lines.md"),
+            include_str!("../../../../docs/trace-format.md"),
         );
         for (kind, members) in KINDS {
             let heading = format!("\n### `{kind}`");
