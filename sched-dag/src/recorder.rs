@@ -16,15 +16,16 @@ pub struct Recorder {
     task_set: Arc<TaskSet>,
     /// The present instant on the scheduler's clock.
     pub now_ns: u64,
-    /// The core that takes the scheduler's step.
-    pub here: CoreId,
+    /// The core that takes the scheduler's step: the one on which an instance has ended
+    /// last.
+    here: CoreId,
     /// What has happened, in its order.
     pub events: Vec<Event>,
     is_closed: bool,
 }
 
 impl Recorder {
-    /// Begins at time 0, on core 0.
+    /// Begins at time 0; until an instance has ended, core 0 takes the steps.
     #[must_use]
     pub const fn new(task_set: Arc<TaskSet>) -> Self {
         Self {
@@ -38,6 +39,9 @@ impl Recorder {
 
     /// Writes down what a core does with an instance.
     pub fn on_core(&mut self, what: What, instance: Instance, core: CoreId) {
+        if matches!(what, What::Finish | What::Ended) {
+            self.here = core;
+        }
         self.write(what, self.now_ns, core, Subject::of(instance));
     }
 

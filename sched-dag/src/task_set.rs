@@ -10,8 +10,8 @@ use crate::ids::{DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::{Activation, OverrunPolicy, Priority};
 use crate::topic::Topic;
 
-/// All DAG tasks of one commit.
-#[derive(Clone, Debug)]
+/// All DAG tasks of one commit; by default none.
+#[derive(Clone, Debug, Default)]
 pub struct TaskSet {
     dags: Box<[Dag]>,
     /// Each DAG's first vertex.

@@ -6,11 +6,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use sched_dag::analysis::{Overheads, Settings, answer};
-use sched_dag::law::{InstanceRecord, JobRecord, Precision, Record, Violation, violations};
+use sched_dag::journal::{Event, What};
+use sched_dag::law::{Record, Terms, Violation, violations};
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     Activation, CoreId, DagId, DagSpec, DagStatistics, Instance, JobOutcome, Observer,
-    OverrunPolicy, Policy, Scheduler, SchedulerOptions, TaskSet,
+    OverrunPolicy, Policy, Recorder, Scheduler, SchedulerOptions, TaskSet,
 };
 use support::random::Random;
 use support::{PREEMPTIVE, commit, dag, overrunning};
@@ -18,8 +19,7 @@ use support::{PREEMPTIVE, commit, dag, overrunning};
 /// Executes every instance for its WCET or 1 ns, sends signals, records all.
 struct Run {
     task_set: Arc<TaskSet>,
-    record: Record,
-    now_ns: u64,
+    journal: Recorder,
     /// Signals by time.
     signals: VecDeque<(u64, DagId)>,
     /// At which instance's completion which DAG gets a signal.
@@ -29,35 +29,41 @@ struct Run {
 }
 
 impl Observer for Run {
-    fn signalled(&mut self, _dag: DagId, _job: u64, release_ns: Option<u64>) {
-        self.arrivals.push((self.now_ns, release_ns));
+    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
+        self.arrivals.push((self.journal.now_ns, release_ns));
+        self.journal.signalled(dag, job, release_ns);
     }
 
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        let now_ns = self.now_ns;
-        *self.record.job_mut(dag, job).expect("recorded") = JobRecord {
-            release_ns: Some(release_ns),
-            released_ns: Some(now_ns),
-            ..JobRecord::default()
-        };
+        self.journal.released(dag, job, release_ns);
+    }
+
+    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.journal.queued(dag, job, release_ns);
+    }
+
+    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.journal.skipped(dag, job, release_ns);
     }
 
     fn ready(&mut self, instance: Instance) {
-        *self.of(instance) = InstanceRecord {
-            ready_ns: Some(self.now_ns),
-            ..InstanceRecord::default()
-        };
+        self.journal.ready(instance);
+    }
+
+    fn cancelled(&mut self, instance: Instance) {
+        self.journal.cancelled(instance);
+    }
+
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        self.journal.aborted(dag, job);
     }
 
     fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        self.record.job_mut(dag, job).expect("recorded").missed_ns = Some(deadline_ns);
+        self.journal.deadline_missed(dag, job, deadline_ns);
     }
 
     fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        let now_ns = self.now_ns;
-        let record = self.record.job_mut(dag, job).expect("recorded");
-        record.ended_ns = Some(now_ns);
-        record.outcome = Some(outcome);
+        self.journal.job_completed(dag, job, outcome);
     }
 }
 
@@ -68,7 +74,7 @@ impl Workload for Run {
     }
 
     fn instant(&mut self, now_ns: u64) {
-        self.now_ns = now_ns;
+        self.journal.now_ns = now_ns;
     }
 
     fn next_signal_ns(&self) -> Option<u64> {
@@ -80,14 +86,20 @@ impl Workload for Run {
         Some(dag)
     }
 
-    fn started(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        self.of(instance).start_ns = Some(now_ns);
-        self.of(instance).core = Some(core);
+    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.journal.on_core(What::Start, instance, core);
     }
 
-    fn finished(&mut self, instance: Instance, _core: CoreId, now_ns: u64) {
-        self.of(instance).finish_ns = Some(now_ns);
-        self.of(instance).runs += 1;
+    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.journal.on_core(What::Suspend, instance, core);
+    }
+
+    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+        self.journal.on_core(What::Resume, instance, core);
+    }
+
+    fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+        self.journal.on_core(What::Finish, instance, core);
         if let Some((from, to)) = self.chained
             && instance.dag == from
         {
@@ -97,13 +109,30 @@ impl Workload for Run {
 }
 
 impl Run {
-    fn of(&mut self, instance: Instance) -> &mut InstanceRecord {
-        self.record.instance_mut(instance).expect("recorded")
+    fn new(task_set: &Arc<TaskSet>, signals: impl Iterator<Item = (u64, DagId)>) -> Self {
+        Self {
+            task_set: Arc::clone(task_set),
+            journal: Recorder::new(Arc::clone(task_set)),
+            signals: signals.collect(),
+            chained: None,
+            arrivals: Vec::new(),
+        }
+    }
+
+    fn record(&self) -> Record {
+        let events = self.journal.events.iter().copied();
+        Record::of_events(&self.task_set, true, events).expect("it fits")
     }
 
     fn releases(&self, dag: u32) -> Vec<u64> {
-        let jobs = self.record.jobs(DagId(dag)).iter();
+        let record = self.record();
+        let jobs = record.jobs(DagId(dag)).iter();
         jobs.filter_map(|job| job.release_ns).collect()
+    }
+
+    fn violations(&self) -> Vec<Violation> {
+        let events = self.journal.events.iter().copied();
+        violations(&self.task_set, Terms::EXACT, events)
     }
 }
 
@@ -123,18 +152,11 @@ fn run(
 ) -> (Run, Vec<DagStatistics>) {
     let task_set = commit(specs, options);
     let last = DagId(u32::try_from(specs.len() - 1).expect("few DAGs"));
-    let mut run = Run {
-        record: Record::with_jobs(&task_set, Precision::Exact, |_| 0..64).expect("it fits"),
-        task_set: Arc::clone(&task_set),
-        now_ns: 0,
-        signals: signals.iter().map(|&at_ns| (at_ns, last)).collect(),
-        chained,
-        arrivals: Vec::new(),
-    };
+    let mut run = Run::new(&task_set, signals.iter().map(|&at_ns| (at_ns, last)));
+    run.chained = chained;
     let mut driver = VirtualTime::new(Scheduler::new(Arc::clone(&task_set), options));
     assert_eq!(driver.run(&mut run), End::Finished);
-    let found: Vec<Violation> = violations(&task_set, &run.record).collect();
-    assert_eq!(found, []);
+    assert_eq!(run.violations(), []);
     let ids = (0..=last.0).map(DagId);
     let statistics = ids.map(|dag| *driver.scheduler().statistics(dag)).collect();
     (run, statistics)
@@ -179,7 +201,7 @@ fn s2_a_job_that_waits_for_room_counts_as_the_one_that_is_kept() {
     let (run, statistics) = run(&[spec], PREEMPTIVE, &[0, 10, 12, 20, 30], None);
     // Job 1 is due at 10 and waits till 25; its nominal release stays.
     assert_eq!(run.releases(0), [0, 10, 30]);
-    assert_eq!(run.record.jobs(DagId(0))[1].released_ns, Some(25));
+    assert_eq!(run.record().jobs(DagId(0))[1].released_ns, Some(25));
     assert_eq!(statistics[0].dropped_signals, 2);
     assert_eq!(statistics[0].queued, 2);
 }
@@ -261,19 +283,24 @@ fn signals_to_an_ended_dag_are_dropped() {
 #[test]
 fn the_check_finds_releases_that_are_too_close() {
     let task_set = commit(&[sporadic(dag(10, 10, 2, &[0], &[]))], PREEMPTIVE);
-    let mut record = Record::with_jobs(&task_set, Precision::Measured, |_| 0..2).expect("it fits");
+    let mut journal = Recorder::new(Arc::clone(&task_set));
     for (job, release_ns) in [(0, 5), (1, 14)] {
-        let record = record.job_mut(DagId(0), job).expect("recorded");
-        record.release_ns = Some(release_ns);
+        journal.now_ns = release_ns;
+        journal.released(DagId(0), job, release_ns);
     }
-    let found: Vec<Violation> = violations(&task_set, &record).collect();
+    let found = |events: &[Event]| {
+        let terms = Terms::whole(u64::MAX);
+        violations(&task_set, terms, events.iter().copied())
+    };
     let expected = Violation::TooSoon {
         dag: DagId(0),
         job: 1,
         release_ns: 14,
         earliest_ns: 15,
     };
-    assert_eq!(found, [expected]);
+    assert_eq!(found(&journal.events), [expected]);
+    let undue = found(&journal.events[1..]);
+    assert!(matches!(undue[..], [Violation::NotDue { .. }, ..]));
 }
 
 /// The analysis takes a sporadic DAG for a periodic one: its bounds hold for any
@@ -315,17 +342,11 @@ fn bounds_hold_for_random_signals() {
             at_ns += random.between(0, 40);
             (at_ns, DagId(u32::try_from(sporadic_at).expect("small")))
         });
-        let mut run = Run {
-            record: Record::with_jobs(&task_set, Precision::Exact, |_| 0..20).expect("it fits"),
-            task_set: Arc::clone(&task_set),
-            now_ns: 0,
-            signals: signals.collect(),
-            chained: None,
-            arrivals: Vec::new(),
-        };
+        let mut run = Run::new(&task_set, signals);
         let mut driver = VirtualTime::new(Scheduler::new(Arc::clone(&task_set), options));
         assert_eq!(driver.run(&mut run), End::Finished, "seed {seed}");
-        assert_eq!(violations(&task_set, &run.record).count(), 0, "seed {seed}");
+        assert_eq!(run.violations(), [], "seed {seed}");
+        let record = run.record();
         let period_ns = task_set.dags()[sporadic_at].period_ns();
         let mut earliest_ns = 0;
         for &(at_ns, release_ns) in &run.arrivals {
@@ -346,7 +367,7 @@ fn bounds_hold_for_random_signals() {
                 continue;
             };
             bounded += 1;
-            for job in run.record.jobs(dag) {
+            for job in record.jobs(dag) {
                 if let (Some(release_ns), Some(ended_ns)) = (job.release_ns, job.ended_ns) {
                     assert!(ended_ns - release_ns <= bound_ns, "seed {seed}");
                 }

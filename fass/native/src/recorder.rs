@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sched_dag::Recorder;
 use sched_dag::journal::What;
-use sched_dag::law::{Precision, Record, dispatch_violations, violations};
+use sched_dag::law::{Terms, dispatch_violations, violations};
 use sched_dag::{CoreId, Instance, SchedulerOptions, TaskSet};
 
 use crate::report::{Recorded, Report};
@@ -27,10 +27,6 @@ impl Watch for Recorder {
 }
 
 /// Checks everything.
-///
-/// # Panics
-///
-/// If the times do not fit into memory.
 pub(crate) fn judge(
     recorder: &Recorder,
     report: Report,
@@ -38,16 +34,16 @@ pub(crate) fn judge(
     options: SchedulerOptions,
 ) -> Recorded {
     let events = recorder.events.iter().copied();
-    let record = Record::of_events(task_set, Precision::Exact, true, events.clone());
-    let record = record.expect("the times of a run fit into memory; state fewer jobs");
-    let of_dispatch = dispatch_violations(task_set, &options, &record, events.clone(), 0);
+    let mut found = violations(task_set, Terms::EXACT, events.clone());
+    let of_dispatch = dispatch_violations(task_set, &options, Terms::EXACT, events.clone());
+    found.extend(of_dispatch);
     let mut by_worker = vec![0; options.cores as usize];
     for event in events.filter(|event| event.what == What::Finish) {
         by_worker[event.core.index()] += 1;
     }
     Recorded {
         report,
-        violations: violations(task_set, &record).chain(of_dispatch).collect(),
+        violations: found,
         instances: by_worker.iter().sum(),
         by_worker,
     }

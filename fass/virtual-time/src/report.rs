@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use sched_dag::journal::{Event, What};
-use sched_dag::law::{self, Precision, Record, Violation};
+use sched_dag::law::{self, Record, Terms, Violation};
 use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::record::{InstanceRecord, JobRecord, PanicRecord};
@@ -100,7 +100,7 @@ impl Report {
     #[must_use]
     pub fn record(&self) -> Record {
         let events = self.events.iter().copied();
-        let record = Record::of_events(&self.task_set, Precision::Exact, true, events);
+        let record = Record::of_events(&self.task_set, true, events);
         record.expect("the report's jobs fit into memory")
     }
 
@@ -110,23 +110,18 @@ impl Report {
     /// After a panic ([`RunError::Panicked`](crate::RunError::Panicked)) the
     /// last instant is incomplete, and may seem to break them.
     ///
-    /// # Panics
-    ///
-    /// If there is no memory for another copy of all times.
-    ///
     /// See [`Report`].
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
-        let record = self.record();
-        // Who has changed times may have put them out of order.
+        // A test that has changed times may have put them out of order.
         let mut events = self.events.clone();
         events.sort_by_key(|event| event.time_ns);
         let events = events.iter().copied();
-        let of_dispatch =
-            law::dispatch_violations(&self.task_set, &self.options, &record, events, 0);
-        law::violations(&self.task_set, &record)
-            .chain(of_dispatch)
-            .collect()
+        let (task_set, terms) = (&self.task_set, Terms::EXACT);
+        let mut found = law::violations(task_set, terms, events.clone());
+        let of_dispatch = law::dispatch_violations(task_set, &self.options, terms, events);
+        found.extend(of_dispatch);
+        found
     }
 
     /// Returns the events as lines such as `5000000 start sink[0] core 1`: time, what

@@ -236,15 +236,15 @@ fn the_check_finds_forged_journals() {
     };
     assert!(broken_by(late_release).contains(&Rule::Release));
     let late_join = |report: &mut Report| shift(report, What::Ready, 3, |ns| ns + 1);
-    // It had started before it waits.
-    let rules = [Rule::AndJoin, Rule::AndJoin, Rule::Dispatch];
-    assert_eq!(broken_by(late_join), rules);
+    // It had started before, and is ready later than what it waits for.
+    let rules = broken_by(late_join);
+    assert!(rules.contains(&Rule::OneLife) && rules.contains(&Rule::CompletionBoundary));
     let early_join = |report: &mut Report| shift(report, What::Ready, 3, |ns| ns - 1);
     // Then it waits although a core is idle.
     assert_eq!(broken_by(early_join), [Rule::AndJoin, Rule::Dispatch]);
     let early_start = |report: &mut Report| shift(report, What::Start, 3, |_| 20 * MS);
     let rules = broken_by(early_start);
-    assert_eq!(rules[..2], [Rule::AndJoin, Rule::CompletionBoundary]);
+    assert!(rules.contains(&Rule::AndJoin) && rules.contains(&Rule::OneLife));
     let lost_finish = |report: &mut Report| {
         let is_it =
             |event: &Event| event.what == What::Finish && event.subtask == Some(SubtaskId(3));

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::cell::OnceCell;
 
-use sched_dag::law::{self, Precision, Record, Tally, Violation};
+use sched_dag::law::{self, Record, Tally, Terms, Violation};
 use sched_dag::{DagId, DagStatistics, TaskSet};
 
 use crate::run::execution::{Execution, Snapshot};
@@ -89,13 +89,8 @@ impl Run {
         self.record.get_or_init(|| {
             let journal = self.journal();
             let is_whole = journal.lost() == 0;
-            Record::of_events(
-                self.task_set(),
-                Precision::Measured,
-                is_whole,
-                journal.events(),
-            )
-            .expect("the times of a journal's events fit into memory")
+            Record::of_events(self.task_set(), is_whole, journal.events())
+                .expect("the times of a journal's events fit into memory")
         })
     }
 
@@ -157,11 +152,21 @@ impl Run {
         Snapshot::of(self.execution.scheduler(), dag)
     }
 
-    /// Returns every breach of the model's rules.
+    /// Returns every breach of the model's rules R1 to R4, and whether each instance had
+    /// one life and each core one instance at a time. However long something takes is
+    /// right, for that is the machine's affair.
     ///
     /// See [`Run`].
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
-        law::violations(self.task_set(), self.record())
+        let terms = self.terms(u64::MAX);
+        law::violations(self.task_set(), terms, self.journal().events()).into_iter()
+    }
+
+    fn terms(&self, tolerance_ns: u64) -> Terms {
+        Terms {
+            is_whole: self.journal().lost() == 0,
+            ..Terms::whole(tolerance_ns)
+        }
     }
 
     /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
@@ -178,8 +183,8 @@ impl Run {
         let journal = self.journal();
         let options = self.execution.scheduler().options();
         (journal.lost() == 0).then(|| {
-            let events = journal.events();
-            law::dispatch_violations(self.task_set(), &options, self.record(), events, bound_ns)
+            let (terms, events) = (self.terms(bound_ns), journal.events());
+            law::dispatch_violations(self.task_set(), &options, terms, events)
         })
     }
 

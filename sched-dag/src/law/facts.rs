@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::{Precision, Record};
+use super::Record;
 use crate::ids::{DagId, Instance};
 use crate::journal::{Event, What};
 use crate::policy::JobOutcome;
@@ -20,12 +20,11 @@ impl Record {
     #[must_use]
     pub fn of_events(
         task_set: &TaskSet,
-        precision: Precision,
         is_whole: bool,
         events: impl Iterator<Item = Event> + Clone,
     ) -> Option<Self> {
         let jobs = jobs(task_set, is_whole, events.clone());
-        let mut record = Self::with_jobs(task_set, precision, |dag| jobs[dag.index()].clone())?;
+        let mut record = Self::with_jobs(task_set, |dag| jobs[dag.index()].clone())?;
         let mut stopped_ns = vec![None; jobs.len()];
         let mut due_ns = vec![0; jobs.len()];
         for event in events {

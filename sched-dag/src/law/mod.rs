@@ -3,34 +3,38 @@
 //! All of it is computed from the [events](crate::journal) that a driver has written
 //! down:
 //!
+//! - [`violations`]: every breach of the model's rules R1 to R4, and of what every
+//!   machine must keep: one life of each instance, one instance on each core;
+//! - [`dispatch_violations`]: every breach of R5; [`sweep`] is its core;
 //! - [`Record::of_events`]: the times of every job and instance, of the latest whole
 //!   jobs if the oldest events are lost;
-//! - [`violations`]: every breach of the model's rules R1 to R4 in a record;
-//! - [`dispatch_violations`]: every breach of R5 that lasts for longer than a stated
-//!   bound; [`sweep`] is its core, for those who have no record;
 //! - [`Tally`]: statistics of a run of any length, in a fixed amount of memory.
 //!
-//! Times are in nanoseconds from the run's epoch.
+//! How strictly a journal is judged is said by [`Terms`]. Times are in nanoseconds from
+//! the run's epoch.
 //!
-//! These are the only checks of the rules after a run, in virtual time, on threads and
-//! in the kernel. They are written from the rules alone and share no code with
-//! the scheduler, so that an error there cannot hide here.
+//! These are the only checks of the rules after a run: in virtual time, on threads, in
+//! the kernel, and of a trace that is read from a file. They are written from the rules
+//! alone and share no code with the scheduler, so that an error there cannot hide here.
+//! They do not find what leaves no event: that values went astray, or that a rule was
+//! broken before the events that are left.
 
-mod check;
 mod dispatch;
 mod facts;
 mod histogram;
+mod replay;
 pub mod sweep;
 mod tally;
 mod violation;
+mod words;
 
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-pub use check::violations;
-pub use dispatch::dispatch_violations;
+pub use dispatch::{Dispatch, dispatch_violations, judge_dispatch};
 pub use histogram::Histogram;
+pub use replay::{Verdict, judge, violations};
 pub use tally::{OfDag, OfSubtask, Tally};
 pub use violation::{Rule, Violation};
 
@@ -75,22 +79,41 @@ pub struct JobRecord {
     pub outcome: Option<JobOutcome>,
 }
 
-/// How exact the times of a record are, and so how strictly it is judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Precision {
-    /// Everything has the very time at which the model lets it happen, as in
-    /// virtual time: later is as wrong as earlier.
-    Exact,
-    /// Times were read from a clock by a machine that itself took time: what it
-    /// has to wait for must have happened *before*, and how much before is its
-    /// latency. Times read on different processors must be comparable.
-    Measured,
+/// What is known of a journal besides its events, and how strictly it is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Terms {
+    /// Whether no event is missing. Else the oldest ones are, and of what they may have
+    /// been about, nothing is concluded from an event that is not there.
+    pub is_whole: bool,
+    /// Whether the run went on until every job had ended.
+    pub is_complete: bool,
+    /// For how long what is owed may be owed, in nanoseconds: a machine takes time from a
+    /// finish to what follows from it, and from a decision to what a core does. Nothing
+    /// may come too early. How late a timer is, is not judged.
+    ///
+    /// 0: everything has the very time at which the model lets it happen, as in virtual
+    /// time; then timers are punctual, too. [`u64::MAX`]: only order counts.
+    pub tolerance_ns: u64,
+}
+
+impl Terms {
+    /// Those of a whole run in virtual time.
+    pub const EXACT: Self = Self::whole(0);
+
+    /// Returns those of a run of which no event is missing, and jobs may be in flight.
+    #[must_use]
+    pub const fn whole(tolerance_ns: u64) -> Self {
+        Self {
+            is_whole: true,
+            is_complete: false,
+            tolerance_ns,
+        }
+    }
 }
 
 /// The times of all jobs of all DAGs.
 #[derive(Clone, Debug)]
 pub struct Record {
-    precision: Precision,
     dags: Vec<DagRecord>,
 }
 
@@ -110,12 +133,7 @@ impl Record {
     ///
     /// Returns `None` if the jobs are too many for this machine's memory to
     /// address.
-    #[must_use]
-    pub fn with_jobs(
-        task_set: &TaskSet,
-        precision: Precision,
-        jobs: impl Fn(DagId) -> Range<u64>,
-    ) -> Option<Self> {
+    fn with_jobs(task_set: &TaskSet, jobs: impl Fn(DagId) -> Range<u64>) -> Option<Self> {
         let dags = (0..).map(DagId).zip(task_set.dags()).map(|(id, dag)| {
             let Range { start, end } = jobs(id);
             let jobs = usize::try_from(end.saturating_sub(start)).ok()?;
@@ -129,15 +147,8 @@ impl Record {
             })
         });
         Some(Self {
-            precision,
             dags: dags.collect::<Option<_>>()?,
         })
-    }
-
-    /// Returns how exact the times are.
-    #[must_use]
-    pub const fn precision(&self) -> Precision {
-        self.precision
     }
 
     /// Returns the recorded jobs of a DAG, one number after the other from
@@ -203,7 +214,7 @@ impl Record {
     }
 
     /// Returns an instance's times to be filled in, `None` if it is not recorded.
-    pub fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
+    fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
         let dag = self.dags.get_mut(instance.dag.index())?;
         let place = dag.place(instance.job)?;
         if place >= dag.jobs.len() || instance.subtask.index() >= dag.subtasks {
@@ -214,7 +225,7 @@ impl Record {
     }
 
     /// Returns a job's times to be filled in, `None` if it is not recorded.
-    pub fn job_mut(&mut self, dag: DagId, job: u64) -> Option<&mut JobRecord> {
+    fn job_mut(&mut self, dag: DagId, job: u64) -> Option<&mut JobRecord> {
         let dag = self.dags.get_mut(dag.index())?;
         let place = dag.place(job)?;
         dag.jobs.get_mut(place)

@@ -1,123 +1,142 @@
-//! What can be wrong with a record, in numbers and in words.
+//! What can be wrong with a journal.
 
-use core::fmt;
+use crate::ids::{CoreId, DagId, Instance};
+use crate::journal::{Event, What};
+use crate::law::sweep::{Stage, Wrong};
 
-use crate::ids::{CoreId, DagId, Instance, SubtaskId};
-use crate::policy::JobOutcome;
-
-/// A rule of the task model; the [crate] states them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// A rule of the task model, which the [crate] states, or one of two that every
+/// machine must keep whatever the model says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Rule {
     /// R1: jobs are released on the nominal grid, and nothing of one runs before.
     Release,
     /// R2: an instance is ready exactly when all that it waits for has happened.
     AndJoin,
-    /// R3: no successor sees anything of an instance before its completion.
+    /// R3: what waits for an instance is released when that has finished, all at once.
     CompletionBoundary,
-    /// R4: a job is complete with its last sink, and meets its deadline or not.
+    /// R4: a job is complete with its last instance, and meets its deadline or not.
     JobCompletion,
-    /// R5: the instances with the smallest keys run, each once.
+    /// R5: the instances with the smallest keys run.
     Dispatch,
+    /// An instance becomes ready, starts and finishes once, is suspended and resumed in
+    /// turns, and is on one core at a time.
+    OneLife,
+    /// A core runs one instance at a time.
+    OneCore,
 }
 
-/// A breach of one of the model's rules in a record.
+/// A breach of a rule in a journal.
+///
+/// Its text says what happened, where, and why it must not be; with the names of DAGs
+/// and subtasks if it is printed [`with_names`](Self::with_names).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the fields' names are the words of the model")]
 pub enum Violation {
-    /// R1: the job's release time is not O + kT.
-    OffGrid {
-        dag: DagId,
-        job: u64,
-        release_ns: u64,
-        grid_ns: u64,
-    },
-    /// R1: a sporadic job's release is less than one minimum inter-arrival time
-    /// after the one before it, or before the offset.
+    /// R1: something of a job happened before its nominal release.
+    BeforeRelease { event: Event, release_ns: u64 },
+    /// R1: something of a job happened before its release was carried out.
+    BeforeReleased { event: Event, released_ns: u64 },
+    /// R1: something of a job happened that was not released, or is forgotten, for a
+    /// later one is complete. The first that happened; all else of it is not judged.
+    NotReleased { event: Event, is_over: bool },
+    /// R1: nothing says when a sporadic job was due.
+    NotDue { event: Event },
+    /// R1: a sporadic job's release is less than one minimum inter-arrival time after
+    /// the one before it, or before the offset.
     TooSoon {
         dag: DagId,
         job: u64,
         release_ns: u64,
         earliest_ns: u64,
     },
-    /// R1 and the overrun policy: the release was carried out too early or,
-    /// where times are exact, too late.
-    ReleasedAtWrongTime {
-        dag: DagId,
-        job: u64,
-        released_ns: u64,
-        /// When it should have been; `None` if not yet.
+    /// R1: a job was released after a later one.
+    OutOfOrder { event: Event, later: u64 },
+    /// The overrun policy: a job was released while as many were in flight as may be.
+    TooMany { event: Event, in_flight: u32 },
+    /// R1 and the overrun policy, where times are exact: the release was carried out at
+    /// another time than the nominal one, or, if it was queued, the end of an older job.
+    Unpunctual {
+        event: Event,
         expected_ns: Option<u64>,
     },
-    /// R1: something is recorded of an instance whose job was not released.
-    NotReleased { instance: Instance },
-    /// R1: the instance started before its job's nominal release.
-    StartedBeforeRelease {
-        instance: Instance,
-        start_ns: u64,
-        release_ns: u64,
+    /// R1 and R4: what happens to a job once happened again, or after what excludes it.
+    Again {
+        event: Event,
+        before: What,
+        before_ns: u64,
     },
-    /// R2: the instance was ready before all that it waits for had happened, or,
-    /// where times are exact, later or not at all.
-    ReadyAtWrongTime {
-        instance: Instance,
-        ready_ns: Option<u64>,
-        /// When all had happened, `None` if it never did.
-        expected_ns: Option<u64>,
+    /// R2: an instance was ready, or started, before another one was over.
+    BeforeJoin {
+        event: Event,
+        awaited: Instance,
+        /// When and where that was over; `None` if it was not over yet.
+        over: Option<(u64, CoreId)>,
     },
-    /// R2: the instance started before it was ready.
-    StartedBeforeReady {
-        instance: Instance,
-        start_ns: u64,
-        ready_ns: u64,
+    /// R3: an instance became ready in a step that nothing brought about that it waits
+    /// for. R4: the same for a job's completion and its instances.
+    OutOfStep {
+        event: Event,
+        last_ns: u64,
+        last_core: CoreId,
     },
-    /// R2: the instance started while its subtask still ran for an older job.
-    OverlapsItself { instance: Instance, start_ns: u64 },
-    /// R3: the instance started before a predecessor finished.
-    StartedBeforePredecessor {
+    /// R3: an instance became ready too late. R4: a job was complete, or missed, too
+    /// late.
+    Late { event: Event, since_ns: u64 },
+    /// R3: an instance never became ready.
+    NeverReady {
         instance: Instance,
-        start_ns: u64,
-        predecessor: SubtaskId,
-        /// When the predecessor finished, `None` if it never did.
-        finish_ns: Option<u64>,
+        since_ns: u64,
+        core: CoreId,
     },
-    /// R4: the job ended at another time than its last sink, or, where times
-    /// are measured, earlier.
-    EndedAtWrongTime {
+    /// R4: a job was completed before one of its instances was over.
+    BeforeItsEnd {
+        event: Event,
+        awaited: Instance,
+        over_ns: Option<u64>,
+    },
+    /// R4: a job is not completed.
+    NeverCompleted {
         dag: DagId,
         job: u64,
-        ended_ns: u64,
-        /// When the last sink finished, `None` if one never did.
-        last_sink_ns: Option<u64>,
+        /// When its last instance was over; `None`: one is not.
+        over_ns: Option<u64>,
+        /// The end of the events.
+        end_ns: u64,
     },
-    /// R4: the job counts as something else than its times say.
-    WrongOutcome {
-        dag: DagId,
-        job: u64,
-        outcome: JobOutcome,
-        /// Whether its deadline was seen to pass.
-        missed: bool,
+    /// R4: a deadline was missed before it had passed.
+    MissedEarly { event: Event, deadline_ns: u64 },
+    /// R4: a job was missed that finished in time.
+    MissedInTime {
+        event: Event,
         finish_ns: u64,
         deadline_ns: u64,
     },
-    /// R5: the instance of a job that ended was not run exactly once.
-    NotRunOnce { instance: Instance, runs: u32 },
-    /// R5: an instance waited although a core was idle, or ran an instance that
-    /// it outranks and could have replaced.
-    PassedOver {
+    /// R4: a job was not missed that finished late, or not at all.
+    NotMissed {
+        dag: DagId,
+        job: u64,
+        finish_ns: Option<u64>,
+        deadline_ns: u64,
+        /// When that was clear.
         at_ns: u64,
-        waiting: Instance,
-        /// What ran instead, `None` if a core was idle.
-        running: Option<Instance>,
     },
+    /// One life: what happened to an instance does not follow from what it was.
+    OutOfTurn { event: Event, stage: Stage },
+    /// One life: it happened before what comes before it.
+    Backwards {
+        event: Event,
+        before: What,
+        before_ns: u64,
+    },
+    /// One life: an instance was cancelled of a job that nothing had cut.
+    CancelledUncut { event: Event },
+    /// One core: an instance began on a core that still ran another one.
+    CoreNotFree { event: Event, occupant: Instance },
+    /// R5: an instance waited although a core was idle, or ran an instance that it
+    /// outranks and could have replaced.
+    PassedOver(Wrong),
     /// R5: an instance that keeps its core lost it.
-    LostItsCore { instance: Instance, at_ns: u64 },
-    /// R5: an instance began on a core that was not free, or while it ran on
-    /// another core already.
-    CoreNotFree {
-        core: CoreId,
-        instance: Instance,
-        at_ns: u64,
-    },
+    LostItsCore { event: Event },
 }
 
 impl Violation {
@@ -125,186 +144,70 @@ impl Violation {
     #[must_use]
     pub const fn rule(&self) -> Rule {
         match self {
-            Self::OffGrid { .. }
-            | Self::TooSoon { .. }
-            | Self::ReleasedAtWrongTime { .. }
+            Self::BeforeRelease { .. }
+            | Self::BeforeReleased { .. }
             | Self::NotReleased { .. }
-            | Self::StartedBeforeRelease { .. } => Rule::Release,
-            Self::ReadyAtWrongTime { .. }
-            | Self::StartedBeforeReady { .. }
-            | Self::OverlapsItself { .. } => Rule::AndJoin,
-            Self::StartedBeforePredecessor { .. } => Rule::CompletionBoundary,
-            Self::EndedAtWrongTime { .. } | Self::WrongOutcome { .. } => Rule::JobCompletion,
-            Self::NotRunOnce { .. }
-            | Self::PassedOver { .. }
-            | Self::LostItsCore { .. }
-            | Self::CoreNotFree { .. } => Rule::Dispatch,
+            | Self::NotDue { .. }
+            | Self::TooSoon { .. }
+            | Self::OutOfOrder { .. }
+            | Self::TooMany { .. }
+            | Self::Unpunctual { .. } => Rule::Release,
+            Self::Again { event, .. } => match event.what {
+                What::Released | What::Queued | What::Skipped => Rule::Release,
+                _ => Rule::JobCompletion,
+            },
+            Self::BeforeJoin { .. } => Rule::AndJoin,
+            Self::OutOfStep { event, .. } | Self::Late { event, .. } => match event.what {
+                What::Ready => Rule::CompletionBoundary,
+                _ => Rule::JobCompletion,
+            },
+            Self::NeverReady { .. } => Rule::CompletionBoundary,
+            Self::BeforeItsEnd { .. }
+            | Self::NeverCompleted { .. }
+            | Self::MissedEarly { .. }
+            | Self::MissedInTime { .. }
+            | Self::NotMissed { .. } => Rule::JobCompletion,
+            Self::OutOfTurn { .. } | Self::Backwards { .. } | Self::CancelledUncut { .. } => {
+                Rule::OneLife
+            }
+            Self::CoreNotFree { .. } => Rule::OneCore,
+            Self::PassedOver(_) | Self::LostItsCore { .. } => Rule::Dispatch,
         }
     }
-}
 
-/// Writes the rule's short name, such as `R2`.
-impl fmt::Display for Rule {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Release => "R1",
-            Self::AndJoin => "R2",
-            Self::CompletionBoundary => "R3",
-            Self::JobCompletion => "R4",
-            Self::Dispatch => "R5",
-        })
-    }
-}
-
-/// A time, or that something never happened.
-struct When(Option<u64>);
-
-impl fmt::Display for When {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Some(time_ns) => write!(f, "at {time_ns} ns"),
-            None => f.write_str("never"),
-        }
-    }
-}
-
-impl fmt::Display for Violation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.rule())?;
+    /// Returns when it shows, in nanoseconds from the run's epoch.
+    #[must_use]
+    pub const fn time_ns(&self) -> u64 {
         match *self {
-            Self::OffGrid {
-                dag,
-                job,
-                release_ns,
-                grid_ns,
-            } => write!(
-                f,
-                "dag {} job {job} has its release at {release_ns} ns, the grid says {grid_ns} ns",
-                dag.0
-            ),
-            Self::TooSoon {
-                dag,
-                job,
-                release_ns,
-                earliest_ns,
-            } => write!(
-                f,
-                "dag {} job {job} has its release at {release_ns} ns, the minimum inter-arrival \
-                 time allows {earliest_ns} ns",
-                dag.0
-            ),
-            Self::ReleasedAtWrongTime {
-                dag,
-                job,
-                released_ns,
-                expected_ns,
-            } => write!(
-                f,
-                "dag {} job {job} was released at {released_ns} ns, which should be {}",
-                dag.0,
-                When(expected_ns)
-            ),
-            Self::NotReleased { instance } => {
-                write!(f, "{instance} is recorded, but its job was not released")
-            }
-            Self::StartedBeforeRelease {
-                instance,
-                start_ns,
-                release_ns,
-            } => write!(
-                f,
-                "{instance} started at {start_ns} ns, before its release at {release_ns} ns"
-            ),
-            Self::ReadyAtWrongTime {
-                instance,
-                ready_ns,
-                expected_ns,
-            } => write!(
-                f,
-                "{instance} was ready {}; all that it waits for had happened {}",
-                When(ready_ns),
-                When(expected_ns)
-            ),
-            Self::StartedBeforeReady {
-                instance,
-                start_ns,
-                ready_ns,
-            } => write!(
-                f,
-                "{instance} started at {start_ns} ns and was ready only at {ready_ns} ns"
-            ),
-            Self::OverlapsItself { instance, start_ns } => write!(
-                f,
-                "{instance} started at {start_ns} ns, while its subtask ran for an older job"
-            ),
-            Self::StartedBeforePredecessor {
-                instance,
-                start_ns,
-                predecessor,
-                finish_ns,
-            } => write!(
-                f,
-                "{instance} started at {start_ns} ns; its predecessor, subtask {}, finished {}",
-                predecessor.0,
-                When(finish_ns)
-            ),
-            Self::EndedAtWrongTime {
-                dag,
-                job,
-                ended_ns,
-                last_sink_ns,
-            } => write!(
-                f,
-                "dag {} job {job} ended at {ended_ns} ns; its last sink finished {}",
-                dag.0,
-                When(last_sink_ns)
-            ),
-            Self::WrongOutcome {
-                dag,
-                job,
-                outcome,
-                missed,
-                finish_ns,
-                deadline_ns,
-            } => {
-                let seen = if missed { "seen" } else { "not seen" };
-                write!(
-                    f,
-                    "dag {} job {job}, complete at {finish_ns} ns with its deadline at \
-                     {deadline_ns} ns, counts as {outcome:?} with a miss {seen}",
-                    dag.0
-                )
-            }
-            Self::NotRunOnce { instance, runs } => {
-                write!(f, "{instance} ran {runs} times, not once")
-            }
-            Self::PassedOver {
-                at_ns,
-                waiting,
-                running: Some(running),
-            } => write!(
-                f,
-                "at {at_ns} ns {waiting} waits while {running} runs, which it outranks"
-            ),
-            Self::PassedOver {
-                at_ns,
-                waiting,
-                running: None,
-            } => write!(f, "at {at_ns} ns {waiting} waits while a core is idle"),
-            Self::LostItsCore { instance, at_ns } => write!(
-                f,
-                "{instance} keeps its core until it finishes, but had to continue at {at_ns} ns"
-            ),
-            Self::CoreNotFree {
-                core,
-                instance,
-                at_ns,
-            } => write!(
-                f,
-                "{instance} began on core {} at {at_ns} ns while that ran something else, or \
-                 while it ran elsewhere",
-                core.0
-            ),
+            Self::BeforeRelease { event, .. }
+            | Self::BeforeReleased { event, .. }
+            | Self::NotReleased { event, .. }
+            | Self::NotDue { event }
+            | Self::OutOfOrder { event, .. }
+            | Self::TooMany { event, .. }
+            | Self::Unpunctual { event, .. }
+            | Self::Again { event, .. }
+            | Self::BeforeJoin { event, .. }
+            | Self::OutOfStep { event, .. }
+            | Self::Late { event, .. }
+            | Self::BeforeItsEnd { event, .. }
+            | Self::MissedEarly { event, .. }
+            | Self::MissedInTime { event, .. }
+            | Self::OutOfTurn { event, .. }
+            | Self::Backwards { event, .. }
+            | Self::CancelledUncut { event }
+            | Self::CoreNotFree { event, .. }
+            | Self::LostItsCore { event } => event.time_ns,
+            Self::TooSoon { release_ns, .. } => release_ns,
+            Self::NeverReady { since_ns, .. } => since_ns,
+            Self::NeverCompleted {
+                over_ns: Some(over_ns),
+                ..
+            } => over_ns,
+            Self::NeverCompleted { end_ns, .. } => end_ns,
+            Self::NotMissed { at_ns, .. } => at_ns,
+            Self::PassedOver(Wrong::Waits { since_ns, .. }) => since_ns,
+            Self::PassedOver(Wrong::OutOfTurn { at_ns, .. }) => at_ns,
         }
     }
 }

@@ -1,21 +1,23 @@
-//! R5 for a run whose times are recorded: the changes that its events are.
+//! R5 for a journal: the changes that its events are.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
-use super::sweep::{Blame, Change, Key, Ranking, Stage, Sweep, Wrong};
-use super::{Record, Violation};
-use crate::ids::{CoreId, Instance};
+use super::replay::{stage_after, stage_before};
+use super::sweep::{Change, Key, Ranking, Stage, Sweep, Waits, Wrong};
+use super::{Terms, Violation};
+use crate::ids::{CoreId, DagId, Instance};
 use crate::journal::{Event, What};
 use crate::policy::SchedulerOptions;
 use crate::policy::{Policy, Preemption};
 use crate::task_set::TaskSet;
 
-/// The model and the options of a run whose times are recorded.
+/// The model and the options of a run.
 struct Model<'a> {
     task_set: &'a TaskSet,
     options: &'a SchedulerOptions,
-    record: &'a Record,
+    /// When sporadic jobs were due.
+    due_ns: BTreeMap<(DagId, u64), u64>,
 }
 
 impl Ranking for Model<'_> {
@@ -26,10 +28,9 @@ impl Ranking for Model<'_> {
         let urgency = match self.options.policy {
             Policy::StaticPriority => model.subtask(subtask).priority().0.into(),
             Policy::Edf => {
-                // The grid says, or, of a sporadic DAG, the record.
-                let recorded = || self.record.job(dag, job)?.release_ns;
+                let due_ns = || self.due_ns.get(&(dag, job)).copied();
                 let release_ns = match model.is_sporadic() {
-                    true => recorded().unwrap_or(u64::MAX),
+                    true => due_ns().unwrap_or(u64::MAX),
                     false => model.grid_ns(job),
                 };
                 release_ns.saturating_add(model.relative_deadline_ns())
@@ -45,45 +46,103 @@ impl Ranking for Model<'_> {
     }
 }
 
-/// Returns every breach of R5 that a whole run's events show, of which none lasts for
-/// at most `bound_ns`; 0 is for exact times.
+/// What a journal shows of R5.
+#[derive(Clone, Debug, Default)]
+pub struct Dispatch {
+    /// Every breach.
+    pub violations: Vec<Violation>,
+    /// How long instances waited.
+    pub waits: Waits,
+}
+
+/// Holds a journal against R5: no instance is owed a core for longer than the terms
+/// tolerate.
 ///
 /// The events are in their order; one whose time is before that of an earlier one
-/// counts as of that.
+/// counts as of that. If the oldest ones are lost, a core takes part from its first known
+/// event on. An ended DAG's waiting instances are owed nothing.
+#[must_use]
+pub fn judge_dispatch(
+    task_set: &TaskSet,
+    options: &SchedulerOptions,
+    terms: Terms,
+    events: impl Iterator<Item = Event> + Clone,
+) -> Dispatch {
+    let due = events.clone().filter(|event| event.what == What::Due);
+    let model = Model {
+        task_set,
+        options,
+        due_ns: due
+            .map(|event| ((event.dag, event.job), event.time_ns))
+            .collect(),
+    };
+    let first_ns = events.clone().next().map_or(0, |event| event.time_ns);
+    let end_ns = events.clone().map(|event| event.time_ns).max().unwrap_or(0);
+    let (mut known, before) = match terms.is_whole {
+        true => ((0..options.cores).map(CoreId).collect(), Vec::new()),
+        false => before(options.cores, events.clone()),
+    };
+    let known_at_first = known.len();
+    let at_first = (0..known_at_first).map(|_| (first_ns, Change::CoreIsKnown));
+    let before = before.into_iter().map(|change| (first_ns, change));
+    let mut latest_ns = 0;
+    let changes = events.clone().flat_map(|event| {
+        latest_ns = event.time_ns.max(latest_ns);
+        let is_new = event.what.is_of_machine() && known.insert(event.core);
+        let stops = matches!(event.what, What::Stopped | What::Ended);
+        let stage = event.instance().filter(|_| event.what != What::Request);
+        let changes = [
+            is_new.then_some(Change::CoreIsKnown),
+            stops.then_some(Change::Stopped(event.dag)),
+            stage.map(|instance| Change::Stage(instance, stage_after(&event))),
+        ];
+        let changes = changes.into_iter().flatten();
+        changes.map(move |change| (latest_ns, change))
+    });
+    let changes = at_first.chain(before).chain(changes);
+    let (wrong, waits) = Sweep::judge(&model, terms.tolerance_ns, changes, end_ns);
+    let mut violations: Vec<Violation> = wrong.into_iter().map(Violation::PassedOver).collect();
+    if terms.tolerance_ns == 0 {
+        violations.extend(chosen_wrongly(&model, events.clone()));
+    }
+    violations.extend(lost_cores(&model, events));
+    Dispatch { violations, waits }
+}
+
+/// Returns the breaches that [`judge_dispatch`] finds.
 #[must_use]
 pub fn dispatch_violations(
     task_set: &TaskSet,
     options: &SchedulerOptions,
-    record: &Record,
+    terms: Terms,
     events: impl Iterator<Item = Event> + Clone,
-    bound_ns: u64,
 ) -> Vec<Violation> {
-    let model = Model {
-        task_set,
-        options,
-        record,
-    };
-    let mut latest_ns = 0;
-    let changes = events.clone().filter_map(move |event| {
-        latest_ns = event.time_ns.max(latest_ns);
-        let stage = match event.what {
-            What::Ready => Stage::Ready,
-            What::Start | What::Resume => Stage::Running(event.core),
-            What::Suspend => Stage::Suspended,
-            What::Finish | What::Ended | What::Cancelled => Stage::Over,
-            _ => return None,
-        };
-        Some((latest_ns, Change::Stage(event.instance()?, stage)))
-    });
-    let cores = (0..options.cores).map(|_| (0, Change::CoreIsKnown));
-    let end_ns = events.clone().map(|event| event.time_ns).max().unwrap_or(0);
-    let (wrong, _) = Sweep::judge(&model, bound_ns, cores.chain(changes), end_ns);
-    let mut found: Vec<Violation> = wrong.iter().map(in_numbers).collect();
-    if bound_ns == 0 {
-        found.extend(chosen_wrongly(&model, events.clone()));
+    judge_dispatch(task_set, options, terms, events).violations
+}
+
+/// Returns what must have been the case before the first event: which cores were busy,
+/// or idle with something else's end to come, and what each instance was.
+fn before(cores: u32, events: impl Iterator<Item = Event>) -> (BTreeSet<CoreId>, Vec<Change>) {
+    let mut first_of_core: BTreeMap<CoreId, What> = BTreeMap::new();
+    let mut first_of_instance: BTreeMap<Instance, Stage> = BTreeMap::new();
+    for event in events.filter(|event| event.what != What::Request) {
+        if let Some(instance) = event.instance() {
+            let stage = first_of_instance.entry(instance);
+            stage.or_insert_with(|| stage_before(&event));
+        }
+        if event.what.is_of_machine() {
+            first_of_core.entry(event.core).or_insert(event.what);
+        }
     }
-    found.extend(occupants(&model, events));
-    found
+    let is_busy = |what: &What| !matches!(what, What::Start | What::Resume);
+    let busy = (0..cores).map(CoreId);
+    let busy = busy.filter(|core| first_of_core.get(core).is_some_and(is_busy));
+    let stages = first_of_instance.into_iter();
+    let stages = stages.filter(|(_, stage)| *stage != Stage::Absent);
+    (
+        busy.collect(),
+        stages.map(|(it, stage)| Change::Stage(it, stage)).collect(),
+    )
 }
 
 /// Returns what started and keeps its core, although one that goes first had been ready
@@ -91,8 +150,8 @@ pub fn dispatch_violations(
 /// may have become ready when the other was chosen already.
 fn chosen_wrongly(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let mut fresh: BTreeSet<Key> = BTreeSet::new();
-    // The one that goes first, the one that started, and when.
-    let mut passed: Vec<(Key, Instance, u64)> = Vec::new();
+    // The one that goes first, and the start of the other one.
+    let mut passed: Vec<(Key, Event)> = Vec::new();
     let mut found = Vec::new();
     let mut now_ns = 0;
     for event in events {
@@ -116,7 +175,7 @@ fn chosen_wrongly(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec
                 if let Some(first) = first
                     && model.keeps_its_core(instance)
                 {
-                    passed.push((*first, instance, now_ns));
+                    passed.push((*first, event));
                 }
             }
             What::Cancelled => {
@@ -127,79 +186,24 @@ fn chosen_wrongly(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec
         }
     }
     found.extend(passed);
-    let in_numbers = |(first, started, at_ns): (Key, Instance, u64)| Violation::PassedOver {
-        at_ns,
-        waiting: first.1,
-        running: Some(started),
-    };
-    found.into_iter().map(in_numbers).collect()
-}
-
-fn in_numbers(wrong: &Wrong) -> Violation {
-    match *wrong {
-        Wrong::Waits {
-            waiting,
-            since_ns,
-            blame,
-            ..
-        } => Violation::PassedOver {
-            at_ns: since_ns,
-            waiting,
-            running: match blame {
-                Blame::Runs(running, _) => Some(running),
-                Blame::Idle(_) => None,
-            },
-        },
-        Wrong::OutOfTurn {
+    let wrong = |(first, event): (Key, Event)| {
+        event.instance().map(|started| Wrong::OutOfTurn {
             started,
-            at_ns,
-            first,
-            ..
-        } => Violation::PassedOver {
-            at_ns,
-            waiting: first,
-            running: Some(started),
-        },
-    }
+            core: event.core,
+            at_ns: event.time_ns,
+            first: first.1,
+            since_ns: event.time_ns,
+        })
+    };
+    let found = found.into_iter().filter_map(wrong);
+    found.map(Violation::PassedOver).collect()
 }
 
-/// Returns what began on a core that was not free, or while it ran elsewhere, and what
-/// lost a core that it keeps.
-fn occupants(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
-    let mut running: BTreeMap<Instance, CoreId> = BTreeMap::new();
-    let mut busy: BTreeMap<CoreId, Instance> = BTreeMap::new();
-    let mut found = Vec::new();
-    for event in events {
-        let Some(instance) = event.instance() else {
-            continue;
-        };
-        let (core, at_ns) = (event.core, event.time_ns);
-        match event.what {
-            What::Start | What::Resume => {
-                let elsewhere = running.insert(instance, core);
-                let other = busy.insert(core, instance);
-                if elsewhere.is_some() || other.is_some() {
-                    found.push(Violation::CoreNotFree {
-                        core,
-                        instance,
-                        at_ns,
-                    });
-                }
-                if event.what == What::Resume && model.keeps_its_core(instance) {
-                    found.push(Violation::LostItsCore { instance, at_ns });
-                }
-            }
-            What::Suspend | What::Finish | What::Ended => {
-                if let Some(core) = running.remove(&instance)
-                    && busy.get(&core) == Some(&instance)
-                {
-                    busy.remove(&core);
-                }
-            }
-            _ => {}
-        }
-    }
-    found
+/// Returns what lost a core that it keeps.
+fn lost_cores(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
+    let resumed = events.filter(|event| event.what == What::Resume);
+    let lost = resumed.filter(|event| event.instance().is_some_and(|it| model.keeps_its_core(it)));
+    lost.map(|event| Violation::LostItsCore { event }).collect()
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::ids::{DagId, SubtaskId};
-use crate::law::Precision;
 use crate::{CommitOptions, DagSpec, Priority, SubtaskSpec, verify};
 
 /// DAGs of one subtask each, DAG 0 the most urgent; the last one's subtask
@@ -24,22 +23,8 @@ fn dags(count: u32, keeps: bool) -> TaskSet {
     verify(&specs, &options).unwrap().task_set
 }
 
-fn of(dag: u32) -> Instance {
-    Instance {
-        dag: DagId(dag),
-        job: 0,
-        subtask: SubtaskId(0),
-    }
-}
-
 /// Ready times by DAG, and stretches as (DAG, core, from, to).
-fn check(
-    task_set: &TaskSet,
-    cores: u32,
-    ready_ns: &[u64],
-    ran: &[(u32, u32, u64, u64)],
-) -> Vec<Violation> {
-    let record = Record::with_jobs(task_set, Precision::Exact, |_| 0..1).unwrap();
+fn events(ready_ns: &[u64], ran: &[(u32, u32, u64, u64)]) -> Vec<Event> {
     let event = |time_ns, what, dag, core| Event {
         time_ns,
         what,
@@ -66,6 +51,16 @@ fn check(
         events.push(event(to_ns, ends, dag, core));
     }
     events.sort_by_key(|event| event.time_ns);
+    events
+}
+
+fn check(
+    task_set: &TaskSet,
+    cores: u32,
+    ready_ns: &[u64],
+    ran: &[(u32, u32, u64, u64)],
+) -> Vec<String> {
+    let events = events(ready_ns, ran);
     let found = |policy| {
         let options = SchedulerOptions {
             policy,
@@ -73,7 +68,8 @@ fn check(
             cores,
         };
         let events = events.iter().copied();
-        dispatch_violations(task_set, &options, &record, events, 0)
+        let found = dispatch_violations(task_set, &options, Terms::EXACT, events);
+        found.iter().map(ToString::to_string).collect::<Vec<_>>()
     };
     // The deadlines are in the order of the priorities.
     let by_priority = found(Policy::StaticPriority);
@@ -81,41 +77,47 @@ fn check(
     by_priority
 }
 
+fn nothing_wrong() -> [String; 0] {
+    []
+}
+
+fn passed_over(at_ns: u64, waiting: u32, length_ns: u64, why: &str) -> [String; 1] {
+    [format!(
+        "at {at_ns} ns, R5 dispatch: subtask 0 of dag {waiting} job 0 should run and waits \
+         {length_ns} ns while {why}"
+    )]
+}
+
 #[test]
 fn r5_accepts_preemption_and_a_full_machine() {
     let two = dags(2, false);
     let ran = [(1, 0, 0, 4), (0, 0, 4, 9), (1, 0, 9, 12)];
-    assert_eq!(check(&two, 1, &[4, 0], &ran), []);
+    assert_eq!(check(&two, 1, &[4, 0], &ran), nothing_wrong());
     let side_by_side = [(1, 0, 0, 4), (0, 1, 2, 9)];
-    assert_eq!(check(&two, 2, &[2, 0], &side_by_side), []);
+    assert_eq!(check(&two, 2, &[2, 0], &side_by_side), nothing_wrong());
     let nothing = [(1, 0, 0, 0), (0, 0, 0, 3)];
-    assert_eq!(check(&two, 1, &[0, 0], &nothing), []);
+    assert_eq!(check(&two, 1, &[0, 0], &nothing), nothing_wrong());
 }
 
 #[test]
 fn r5_finds_an_idle_core_and_a_missing_preemption() {
     let two = dags(2, false);
-    let passed_over = |at_ns, waiting, running: Option<u32>| Violation::PassedOver {
-        at_ns,
-        waiting: of(waiting),
-        running: running.map(of),
-    };
     let idle = [(0, 0, 0, 4), (1, 0, 4, 9)];
     assert_eq!(
         check(&two, 2, &[0, 0], &idle),
-        [passed_over(0, 1, None)],
+        passed_over(0, 1, 4, "core 1 is idle"),
         "core 1 could run it"
     );
     let not_preempted = [(1, 0, 0, 9), (0, 0, 9, 12)];
     assert_eq!(
         check(&two, 1, &[4, 0], &not_preempted),
-        [passed_over(4, 0, Some(1))]
+        passed_over(4, 0, 5, "core 0 runs subtask 0 of dag 1 job 0")
     );
     let three = dags(3, false);
     let wrong_one = [(1, 0, 0, 4), (2, 1, 0, 9), (0, 0, 4, 6), (1, 0, 6, 8)];
     assert_eq!(
         check(&three, 2, &[4, 0, 0], &wrong_one),
-        [passed_over(4, 1, Some(2))],
+        passed_over(4, 1, 2, "core 1 runs subtask 0 of dag 2 job 0"),
         "of two, the one with the larger key is preempted"
     );
 }
@@ -124,32 +126,26 @@ fn r5_finds_an_idle_core_and_a_missing_preemption() {
 fn r5_lets_a_started_instance_keep_its_core() {
     let two = dags(2, true);
     let kept = [(1, 0, 0, 9), (0, 0, 9, 12)];
-    assert_eq!(check(&two, 1, &[4, 0], &kept), []);
+    assert_eq!(check(&two, 1, &[4, 0], &kept), nothing_wrong());
     // Chosen at one instant, the smaller key comes first all the same.
-    let chosen = Violation::PassedOver {
-        at_ns: 0,
-        waiting: of(0),
-        running: Some(of(1)),
-    };
+    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 1 job 0 starts on core 0 and keeps it, \
+                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
     assert_eq!(check(&two, 1, &[0, 0], &kept), [chosen]);
-    let lost = Violation::LostItsCore {
-        instance: of(1),
-        at_ns: 6,
-    };
+    let lost = "at 6 ns, R5 dispatch: subtask 0 of dag 1 job 0 is resumed on core 0 although it \
+                keeps its core until it finishes";
     let preempted = [(1, 0, 0, 4), (0, 0, 4, 6), (1, 0, 6, 9)];
     assert_eq!(check(&two, 1, &[4, 0], &preempted), [lost]);
 }
 
 #[test]
-fn r5_finds_a_core_or_an_instance_in_two_places() {
+fn finds_a_core_or_an_instance_in_two_places() {
     let two = dags(2, false);
-    let not_free = |core, instance, at_ns| Violation::CoreNotFree {
-        core: CoreId(core),
-        instance: of(instance),
-        at_ns,
+    let found = |ready_ns: &[u64], ran: &[(u32, u32, u64, u64)]| {
+        let found = crate::law::violations(&two, Terms::EXACT, events(ready_ns, ran));
+        found.iter().map(ToString::to_string).collect::<Vec<_>>()
     };
-    let one_core = [(0, 0, 0, 4), (1, 0, 2, 6)];
-    assert!(check(&two, 2, &[0, 2], &one_core).contains(&not_free(0, 1, 2)));
-    let two_cores = [(0, 0, 0, 4), (0, 1, 2, 6), (1, 1, 6, 7)];
-    assert!(check(&two, 2, &[0, 6], &two_cores).contains(&not_free(1, 0, 2)));
+    let one_core = found(&[0, 2], &[(0, 0, 0, 4), (1, 0, 2, 6)]);
+    let not_free = "at 2 ns, one core: core 0 runs subtask 0 of dag 1 job 0 while it still runs \
+                    subtask 0 of dag 0 job 0";
+    assert!(one_core.iter().any(|text| text == not_free), "{one_core:?}");
 }

@@ -44,7 +44,7 @@ fn judge_run(run: &Run, round: u64, bound_ns: u64, judged: &mut Judged) {
     judged.figures.add_trace(&findings);
     let breaches = &findings.breaches;
     for breach in breaches.iter().take(SHOWN) {
-        judged.fail(round, breach.to_string());
+        judged.fail(round, breach.with_names(&run.task_set).to_string());
     }
     if let Some(more) = breaches.len().checked_sub(SHOWN + 1) {
         judged.fail(round, format!("and {} breaches more", more + 1));

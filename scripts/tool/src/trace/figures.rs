@@ -17,9 +17,9 @@
 use std::collections::BTreeMap;
 
 use sched_dag::CoreId;
+use sched_dag::journal::What;
 use sched_dag::law::sweep::Waits;
 
-use super::model::What;
 use super::view::View;
 
 /// The figures of one run. Times are in nanoseconds.
@@ -81,17 +81,17 @@ impl Distribution {
 }
 
 /// Computes the figures of a run.
-pub(super) fn compute(view: &View<'_>, finish_to_ready: Option<u64>, waits: Waits) -> Figures {
-    let first_ns = view.events.first().map_or(0, |(event, _)| event.time_ns);
+pub(super) fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: Waits) -> Figures {
+    let first_ns = view.events.first().map_or(0, |event| event.time_ns);
     let span_ns = view.end_ns.saturating_sub(first_ns);
     let histories = view.histories.values();
     Figures {
         events: view.events.len(),
-        instances: histories.filter(|it| it.start.is_some()).count(),
+        instances: histories.filter(|it| it.start_ns.is_some()).count(),
         preemptions: view.histories.values().map(|it| it.suspensions).sum(),
         from_ns: view.from_ns,
         span_ns,
-        finish_to_ready_max_ns: finish_to_ready.unwrap_or(0),
+        finish_to_ready_max_ns,
         ready_to_start: Distribution::of(waits.ready_to_start_ns),
         preemption: Distribution::of(preemption_latencies_ns(view)),
         longest_inversion_ns: waits.longest_owed_ns,
@@ -104,7 +104,7 @@ fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
     // The next request for each core, as seen from the one at hand.
     let mut next_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     let requests = view.events.iter().rev();
-    for (event, _) in requests.filter(|(event, _)| event.what == What::Request) {
+    for event in requests.filter(|event| event.what == What::Request) {
         let overtaken_ns = next_ns.insert(event.core, event.time_ns);
         let history = event.instance().and_then(|it| view.histories.get(&it));
         let slices = history.map_or(&[][..], |history| &history.slices);
@@ -132,5 +132,5 @@ fn load_permille(view: &View<'_>, first_ns: u64, span_ns: u64) -> Vec<u64> {
         let permille = u128::from(busy_ns) * 1000 / u128::from(span_ns.max(1));
         u64::try_from(permille).unwrap_or(u64::MAX)
     };
-    (0..view.run.cores).map(permille).collect()
+    (0..view.run.options.cores).map(permille).collect()
 }

@@ -3,21 +3,35 @@
 //! The log is a serial log or any file of JSON lines; lines of other kinds and
 //! lines for people are passed over, also within a run. A trace that is not as
 //! `docs/trace-format.md` says is [`Malformed`] with its line, so that a
-//! damaged log is never taken for a good run or for a breach. A count that memory
-//! is taken for is held against the most that there can be before.
+//! damaged log is never taken for a good run or for a breach. Its DAGs are verified as a
+//! commit verifies them. A count that memory is taken for is held against the most that
+//! there can be before.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use sched_dag::{CoreId, DagId, Policy, Preemption, SubtaskId};
+use sched_dag::journal::{Event, What};
+use sched_dag::{
+    Activation, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, OverrunPolicy, Policy,
+    Preemption, Priority, SchedulerOptions, SubtaskId, SubtaskSpec, TaskSet, verify,
+};
 
 use super::bound;
-use super::model::{Dag, Event, Releases, Run, Subtask, What};
+use super::model::Run;
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
 use crate::qemu::MOST_CORES;
 use replay::lines::Malformed;
 use replay::shown::quoted;
+
+/// A run of which not all lines are read.
+struct Open {
+    /// Without its model.
+    run: Run,
+    dags: Vec<DagSpec>,
+    /// The line of each DAG.
+    lines: Vec<usize>,
+}
 
 /// Reads all runs of a log; there may be none.
 ///
@@ -26,7 +40,7 @@ use replay::shown::quoted;
 /// The first line that is damaged or out of place.
 pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     let mut runs: Vec<Run> = Vec::new();
-    let mut open: Option<Run> = None;
+    let mut open: Option<Open> = None;
     // A line of a trace that something before its `{` makes one for people.
     let mut spoilt = None;
     let mut is_counted = false;
@@ -52,17 +66,18 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
                         run.number, first.line
                     )));
                 }
-                open = Some(run);
+                let (dags, lines) = (Vec::new(), Vec::new());
+                open = Some(Open { run, dags, lines });
             }
-            ("trace_begin", Some(run)) => {
-                let reason = format!("the trace of line {} has not ended yet", run.line);
+            ("trace_begin", Some(open)) => {
+                let reason = format!("the trace of line {} has not ended yet", open.run.line);
                 return Err(line.malformed(reason));
             }
-            ("trace_dag", Some(run)) => add_dag(&line, run)?,
-            ("trace", Some(run)) => add_events(&line, run)?,
-            ("trace_end", Some(run)) => {
-                end(&line, run)?;
-                runs.extend(open.take());
+            ("trace_dag", Some(open)) => add_dag(&line, open)?,
+            ("trace", Some(open)) => add_events(&line, open)?,
+            ("trace_end", Some(_)) => {
+                let ended = open.take().map(|open| end(&line, open));
+                runs.extend(ended.transpose()?);
             }
             ("trace_dag" | "trace" | "trace_end", None) => {
                 let hint = spoilt.map_or(String::new(), |number| {
@@ -75,8 +90,8 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     }
     match open {
         None => Ok(runs),
-        Some(run) => Err(Malformed {
-            line: run.line,
+        Some(open) => Err(Malformed {
+            line: open.run.line,
             reason: "this trace has no `trace_end`; was the guest killed?".into(),
         }),
     }
@@ -87,147 +102,101 @@ fn begin(line: &Line<'_>, is_counted: bool) -> Result<Run, Malformed> {
     Ok(Run {
         number: line.number("run")?,
         line: line.0.number,
-        policy: match line.text("policy")? {
-            "static" => Policy::StaticPriority,
-            "edf" => Policy::Edf,
-            other => return Err(line.unknown("policy", other, "static or edf")),
+        options: SchedulerOptions {
+            policy: match line.text("policy")? {
+                "static" => Policy::StaticPriority,
+                "edf" => Policy::Edf,
+                other => return Err(line.unknown("policy", other, "static or edf")),
+            },
+            preemption: match line.text("preemption")? {
+                "on" => Preemption::Enabled,
+                "off" => Preemption::Disabled,
+                other => return Err(line.unknown("preemption", other, "on or off")),
+            },
+            cores: line.small(cores)?,
         },
-        preemption: match line.text("preemption")? {
-            "on" => Preemption::Enabled,
-            "off" => Preemption::Disabled,
-            other => return Err(line.unknown("preemption", other, "on or off")),
-        },
-        cores: line.small(cores)?,
         is_counted,
-        dags: Vec::new(),
+        task_set: TaskSet::default(),
         events: Vec::new(),
         lost: 0,
         complete: false,
     })
 }
 
-fn add_dag(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
-    let (number, expected) = (line.number("dag")?, run.dags.len() as u64);
+fn add_dag(line: &Line<'_>, open: &mut Open) -> Result<(), Malformed> {
+    let (number, expected) = (line.number("dag")?, open.dags.len() as u64);
     if number != expected {
         return Err(line.malformed(format!("dag {number} stands where dag {expected} belongs")));
     }
-    if !run.events.is_empty() {
+    if !open.run.events.is_empty() {
         return Err(line.malformed("a DAG is described after the first event"));
     }
-    match line.text("overrun")? {
-        "queue" | "skip" | "abort" => {}
-        other => return Err(line.unknown("overrun", other, "queue, skip or abort")),
-    }
-    line.within("in_flight", 1..=u64::from(u32::MAX))?;
-    let subtasks = line
-        .elements("subtasks")?
-        .iter()
-        .map(|it| subtask(line, it));
-    let subtasks: Vec<Subtask> = subtasks.collect::<Result<_, _>>()?;
-    let mut predecessors = vec![Vec::new(); subtasks.len()];
-    let mut followed: Vec<Vec<u32>> = vec![Vec::new(); subtasks.len()];
-    for edge in line.elements("edges")? {
+    let subtasks = line.elements("subtasks")?.iter();
+    let subtasks = subtasks.map(|it| subtask(line, it));
+    let subtasks: Vec<SubtaskSpec> = subtasks.collect::<Result<_, _>>()?;
+    let in_flight = line.within("in_flight", 1..=u64::from(u32::MAX))?;
+    let count = subtasks.len() as u64;
+    let edge = |edge: &Value| {
         let ends: Option<Vec<u64>> = edge.elements().iter().map(Value::as_u64).collect();
-        let count = subtasks.len() as u64;
         let ends = ends.filter(|ends| ends.iter().all(|&end| end < count));
         let Some(&[from, to]) = ends.as_deref() else {
             return Err(line.malformed(format!(
                 "an edge is a pair of numbers less than {count}, the number of subtasks"
             )));
         };
-        let (from, to) = (line.small(from)?, line.small(to)?);
-        predecessors[to as usize].push(SubtaskId(from));
-        followed[from as usize].push(to);
-    }
-    if has_cycle(&followed) {
-        return Err(line.malformed("`edges` have a cycle, which no commit lets pass"));
-    }
-    for before in &mut predecessors {
-        before.sort_unstable();
-        before.dedup();
-    }
-    run.dags.push(Dag {
+        Ok((line.small(from)? as usize, line.small(to)? as usize))
+    };
+    let edges = line.elements("edges")?.iter().map(edge);
+    open.lines.push(line.0.number);
+    open.dags.push(DagSpec {
         name: line.text("name")?.to_string(),
-        period_ns: line.within("period_ns", 1..=u64::MAX)?,
-        relative_deadline_ns: line.within("relative_deadline_ns", 1..=u64::MAX)?,
+        activation: match line.flag("sporadic")? {
+            true => Activation::Sporadic,
+            false => Activation::Periodic,
+        },
+        period_ns: Some(line.within("period_ns", 1..=u64::MAX)?),
+        relative_deadline_ns: Some(line.within("relative_deadline_ns", 1..=u64::MAX)?),
         offset_ns: line.number("offset_ns")?,
-        sporadic: releases(line)?,
+        in_flight: Some(line.small(in_flight)?),
+        overrun: match line.text("overrun")? {
+            "queue" => OverrunPolicy::Queue,
+            "skip" => OverrunPolicy::Skip,
+            "abort" => OverrunPolicy::Abort,
+            other => return Err(line.unknown("overrun", other, "queue, skip or abort")),
+        },
         subtasks,
-        predecessors,
+        edges: edges.collect::<Result<_, _>>()?,
+        ..DagSpec::default()
     });
     Ok(())
 }
 
-/// Reports whether subtasks come before themselves; `followed` has the successors of
-/// each.
-fn has_cycle(followed: &[Vec<u32>]) -> bool {
-    let mut waits_for = vec![0_u32; followed.len()];
-    for &to in followed.iter().flatten() {
-        waits_for[to as usize] += 1;
+/// Makes the model, as a commit does.
+fn model(open: &Open) -> Result<TaskSet, Malformed> {
+    let SchedulerOptions { policy, cores, .. } = open.run.options;
+    let options = CommitOptions::new(policy, cores)
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_instance_limit(u32::MAX);
+    if open.dags.is_empty() {
+        return Ok(TaskSet::default());
     }
-    let is_free = |subtask: &usize| waits_for[*subtask] == 0;
-    let mut free: Vec<usize> = (0..followed.len()).filter(is_free).collect();
-    let mut ordered = 0;
-    while let Some(subtask) = free.pop() {
-        ordered += 1;
-        for &to in &followed[subtask] {
-            waits_for[to as usize] -= 1;
-            if waits_for[to as usize] == 0 {
-                free.push(to as usize);
+    verify(&open.dags, &options)
+        .map(|verified| verified.task_set)
+        .map_err(|rejected| {
+            let is_right = |line: &usize| {
+                let before = open.lines.partition_point(|other| other <= line);
+                verify(&open.dags[..before], &options).is_ok()
+            };
+            let wrong = open.lines.partition_point(is_right);
+            let faults: Vec<String> = rejected.faults().iter().map(ToString::to_string).collect();
+            Malformed {
+                line: open.lines.get(wrong).copied().unwrap_or(open.run.line),
+                reason: format!("`trace_dag`: {}", faults.join("; ")),
             }
-        }
-    }
-    ordered < followed.len()
+        })
 }
 
-/// Reads the releases of a sporadic DAG.
-fn releases(line: &Line<'_>) -> Result<Option<Releases>, Malformed> {
-    if !line.flag("sporadic")? {
-        return Ok(None);
-    }
-    let mut times_ns = BTreeMap::new();
-    if line.0.value.get("releases").is_none() {
-        return Ok(Some(Releases::default()));
-    }
-    for release in line.elements("releases")? {
-        let pair: Option<Vec<u64>> = release.elements().iter().map(Value::as_u64).collect();
-        let Some(&[job, time_ns]) = pair.as_deref() else {
-            return Err(line.malformed("a release is a pair of a job and a time"));
-        };
-        if times_ns.insert(job, time_ns).is_some() {
-            return Err(line.malformed(format!("the release of job {job} stands here twice")));
-        }
-    }
-    Ok(Some(Releases {
-        are_exact: !times_ns.is_empty(),
-        times_ns,
-    }))
-}
-
-/// Takes the releases of sporadic DAGs from the events. Where they do not state one,
-/// it is taken to be when the scheduler first dealt with the job.
-fn find_releases(run: &mut Run) {
-    for event in &run.events {
-        if event.what == What::Due
-            && let Some(releases) = &mut run.dags[event.dag.index()].sporadic
-        {
-            releases.times_ns.insert(event.job, event.time_ns);
-            releases.are_exact = true;
-        }
-    }
-    for event in &run.events {
-        let is_due = matches!(event.what, What::Released | What::Queued | What::Skipped);
-        if let Some(releases) = &mut run.dags[event.dag.index()].sporadic
-            && is_due
-            && !releases.are_exact
-        {
-            let time_ns = releases.times_ns.entry(event.job).or_insert(event.time_ns);
-            *time_ns = event.time_ns.min(*time_ns);
-        }
-    }
-}
-
-fn subtask(line: &Line<'_>, value: &Value) -> Result<Subtask, Malformed> {
+fn subtask(line: &Line<'_>, value: &Value) -> Result<SubtaskSpec, Malformed> {
     let read = || {
         let [name, priority, non_preemptive, wcet_ns] = value.elements() else {
             return None;
@@ -236,10 +205,13 @@ fn subtask(line: &Line<'_>, value: &Value) -> Result<Subtask, Malformed> {
         let non_preemptive = non_preemptive
             .as_u64()
             .filter(|&flag| flag < 2 && is_wcet)?;
-        Some(Subtask {
+        let priority = u32::try_from(priority.as_u64()?).ok()?;
+        Some(SubtaskSpec {
             name: name.as_text()?.to_string(),
-            priority: u32::try_from(priority.as_u64()?).ok()?,
+            wcet_ns: wcet_ns.as_u64(),
+            priority: Some(Priority(priority)),
             non_preemptive: non_preemptive == 1,
+            ..SubtaskSpec::default()
         })
     };
     read().ok_or_else(|| {
@@ -247,16 +219,16 @@ fn subtask(line: &Line<'_>, value: &Value) -> Result<Subtask, Malformed> {
     })
 }
 
-fn add_events(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
+fn add_events(line: &Line<'_>, open: &mut Open) -> Result<(), Malformed> {
     for (index, value) in line.elements("events")?.iter().enumerate() {
-        let event = event(run, value)
+        let event = event(open, value)
             .map_err(|reason| line.malformed(format!("event {} of the line: {reason}", index + 1)));
-        run.events.push(event?);
+        open.run.events.push(event?);
     }
     Ok(())
 }
 
-fn event(run: &Run, value: &Value) -> Result<Event, String> {
+fn event(open: &Open, value: &Value) -> Result<Event, String> {
     let [time_ns, word, core, dag, job, subtask] = value.elements() else {
         return Err("it is not [time, event, core, dag, job, subtask]".into());
     };
@@ -268,10 +240,10 @@ fn event(run: &Run, value: &Value) -> Result<Event, String> {
     let what: What = text
         .parse()
         .map_err(|_| format!("{} is no event", quoted(text)))?;
-    let core = number("core", core, u64::from(run.cores))?;
-    let dag = number("dag", dag, run.dags.len() as u64)?;
+    let core = number("core", core, u64::from(open.run.options.cores))?;
+    let dag = number("dag", dag, open.dags.len() as u64)?;
     let dag = DagId(u32::try_from(dag).map_err(|error| error.to_string())?);
-    let subtasks = run.dags[dag.index()].subtasks.len() as u64;
+    let subtasks = open.dags[dag.index()].subtasks.len() as u64;
     let subtask = match what.is_of_job() {
         true if *subtask == Value::Integer(-1) => None,
         true => return Err(format!("`{text}` is of a job, and its subtask not -1")),
@@ -288,20 +260,23 @@ fn event(run: &Run, value: &Value) -> Result<Event, String> {
     })
 }
 
-fn end(line: &Line<'_>, run: &mut Run) -> Result<(), Malformed> {
+fn end(line: &Line<'_>, open: Open) -> Result<Run, Malformed> {
+    let task_set = model(&open)?;
+    let mut run = open.run;
+    run.task_set = task_set;
     let (stated, found) = (line.number("events")?, run.events.len());
     if stated != found as u64 {
         return Err(line.malformed(format!("{stated} events are announced, {found} are there")));
     }
     run.lost = line.number("lost")?;
     run.complete = line.flag("complete")?;
-    find_releases(run);
-    in_order(run).map_err(|core| {
+    in_order(&run).map_err(|core| {
         line.malformed(format!(
             "time goes back in the events of core {}; each core's must be in the order of time",
             core.0
         ))
-    })
+    })?;
+    Ok(run)
 }
 
 /// Reports whether each core's own events are in the order of time, or else whose are

@@ -14,15 +14,15 @@ use crate::json::quoted;
 pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: usize) -> String {
     let mut text = String::new();
     let Findings { breaches, figures } = findings;
-    let policy = match run.policy {
+    let policy = match run.options.policy {
         Policy::StaticPriority => "static",
         Policy::Edf => "edf",
     };
-    let preemption = match run.preemption {
+    let preemption = match run.options.preemption {
         Preemption::Enabled => "on",
         Preemption::Disabled => "off",
     };
-    let (number, line, cores) = (run.number, run.line, run.cores);
+    let (number, line, cores) = (run.number, run.line, run.options.cores);
     let mut say = |line: &str| {
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{line}");
@@ -31,7 +31,7 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
         "{file}:{line}: run {number}, policy {policy}, preemption {preemption}, {cores} cores"
     ));
     for breach in breaches.iter().take(shown) {
-        say(&format!("  breach {breach}"));
+        say(&format!("  breach {}", breach.with_names(&run.task_set)));
     }
     if breaches.len() > shown {
         say(&format!("  and {} breaches more", breaches.len() - shown));

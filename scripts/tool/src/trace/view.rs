@@ -1,37 +1,15 @@
-//! A run's events put in order, and sorted by whom they happened to.
-//!
-//! Words. A *step* of the scheduler is known by the core that made it and by
-//! that core's last machine event before it: between two machine events of a
-//! core, a completion's step cannot begin. A *moment* is when and in which step
-//! something happened.
+//! A run's events in the order of time, and sorted by what they happened to: what the
+//! figures and the viewer need. Nothing is judged here.
 //!
 //! If events were lost, they were the oldest. A trace is *complete from* the first
-//! instant after the first event that is left; what happened before is left out here,
-//! and then nothing can be concluded from an event that is not there.
+//! instant after the first event that is left; what happened before is left out here.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
+use sched_dag::journal::{Event, What};
 use sched_dag::{CoreId, DagId, Instance};
 
-use super::breach::Breach;
-use super::history::{self, History};
-use super::jobs::JobHistory;
-use super::model::{Event, Run, What};
-
-/// When and in which step of the scheduler something happened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Moment {
-    pub(super) time_ns: u64,
-    pub(super) core: CoreId,
-    /// Counts the core's machine events up to this one.
-    step: u64,
-}
-
-impl Moment {
-    pub(super) fn is_same_step(self, other: Moment) -> bool {
-        (self.core, self.step) == (other.core, other.step)
-    }
-}
+use super::model::Run;
 
 /// A run in the order of time.
 #[derive(Debug)]
@@ -42,110 +20,98 @@ pub(super) struct View<'r> {
     /// The time of the last event.
     pub(super) end_ns: u64,
     /// The events from `from_ns` on, by time.
-    pub(super) events: Vec<(Event, Moment)>,
+    pub(super) events: Vec<Event>,
     pub(super) histories: BTreeMap<Instance, History>,
+    /// The jobs, each with what has happened to it and when.
     pub(super) jobs: BTreeMap<(DagId, u64), JobHistory>,
-    /// The jobs of each DAG of which instances may run, ascending.
-    released: BTreeMap<DagId, BTreeSet<u64>>,
-    /// When each DAG was ended before its time, by a fault or a stop.
-    pub(super) stopped: BTreeMap<DagId, u64>,
+    /// When sporadic jobs were due.
+    due_ns: BTreeMap<(DagId, u64), u64>,
+}
+
+/// What happened to a job, and when first.
+#[derive(Clone, Debug, Default)]
+pub(super) struct JobHistory {
+    pub(super) released_ns: Option<u64>,
+    pub(super) aborted_ns: Option<u64>,
+    pub(super) missed_ns: Option<u64>,
+    pub(super) completed_ns: Option<u64>,
+}
+
+/// What happened to an instance, and when first.
+#[derive(Clone, Debug, Default)]
+pub(super) struct History {
+    pub(super) ready_ns: Option<u64>,
+    pub(super) start_ns: Option<u64>,
+    pub(super) finish_ns: Option<u64>,
+    /// When it was cancelled, or ended by a fault.
+    pub(super) dropped_ns: Option<u64>,
+    /// The times on a core.
+    pub(super) slices: Vec<Slice>,
+    pub(super) suspensions: u64,
+}
+
+/// A stretch of time on one core.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slice {
+    pub(super) core: CoreId,
+    pub(super) from_ns: u64,
+    /// `None`: it ran when the trace ended.
+    pub(super) to_ns: Option<u64>,
 }
 
 impl<'r> View<'r> {
-    /// Puts a run in order, and adds the breaches that show on the way.
-    pub(super) fn new(run: &'r Run, breaches: &mut Vec<Breach>) -> View<'r> {
-        let from_ns = complete_from_ns(run);
-        let mut events = with_moments(run);
-        events.retain(|(event, _)| event.time_ns >= from_ns);
-        events.sort_by_key(|(event, _)| event.time_ns);
+    /// Puts a run in order.
+    pub(super) fn new(run: &'r Run) -> View<'r> {
         let mut view = View {
             run,
-            from_ns,
-            end_ns: events.last().map_or(from_ns, |(event, _)| event.time_ns),
-            events,
+            from_ns: complete_from_ns(run),
+            end_ns: 0,
+            events: Vec::new(),
             histories: BTreeMap::new(),
             jobs: BTreeMap::new(),
-            released: BTreeMap::new(),
-            stopped: BTreeMap::new(),
+            due_ns: BTreeMap::new(),
         };
-        view.sort_by_job(breaches);
-        view.sort_by_instance(breaches);
-        view.find_stops();
+        view.events = view.in_the_order_of_the_log().collect();
+        view.events.sort_by_key(|event| event.time_ns);
+        view.end_ns = view.events.last().map_or(view.from_ns, |last| last.time_ns);
+        for event in &view.events {
+            let of_job = (event.dag, event.job);
+            match (event.what, event.instance()) {
+                (What::Request, _) => {}
+                (_, Some(instance)) => {
+                    let history = view.histories.entry(instance).or_default();
+                    history.note(event, run.lost > 0, view.from_ns);
+                }
+                (What::Due, None) => {
+                    view.due_ns.insert(of_job, event.time_ns);
+                }
+                (What::Signalled | What::Dropped | What::Stopped, None) => {}
+                (_, None) => view.jobs.entry(of_job).or_default().note(event),
+            }
+        }
         view
     }
 
-    /// Reports whether an event that is not there may have been lost.
-    pub(super) fn is_lossy(&self) -> bool {
-        self.run.lost > 0
+    /// Returns the events that are judged, in the order in which they were learnt of.
+    pub(super) fn in_the_order_of_the_log(&self) -> impl Iterator<Item = Event> {
+        let events = self.run.events.iter().copied();
+        events.filter(|event| event.time_ns >= self.from_ns)
     }
 
-    /// Returns the job before `job` of which instances may have run.
-    pub(super) fn job_before(&self, dag: DagId, job: u64) -> Option<u64> {
-        let jobs = self.released.get(&dag)?;
-        jobs.range(..job).next_back().copied()
-    }
-
-    /// Reports whether a job was aborted, or cut short by its DAG's end.
-    pub(super) fn is_cut(&self, dag: DagId, job: u64) -> bool {
-        let aborted = self
-            .jobs
-            .get(&(dag, job))
-            .is_some_and(|job| job.is_aborted());
-        aborted || self.stopped.contains_key(&dag)
-    }
-
-    fn sort_by_job(&mut self, breaches: &mut Vec<Breach>) {
-        for &(event, moment) in &self.events {
-            let (dag, job) = (event.dag, event.job);
-            let is_signal = matches!(
-                event.what,
-                What::Signalled | What::Dropped | What::Due | What::Stopped
-            );
-            if event.what.is_of_job() && !is_signal {
-                let history = self.jobs.entry((dag, job)).or_default();
-                breaches.extend(history.note(self.run, &event, moment));
-            }
-            let runs = event.what == What::Released || event.subtask.is_some();
-            if runs {
-                self.released.entry(dag).or_default().insert(job);
-            }
+    /// Returns the nominal release of a job; 0 if nothing is known of that of a sporadic
+    /// one.
+    pub(super) fn release_ns(&self, dag: DagId, job: u64) -> u64 {
+        let model = self.run.task_set.dag(dag);
+        match model.is_sporadic() {
+            true => self.due_ns.get(&(dag, job)).copied().unwrap_or(0),
+            false => model.grid_ns(job),
         }
     }
 
-    fn sort_by_instance(&mut self, breaches: &mut Vec<Breach>) {
-        let mut lives: BTreeMap<Instance, Vec<(Event, Moment)>> = BTreeMap::new();
-        for &(event, moment) in &self.events {
-            // A request is a wish; nothing has happened to the instance.
-            if let Some(instance) = event.instance()
-                && event.what != What::Request
-            {
-                lives.entry(instance).or_default().push((event, moment));
-            }
-        }
-        for (instance, events) in lives {
-            let history = history::follow(self, instance, &events, breaches);
-            self.histories.insert(instance, history);
-        }
-    }
-
-    fn find_stops(&mut self) {
-        let mut stopped = BTreeMap::new();
-        for (event, _) in &self.events {
-            let is_aborted = |job: &JobHistory| job.is_aborted();
-            let is_stop = match event.what {
-                What::Ended | What::Stopped => true,
-                // Only an abort and an end cancel, so this was an end.
-                What::Cancelled => {
-                    let job = self.jobs.get(&(event.dag, event.job));
-                    !job.is_some_and(is_aborted)
-                }
-                _ => false,
-            };
-            if is_stop {
-                stopped.entry(event.dag).or_insert(event.time_ns);
-            }
-        }
-        self.stopped = stopped;
+    /// Returns the absolute deadline of a job.
+    pub(super) fn deadline_ns(&self, dag: DagId, job: u64) -> u64 {
+        let relative_ns = self.run.task_set.dag(dag).relative_deadline_ns();
+        self.release_ns(dag, job).saturating_add(relative_ns)
     }
 }
 
@@ -161,17 +127,55 @@ fn complete_from_ns(run: &Run) -> u64 {
     first.map_or(u64::MAX, |first| first.time_ns.saturating_add(1))
 }
 
-fn with_moments(run: &Run) -> Vec<(Event, Moment)> {
-    let mut steps: BTreeMap<CoreId, u64> = BTreeMap::new();
-    let moment = |event: &Event| {
-        let step = steps.entry(event.core).or_insert(0);
-        *step += u64::from(event.what.is_of_machine());
-        let moment = Moment {
-            time_ns: event.time_ns,
-            core: event.core,
-            step: *step,
+impl JobHistory {
+    fn note(&mut self, event: &Event) {
+        let place = match event.what {
+            What::Released => &mut self.released_ns,
+            What::Aborted => &mut self.aborted_ns,
+            What::Missed => &mut self.missed_ns,
+            What::Completed => &mut self.completed_ns,
+            _ => return,
         };
-        (*event, moment)
-    };
-    run.events.iter().map(moment).collect()
+        place.get_or_insert(event.time_ns);
+    }
+}
+
+impl History {
+    /// Returns when the instance was over: finished, cancelled or ended.
+    pub(super) fn over_ns(&self) -> Option<u64> {
+        self.finish_ns.or(self.dropped_ns)
+    }
+
+    fn note(&mut self, event: &Event, is_lossy: bool, from_ns: u64) {
+        let time_ns = event.time_ns;
+        let is_first = self.slices.is_empty() && self.start_ns.is_none();
+        let ran = matches!(event.what, What::Suspend | What::Finish | What::Ended);
+        if is_lossy && is_first && ran {
+            // It has been running since before the trace.
+            self.begin(event.core, from_ns);
+        }
+        if let Some(slice) = self.slices.last_mut() {
+            slice.to_ns.get_or_insert(time_ns);
+        }
+        let place = match event.what {
+            What::Ready => &mut self.ready_ns,
+            What::Start => &mut self.start_ns,
+            What::Finish => &mut self.finish_ns,
+            What::Cancelled | What::Ended => &mut self.dropped_ns,
+            _ => &mut None,
+        };
+        place.get_or_insert(time_ns);
+        self.suspensions += u64::from(event.what == What::Suspend);
+        if matches!(event.what, What::Start | What::Resume) {
+            self.begin(event.core, time_ns);
+        }
+    }
+
+    fn begin(&mut self, core: CoreId, from_ns: u64) {
+        self.slices.push(Slice {
+            core,
+            from_ns,
+            to_ns: None,
+        });
+    }
 }

@@ -3,7 +3,8 @@
 //! A lie says whether it could be told of the run at hand. What would not break
 //! a rule, such as moving an event within an instant, is never told.
 
-use tool::trace::model::{Event, Run, What};
+use sched_dag::journal::{Event, What};
+use tool::trace::model::Run;
 
 use crate::random::Random;
 
@@ -48,7 +49,7 @@ pub(crate) const LIES: [(&str, Lie); 16] = [
 
 /// Brings the events back into the order of a log.
 pub(crate) fn order(run: &mut Run) {
-    run.events.sort_by_key(|event| (event.core, event.time_ns));
+    run.events.sort_by_key(|event| event.time_ns);
 }
 
 fn pick(run: &Run, random: &mut Random, is_it: impl Fn(&Event) -> bool) -> Option<usize> {
@@ -130,13 +131,14 @@ fn missing_miss(run: &mut Run, random: &mut Random) -> bool {
 }
 
 fn early_release(run: &mut Run, random: &mut Random) -> bool {
-    let is_late_enough =
-        |event: &Event| event.what == What::Released && run.release_ns(event.dag, event.job) > 0;
+    let is_late_enough = |event: &Event| {
+        event.what == What::Released && run.task_set.dag(event.dag).grid_ns(event.job) > 0
+    };
     let Some(position) = pick(run, random, is_late_enough) else {
         return false;
     };
     let event = &run.events[position];
-    let nominal_ns = run.release_ns(event.dag, event.job);
+    let nominal_ns = run.task_set.dag(event.dag).grid_ns(event.job);
     run.events[position].time_ns = random.between(0, nominal_ns - 1);
     true
 }
@@ -144,7 +146,7 @@ fn early_release(run: &mut Run, random: &mut Random) -> bool {
 /// The last finish of an instance's predecessors.
 fn join_ns(run: &Run, event: &Event) -> Option<u64> {
     let subtask = event.subtask?;
-    let predecessors = &run.dags[event.dag.index()].predecessors[subtask.index()];
+    let predecessors = run.task_set.dag(event.dag).predecessors(subtask);
     let finishes = predecessors.iter().map(|&predecessor| {
         let like = Event {
             subtask: Some(predecessor),
@@ -201,10 +203,10 @@ fn swapped(run: &mut Run, random: &mut Random) -> bool {
 
 fn finish_elsewhere(run: &mut Run, random: &mut Random) -> bool {
     let position = pick(run, random, |event| event.what == What::Finish);
-    let Some(position) = position.filter(|_| run.cores > 1) else {
+    let Some(position) = position.filter(|_| run.options.cores > 1) else {
         return false;
     };
     let core = &mut run.events[position].core.0;
-    *core = (*core + 1) % run.cores;
+    *core = (*core + 1) % run.options.cores;
     true
 }

@@ -1,7 +1,6 @@
 //! A set in the real scheduler and virtual time, and the trace that a kernel leaves.
 //!
-//! What a kernel does is imitated: a completion's step is made by the core that
-//! has finished, any other by core 0.
+//! The requests that a kernel makes of cores are imitated.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -190,7 +189,6 @@ impl Observer for Driver<'_> {
 impl Workload for Driver<'_> {
     fn instant(&mut self, now_ns: u64) {
         self.journal.now_ns = now_ns;
-        self.journal.here = CoreId(0);
     }
 
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
@@ -213,7 +211,6 @@ impl Workload for Driver<'_> {
     }
 
     fn finished(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.journal.here = core;
         self.journal.on_core(What::Finish, instance, core);
     }
 }

@@ -8,9 +8,10 @@
 use std::collections::BTreeMap;
 
 use sched_dag::DagId;
+use sched_dag::journal::{Event, What};
 
 use super::figure::Figure;
-use crate::trace::model::{Event, Run, What};
+use crate::trace::model::Run;
 use crate::trace::read;
 
 /// The preemptor's DAG in the runs that have one.
@@ -32,7 +33,8 @@ pub(super) fn read_all(log: &str, cores: u64) -> Result<Vec<Figure>, String> {
 }
 
 fn is_of(run: &Run, name: &str) -> bool {
-    run.dags.first().is_some_and(|dag| dag.name == name)
+    let mut dags = run.task_set.dags().iter();
+    dags.next().is_some_and(|dag| dag.name() == name)
 }
 
 /// Counts how often sinks of fork-joins are made ready.
@@ -40,7 +42,7 @@ fn wakeups(runs: &[Run], cores: u64) -> Vec<Figure> {
     // By number of branches: wake-ups and jobs.
     let mut counts: BTreeMap<usize, (u64, u64)> = BTreeMap::new();
     for run in runs.iter().filter(|run| is_of(run, "fork-join")) {
-        let sink = run.dags[0].subtasks.len() - 1;
+        let sink = run.task_set.dag(DagId(0)).subtasks().len() - 1;
         let count =
             |is_it: &dyn Fn(&&Event) -> bool| run.events.iter().filter(is_it).count() as u64;
         let (ready, jobs) = counts.entry(sink - 1).or_default();

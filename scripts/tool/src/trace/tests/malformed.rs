@@ -17,9 +17,9 @@ fn a_good_log_is_read() {
     let runs = read(GOOD).unwrap();
     assert_eq!(runs.len(), 1);
     let run = &runs[0];
-    assert_eq!((run.number, run.line, run.cores), (3, 2, 2));
-    assert_eq!((run.events.len(), run.dags.len()), (3, 1));
-    assert!(run.dags[0].subtasks[1].non_preemptive);
+    assert_eq!((run.number, run.line, run.options.cores), (3, 2, 2));
+    assert_eq!((run.events.len(), run.task_set.dags().len()), (3, 1));
+    assert!(run.task_set.dags()[0].subtasks()[1].is_non_preemptive());
     assert_eq!(read("hello\n").unwrap().len(), 0);
     let second = GOOD.replace("\"run\":3", "\"run\":4");
     assert_eq!(read(&format!("{GOOD}{second}")).unwrap().len(), 2);
@@ -77,22 +77,19 @@ fn whatever_is_wrong_is_named_with_its_line() {
             "`trace_dag`: `sporadic` is neither true nor false",
         ),
         (
-            "\"overrun\":\"skip\"",
-            "\"overrun\":\"skip\",\"sporadic\":true,\"releases\":[[1,5],[1,6]]",
-            3,
-            "`trace_dag`: the release of job 1 stands here twice",
-        ),
-        (
             "[[0,1]]",
             "[[0,1],[1,0]]",
             3,
-            "`trace_dag`: `edges` have a cycle, which no commit lets pass",
+            "`trace_dag`: dag `x` has no source: every subtask has an input; register a periodic \
+             subtask; dag `x` has no sink: every subtask has a successor; register a sink subtask; \
+             dag `x` has a cycle: subtask `a` -> subtask `b` -> subtask `a`; remove one of these \
+             edges",
         ),
         (
             "[[0,1]]",
             "[[1,1]]",
             3,
-            "`trace_dag`: `edges` have a cycle, which no commit lets pass",
+            "`trace_dag`: subtask `b` of dag `x` precedes itself; remove the edge",
         ),
         (
             "\"lost\":0",
@@ -259,12 +256,14 @@ fn what_a_message_repeats_is_short_and_can_be_seen() {
 
 #[test]
 fn a_chain_of_many_subtasks_is_no_cycle() {
-    let subtasks = vec!["[\"a\",0,0,null]"; 3000].join(",");
+    let subtasks: Vec<String> = (0..3000).map(|n| format!("[\"s{n}\",0,0,null]")).collect();
+    let subtasks = subtasks.join(",");
     let edges: Vec<String> = (1..3000).map(|n| format!("[{},{n}]", n - 1)).collect();
     let log = GOOD
         .replace("[[\"a\",0,0,null],[\"b\",1,1,7]]", &format!("[{subtasks}]"))
         .replace("[[0,1]]", &format!("[{}]", edges.join(",")));
-    assert_eq!(read(&log).unwrap()[0].dags[0].predecessors.len(), 3000);
+    let runs = read(&log).unwrap();
+    assert_eq!(runs[0].task_set.dags()[0].subtasks().len(), 3000);
 }
 
 #[test]

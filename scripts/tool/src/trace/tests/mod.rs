@@ -10,8 +10,9 @@ mod malformed;
 mod rules;
 mod sporadic;
 
-use super::model::{Event, Run};
+use super::model::Run;
 use super::{Findings, check, read};
+use sched_dag::journal::Event;
 use sched_dag::{CoreId, DagId, SubtaskId};
 
 /// How long one may wait in these traces.
@@ -58,7 +59,10 @@ fn with(events: &str, changes: &[(&str, &str)]) -> String {
 /// Checks a run and returns its breaches as texts.
 fn breaches(run: &Run) -> Vec<String> {
     let Findings { breaches, .. } = check(run, BOUND_NS);
-    breaches.iter().map(ToString::to_string).collect()
+    let texts = breaches
+        .iter()
+        .map(|breach| breach.with_names(&run.task_set).to_string());
+    texts.collect()
 }
 
 /// Asserts that a run shows this breach, perhaps among others.

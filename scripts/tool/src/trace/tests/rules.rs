@@ -99,12 +99,12 @@ fn r1_a_job_released_and_skipped_or_released_twice() {
     let skipped = "110 released c0 0.1\n110 skipped c0 0.1";
     assert_shows(
         &changed(&[("110 released c0 0.1", skipped)]),
-        "at 110 ns, R1 release: dag `fork` job 1 is released at 110 ns and also skipped",
+        "at 110 ns, R1 release: dag `fork` job 1 is skipped although it was released at 110 ns",
     );
     let twice = "110 released c0 0.1\n110 released c0 0.1";
     assert_shows(
         &changed(&[("110 released c0 0.1", twice)]),
-        "at 110 ns, R1 release: dag `fork` job 1 is released a second time, after 110 ns",
+        "at 110 ns, R1 release: dag `fork` job 1 is released although it was released at 110 ns",
     );
 }
 
@@ -123,7 +123,7 @@ fn r2_ready_or_started_before_a_predecessor_finished() {
     assert_shows(
         &changed(&[("40 finish c0 0.0.1\n", "")]),
         "at 51 ns, R2 join: subtask `d` of dag `fork` job 0 is ready on core 1; subtask `b` of dag \
-         `fork` job 0, which it waits for, finishes never",
+         `fork` job 0, which it waits for, finishes later or never",
     );
 }
 
@@ -158,7 +158,7 @@ fn r3_a_successor_released_late() {
             ("52 start c1 0.0.3", "56 start c1 0.0.3"),
         ]),
         "at 56 ns, R3 completion boundary: subtask `d` of dag `fork` job 0 is ready 6 ns after the \
-         last of what it waits for was over at 50 ns on core 1",
+         last of what it waits for was over at 50 ns",
     );
 }
 
@@ -206,7 +206,7 @@ fn r4_completed_before_or_apart_from_the_last_finish() {
             ),
         ]),
         "at 111 ns, R4 completion: dag `fork` job 0 is completed in a step on core 0 that no \
-         instance of it brought about",
+         instance of it brought about; the last of that was over at 60 ns on core 1",
     );
     assert_shows(
         &changed(&[("61 completed c1 0.0", "70 completed c1 0.0")]),

@@ -1,10 +1,9 @@
 //! The tracks of the cores: what each one executed when.
 
+use sched_dag::journal::What;
 use sched_dag::{CoreId, Instance};
 
-use super::super::history::Slice;
-use super::super::model::What;
-use super::super::view::View;
+use super::super::view::{Slice, View};
 use super::flows::Flows;
 use super::output::{Output, Track};
 use super::{Pieces, instance_args, instance_name};
@@ -21,7 +20,7 @@ struct Piece {
 pub(super) fn draw(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output) {
     let pieces = pieces(view);
     let group = output.group(&format!("{prefix}cores"), "");
-    for core in (0..view.run.cores).map(CoreId) {
+    for core in (0..view.run.options.cores).map(CoreId) {
         let mut track = output.track(group, &format!("core {}", core.0));
         for piece in pieces.iter().filter(|piece| piece.slice.core == core) {
             draw_piece(view, piece, flows, &mut track);
@@ -60,7 +59,7 @@ fn draw_piece(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) 
     let is_last = number + 1 == of as u64;
     let begins = if number > 0 {
         "resume"
-    } else if history.start.is_some() {
+    } else if history.start_ns.is_some() {
         "start"
     } else {
         "before the trace"
@@ -68,8 +67,8 @@ fn draw_piece(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) 
     let ends = match slice.to_ns {
         None => "after the trace",
         Some(_) if !is_last => "suspend",
-        Some(_) if history.finish.is_some() => "finish",
-        Some(_) if history.dropped.is_some() => "fault",
+        Some(_) if history.finish_ns.is_some() => "finish",
+        Some(_) if history.dropped_ns.is_some() => "fault",
         Some(_) => "suspend",
     };
     let args = instance_args(instance)
@@ -91,7 +90,7 @@ fn draw_piece(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) 
 
 /// Draws what was asked of a core and what it did.
 fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
-    for (event, _) in &view.events {
+    for event in &view.events {
         let what = match event.what {
             What::Request => "preempt for",
             What::Suspend => "preempted",

@@ -4,11 +4,10 @@
 //! as overlap at most. A subtask needs one track only: by R2 its instance of a job
 //! is not ready before the one of the job before has finished.
 
+use sched_dag::journal::What;
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use super::super::jobs::JobHistory;
-use super::super::model::What;
-use super::super::view::View;
+use super::super::view::{JobHistory, View};
 use super::flows::Flows;
 use super::output::{Group, Output, Track};
 use super::{instance_args, name_or};
@@ -17,19 +16,23 @@ use crate::json::Object;
 /// Draws all DAGs of a run.
 pub(super) fn draw(view: &View<'_>, prefix: &str, flows: &mut Flows, output: &mut Output) {
     flows.draw_again();
-    for (dag, model) in (0..).map(DagId).zip(&view.run.dags) {
+    for (dag, model) in (0..).map(DagId).zip(view.run.task_set.dags()) {
         let label = format!(
             "{}T = {}, D = {}",
-            model.sporadic.as_ref().map_or("", |_| "sporadic, "),
-            milliseconds(model.period_ns),
-            milliseconds(model.relative_deadline_ns)
+            if model.is_sporadic() {
+                "sporadic, "
+            } else {
+                ""
+            },
+            milliseconds(model.period_ns()),
+            milliseconds(model.relative_deadline_ns())
         );
-        let name = format!("{prefix}dag {}", name_or(&model.name, dag.0));
+        let name = format!("{prefix}dag {}", name_or(model.name(), dag.0));
         let group = output.group(&name, &label);
         draw_moments(view, dag, group, output);
         draw_jobs(view, dag, group, output);
-        for (subtask, of) in (0..).map(SubtaskId).zip(&model.subtasks) {
-            let mut track = output.track(group, &name_or(&of.name, subtask.0));
+        for (subtask, of) in (0..).map(SubtaskId).zip(model.subtasks()) {
+            let mut track = output.track(group, &name_or(of.name(), subtask.0));
             draw_subtask(view, dag, subtask, flows, &mut track);
             output.add(track);
         }
@@ -40,7 +43,7 @@ pub(super) fn draw(view: &View<'_>, prefix: &str, flows: &mut Flows, output: &mu
 fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
     let mut track = output.track(group, "releases, deadlines");
     let args = |job: u64| Object::new().number("job", job).end();
-    for (event, _) in view.events.iter().filter(|(event, _)| event.dag == dag) {
+    for event in view.events.iter().filter(|event| event.dag == dag) {
         let what = match event.what {
             What::Released => "release",
             What::Queued => "release waits",
@@ -55,9 +58,9 @@ fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) 
         track.instant(event.time_ns, &name, &args(event.job));
     }
     for (&(_, job), history) in jobs_of(view, dag) {
-        let deadline_ns = view.run.deadline_ns(dag, job);
+        let deadline_ns = view.deadline_ns(dag, job);
         // A later one would only make the picture longer.
-        if history.released.is_some() && deadline_ns <= view.end_ns {
+        if history.released_ns.is_some() && deadline_ns <= view.end_ns {
             track.instant(deadline_ns, &format!("deadline #{job}"), &args(job));
         }
     }
@@ -69,11 +72,11 @@ fn draw_jobs(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
     let mut lanes: Vec<Track> = Vec::new();
     let mut busy_until_ns: Vec<u64> = Vec::new();
     for (&(_, job), history) in jobs_of(view, dag) {
-        if history.released.is_none() && history.completed.is_none() {
+        if history.released_ns.is_none() && history.completed_ns.is_none() {
             continue;
         }
-        let nominal_ns = view.run.release_ns(dag, job);
-        let end_ns = history.completed.map(|moment| moment.time_ns);
+        let nominal_ns = view.release_ns(dag, job);
+        let end_ns = history.completed_ns;
         let to_ns = end_ns.unwrap_or(view.end_ns).max(nominal_ns);
         let is_free = |until_ns: &u64| *until_ns <= nominal_ns;
         let lane = busy_until_ns.iter().position(is_free);
@@ -93,24 +96,24 @@ fn draw_jobs(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
 
 fn what_became_of(history: &JobHistory) -> &'static str {
     match history {
-        job if job.is_aborted() => ", aborted",
-        job if job.missed.is_some() => ", missed",
-        job if job.completed.is_none() => ", not completed",
+        job if job.aborted_ns.is_some() => ", aborted",
+        job if job.missed_ns.is_some() => ", missed",
+        job if job.completed_ns.is_none() => ", not completed",
         _ => "",
     }
 }
 
 fn job_args(view: &View<'_>, dag: DagId, job: u64, history: &JobHistory) -> String {
-    let release_ns = view.run.release_ns(dag, job);
+    let release_ns = view.release_ns(dag, job);
     let mut args = Object::new()
         .number("job", job)
         .number("release_ns", release_ns)
-        .number("deadline_ns", view.run.deadline_ns(dag, job));
-    if let Some(released) = history.released {
-        args = args.number("released_ns", released.time_ns);
+        .number("deadline_ns", view.deadline_ns(dag, job));
+    if let Some(released_ns) = history.released_ns {
+        args = args.number("released_ns", released_ns);
     }
-    if let Some(completed) = history.completed {
-        let response_ns = completed.time_ns.saturating_sub(release_ns);
+    if let Some(completed_ns) = history.completed_ns {
+        let response_ns = completed_ns.saturating_sub(release_ns);
         args = args.number("response_time_ns", response_ns);
     }
     args.end()
@@ -130,31 +133,30 @@ fn draw_subtask(view: &View<'_>, dag: DagId, subtask: SubtaskId, flows: &Flows, 
     let instances = view.histories.range(of_dag);
     for (&instance, history) in instances.filter(|(instance, _)| instance.subtask == subtask) {
         let first = history.slices.first();
-        let begin_ns = history.ready.map(|moment| moment.time_ns);
-        let Some(begin_ns) = begin_ns.or(first.map(|slice| slice.from_ns)) else {
+        let Some(begin_ns) = history.ready_ns.or(first.map(|slice| slice.from_ns)) else {
             continue;
         };
-        let over_ns = history.over().map(|moment| moment.time_ns);
+        let over_ns = history.over_ns();
         let was_cancelled = over_ns.is_some() && first.is_none();
         let name = match was_cancelled {
             true => format!("#{}, cancelled", instance.job),
             false => format!("#{}", instance.job),
         };
-        if let Some(ready) = history.ready {
+        if let Some(ready_ns) = history.ready_ns {
             let name = format!("ready #{}", instance.job);
-            track.instant(ready.time_ns, &name, &instance_args(instance).end());
+            track.instant(ready_ns, &name, &instance_args(instance).end());
         }
         let args = instance_args(instance).number("suspensions", history.suspensions);
         track.begin(begin_ns, &name, &args.end());
         for (index, slice) in history.slices.iter().enumerate() {
             let args = Object::new().number("core", slice.core.0).end();
             track.begin(slice.from_ns, &format!("on core {}", slice.core.0), &args);
-            if index == 0 && history.start.is_some() {
+            if index == 0 && history.start_ns.is_some() {
                 flows.into(instance).for_each(|flow| track.flow_in(flow));
             }
             let to_ns = slice.to_ns.unwrap_or(view.end_ns);
             track.advance(to_ns);
-            if index + 1 == history.slices.len() && history.finish.is_some() {
+            if index + 1 == history.slices.len() && history.finish_ns.is_some() {
                 flows.out(instance).for_each(|flow| track.flow_out(flow));
             }
             track.end(to_ns);

@@ -34,12 +34,12 @@ impl Flows {
             shift: 0,
         };
         for (&later, history) in &view.histories {
-            if history.start.is_none() {
+            if history.start_ns.is_none() {
                 continue;
             }
             for &subtask in predecessors(view, later.dag, later.subtask) {
                 let earlier = Instance { subtask, ..later };
-                let finish = view.histories.get(&earlier).and_then(|it| it.finish);
+                let finish = view.histories.get(&earlier).and_then(|it| it.finish_ns);
                 if finish.is_some() {
                     flows.out.entry(earlier).or_default().push(flows.count);
                     flows.into.entry(later).or_default().push(flows.count);
@@ -77,5 +77,5 @@ impl Flows {
 }
 
 fn predecessors<'v>(view: &'v View<'_>, dag: DagId, subtask: SubtaskId) -> &'v [SubtaskId] {
-    &view.run.dags[dag.index()].predecessors[subtask.index()]
+    view.run.task_set.dag(dag).predecessors(subtask)
 }

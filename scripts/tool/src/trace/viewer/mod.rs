@@ -35,8 +35,8 @@ mod tests;
 use std::collections::BTreeMap;
 
 use sched_dag::Instance;
+use sched_dag::law::Violation;
 
-use super::breach::Breach;
 use super::check;
 use super::model::Run;
 use super::view::View;
@@ -52,7 +52,7 @@ pub use command::{TRACE, trace};
 pub fn convert(runs: &[Run], bound_ns: u64) -> String {
     let mut output = Output::default();
     for run in runs {
-        let view = View::new(run, &mut Vec::new());
+        let view = View::new(run);
         let breaches = check(run, bound_ns).breaches;
         let prefix = match runs {
             [_] => String::new(),
@@ -61,21 +61,22 @@ pub fn convert(runs: &[Run], bound_ns: u64) -> String {
         let mut flows = Flows::new(&view, output.next_flow());
         cores::draw(&view, &prefix, &flows, &mut output);
         dags::draw(&view, &prefix, &mut flows, &mut output);
-        draw_breaches(&breaches, &prefix, &mut output);
+        draw_breaches(run, &breaches, &prefix, &mut output);
         output.set_next_flow(flows.next());
     }
     output.end()
 }
 
-fn draw_breaches(breaches: &[Breach], prefix: &str, output: &mut Output) {
+fn draw_breaches(run: &Run, breaches: &[Violation], prefix: &str, output: &mut Output) {
     if breaches.is_empty() {
         return;
     }
     let group = output.group(&format!("{prefix}breaches"), "");
     let mut track = output.track(group, "rules");
     for breach in breaches {
-        let args = Object::new().text("what", &breach.text).end();
-        track.instant(breach.time_ns, &breach.rule.to_string(), &args);
+        let what = breach.with_names(&run.task_set).to_string();
+        let args = Object::new().text("what", &what).end();
+        track.instant(breach.time_ns(), &breach.rule().to_string(), &args);
     }
     output.add(track);
 }
@@ -83,9 +84,9 @@ fn draw_breaches(breaches: &[Breach], prefix: &str, output: &mut Output) {
 /// The name of an instance on a track that shows all DAGs.
 fn instance_name(run: &Run, instance: Instance) -> String {
     let Instance { dag, job, subtask } = instance;
-    let model = &run.dags[dag.index()];
-    let subtask = name_or(&model.subtasks[subtask.index()].name, subtask.0);
-    format!("{}/{subtask} #{job}", name_or(&model.name, dag.0))
+    let model = run.task_set.dag(dag);
+    let subtask = name_or(model.subtask(subtask).name(), subtask.0);
+    format!("{}/{subtask} #{job}", name_or(model.name(), dag.0))
 }
 
 fn name_or(name: &str, number: u32) -> String {

@@ -1,0 +1,397 @@
+//! Rules R1 and R4: when a job is released, complete, and late.
+//!
+//! R1: a job is released, queued or skipped at or after its nominal release, and not
+//! both released and skipped; sporadic ones are due at least T apart, and never before
+//! O. No more jobs are in flight than may be. Where times are exact, a release is carried
+//! out at the nominal instant or, if it was queued, when an older job ends.
+//!
+//! R4: a job is complete with the last of its instances, which must all be over, in the
+//! scheduler's step that the last one brings about, within the tolerance. It has missed
+//! its deadline if and only if the last finish is later than that. A core may finish in
+//! time while another one is just noticing the miss: that is a breach only if more than
+//! the tolerance lies between. Where times are exact, a miss is noticed at once.
+//!
+//! A job that was aborted, or cut short by its DAG's end, is complete with its last
+//! instance, too; whether it missed its deadline is not judged.
+
+use alloc::collections::BTreeMap;
+
+use super::lives::Life;
+use super::{Moment, OfDag, Replay};
+use crate::ids::{DagId, Instance, SubtaskId};
+use crate::journal::{Event, What};
+use crate::law::{Violation, latest};
+
+/// What is known of a job.
+#[derive(Default)]
+pub(super) struct Job {
+    /// The nominal release; `None` for a sporadic job until it is released.
+    pub(super) release_ns: Option<u64>,
+    /// Whether its release may be among the events that are lost.
+    pub(super) is_partial: bool,
+    pub(super) released: Option<Moment>,
+    queued: Option<Moment>,
+    skipped: Option<Moment>,
+    pub(super) aborted: Option<Moment>,
+    missed: Option<Moment>,
+    completed: Option<Moment>,
+    pub(super) lives: BTreeMap<SubtaskId, Life>,
+}
+
+impl Job {
+    pub(super) fn partial(release_ns: Option<u64>) -> Self {
+        Self {
+            release_ns,
+            is_partial: true,
+            ..Self::default()
+        }
+    }
+
+    /// Takes note of an event; that it happens twice is a breach.
+    fn note(&mut self, event: &Event, moment: Moment) -> Option<Violation> {
+        let place = match event.what {
+            What::Released => &mut self.released,
+            What::Queued => &mut self.queued,
+            What::Skipped => &mut self.skipped,
+            What::Aborted => &mut self.aborted,
+            What::Missed => &mut self.missed,
+            _ => &mut self.completed,
+        };
+        let earlier = place.replace(moment)?;
+        *place = Some(earlier);
+        Some(Violation::Again {
+            event: *event,
+            before: event.what,
+            before_ns: earlier.time_ns,
+        })
+    }
+
+    /// Returns when the last instance had finished; `None` if one has not.
+    fn finish_ns(&self, subtasks: u32) -> Option<u64> {
+        let finish_ns = |subtask| Some(self.lives.get(&SubtaskId(subtask))?.finish?.time_ns);
+        latest((0..subtasks).map(finish_ns))
+    }
+}
+
+impl OfDag {
+    /// Forgets the jobs before a complete one that are over.
+    fn forget_before(&mut self, job: u64) {
+        while let Some(first) = self.jobs.first_entry()
+            && *first.key() < job
+            && first.get().completed.is_some()
+        {
+            self.forgotten = first.key() + 1;
+            first.remove();
+        }
+        while let Some(first) = self.waiting.first_entry()
+            && *first.key() < job
+            && first.get().skipped.is_some()
+        {
+            first.remove();
+        }
+    }
+}
+
+impl Replay<'_> {
+    /// Takes what happens to a job that is due.
+    pub(super) fn release(&mut self, event: &Event) {
+        let event = *event;
+        let Event { dag, job, .. } = event;
+        let moment = self.moment(&event);
+        let model = self.task_set.dag(dag);
+        let is_released = event.what == What::Released;
+        let of_dag = self.dag(dag);
+        let due_ns = of_dag.due.filter(|due| due.0 == job).map(|due| due.1);
+        let release_ns = match model.is_sporadic() {
+            true => due_ns,
+            false => Some(model.grid_ns(job)),
+        };
+        let mut found = [None; 4];
+        if let Some(known) = of_dag.jobs.get_mut(&job)
+            && known.released.is_some()
+        {
+            let before_ns = known.released.map_or(0, |released| released.time_ns);
+            let before = What::Released;
+            // Twice, or queued or skipped after all.
+            found[0] = Some(Violation::Again {
+                event,
+                before,
+                before_ns,
+            });
+            self.found.extend(found.into_iter().flatten());
+            return;
+        }
+        let waiting = of_dag.waiting.entry(job).or_default();
+        waiting.release_ns = release_ns;
+        found[0] = waiting.note(&event, moment);
+        if is_released && let Some(skipped) = waiting.skipped {
+            let (before, before_ns) = (What::Skipped, skipped.time_ns);
+            found[1] = Some(Violation::Again {
+                event,
+                before,
+                before_ns,
+            });
+        }
+        found[2] = release_ns
+            .filter(|release_ns| event.time_ns < *release_ns)
+            .map(|release_ns| Violation::BeforeRelease { event, release_ns });
+        if is_released {
+            found[3] = self.released_at_wrong_time(&event, release_ns);
+        }
+        self.found.extend(found.into_iter().flatten());
+        if is_released {
+            self.begin(&event, release_ns);
+        }
+    }
+
+    /// The first thing that is wrong with a release but that it is early.
+    fn released_at_wrong_time(&self, event: &Event, release_ns: Option<u64>) -> Option<Violation> {
+        let event = *event;
+        let Event { dag, job, .. } = event;
+        let model = self.task_set.dag(dag);
+        let of_dag = &self.dags[dag.index()];
+        if let Some((later, _)) = of_dag.latest.filter(|latest| latest.0 > job) {
+            return Some(Violation::OutOfOrder { event, later });
+        }
+        if of_dag.in_flight >= model.in_flight() {
+            let in_flight = of_dag.in_flight;
+            return Some(Violation::TooMany { event, in_flight });
+        }
+        let Some(release_ns) = release_ns else {
+            return self.terms.is_whole.then_some(Violation::NotDue { event });
+        };
+        if model.is_sporadic() {
+            let before_ns = of_dag.latest.and_then(|(_, release_ns)| release_ns);
+            let earliest_ns = before_ns.map_or(model.offset_ns(), |before_ns| {
+                before_ns.saturating_add(model.period_ns())
+            });
+            if release_ns < earliest_ns {
+                return Some(Violation::TooSoon {
+                    dag,
+                    job,
+                    release_ns,
+                    earliest_ns,
+                });
+            }
+        }
+        let was_queued = of_dag.waiting.get(&job)?.queued.is_some();
+        let expected_ns = match was_queued {
+            true => of_dag.completed_ns,
+            false => Some(release_ns),
+        };
+        let is_late = self.is_exact() && self.terms.is_whole && expected_ns != Some(event.time_ns);
+        is_late.then_some(Violation::Unpunctual { event, expected_ns })
+    }
+
+    /// From now on the job is in flight.
+    fn begin(&mut self, event: &Event, release_ns: Option<u64>) {
+        let Event { dag, job, .. } = *event;
+        let moment = self.moment(event);
+        let of_dag = self.dag(dag);
+        let mut begun = of_dag.waiting.remove(&job).unwrap_or_default();
+        // Something of a partial one may have happened, such as its deadline's passing.
+        if let Some(partial) = of_dag.jobs.remove(&job) {
+            begun.missed = begun.missed.or(partial.missed);
+            begun.lives = partial.lives;
+        }
+        begun.released = Some(moment);
+        begun.release_ns = release_ns;
+        of_dag.jobs.insert(job, begun);
+        of_dag.in_flight += 1;
+        of_dag.latest = of_dag.latest.max(Some((job, release_ns)));
+    }
+
+    /// Takes what happens to a job later.
+    pub(super) fn job(&mut self, event: &Event) {
+        let Event { dag, job, .. } = *event;
+        let moment = self.moment(event);
+        let of_dag = self.dag(dag);
+        // A job may miss its deadline while its release waits.
+        if event.what == What::Missed
+            && let Some(waiting) = of_dag.waiting.get_mut(&job)
+        {
+            let again = waiting.note(event, moment);
+            self.found.extend(again);
+            return;
+        }
+        if !self.find_job(event) {
+            return;
+        }
+        let Some(known) = self.dag(dag).jobs.get_mut(&job) else {
+            return;
+        };
+        if let Some(again) = known.note(event, moment) {
+            self.found.push(again);
+            return;
+        }
+        let is_judged = event.what != What::Aborted && known.completed.is_some();
+        let was_counted = known.released.is_some();
+        if event.what == What::Completed {
+            let wrong = self.completed_at_wrong_time(event, moment);
+            self.found.extend(wrong);
+            if let Some(Violation::BeforeItsEnd { awaited, .. }) = wrong {
+                self.found.extend(self.never_ready(awaited));
+            }
+            let of_dag = self.dag(dag);
+            of_dag.completed_ns = of_dag.completed_ns.max(Some(event.time_ns));
+            of_dag.in_flight -= u32::from(was_counted);
+        }
+        if is_judged {
+            self.found.extend(self.missed_wrongly(dag, job));
+        }
+        if event.what == What::Completed {
+            self.dag(dag).forget_before(job);
+        }
+    }
+
+    fn subtasks(&self, dag: DagId) -> u32 {
+        crate::ids::to_u32(self.task_set.dag(dag).subtasks().len())
+    }
+
+    /// R4: complete with the last instance, in its step.
+    fn completed_at_wrong_time(&self, event: &Event, completed: Moment) -> Option<Violation> {
+        let event = *event;
+        let Event { dag, job, .. } = event;
+        let of_dag = &self.dags[dag.index()];
+        let known = of_dag.jobs.get(&job)?;
+        let mut last = completed;
+        let mut last_ns = 0;
+        let is_same_step = |moment: Moment| moment.is_same_step(completed);
+        let mut has_cause = known.aborted.is_some_and(is_same_step);
+        for subtask in (0..self.subtasks(dag)).map(SubtaskId) {
+            let life = known.lives.get(&subtask);
+            match life.and_then(Life::over) {
+                Some(over) if over.time_ns <= completed.time_ns => {
+                    if over.time_ns >= last_ns {
+                        (last, last_ns) = (over, over.time_ns);
+                    }
+                    has_cause |= is_same_step(over);
+                }
+                // Of an ended DAG, an instance may be taken away for good.
+                _ if of_dag.is_stopped => return None,
+                None if known.is_partial && life.is_none() => return None,
+                late => {
+                    let awaited = Instance { dag, job, subtask };
+                    let over_ns = late.map(|over| over.time_ns);
+                    return Some(Violation::BeforeItsEnd {
+                        event,
+                        awaited,
+                        over_ns,
+                    });
+                }
+            }
+        }
+        if !has_cause {
+            return Some(Violation::OutOfStep {
+                event,
+                last_ns,
+                last_core: last.core,
+            });
+        }
+        let is_late = !self.is_tolerable(last_ns, completed.time_ns);
+        is_late.then_some(Violation::Late {
+            event,
+            since_ns: last_ns,
+        })
+    }
+
+    /// R4 for a deadline, once the job is complete.
+    fn missed_wrongly(&self, dag: DagId, job: u64) -> Option<Violation> {
+        let of_dag = &self.dags[dag.index()];
+        let known = of_dag.jobs.get(&job)?;
+        let relative_deadline_ns = self.task_set.dag(dag).relative_deadline_ns();
+        let deadline_ns = known.release_ns?.saturating_add(relative_deadline_ns);
+        let finish_ns = known.finish_ns(self.subtasks(dag));
+        let Some(missed) = known.missed else {
+            let may_be_lost = self.may_be_lost(deadline_ns);
+            let is_cut = known.aborted.is_some() || of_dag.is_stopped;
+            let late_ns = finish_ns.filter(|finish_ns| *finish_ns > deadline_ns)?;
+            return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
+                dag,
+                job,
+                finish_ns,
+                deadline_ns,
+                at_ns: late_ns,
+            });
+        };
+        let event = Event {
+            time_ns: missed.time_ns,
+            what: What::Missed,
+            core: missed.core,
+            dag,
+            job,
+            subtask: None,
+        };
+        if missed.time_ns <= deadline_ns {
+            return Some(Violation::MissedEarly { event, deadline_ns });
+        }
+        if let Some(finish_ns) = finish_ns.filter(|finish_ns| *finish_ns <= deadline_ns)
+            && !self.is_tolerable(finish_ns, missed.time_ns)
+        {
+            return Some(Violation::MissedInTime {
+                event,
+                finish_ns,
+                deadline_ns,
+            });
+        }
+        let is_late = self.is_exact() && missed.time_ns > deadline_ns + 1;
+        is_late.then_some(Violation::Late {
+            event,
+            since_ns: deadline_ns,
+        })
+    }
+
+    /// Reports whether what followed from a deadline may be among the events that are
+    /// lost: a miss, or an abort before.
+    fn may_be_lost(&self, deadline_ns: u64) -> bool {
+        !self.terms.is_whole && Some(deadline_ns) < self.first_ns
+    }
+
+    /// R4 at the end, for a job that is not complete.
+    pub(super) fn never_completed(&self, dag: DagId, job: u64) -> Option<Violation> {
+        let of_dag = &self.dags[dag.index()];
+        let known = of_dag.jobs.get(&job)?;
+        if known.completed.is_some() || known.released.is_none() || of_dag.is_stopped {
+            return None;
+        }
+        let over_ns = |subtask| {
+            let life = known.lives.get(&SubtaskId(subtask))?;
+            Some(life.over()?.time_ns)
+        };
+        let over_ns = latest((0..self.subtasks(dag)).map(over_ns))
+            .filter(|over_ns| !self.is_tolerable(*over_ns, self.end_ns));
+        let is_missing = over_ns.is_some() || self.terms.is_complete;
+        is_missing.then_some(Violation::NeverCompleted {
+            dag,
+            job,
+            over_ns,
+            end_ns: self.end_ns,
+        })
+    }
+
+    /// R4 at the end, for the deadline of a job that is not complete.
+    pub(super) fn never_missed(&self, dag: DagId, job: u64) -> Option<Violation> {
+        let of_dag = &self.dags[dag.index()];
+        let known = of_dag.jobs.get(&job)?;
+        if known.completed.is_some() {
+            return None;
+        }
+        let judged = self.missed_wrongly(dag, job);
+        if judged.is_some() || known.missed.is_some() || known.aborted.is_some() {
+            return judged;
+        }
+        let relative_deadline_ns = self.task_set.dag(dag).relative_deadline_ns();
+        let deadline_ns = known.release_ns?.saturating_add(relative_deadline_ns);
+        let may_be_lost = self.may_be_lost(deadline_ns);
+        let is_finished = known.finish_ns(self.subtasks(dag)).is_some();
+        let has_passed = !self.is_tolerable(deadline_ns, self.end_ns);
+        let is_missing = has_passed && !is_finished && !of_dag.is_stopped && !may_be_lost;
+        is_missing.then_some(Violation::NotMissed {
+            dag,
+            job,
+            finish_ns: None,
+            deadline_ns,
+            at_ns: self.end_ns,
+        })
+    }
+}

@@ -1,0 +1,213 @@
+//! Replaying a journal: R1 to R4, one life of each instance, one instance on each core.
+//!
+//! The events are taken in their order, in which each comes after all that it follows
+//! from, and held against what is known by then: so what is not there yet has not
+//! happened, whatever its time says. Jobs are forgotten once they are complete and
+//! nothing waits for them any more, so the memory that it takes is that of the jobs in
+//! flight.
+//!
+//! Words. A *step* of the scheduler is known by the core that made it and by that core's
+//! last machine event before it: between two machine events of a core, a completion's
+//! step cannot begin. A *moment* is when and in which step something happened. A job's
+//! *precursor* is the job of the same DAG that was released before it.
+//!
+//! If the oldest events are lost, a job is *partial* if its release may be among them:
+//! of what is not there of it, nothing can be concluded. All other jobs are judged as in
+//! a whole journal.
+
+mod jobs;
+mod joins;
+mod lives;
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use super::{Terms, Violation};
+use crate::ids::{CoreId, DagId, Instance, SubtaskId};
+use crate::journal::{Event, What};
+use crate::task_set::TaskSet;
+pub(super) use lives::{stage_after, stage_before};
+
+use jobs::Job;
+
+/// What a journal shows of R1 to R4, of lives and of cores.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Verdict {
+    /// Every breach, in the order in which they were found.
+    pub violations: Vec<Violation>,
+    /// The longest time from a finish that an instance waited for last to its
+    /// readiness.
+    pub finish_to_ready_max_ns: u64,
+}
+
+/// Holds a journal against the rules R1 to R4, and each instance and each core against
+/// what no machine may do.
+///
+/// Which instance should have run is judged by
+/// [`dispatch_violations`](super::dispatch_violations).
+#[must_use]
+pub fn judge(task_set: &TaskSet, terms: Terms, events: impl IntoIterator<Item = Event>) -> Verdict {
+    let mut replay = Replay {
+        task_set,
+        terms,
+        dags: task_set.dags().iter().map(|_| OfDag::default()).collect(),
+        cores: Vec::new(),
+        first_ns: None,
+        end_ns: 0,
+        found: Vec::new(),
+        finish_to_ready_max_ns: 0,
+    };
+    for event in events {
+        replay.take(&event);
+    }
+    replay.end();
+    Verdict {
+        violations: replay.found,
+        finish_to_ready_max_ns: replay.finish_to_ready_max_ns,
+    }
+}
+
+/// Returns the breaches that [`judge`] finds.
+#[must_use]
+pub fn violations(
+    task_set: &TaskSet,
+    terms: Terms,
+    events: impl IntoIterator<Item = Event>,
+) -> Vec<Violation> {
+    judge(task_set, terms, events).violations
+}
+
+struct Replay<'a> {
+    task_set: &'a TaskSet,
+    terms: Terms,
+    dags: Vec<OfDag>,
+    cores: Vec<OfCore>,
+    /// The time of the first event.
+    first_ns: Option<u64>,
+    /// The latest time so far.
+    end_ns: u64,
+    found: Vec<Violation>,
+    finish_to_ready_max_ns: u64,
+}
+
+#[derive(Default)]
+struct OfDag {
+    /// The jobs that are released, or partial, and not forgotten.
+    jobs: BTreeMap<u64, Job>,
+    /// The jobs that are due and not released.
+    waiting: BTreeMap<u64, Job>,
+    /// How many jobs were released and are not complete.
+    in_flight: u32,
+    /// All jobs before this one are forgotten or not complete.
+    forgotten: u64,
+    /// The sporadic job that is being released, and when it was due.
+    due: Option<(u64, u64)>,
+    /// The job that was released last, and its nominal release.
+    latest: Option<(u64, Option<u64>)>,
+    /// When a job was complete last.
+    completed_ns: Option<u64>,
+    is_stopped: bool,
+}
+
+#[derive(Clone, Default)]
+struct OfCore {
+    /// Counts its machine events.
+    step: u64,
+    /// What it runs.
+    occupant: Option<Instance>,
+}
+
+/// When and in which step of the scheduler something happened.
+#[derive(Clone, Copy)]
+struct Moment {
+    time_ns: u64,
+    core: CoreId,
+    step: u64,
+}
+
+impl Moment {
+    fn is_same_step(self, other: Self) -> bool {
+        (self.core, self.step) == (other.core, other.step)
+    }
+}
+
+impl Replay<'_> {
+    fn take(&mut self, event: &Event) {
+        self.first_ns.get_or_insert(event.time_ns);
+        self.end_ns = self.end_ns.max(event.time_ns);
+        match event.what {
+            What::Due => self.dag(event.dag).due = Some((event.job, event.time_ns)),
+            What::Stopped => self.dag(event.dag).is_stopped = true,
+            What::Signalled | What::Dropped | What::Request => {}
+            What::Released | What::Queued | What::Skipped => self.release(event),
+            What::Aborted | What::Missed | What::Completed => self.job(event),
+            _ => self.instance(event),
+        }
+    }
+
+    fn dag(&mut self, dag: DagId) -> &mut OfDag {
+        &mut self.dags[dag.index()]
+    }
+
+    fn core(&mut self, core: CoreId) -> &mut OfCore {
+        if self.cores.len() <= core.index() {
+            self.cores.resize(core.index() + 1, OfCore::default());
+        }
+        &mut self.cores[core.index()]
+    }
+
+    fn moment(&mut self, event: &Event) -> Moment {
+        Moment {
+            time_ns: event.time_ns,
+            core: event.core,
+            step: self.core(event.core).step,
+        }
+    }
+
+    /// Reports whether something may last so long.
+    const fn is_tolerable(&self, from_ns: u64, to_ns: u64) -> bool {
+        to_ns <= from_ns.saturating_add(self.terms.tolerance_ns)
+    }
+
+    /// Reports whether the times are those at which the model lets things happen.
+    const fn is_exact(&self) -> bool {
+        self.terms.tolerance_ns == 0
+    }
+
+    /// Finds the job of an event; takes it for a partial one if it may be. That it can
+    /// be neither is a breach.
+    fn find_job(&mut self, event: &Event) -> bool {
+        let Event { dag, job, .. } = *event;
+        let model = self.task_set.dag(dag);
+        let release_ns = (!model.is_sporadic()).then(|| model.grid_ns(job));
+        let may_be_lost = !self.terms.is_whole && release_ns <= self.first_ns;
+        let of_dag = self.dag(dag);
+        if of_dag.jobs.contains_key(&job) {
+            return true;
+        }
+        let is_over = job < of_dag.forgotten;
+        let is_partial = may_be_lost && !is_over && !of_dag.waiting.contains_key(&job);
+        // In both cases nothing is concluded from what is not there of it.
+        of_dag.jobs.insert(job, Job::partial(release_ns));
+        if !is_partial {
+            let event = *event;
+            self.found.push(Violation::NotReleased { event, is_over });
+        }
+        is_partial
+    }
+
+    fn end(&mut self) {
+        for dag in (0..).map(DagId).take(self.dags.len()) {
+            let jobs: Vec<u64> = self.dag(dag).jobs.keys().copied().collect();
+            for job in jobs {
+                self.found.extend(self.never_completed(dag, job));
+                self.found.extend(self.never_missed(dag, job));
+                for subtask in (0..).take(self.task_set.dag(dag).subtasks().len()) {
+                    let subtask = SubtaskId(subtask);
+                    let instance = Instance { dag, job, subtask };
+                    self.found.extend(self.never_ready(instance));
+                }
+            }
+        }
+    }
+}
