@@ -4,9 +4,9 @@
 //! instant from which the nominal release times O + kT count. Sums that leave
 //! `u64` stay at its end, for a trace may state any number.
 //!
-//! *Events* are either of a job or of an instance; [`What`] says which. Those
-//! of the machine (`start` to `ended`) happened on the core that they name,
-//! those of the scheduler in a step that was made on that core; only `request`
+//! *Events* are either of a job or of an instance; [`What`](sched_dag::journal::What)
+//! says which. Those of the machine (`start` to `ended`) happened on the core that they
+//! name, those of the scheduler in a step that was made on that core; only `request`
 //! names another core, the one that shall switch.
 
 use sched_dag::journal::Event;
