@@ -82,7 +82,7 @@ struct Replay<'a> {
     terms: Terms,
     dags: Vec<OfDag>,
     cores: Vec<OfCore>,
-    /// The time of the first event.
+    /// The time at which the first event was written.
     first_ns: Option<u64>,
     /// The latest time so far.
     end_ns: u64,
@@ -133,7 +133,10 @@ impl Moment {
 
 impl Replay<'_> {
     fn take(&mut self, event: &Event) {
-        self.first_ns.get_or_insert(event.time_ns);
+        // The time of these may be before that of events that are lost.
+        if !matches!(event.what, What::Finish | What::Due) {
+            self.first_ns.get_or_insert(event.time_ns);
+        }
         self.end_ns = self.end_ns.max(event.time_ns);
         match event.what {
             What::Due => self.dag(event.dag).due = Some((event.job, event.time_ns)),
@@ -180,7 +183,8 @@ impl Replay<'_> {
         let Event { dag, job, .. } = *event;
         let model = self.task_set.dag(dag);
         let release_ns = (!model.is_sporadic()).then(|| model.grid_ns(job));
-        let may_be_lost = !self.terms.is_whole && release_ns <= self.first_ns;
+        let is_old = self.first_ns.is_none() || release_ns <= self.first_ns;
+        let may_be_lost = !self.terms.is_whole && is_old;
         let of_dag = self.dag(dag);
         if of_dag.jobs.contains_key(&job) {
             return true;
