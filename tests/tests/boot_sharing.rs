@@ -49,8 +49,9 @@ fn samples_are_whole_where_cores_really_run_side_by_side() {
 
 #[test]
 fn bytes_release_a_dag() {
-    // A text ends its line: two bytes. The second comes early and is kept.
-    let typed = [("\"kind\":\"listening\"", "a")];
+    // A text ends its line: two bytes. The second comes early and is kept. Both come
+    // while jobs run: before time 0 one of them would be dropped.
+    let typed = [("\"kind\":\"progress\"", "a")];
     let outcome = sharing("edf").word("input=yes").typing(&typed).succeed();
     assert_eq!(number(&outcome, "answers_to_bytes"), 2);
     assert_eq!(number(&outcome, "violations"), 0);
@@ -59,7 +60,7 @@ fn bytes_release_a_dag() {
 #[test]
 fn what_comes_before_time_0_releases_nothing_yet() {
     let typed = [("\"kind\":\"listening\"", "a")];
-    let guest = sharing("static").word("input=yes").word("later_ms=100");
+    let guest = sharing("static").word("input=yes").word("later_ms=400");
     let outcome = guest.typing(&typed).succeed();
     assert_eq!(number(&outcome, "answers_to_bytes"), 1);
     assert_eq!(number(&outcome, "violations"), 0);
