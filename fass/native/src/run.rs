@@ -68,7 +68,7 @@ pub fn worker() -> Option<u32> {
 /// assert_eq!(report.statistics[0].completed, 10);
 /// ```
 pub fn run(task_set: TaskSet, bodies: Vec<Vec<Closure>>, setting: Setting) -> Report {
-    run_bodies(task_set, bodies, setting)
+    run_bodies(Arc::new(task_set), bodies, setting)
 }
 
 /// Runs as [`run`] does, writes everything down, and checks it.
@@ -82,19 +82,19 @@ pub fn run(task_set: TaskSet, bodies: Vec<Vec<Closure>>, setting: Setting) -> Re
 /// As [`run`]; if the record does not fit into memory; if a sporadic DAG has no limit
 /// of jobs.
 pub fn run_recorded(task_set: TaskSet, bodies: Vec<Vec<Closure>>, setting: Setting) -> Recorded {
-    run_bodies_recorded(task_set, bodies, setting)
+    run_bodies_recorded(Arc::new(task_set), bodies, setting)
 }
 
 pub(crate) fn run_bodies<B: Execute>(
-    task_set: TaskSet,
+    task_set: Arc<TaskSet>,
     bodies: Vec<Vec<B>>,
     setting: Setting,
 ) -> Report {
-    run_watched(&Arc::new(task_set), bodies, setting, ()).0
+    run_watched(&task_set, bodies, setting, ()).0
 }
 
 pub(crate) fn run_bodies_recorded<B: Execute>(
-    task_set: TaskSet,
+    task_set: Arc<TaskSet>,
     bodies: Vec<Vec<B>>,
     setting: Setting,
 ) -> Recorded {
@@ -106,7 +106,6 @@ pub(crate) fn run_bodies_recorded<B: Execute>(
             endless.name()
         );
     }
-    let task_set = Arc::new(task_set);
     let recorder = Recorder::new(Arc::clone(&task_set));
     let (report, recorder) = run_watched(&task_set, bodies, setting, recorder);
     judge(&recorder, report, &task_set, options(setting))

@@ -58,7 +58,7 @@ const MOST_NAMED: usize = 8;
 /// ));
 /// assert_eq!(
 ///     answer.to_string(),
-///     "dag `demo` takes at most 5ms, by long paths (He et al. 2022)"
+///     "dag `demo` takes at most 5ms, by multiple paths"
 /// );
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -217,6 +217,7 @@ pub(crate) struct Answers {
     pub(crate) of_dags: Vec<Answer>,
     /// The position of the first DAG that fails.
     pub(crate) first_unproven: Option<usize>,
+    settings: Settings,
 }
 
 impl Answers {
@@ -247,7 +248,13 @@ impl Answers {
         Self {
             of_dags: of_dags.collect(),
             first_unproven: answer.first_failing.map(|failing| failing.dag.index()),
+            settings,
         }
+    }
+
+    /// Returns a witness for the bounds of the DAGs that they were made for.
+    pub(crate) fn witness(&self, task_set: &TaskSet) -> String {
+        analysis::witness(task_set, &self.settings)
     }
 
     /// Returns the bounds, for the platform.

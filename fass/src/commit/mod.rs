@@ -17,11 +17,11 @@ mod tie;
 
 use alloc::collections::BTreeSet;
 use alloc::rc::Rc;
-use alloc::string::ToString;
+use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
-use sched_dag::{Policy, Verified, Warning};
+use sched_dag::{Policy, TaskSet, Verified, Warning};
 
 use crate::api::dag::Dag;
 use crate::platform;
@@ -133,7 +133,6 @@ pub fn finish_create_dags_with(
     let Verified {
         task_set,
         mut warnings,
-        ..
     } = verify(dags, options)?;
     let answers = Answers::new(&task_set, platform);
     let certain = answers.certain_misses();
@@ -143,12 +142,19 @@ pub fn finish_create_dags_with(
         return Err(CommitError { faults, warnings });
     }
     let staleness = staleness::of_all(dags, &task_set, &answers.of_dags);
-    let plan = tie(dags, task_set, answers.bounds_ns(), staleness.clone());
+    let task_set = Arc::new(task_set);
+    let plan = tie(
+        dags,
+        Arc::clone(&task_set),
+        answers.bounds_ns(),
+        staleness.clone(),
+    );
     match platform.launch(plan) {
         Ok(()) => Ok(Commit {
             warnings,
             answers,
             staleness,
+            task_set,
         }),
         Err(error) => Err(CommitError {
             faults: Vec::from([Fault::NotLaunched(error)]),
@@ -183,6 +189,7 @@ pub struct Commit {
     warnings: Vec<Warning>,
     answers: Answers,
     staleness: Vec<Staleness>,
+    task_set: Arc<TaskSet>,
 }
 
 impl Commit {
@@ -231,6 +238,25 @@ impl Commit {
     #[must_use]
     pub fn answers(&self) -> &[Answer] {
         &self.answers.of_dags
+    }
+
+    /// Returns what proves the bounds, for `./scripts/check-witness` to compute again.
+    ///
+    /// ```
+    /// # use core::time::Duration;
+    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// # let dag = create_dag();
+    /// # let period = Duration::from_millis(10);
+    /// # let taking = |name, ms| SubtaskAttributes::named(name).wcet(Duration::from_millis(ms));
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, taking("sink", 3));
+    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, taking("source", 2));
+    /// let commit = finish_create_dags(&[dag]).unwrap();
+    /// assert!(commit.witnesses().contains("bound 0 5000000 "));
+    /// ```
+    #[must_use]
+    pub fn witnesses(&self) -> String {
+        self.answers.witness(&self.task_set)
     }
 
     /// Returns for each subtask that samples a latest value, in the order of the

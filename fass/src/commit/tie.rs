@@ -3,6 +3,7 @@
 //! Edges get their rings, functions become bodies, signals learn their DAG, and
 //! latest values get their writers. All has been verified, so nothing can fail.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -20,7 +21,7 @@ static PLANS: AtomicU64 = AtomicU64::new(0);
 /// Turns verified DAGs into a plan, and closes their handles.
 pub(crate) fn tie(
     dags: &[Dag],
-    task_set: TaskSet,
+    task_set: Arc<TaskSet>,
     bounds_ns: Vec<Option<u64>>,
     staleness: Vec<Staleness>,
 ) -> Plan {

@@ -4,6 +4,7 @@
 //! it then calls [`Body::run`] there. A body never decides anything.
 
 use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::convert::Infallible;
 use core::pin::Pin;
@@ -33,7 +34,7 @@ use super::staleness::Staleness;
 #[derive(Debug)]
 pub struct Plan {
     /// The verified model, for the scheduler.
-    pub task_set: TaskSet,
+    pub task_set: Arc<TaskSet>,
     /// The plan's number, never 0, different from that of every other plan of the
     /// program. Signals know their plan by it
     /// ([`Platform::raise`](crate::Platform::raise)).

@@ -34,7 +34,7 @@ pub(crate) struct Session {
 
 impl Session {
     pub(crate) fn new(plan: Plan, options: SchedulerOptions) -> Self {
-        let task_set = Arc::new(plan.task_set);
+        let task_set = plan.task_set;
         Self {
             driver: Driver::new(Scheduler::new(Arc::clone(&task_set), options)),
             recording: Recording {

@@ -180,7 +180,7 @@ fn dags_without_all_wcets_say_so() {
         [
             "dag `unknown` is not proven to meet its deadlines: no WCET above 0 is given for \
              subtask `sink`; give every subtask one to have the dag analysed",
-            "dag `urgent` takes at most 2ms, by long paths (He et al. 2022)",
+            "dag `urgent` takes at most 2ms, by multiple paths",
             "dag `lax` is not proven to meet its deadlines: dag `unknown`, which may delay it, is \
              not proven itself; see to that one first",
         ]

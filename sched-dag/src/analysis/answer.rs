@@ -47,19 +47,19 @@ pub struct DagBound {
 /// The test that gave a bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Test {
-    /// Long paths (He et al. 2022): nothing else can delay this DAG.
+    /// The multi-path bound: nothing else can delay this DAG.
     Alone,
     /// Intra-task priorities (He et al. 2019): nothing else can delay this DAG.
     IntraTask,
-    /// Global fixed priorities (Melani et al. 2015, width refinement).
+    /// The multi-path bound under global fixed priorities.
     FixedPriority,
-    /// Global EDF (Melani et al. 2015, width refinement).
+    /// The multi-path bound under global EDF.
     Edf,
-    /// Subtasks that keep their core (the safe form).
+    /// The multi-path bound of subtasks that keep their core.
     NonPreemptive,
-    /// Jobs that may overlap (the sound form), with either policy.
+    /// Jobs that overlap, with either policy.
     Pipelined,
-    /// Any work-conserving order: all other DAGs count in full.
+    /// The multi-path bound in any work-conserving order: all other DAGs count in full.
     AnyOrder,
     /// Capacity augmentation for EDF or RM (Li et al. 2014); the bound is the
     /// deadline itself.
@@ -139,13 +139,13 @@ impl Reason {
 impl fmt::Display for Test {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Alone => "long paths (He et al. 2022)",
+            Self::Alone => "multiple paths",
             Self::IntraTask => "intra-task priorities (He et al. 2019)",
-            Self::FixedPriority => "global fixed priorities (Melani et al. 2015)",
-            Self::Edf => "global EDF (Melani et al. 2015)",
-            Self::NonPreemptive => "non-preemptive subtasks",
+            Self::FixedPriority => "multiple paths under global fixed priorities",
+            Self::Edf => "multiple paths under global EDF",
+            Self::NonPreemptive => "multiple paths of non-preemptive subtasks",
             Self::Pipelined => "overlapping jobs",
-            Self::AnyOrder => "any work-conserving order",
+            Self::AnyOrder => "multiple paths in any work-conserving order",
             Self::Capacity => "capacity augmentation (Li et al. 2014)",
             Self::SpeedUp => "speed-up (Bonifaci et al. 2013)",
         })

@@ -28,7 +28,7 @@ pub fn bonifaci_edf(tasks: &[&Task], cores: u32) -> bool {
 #[must_use]
 pub fn bonifaci_dm(tasks: &[&Task], cores: u32) -> bool {
     let m = u128::from(cores);
-    if super::melani::constrained(tasks, cores) {
+    if super::set::constrained(tasks, cores) {
         accepts(tasks, 4, 3 * m + 1, 12)
     } else {
         accepts(tasks, 5, 4 * m + 1, 20)

@@ -3,7 +3,7 @@
 //! J. Li, J.-J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, ECRTS 2014,
 //! doi:10.1109/ECRTS.2014.23; with `D <= T`: S. Baruah, DATE 2015. A *heavy*
 //! DAG (`volume > D`) gets `ceil((volume - length) / (D - length))` dedicated
-//! cores, on which Graham's bound is at most `D`; with the long-paths bound it
+//! cores, on which Graham's bound is at most `D`; with the multi-path bound it
 //! often needs fewer. A *light* one is executed sequentially on one of the
 //! remaining cores, and a core takes light DAGs while the sum of their
 //! densities `volume / D` is at most 1 (partitioned EDF).
@@ -17,9 +17,9 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::long_paths::long_paths;
-use super::melani::constrained;
+use super::multi_path::multi_path;
 use super::ratio::Ratio;
+use super::set::constrained;
 use super::task::Task;
 use crate::order::sort;
 
@@ -48,12 +48,12 @@ pub fn federated(tasks: &[&Task], cores: u32) -> Option<Federation> {
     })
 }
 
-/// Assigns cores by the long-paths bound: never more than [`federated`].
+/// Assigns cores by the multi-path bound: never more than [`federated`].
 #[must_use]
-pub fn federated_long_paths(tasks: &[&Task], cores: u32) -> Option<Federation> {
+pub fn federated_multi_path(tasks: &[&Task], cores: u32) -> Option<Federation> {
     assign(tasks, cores, |task, most| {
         (1..=most).find(|&count| {
-            long_paths(task, count).is_some_and(|bound| bound <= task.relative_deadline_ns())
+            multi_path(task, count).is_some_and(|bound| bound <= task.relative_deadline_ns())
         })
     })
 }
@@ -107,7 +107,7 @@ fn place(tasks: &[&Task], mut light: Vec<usize>, cores: u32) -> Option<Vec<Vec<u
 
 #[cfg(test)]
 mod tests {
-    use super::{federated, federated_long_paths};
+    use super::{federated, federated_multi_path};
     use crate::analysis::Task;
 
     #[test]
@@ -122,7 +122,7 @@ mod tests {
         assert_eq!((five.heavy, five.light), (vec![(0, 4)], vec![vec![1, 2]]));
         let six = federated(&tasks, 6).unwrap();
         assert_eq!((six.heavy, six.light.len()), (vec![(0, 4)], 2));
-        let four = federated_long_paths(&tasks, 4).unwrap();
+        let four = federated_multi_path(&tasks, 4).unwrap();
         assert_eq!((four.heavy, four.light), (vec![(0, 3)], vec![vec![1, 2]]));
     }
 

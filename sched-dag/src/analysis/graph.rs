@@ -87,6 +87,17 @@ impl Task {
         path
     }
 
+    /// Tells for each subtask whether it has no predecessor.
+    pub(super) fn sources(&self) -> Vec<bool> {
+        let mut is_source = vec![true; self.subtask_count()];
+        for subtask in 0..self.subtask_count() {
+            for &next in self.successors(subtask) {
+                is_source[next] = false;
+            }
+        }
+        is_source
+    }
+
     /// Returns the largest number of subtasks on one path.
     #[must_use]
     pub fn most_subtasks_on_a_path(&self) -> u64 {

@@ -11,12 +11,12 @@
 //! Trap: carrying one "best" path per subtask through the graph, as published
 //! code does, is unsafe, because the union is not additive: in example E5 that
 //! gives 63, and a schedule of 64 exists. So paths are enumerated, up to
-//! [`PATH_LIMIT`]; beyond, callers use the long-paths bound.
+//! [`PATH_LIMIT`]; beyond, callers use the multi-path bound.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::closure::{Closure, contains, insert};
+use super::closure::{Closure, contains, insert, remove};
 use super::task::Task;
 
 /// The most complete paths that [`intra_task`] enumerates: 4,096.
@@ -32,61 +32,65 @@ pub const PATH_LIMIT: u32 = 4096;
 pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     let count = task.subtask_count();
     let ranks = ranks(task, order)?;
-    if paths(task) > PATH_LIMIT {
+    if cores == 0 || paths(task) > PATH_LIMIT {
         return None;
     }
     let closure = Closure::of(task)?;
-    let words = closure.words();
-    let wcets = task.wcets_ns();
     let interferes = |v: usize, u: usize| {
         ranks[u] < ranks[v] && !closure.precedes(u, v) && !closure.precedes(v, u)
     };
+    let words = closure.words();
     let mut interfering = vec![0_u64; words * count];
     for v in 0..count {
         for u in (0..count).filter(|&u| interferes(v, u)) {
             insert(&mut interfering[v * words..], u);
         }
     }
-
-    let is_source = sources(task);
+    let wcets = task.wcets_ns();
     let mut bound = 0;
+    each_path(task, |path| {
+        let mut union = vec![0_u64; words];
+        for v in path {
+            let row = &interfering[v * words..(v + 1) * words];
+            union.iter_mut().zip(row).for_each(|(all, row)| *all |= row);
+        }
+        path.iter().for_each(|&v| remove(&mut union, v));
+        let beside = (0..count).filter(|&v| contains(&union, v));
+        let beside: u64 = beside.map(|v| wcets[v]).sum();
+        let length: u64 = path.iter().map(|&v| wcets[v]).sum();
+        bound = bound.max(length + beside.div_ceil(u64::from(cores)));
+    });
+    Some(bound)
+}
+
+/// Visits each path from a source to a sink, in the order of their subtasks' positions.
+pub(super) fn each_path(task: &Task, mut visit: impl FnMut(&[usize])) {
+    let is_source = task.sources();
+    // The path so far, and for each of its subtasks which successor is next.
     let mut path: Vec<usize> = Vec::new();
-    // Next successor to try, by place on the path; unions, by place, in a row.
     let mut tried: Vec<usize> = Vec::new();
-    let mut unions: Vec<u64> = Vec::new();
-    for source in (0..count).filter(|&v| is_source[v]) {
+    for source in (0..task.subtask_count()).filter(|&v| is_source[v]) {
         let mut step = Some(source);
         loop {
             if let Some(v) = step {
-                let before = unions.len().checked_sub(words);
-                for word in 0..words {
-                    let inherited = before.map_or(0, |start| unions[start + word]);
-                    unions.push(inherited | interfering[v * words + word]);
-                }
                 path.push(v);
                 tried.push(0);
             }
-            let Some(&last) = path.last() else {
+            let (Some(&last), Some(tried_here)) = (path.last(), tried.last_mut()) else {
                 break;
             };
-            if task.successors(last).is_empty() {
-                let union = &unions[unions.len() - words..];
-                let length: u64 = path.iter().map(|&v| wcets[v]).sum();
-                let parallel = (0..count).filter(|&v| contains(union, v) && !path.contains(&v));
-                let beside: u64 = parallel.map(|v| wcets[v]).sum();
-                bound = bound.max(length + beside.checked_div(cores.into())?);
+            let successors = task.successors(last);
+            if successors.is_empty() {
+                visit(&path);
             }
-            let place = path.len() - 1;
-            step = task.successors(last).get(tried[place]).copied();
-            tried[place] += 1;
+            step = successors.get(*tried_here).copied();
+            *tried_here += 1;
             if step.is_none() {
                 path.pop();
                 tried.pop();
-                unions.truncate(unions.len() - words);
             }
         }
     }
-    (cores > 0).then_some(bound)
 }
 
 /// Assigns priorities within a DAG: the subtasks by descending priority.
@@ -160,20 +164,9 @@ fn paths(task: &Task) -> u32 {
         let sum = successors.fold(0_u32, |sum, &next| sum.saturating_add(onward[next]));
         onward[v] = sum.max(1);
     }
-    let is_source = sources(task);
+    let is_source = task.sources();
     let from_sources = (0..count).filter(|&v| is_source[v]);
     from_sources.fold(0, |sum, v| sum.saturating_add(onward[v]))
-}
-
-/// Tells for each subtask whether it has no predecessor.
-fn sources(task: &Task) -> Vec<bool> {
-    let mut is_source = vec![true; task.subtask_count()];
-    for v in 0..task.subtask_count() {
-        for &next in task.successors(v) {
-            is_source[next] = false;
-        }
-    }
-    is_source
 }
 
 /// Returns each subtask's place in `order`, if that is a permutation that
@@ -196,7 +189,7 @@ fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::{assign_intra_task, intra_task};
-    use crate::analysis::{Task, long_paths};
+    use crate::analysis::{Task, multi_path};
 
     const EDGES: [(usize, usize); 12] = [
         (0, 1),
@@ -218,7 +211,7 @@ mod tests {
         let task = Task::new(1000, 1000, vec![5, 16, 15, 1, 10, 17, 7, 11], &EDGES).unwrap();
         // Priorities [0, 1, 2, 3, 4, 6, 5, 7] by subtask, as an order:
         assert_eq!(intra_task(&task, &[0, 1, 2, 3, 4, 6, 5, 7], 2), Some(70));
-        assert_eq!(long_paths(&task, 2), Some(67));
+        assert_eq!(multi_path(&task, 2), Some(66));
         // Assigned priorities [0, 1, 5, 2, 3, 4, 6, 7] by subtask, as an order:
         let assigned = assign_intra_task(&task).unwrap();
         assert_eq!(assigned, [0, 1, 3, 4, 5, 2, 6, 7]);

@@ -23,7 +23,7 @@
 //!   blocking term does not cover. Then every other DAG counts in full, in
 //!   whatever order: true of any work-conserving scheduler.
 //! - *Alone.* A DAG that nothing may outrank or block, and whose bound is
-//!   within its period, has the bounds for one job alone.
+//!   within its period, may have a shorter one by its subtasks' priorities.
 //!
 //! If a younger job may win over an older one of the same DAG (unequal
 //! priorities inside, or no preemption), the equation counts younger jobs too.
@@ -41,30 +41,47 @@ use super::bonifaci::{bonifaci_dm, bonifaci_edf};
 use super::capacity::{gedf_capacity, grm_capacity};
 use super::closure::SUBTASK_LIMIT;
 use super::intra_task::intra_task;
-use super::long_paths::long_paths_among;
-use super::melani::{constrained, widths};
+use super::multi_path;
+use super::non_preemptive::Blocking;
+use super::pipelined::Unsolved;
 use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
-use super::response::{Blocking, Unsolved};
-use super::set::{Failure, Set, Solution};
+use super::set::{Failure, Set, Solution, constrained};
 use super::task::{Task, TaskError};
 use crate::ids::{DagId, SubtaskId};
 use crate::order::sorted_by_key;
 use crate::policy::Policy;
 use crate::task_set::{Dag, TaskSet};
 
-/// The walks' total of subtasks and edges after which no further long paths
-/// are looked for (the first two always are).
-const LONG_PATHS_STEPS: usize = 1 << 17;
-
 /// Bounds the response time of every DAG, as far as a test proves it.
 #[must_use]
 pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
     let dags = task_set.dags();
+    with_case(task_set, settings, |case, mut reasons| {
+        let mut bounds: Vec<Option<DagBound>> = dags.iter().map(|_| None).collect();
+        let verdict = case.verdict();
+        let first_failing = first_unknown(&reasons).or(verdict.first_failing);
+        for (position, &dag) in case.members.iter().enumerate() {
+            bounds[dag] = verdict.bounds[position];
+            reasons[dag] = verdict.reasons[position];
+        }
+        Answer {
+            bounds,
+            reasons,
+            first_failing,
+        }
+    })
+}
+
+/// Makes the case of the DAGs that can be analysed, and tells why others cannot be.
+pub(super) fn with_case<T>(
+    task_set: &TaskSet,
+    settings: &Settings,
+    work: impl FnOnce(&Case<'_>, Vec<Option<Reason>>) -> T,
+) -> T {
+    let dags = task_set.dags();
     let relation = Relation::new(dags, settings.policy, settings.preemption);
-    let (tasks, mut reasons) = analysable(dags, &relation, settings);
-    let mut bounds: Vec<Option<DagBound>> = dags.iter().map(|_| None).collect();
-    let mut first_failing = first_unknown(&reasons);
+    let (tasks, reasons) = analysable(dags, &relation, settings);
     let members: Vec<usize> = (0..dags.len())
         .filter(|&dag| reasons[dag].is_none())
         .collect();
@@ -73,19 +90,7 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
         .filter_map(|&dag| tasks[dag].as_ref())
         .collect();
     let case = Case::new(dags, &members, &tasks, relation.among(&members), settings);
-    let verdict = case.verdict();
-    for (position, &dag) in members.iter().enumerate() {
-        bounds[dag] = verdict.bounds[position];
-        reasons[dag] = verdict.reasons[position];
-    }
-    if first_failing.is_none() {
-        first_failing = verdict.first_failing;
-    }
-    Answer {
-        bounds,
-        reasons,
-        first_failing,
-    }
+    work(&case, reasons)
 }
 
 /// Returns the DAGs as the analysis sees them, and for each that cannot be
@@ -138,18 +143,17 @@ fn first_unknown(reasons: &[Option<Reason>]) -> Option<NotProven> {
 }
 
 /// The DAGs that can be analysed, and what follows from their attributes.
-struct Case<'a> {
+pub(super) struct Case<'a> {
     /// All DAGs of the commit.
     all: &'a [Dag],
     /// Those of this case; elsewhere a DAG is a position in this list.
-    members: &'a [usize],
-    tasks: &'a [&'a Task],
+    pub(super) members: &'a [usize],
+    pub(super) tasks: &'a [&'a Task],
     settings: &'a Settings,
-    relation: Relation,
+    pub(super) relation: Relation,
     /// The most urgent DAG first.
     order: Vec<usize>,
-    /// Bounds of DAGs that nothing can delay.
-    alone: Vec<Option<DagBound>>,
+    pub(super) set: Set<'a>,
 }
 
 impl<'a> Case<'a> {
@@ -171,9 +175,9 @@ impl<'a> Case<'a> {
             settings,
             relation,
             order,
-            alone: Vec::new(),
+            set: Set::new(tasks, settings.cores),
         };
-        case.alone = (0..members.len()).map(|dag| case.alone(dag)).collect();
+        case.complete();
         case
     }
 
@@ -187,7 +191,7 @@ impl<'a> Case<'a> {
 
     /// Answers for the DAGs of this case, by their positions in it; names them
     /// by their positions in the commit.
-    fn verdict(&self) -> Answer {
+    pub(super) fn verdict(&self) -> Answer {
         let solution = self.solve();
         let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
             .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
@@ -227,57 +231,44 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// Bounds the response time of a DAG that nothing else can delay.
-    fn alone(&self, dag: usize) -> Option<DagBound> {
-        let preemption = self.relation.preemption;
-        let mut others = (0..self.members.len()).filter(|&other| other != dag);
-        let blocked = preemption != Mixture::All && self.all.len() > 1;
-        if blocked || others.any(|other| self.relation.may_outrank(other, dag)) {
-            return None;
-        }
-        let (task, cores) = (self.tasks[dag], self.settings.cores);
-        let steps = (task.subtask_count() + task.edge_count()).max(1);
-        let paths = (LONG_PATHS_STEPS / steps).max(2);
-        let mut best = DagBound {
-            bound_ns: long_paths_among(task, cores, paths)?,
-            test: Test::Alone,
-        };
-        let subtasks = self.dag(dag).subtasks();
-        if preemption == Mixture::All
-            && self.settings.policy == Policy::StaticPriority
-            && subtasks.len() <= SUBTASK_LIMIT
-        {
-            let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
-            if let Some(bound_ns) = intra_task(task, &order, cores)
-                && bound_ns < best.bound_ns
-            {
-                best = DagBound {
-                    bound_ns,
-                    test: Test::IntraTask,
-                };
-            }
-        }
-        let limit = task.relative_deadline_ns().min(task.period_ns());
-        (best.bound_ns <= limit).then_some(best)
+    /// Reports whether a DAG has all cores whenever it needs them.
+    fn is_alone(&self, dag: usize) -> bool {
+        let blocked = self.relation.preemption != Mixture::All && self.all.len() > 1;
+        let mut others = 0..self.members.len();
+        !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
     }
 
-    fn solve(&self) -> Solution {
-        let cores = u64::from(self.settings.cores);
-        let parallelism = widths(self.tasks, self.settings.cores);
-        let mut set = Set::new(self.tasks, cores, &parallelism);
-        set.known = self
-            .alone
-            .iter()
-            .map(|bound| bound.map(|bound| bound.bound_ns))
-            .collect();
-        set.deadlines_limit = self.settings.policy == Policy::Edf
+    /// Bounds the response time of a DAG by its subtasks' priorities, if nothing can delay it
+    /// and that is the shortest bound.
+    fn by_priorities(&self, dag: usize) -> Option<u64> {
+        let (task, cores) = (self.tasks[dag], self.settings.cores);
+        let subtasks = self.dag(dag).subtasks();
+        if self.relation.preemption != Mixture::All
+            || self.settings.policy != Policy::StaticPriority
+            || subtasks.len() > SUBTASK_LIMIT
+            || !self.is_alone(dag)
+        {
+            return None;
+        }
+        let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
+        let covers = &self.set.shapes[dag].covers;
+        let others = multi_path::alone(task, covers, cores.into())?;
+        let limit = task.relative_deadline_ns().min(task.period_ns());
+        intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others && bound_ns <= limit)
+    }
+
+    /// Tells the equations what follows from the attributes.
+    fn complete(&mut self) {
+        let known = (0..self.members.len()).map(|dag| self.by_priorities(dag));
+        self.set.known = known.collect();
+        self.set.deadlines_limit = self.settings.policy == Policy::Edf
             && self.relation.preemption != Mixture::Some
             && constrained(self.tasks, self.settings.cores);
-        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
-        let counts_in_full = |other, dag| may_outrank(other, dag) && !set.deadlines_limit;
-        for (dag, figures) in set.figures.iter_mut().enumerate() {
+        let counts_in_full =
+            |other, dag| self.relation.may_outrank(other, dag) && !self.set.deadlines_limit;
+        for (dag, figures) in self.set.figures.iter_mut().enumerate() {
             figures.younger_may_win = self.relation.younger_may_win(dag);
-            figures.allow_in_flight(self.dag(dag).in_flight());
+            figures.allow_in_flight(self.all[self.members[dag]].in_flight());
             if self.relation.preemption == Mixture::None {
                 let others = (0..self.tasks.len()).filter(|&other| other != dag);
                 let blocking = others.filter(|&other| !counts_in_full(other, dag));
@@ -286,16 +277,21 @@ impl<'a> Case<'a> {
                     Blocking::by(wcets.collect(), self.settings.cores, self.tasks[dag]);
             }
         }
-        set.solve(&self.order, may_outrank)
+    }
+
+    fn solve(&self) -> Solution {
+        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
+        self.set.solve(&self.order, may_outrank)
     }
 
     /// Names the test behind a response time of the set's equations.
     fn bound(&self, dag: usize, bound_ns: u64) -> DagBound {
-        if let Some(alone) = self.alone[dag] {
-            return alone;
-        }
-        let test = if !constrained(self.tasks, self.settings.cores) {
+        let test = if self.set.known[dag].is_some() {
+            Test::IntraTask
+        } else if bound_ns > self.tasks[dag].period_ns() {
             Test::Pipelined
+        } else if self.is_alone(dag) {
+            Test::Alone
         } else {
             match (self.relation.preemption, self.settings.policy) {
                 (Mixture::Some, _) => Test::AnyOrder,

@@ -12,14 +12,17 @@
 //! |---|---|---|
 //! | `task`, `graph` | length, volume, bottom levels | |
 //! | `width` | largest antichain, by matching | Dilworth; Hopcroft and Karp |
-//! | `graham`, `long_paths`, `intra_task` | one DAG alone | Graham 1969; He 2022; He 2019 |
-//! | `workload`, `response`, `set` | the shared equation, solved exactly | Melani 2015, extended |
-//! | `melani` | global preemptive, `D <= T` | Melani 2015, width refinement |
+//! | `cover` | the most work of disjoint chains, by a flow | Ahuja 1993 |
+//! | `multi_path` | one job of a DAG at a time, alone or among others | derived here |
+//! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
+//! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
+//! | `set` | the equations of all DAGs, solved exactly | |
 //! | `non_preemptive` | subtasks that keep their core | derived here |
-//! | `pipelined` | overlapping jobs, `D > T` | derived here |
+//! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
 //! | `federated` | dedicated cores, as an offer | Li 2014; Baruah 2015 |
 //! | `judge`, `relation`, `answer`, `overheads` | the verdict at commit | |
+//! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
 //! uses that releases lie on a grid: their papers' model is the sporadic one, and
@@ -53,45 +56,45 @@
 //! - A WCET that is exceeded voids the bounds of every DAG.
 //! - Time that the platform takes is covered as far as [`Overheads`] says.
 //! - The cores must be identical and serve these DAGs only.
-//! - The forms derived here rest on the arguments given in their modules and on
-//!   that evidence, not on a reviewed proof.
+//! - The form of overlapping jobs rests on the argument given in its module and on that
+//!   evidence, not on a reviewed proof. The multi-path bound is proven in
+//!   `docs/multi-path-bound.md`.
 
 mod answer;
 mod bonifaci;
 mod capacity;
 mod closure;
+mod cover;
 mod federated;
-mod graham;
 mod graph;
+mod interference;
 mod intra_task;
 mod judge;
-mod long_paths;
-mod melani;
+mod multi_path;
 mod non_preemptive;
 mod overheads;
 mod pipelined;
 mod ratio;
 mod refusal;
 mod relation;
-mod response;
 mod set;
 mod task;
 mod width;
+mod witness;
 mod workload;
 
 pub use answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
 pub use bonifaci::{bonifaci_dm, bonifaci_edf};
 pub use capacity::{gedf_capacity, grm_capacity};
 pub use closure::SUBTASK_LIMIT;
-pub use federated::{Federation, federated, federated_long_paths};
-pub use graham::graham;
+pub use cover::covers;
+pub use federated::{Federation, federated, federated_multi_path};
+pub use interference::Clip;
 pub use intra_task::{PATH_LIMIT, assign_intra_task, intra_task};
 pub use judge::answer;
-pub use long_paths::{long_paths, long_paths_among, path_list};
-pub use melani::{melani_edf, melani_edf_width, melani_fp, melani_fp_width};
-pub use non_preemptive::{np_safe_edf, np_safe_fp, np_safe_fp_width};
+pub use multi_path::{multi_path, multi_path_edf, multi_path_fp};
 pub use overheads::Overheads;
-pub use pipelined::pipelined_fp;
 pub use refusal::Refusal;
 pub use task::{Task, TaskError};
 pub use width::{parallelism, width};
+pub use witness::witness;

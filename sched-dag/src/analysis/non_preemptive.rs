@@ -1,16 +1,18 @@
-//! Subtasks that keep their core once started ("limited preemption"): a safe
-//! form, derived for this project.
+//! Subtasks that keep their core once started ("limited preemption"): what lower-ranked
+//! work they may have to wait for. A safe form, derived for this project.
 //!
-//! `R_k = length + (volume - length + sum of W_i(R_k) + Delta(m) +
-//! (N - 1) Delta(m - 1)) / m`, with `Delta(x)` the sum of the `x` largest
-//! lower-ranked subtasks of other DAGs and `N` the most subtasks on a path of
-//! DAG `k`.
+//! Let `Delta(x)` be the sum of the `x` largest lower-ranked subtasks of other DAGs. While a
+//! subtask of the job waits, nothing lower starts. What lower-ranked work it finds was
+//! started before it became ready: on at most `m` cores for a source, on at most `m - 1` for
+//! a later one, because the core of its predecessor has just become free. A subtask never
+//! overlaps with itself, so those running are different subtasks. On `m - j` cores then
 //!
-//! Why: while a subtask of the critical chain waits, nothing lower starts. What
-//! lower-ranked work it finds was started before it became ready: on at most
-//! `m` cores for the chain's first subtask, on at most `m - 1` for a later one,
-//! because the core of its predecessor has just become free. A subtask never
-//! overlaps with itself, so the `x` running ones are different subtasks.
+//! - at most `Delta(m - j) + N Delta(m - max(j, 1))` blocks, with `N` the number of the DAG's
+//!   subtasks that have a predecessor: each stretch of waiting but the first begins when
+//!   one of these becomes ready;
+//! - for `j = 0`, unless clipped, at most `Delta(m) + (P - 1) Delta(m - 1)`, with `P` the most
+//!   subtasks on a path, by the critical chain of `pipelined` instead: only the subtasks of
+//!   that one chain wait.
 //!
 //! Trap: the published LP-max bound (M. A. Serrano et al., "Response-Time
 //! Analysis of DAG Tasks under Fixed Priority Scheduling with Limited
@@ -19,65 +21,25 @@
 //! cores idle, and those admit new lower-priority subtasks without anybody
 //! being preempted: in the unit test below that gives 10 and 11 is observed.
 //!
-//! Under EDF any other DAG's job may have the later deadline, so `Delta` is
-//! over all other DAGs, and the workloads are those of EDF.
+//! Under EDF any other DAG's job may have the later deadline, whatever the relative
+//! deadlines: it may be released during this job. So `Delta` is over all other DAGs.
 //!
-//! Assumes: *no* subtask of any DAG is ever preempted; work-conserving;
-//! `D <= T`; for fixed priorities one priority a DAG.
+//! Assumes: *no* subtask of any DAG is ever preempted; work-conserving.
 
 use alloc::vec::Vec;
 
-use super::melani::{constrained, widths};
-use super::refusal::Refusal;
-use super::response::Blocking;
-use super::set::Set;
 use super::task::Task;
+use crate::order::sorted;
 
-/// Bounds the response times of non-preemptive subtasks under global fixed
-/// priorities, the DAGs given from the highest priority to the lowest.
-///
-/// # Errors
-///
-/// [`Refusal`] if a DAG has `D > T`, or no bound within its deadline.
-pub fn np_safe_fp(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
-    let all = alloc::vec![u64::from(cores); tasks.len()];
-    bound(tasks, cores, &all, false)
-}
-
-/// As [`np_safe_fp`], with the width refinement of the workloads.
-///
-/// # Errors
-///
-/// As [`np_safe_fp`].
-pub fn np_safe_fp_width(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
-    bound(tasks, cores, &widths(tasks, cores), false)
-}
-
-/// Bounds the response times of non-preemptive subtasks under global EDF, with
-/// the width refinement, in the order given.
-///
-/// # Errors
-///
-/// As [`np_safe_fp`].
-pub fn np_safe_edf(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
-    bound(tasks, cores, &widths(tasks, cores), true)
-}
-
-fn bound(tasks: &[&Task], cores: u32, parallelism: &[u64], edf: bool) -> Result<Vec<u64>, Refusal> {
-    if !constrained(tasks, cores) {
-        return Err(Refusal::DoesNotApply);
-    }
-    let mut set = Set::new(tasks, cores.into(), parallelism);
-    set.deadlines_limit = edf;
-    for (dag, figures) in set.figures.iter_mut().enumerate() {
-        let lower = tasks.iter().enumerate();
-        let lower = lower.filter(|&(other, _)| if edf { other != dag } else { other > dag });
-        let wcets = lower.flat_map(|(_, task)| task.wcets_ns().iter().copied());
-        figures.blocking = Blocking::by(wcets.collect(), cores, tasks[dag]);
-    }
-    let order: Vec<usize> = (0..tasks.len()).collect();
-    set.solve(&order, |other, dag| edf || other < dag)
-        .complete()
+/// Lower-ranked work that a job may find on the cores and must wait for; none by default.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Blocking {
+    /// The sums of the 1, 2, .. largest subtasks, for as many as there are cores.
+    largest: Vec<u128>,
+    /// The most subtasks on a path of the blocked DAG.
+    path: u128,
+    /// Its subtasks that have a predecessor.
+    later: u128,
 }
 
 impl Blocking {
@@ -88,34 +50,39 @@ impl Blocking {
             wcets_ns.select_nth_unstable_by_key(cores, |&wcet| core::cmp::Reverse(wcet));
             wcets_ns.truncate(cores);
         }
-        let sum: u128 = wcets_ns.iter().map(|&wcet| u128::from(wcet)).sum();
-        // The least of m blocking subtasks is not among the m - 1 largest.
-        let least = if wcets_ns.len() < cores {
-            0
-        } else {
-            wcets_ns.iter().copied().min().unwrap_or(0)
-        };
+        let ascending = sorted(&wcets_ns);
+        let largest = ascending.iter().rev().scan(0, |sum, &wcet| {
+            *sum += u128::from(wcet);
+            Some(*sum)
+        });
+        let is_source = task.sources();
+        let later = is_source.iter().filter(|&&is_source| !is_source);
         Self {
-            first: sum,
-            later: sum - u128::from(least),
-            chain: task.most_subtasks_on_a_path().into(),
+            largest: largest.collect(),
+            path: task.most_subtasks_on_a_path().into(),
+            later: later.count() as u128,
         }
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::{np_safe_edf, np_safe_fp};
-    use crate::analysis::Task;
+    /// Returns the sum of the `count` largest subtasks.
+    fn sum(&self, count: usize) -> u128 {
+        let last = count.min(self.largest.len()).checked_sub(1);
+        last.map_or(0, |last| self.largest[last])
+    }
 
-    #[test]
-    fn e4_blocking_without_any_preemption() {
-        let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
-        let high = Task::new(100, 100, vec![1, 3, 3, 1], &diamond).unwrap();
-        let fork = (1..6).flat_map(|v| [(0, v), (v, 6)]).collect::<Vec<_>>();
-        let low = Task::new(100, 100, vec![1, 4, 4, 4, 4, 4, 1], &fork).unwrap();
-        let bounds = np_safe_fp(&[&high, &low], 2).unwrap();
-        assert_eq!(bounds[0], 14);
-        assert!(np_safe_edf(&[&high, &low], 2).unwrap()[0] >= 14);
+    /// Returns what may block on `cores - j` cores; if not `is_clipped`, in the window.
+    pub(super) fn during(&self, cores: usize, j: usize, is_clipped: bool) -> u128 {
+        if j == 0 && !is_clipped {
+            return self.along_a_chain(cores, 0);
+        }
+        let again = self.later.saturating_mul(self.sum(cores - j.max(1)));
+        self.sum(cores - j).saturating_add(again)
+    }
+
+    /// Returns what may block a critical chain that crosses `back` releases.
+    pub(super) fn along_a_chain(&self, cores: usize, back: u128) -> u128 {
+        let again = (self.path + back).saturating_sub(1);
+        let again = again.saturating_mul(self.sum(cores - 1));
+        self.sum(cores).saturating_add(again)
     }
 }

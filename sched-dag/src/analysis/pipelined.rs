@@ -1,17 +1,28 @@
-//! Jobs that overlap: relative deadlines beyond the period.
+//! Jobs that overlap, `R > T`: their equation, and its solution.
 //!
-//! Global preemptive fixed priorities, one priority a DAG; each subtask is
-//! sequential over its own jobs, and the older job wins. Derived for this
-//! project; related work (J. Fonseca, G. Nelissen, V. Nélis, Real-Time Systems
-//! 55, 2019) has arbitrary deadlines without the own-job rule. The equation and
-//! its terms are explained in this module's sibling `response`.
+//! Derived for this project; related work (J. Fonseca, G. Nelissen, V. Nélis, Real-Time
+//! Systems 55, 2019) has arbitrary deadlines without the rule that a subtask is sequential
+//! over its own jobs.
 //!
-//! Words: the critical chain *crosses* a release if it comes from the same
-//! subtask's job before.
+//! The critical chain of a job ends with its last subtask and goes back through
+//! what each subtask waited for last: a predecessor, or the same subtask of the
+//! job before. Say it starts with the release of the job `j` places earlier.
+//! It has at most `P_j = length + j * largest WCET` of its own, and whenever it
+//! waits, all `m` cores run something else. So the job's last finish, counted
+//! from that release, is at most the least `X` with
 //!
-//! [`pipelined_fp`] follows the chain back over as many releases as it can
-//! cross: to cross the `j`-th, its part since the first must be able to last
-//! until then. A set is accepted only when that ends.
+//! `X = P_j + ((j + 1) volume - P_j + own + blocking + sum of W_i(X)) / m`
+//!
+//! and the response time is `R = max over j of X_j - j T`. Which `j` can occur
+//! follows from the chain: it goes back over `j` releases only if its part over
+//! `j - 1` of them can last until the next release, `X_(j-1) > j T`.
+//!
+//! The terms: `W_i`, the [`Workload`](super::workload::Workload) of each DAG that may
+//! outrank this one; `own`, what still older jobs may run in the window,
+//! `sum over l >= 1, l T < R of min(volume, p (R - l T))`, twice that if
+//! younger jobs may win over older ones; `blocking`, lower-ranked work that
+//! cannot be preempted. While `X_0 <= T` only `j = 0` is left and `own` is 0:
+//! then this is the equation of Melani et al. 2015, and `multi_path` has better ones.
 //!
 //! Traps, both found in an earlier form:
 //!
@@ -24,47 +35,214 @@
 //!    when its jobs overlap. In the test `overlapping_jobs_stack` that would
 //!    claim 8, and 9 is observed.
 //!
-//! With `D <= T` this is [`melani_fp_width`](super::melani_fp_width).
+//! The least solution is found exactly, from below. Both sides are piecewise
+//! linear, so instead of creeping up by the difference, which may be one
+//! nanosecond a step, each step solves the present linear piece or jumps to
+//! its end; see [`Piece`].
 
 use alloc::vec::Vec;
 
-use super::melani::widths;
-use super::refusal::Refusal;
-use super::set::Set;
+use super::interference::{Other, Shape};
+use super::non_preemptive::Blocking;
 use super::task::Task;
+use super::workload::Piece;
 
-/// Bounds the response times under global fixed priorities with any deadlines,
-/// the DAGs given from the highest priority to the lowest.
-///
-/// # Errors
-///
-/// [`Refusal`] if there is no core, or a DAG has no bound within its deadline.
-pub fn pipelined_fp(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
-    if cores == 0 {
-        return Err(Refusal::DoesNotApply);
-    }
-    let widths = widths(tasks, cores);
-    let set = Set::new(tasks, cores.into(), &widths);
-    for (position, task) in tasks.iter().enumerate() {
-        if u128::from(task.volume_ns()) > u128::from(cores) * u128::from(task.period_ns()) {
-            return Err(Refusal::Fails { position });
+/// The most evaluations of an equation's right-hand side in one analysis; a
+/// set that needs more is "not proven". Ordinary sets need tens.
+pub(super) const STEP_LIMIT: u64 = 200_000;
+
+/// The most jobs of one DAG that a window may reach back over; a set that
+/// needs more (`R > 1024 T`) is "not proven".
+const OVERLAP_LIMIT: u64 = 1024;
+
+/// What of a task enters its equation.
+#[derive(Clone, Debug)]
+pub(super) struct Figures {
+    period: u128,
+    deadline: u128,
+    volume: u128,
+    length: u128,
+    largest: u128,
+    cores: usize,
+    /// The most cores that one job can use, at most `cores`.
+    parallelism: u128,
+    /// Whether a younger job's subtask may win over an older job's.
+    pub(super) younger_may_win: bool,
+    /// Non-preemptible work of lower rank.
+    pub(super) blocking: Blocking,
+}
+
+/// Why an equation has no usable solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unsolved {
+    /// The least solution, if any, exceeds the relative deadline.
+    BeyondDeadline,
+    /// A limit on steps, on overlapping jobs or on the numbers' size was hit.
+    Limit,
+}
+
+impl Figures {
+    /// Takes the figures of a task on `cores >= 1` cores: preemptive, older jobs first.
+    pub(super) fn of(task: &Task, cores: usize, shape: &Shape) -> Self {
+        Self {
+            period: task.period_ns().into(),
+            deadline: task.relative_deadline_ns().into(),
+            volume: task.volume_ns().into(),
+            length: task.length_ns().into(),
+            largest: task.largest_wcet_ns().into(),
+            cores,
+            parallelism: shape.parallelism.into(),
+            younger_may_win: false,
+            blocking: Blocking::default(),
         }
     }
-    let order: Vec<usize> = (0..tasks.len()).collect();
-    set.solve(&order, |other, dag| other < dag).complete()
+
+    /// Accepts no response time beyond this number of periods: one more job would meet
+    /// the overrun policy.
+    pub(super) fn allow_in_flight(&mut self, jobs: u32) {
+        self.deadline = self.deadline.min(u128::from(jobs) * self.period);
+    }
+
+    /// Returns the longest response time of use.
+    pub(super) fn limit_ns(&self) -> u64 {
+        u64::try_from(self.deadline).unwrap_or(u64::MAX)
+    }
+
+    /// Returns the least response-time bound that is at least `start_ns`, which
+    /// must not exceed the least solution (0 always is right).
+    pub(super) fn solve(
+        &self,
+        others: &[Other],
+        start_ns: u64,
+        steps: &mut u64,
+    ) -> Result<u64, Unsolved> {
+        let mut response = u128::from(start_ns);
+        let mut windows: Vec<u128> = Vec::new();
+        loop {
+            self.extend(&mut windows, response, others, steps)?;
+            let back = windows.iter().zip(0..);
+            let responses = back.map(|(window, back)| window.saturating_sub(back * self.period));
+            let largest = responses.max().unwrap_or(0).max(response);
+            if largest == response {
+                return u64::try_from(response).map_err(|_| Unsolved::BeyondDeadline);
+            }
+            response = largest;
+        }
+    }
+
+    /// Returns the windows `X_0`, `X_1`, .. of a response time that is a solution, and what
+    /// jobs before the chain's first can run.
+    pub(super) fn windows(
+        &self,
+        others: &[Other],
+        response_ns: u64,
+    ) -> Result<(Vec<u128>, u128), Unsolved> {
+        let (mut windows, mut steps) = (Vec::new(), STEP_LIMIT);
+        let response = u128::from(response_ns);
+        self.extend(&mut windows, response, others, &mut steps)?;
+        Ok((windows, self.other_jobs(response)?))
+    }
+
+    /// Raises the windows to those of a response time.
+    fn extend(
+        &self,
+        windows: &mut Vec<u128>,
+        response: u128,
+        others: &[Other],
+        steps: &mut u64,
+    ) -> Result<(), Unsolved> {
+        let own = self.other_jobs(response)?;
+        for back in 0..=OVERLAP_LIMIT {
+            let index = usize::try_from(back).map_err(|_| Unsolved::Limit)?;
+            if index == windows.len() {
+                windows.push(0);
+            }
+            windows[index] = self.window(back, own, others, windows[index], steps)?;
+            if windows[index] <= u128::from(back + 1) * self.period {
+                return Ok(());
+            }
+        }
+        Err(Unsolved::Limit)
+    }
+
+    /// Returns what jobs before the chain's first (and after the job itself,
+    /// if they may win) can run while the chain lasts.
+    fn other_jobs(&self, response: u128) -> Result<u128, Unsolved> {
+        let mut sum = 0;
+        let mut left = response;
+        for _ in 0..OVERLAP_LIMIT {
+            match left.checked_sub(self.period) {
+                None | Some(0) => {
+                    let sides = if self.younger_may_win { 2 } else { 1 };
+                    return Ok(sides * sum);
+                }
+                Some(rest) => {
+                    sum += self.volume.min(self.parallelism * rest);
+                    left = rest;
+                }
+            }
+        }
+        Err(Unsolved::Limit)
+    }
+
+    /// Returns the least `X_j`, starting from a value not above it.
+    fn window(
+        &self,
+        back: u64,
+        own: u128,
+        others: &[Other],
+        start: u128,
+        steps: &mut u64,
+    ) -> Result<u128, Unsolved> {
+        let back = u128::from(back);
+        let limit = self.deadline + back * self.period;
+        let cores = self.cores as u128;
+        let mut window = start.max(self.chain(back));
+        while window <= limit {
+            *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
+            let length = u64::try_from(window).map_err(|_| Unsolved::Limit)?;
+            let busy = self.busy(back, own, others, length);
+            match busy.lacks(cores, window - self.chain(back)) {
+                None => return Ok(window),
+                Some(lack) => window = window.checked_add(lack).ok_or(Unsolved::Limit)?,
+            }
+        }
+        Err(Unsolved::BeyondDeadline)
+    }
+
+    /// Returns `P_j`.
+    fn chain(&self, back: u128) -> u128 {
+        self.length + back * self.largest
+    }
+
+    /// Returns what the cores execute at most while a chain over `back` releases waits.
+    pub(super) fn busy(&self, back: u128, own: u128, others: &[Other], window_ns: u64) -> Piece {
+        let constant = ((back + 1) * self.volume - self.chain(back))
+            .saturating_add(own)
+            .saturating_add(self.blocking.along_a_chain(self.cores, back));
+        let pieces = others
+            .iter()
+            .map(|other| other.on_all_cores().at(window_ns));
+        let sum = pieces.fold(Piece::NONE, Piece::and);
+        let value = sum.value.saturating_add(constant);
+        Piece { value, ..sum }
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::pipelined_fp;
-    use crate::analysis::{Refusal, Task};
+    use crate::analysis::{Clip, Refusal, Task, multi_path_fp};
+
+    fn pipelined_fp(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
+        multi_path_fp(tasks, cores, Clip::Window)
+    }
 
     #[test]
     fn e8_two_pipelines() {
         let chain = Task::new(10, 30, vec![4, 5, 3], &[(0, 1), (1, 2)]).unwrap();
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let other = Task::new(25, 50, vec![1, 3, 3, 1], &diamond).unwrap();
-        assert_eq!(pipelined_fp(&[&chain, &other], 3), Ok(vec![12, 14]));
+        assert_eq!(pipelined_fp(&[&chain, &other], 3), Ok(vec![13, 14]));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::response::Unsolved;
+use super::pipelined::Unsolved;
 use super::set::Solution;
 
 /// Why a sufficient test did not prove a set of DAGs schedulable.
@@ -30,9 +30,18 @@ impl Solution {
     /// Returns the bounds if there is one for each DAG.
     pub(super) fn complete(self) -> Result<alloc::vec::Vec<u64>, Refusal> {
         match self.first_failing {
-            Some((position, Unsolved::BeyondDeadline)) => Err(Refusal::Fails { position }),
-            Some((position, Unsolved::Limit)) => Err(Refusal::Limit { position }),
+            Some((position, why)) => Err(why.at(position)),
             None => Ok(self.responses.into_iter().flatten().collect()),
+        }
+    }
+}
+
+impl Unsolved {
+    /// Names the DAG whose equation has no usable solution.
+    pub(super) const fn at(self, position: usize) -> Refusal {
+        match self {
+            Self::BeyondDeadline => Refusal::Fails { position },
+            Self::Limit => Refusal::Limit { position },
         }
     }
 }

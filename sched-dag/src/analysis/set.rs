@@ -4,7 +4,8 @@
 //! instance of `k` waits for. The bound of `k` then depends on the bound of
 //! `i`. If priorities do not interleave this goes one way, from the highest
 //! down; if they do, or under EDF, it goes round in circles. Both are solved
-//! alike: start from Graham's bounds, improve one DAG after the other until nothing changes.
+//! alike: start from the bounds of jobs alone, raise one DAG's after the other until
+//! nothing changes.
 //! All functions are monotone, so that ends in the least solution of all.
 //!
 //! Why circles are sound: look at the first job ever to exceed its bound, at
@@ -17,20 +18,22 @@
 
 use alloc::vec::Vec;
 
-use super::graham::graham;
-use super::response::{Figures, STEP_LIMIT, Unsolved};
+use super::interference::{Clip, Other, Shape};
+use super::multi_path::{Equations, alone};
+use super::pipelined::{Figures, STEP_LIMIT, Unsolved};
 use super::task::Task;
 use super::workload::Workload;
 
 /// DAGs with what enters their equations.
 pub(super) struct Set<'a> {
     pub(super) tasks: &'a [&'a Task],
-    pub(super) cores: u64,
-    /// The most cores that one job can use, by DAG, at most `cores`.
-    pub(super) parallelism: &'a [u64],
+    pub(super) cores: u32,
+    pub(super) shapes: Vec<Shape>,
     pub(super) figures: Vec<Figures>,
     /// Whether only jobs with deadlines no later count (EDF with `D <= T`).
     pub(super) deadlines_limit: bool,
+    /// Which interference counts.
+    pub(super) clip: Clip,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
 }
@@ -57,16 +60,18 @@ pub(super) enum Failure {
 
 impl<'a> Set<'a> {
     /// Describes DAGs that are preemptive and whose older jobs win.
-    pub(super) fn new(tasks: &'a [&'a Task], cores: u64, parallelism: &'a [u64]) -> Self {
-        let figures = tasks.iter().zip(parallelism);
+    pub(super) fn new(tasks: &'a [&'a Task], cores: u32) -> Self {
+        let shapes: Vec<Shape> = tasks.iter().map(|task| Shape::of(task, cores)).collect();
+        let figures = tasks.iter().zip(&shapes);
         Self {
             tasks,
             cores,
-            parallelism,
             figures: figures
-                .map(|(task, &p)| Figures::of(task, cores, p))
+                .map(|(task, shape)| Figures::of(task, cores as usize, shape))
                 .collect(),
+            shapes,
             deadlines_limit: false,
+            clip: Clip::Chains,
             known: alloc::vec![None; tasks.len()],
         }
     }
@@ -92,8 +97,8 @@ impl<'a> Set<'a> {
                 };
                 let after = match self.interference(dag, &responses, &may_outrank) {
                     Err(other) => Err(Failure::Other(other)),
-                    Ok(others) => self.figures[dag]
-                        .solve(&others, before, &mut steps)
+                    Ok(others) => self
+                        .respond(dag, &others, before, &mut steps)
                         .map_err(|why| {
                             first_failing.get_or_insert((dag, why));
                             Failure::Own(why)
@@ -106,9 +111,9 @@ impl<'a> Set<'a> {
             }
         }
         if let Some((_, Unsolved::Limit)) = first_failing
-            && let Some(coarse) = self.within_deadlines(&may_outrank)
+            && let Ok(coarse) = self.down_from_deadlines(&may_outrank)
         {
-            responses = coarse;
+            responses = coarse.into_iter().map(Some).collect();
             first_failing = None;
             failures.fill(None);
         }
@@ -119,61 +124,106 @@ impl<'a> Set<'a> {
         }
     }
 
-    /// Returns what is known, or Graham's bound, below which no solution lies: from there on the
-    /// workloads only grow.
+    /// Returns the least response time of a DAG among others, if it is at least `start_ns`.
+    pub(super) fn respond(
+        &self,
+        dag: usize,
+        others: &[Other],
+        start_ns: u64,
+        steps: &mut u64,
+    ) -> Result<u64, Unsolved> {
+        let (equations, figures) = (self.equations(dag), &self.figures[dag]);
+        match equations.solve(others, start_ns, steps) {
+            Err(Unsolved::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
+                figures.solve(others, start_ns, steps)
+            }
+            solved => solved,
+        }
+    }
+
+    /// Returns the equations of a DAG's jobs one at a time.
+    pub(super) fn equations(&self, dag: usize) -> Equations<'_> {
+        let figures = &self.figures[dag];
+        Equations {
+            task: self.tasks[dag],
+            covers: &self.shapes[dag].covers,
+            cores: self.cores as usize,
+            blocking: &figures.blocking,
+            clip: self.clip,
+            limit_ns: figures.limit_ns().min(self.tasks[dag].period_ns()),
+        }
+    }
+
+    /// Returns what is known, or the bound of a job alone, below which no solution lies: from
+    /// there on the workloads only grow.
     fn start(&self, dag: usize) -> Option<u64> {
-        let graham = || graham(self.tasks[dag], u32::try_from(self.cores).ok()?);
-        self.known[dag].or_else(graham)
+        let alone = || alone(self.tasks[dag], &self.shapes[dag].covers, self.cores.into());
+        self.known[dag].or_else(alone)
     }
 
     /// Tries the deadlines as bounds: if each equation holds with the others'
     /// deadlines, then the least solution lies below, however slowly one
-    /// comes near it.
-    fn within_deadlines(
+    /// comes near it. From there it goes down, as long as steps are left.
+    pub(super) fn down_from_deadlines(
         &self,
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Option<Vec<Option<u64>>> {
-        let deadline = |dag: usize| self.tasks[dag].relative_deadline_ns();
-        let deadlines = (0..self.tasks.len()).map(|dag| self.known[dag].or(Some(deadline(dag))));
-        let deadlines: Vec<Option<u64>> = deadlines.collect();
+    ) -> Result<Vec<u64>, (usize, Unsolved)> {
         let mut steps = STEP_LIMIT;
-        let bounds = (0..self.tasks.len()).map(|dag| {
-            if let known @ Some(_) = self.known[dag] {
-                return Some(known);
+        let mut bounds: Vec<u64> = (self.known.iter().zip(self.tasks))
+            .map(|(known, task)| known.unwrap_or(task.relative_deadline_ns()))
+            .collect();
+        let mut has_round = false;
+        loop {
+            let responses: Vec<Option<u64>> = bounds.iter().copied().map(Some).collect();
+            let lower = (0..self.tasks.len()).map(|dag| {
+                if let Some(known) = self.known[dag] {
+                    return Ok(known);
+                }
+                let others = self.interference(dag, &responses, &may_outrank);
+                let others = others.map_err(|_| (dag, Unsolved::Limit))?;
+                let response = self.respond(dag, &others, 0, &mut steps);
+                response.map_err(|why| (dag, why))
+            });
+            match lower.collect::<Result<Vec<u64>, _>>() {
+                Err(_) if has_round => return Ok(bounds),
+                Err(why) => return Err(why),
+                Ok(lower) if lower == bounds => return Ok(bounds),
+                Ok(lower) => bounds = lower,
             }
-            let others = self.interference(dag, &deadlines, &may_outrank).ok()?;
-            self.figures[dag]
-                .solve(&others, 0, &mut steps)
-                .ok()
-                .map(Some)
-        });
-        bounds.collect()
+            has_round = true;
+        }
     }
 
     /// Returns the workloads of the DAGs that may outrank `dag`, or the first of
     /// these that has no bound.
-    fn interference(
+    pub(super) fn interference(
         &self,
         dag: usize,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<Vec<Workload>, usize> {
+    ) -> Result<Vec<Other>, usize> {
         let others = (0..self.tasks.len()).filter(|&other| other != dag && may_outrank(other, dag));
-        let workloads = others.map(|other| {
-            let task = self.tasks[other];
-            let workload = Workload::new(
-                task,
-                responses[other].ok_or(other)?,
-                self.parallelism[other],
-                self.cores,
-            );
-            Ok(if self.deadlines_limit {
-                let deadline = self.tasks[dag].relative_deadline_ns();
-                workload.under_edf(task.relative_deadline_ns(), deadline)
-            } else {
-                workload
-            })
+        let others = others.map(|other| {
+            let response = responses[other].ok_or(other)?;
+            Ok(self.other(other, response, dag))
         });
-        workloads.collect()
+        others.collect()
     }
+
+    /// Describes what a DAG with a response-time bound may execute next to `dag`.
+    pub(super) fn other(&self, other: usize, response_ns: u64, dag: usize) -> Other {
+        let (task, shape) = (self.tasks[other], &self.shapes[other]);
+        let deadline = self.tasks[dag].relative_deadline_ns();
+        let limit = |workload: Workload| match self.deadlines_limit {
+            true => workload.under_edf(task.relative_deadline_ns(), deadline),
+            false => workload,
+        };
+        Other::new(task, shape, response_ns, self.cores.into(), limit)
+    }
+}
+
+/// Reports whether there are cores and every DAG has `D <= T`.
+pub(super) fn constrained(tasks: &[&Task], cores: u32) -> bool {
+    let one = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
+    cores > 0 && tasks.iter().all(one)
 }

@@ -206,6 +206,12 @@ impl Task {
         &self.successors[self.starts[subtask]..self.starts[subtask + 1]]
     }
 
+    /// Returns the edges from a subtask: their numbers, and the successors.
+    pub(super) fn edges_of(&self, subtask: usize) -> impl Iterator<Item = (usize, usize)> {
+        let range = self.starts[subtask]..self.starts[subtask + 1];
+        range.map(|edge| (edge, self.successors[edge]))
+    }
+
     /// Returns the number of edges.
     #[must_use]
     pub const fn edge_count(&self) -> usize {

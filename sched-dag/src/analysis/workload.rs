@@ -6,19 +6,20 @@
 //! (first at ECRTS 2015). With `p` cores at most at an instant, in any window
 //! of length `L`, while every job is complete within `R` of its release:
 //!
-//! - `A = p (L + R) - volume`,
-//! - `W(L) = min(p L, (A / (p T)) volume + min(volume, A mod (p T)))`;
-//!   if `A < 0`, `W(L) = min(volume, p L)`.
+//! - `V = min(volume, p R)`, the most that one job can execute so,
+//! - `A = p (L + R) - V`, never below 0,
+//! - `W(L) = min(p L, (A / (p T)) V + min(V, A mod (p T)))`.
 //!
 //! Under EDF, with respect to a job of relative deadline `D_k`, only jobs with
 //! a deadline no later count:
 //!
 //! - `N = max(0, (D_k - D) / T + 1)` (floor),
-//! - `WE = N volume + min(volume, p max(0, D_k - N T - (D - R)))`.
+//! - `WE = N V + min(V, p max(0, D_k - N T - (D - R)))`.
 //!
-//! The paper has `p = m`. `p = min(m, width)` is a refinement of our own: the
-//! worst case packs each job into a rectangle as wide as the job can be. It
-//! needs jobs that do not overlap, `R <= T`. Jobs that do are dealt out in turn
+//! The paper has `p = m`. A smaller `p`, as the width of the DAG or the cores that
+//! count, is a refinement of our own: the worst case packs each job into a rectangle
+//! as wide as the job can be. The same holds for a part of a DAG, such as a chain,
+//! whose volume is its own and for which `p = 1`. It needs jobs that do not overlap, `R <= T`. Jobs that do are dealt out in turn
 //! to `k = ceil(R / T)` *lanes*: within a lane the period is `k T >= R`, so
 //! nothing overlaps, and the DAG's workload is at most `k` times a lane's, and
 //! at most `min(m, k p) L`.
@@ -27,9 +28,10 @@
 
 use super::task::Task;
 
-/// A DAG that may execute next to the one under analysis.
+/// A DAG, or a part of one, that may execute next to the DAG under analysis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Workload {
+    /// The most that one job executes.
     volume: u128,
     /// The period of a lane.
     period: u128,
@@ -56,15 +58,22 @@ pub(super) struct Piece {
 }
 
 impl Workload {
-    /// Describes a task whose jobs are complete within `response_ns`, with at
-    /// most `parallelism` cores a job and `cores < 2^32` cores for all jobs.
-    pub(super) fn new(task: &Task, response_ns: u64, parallelism: u64, cores: u64) -> Self {
+    /// Describes a part of `volume_ns` of a task whose jobs are complete within
+    /// `response_ns`, with at most `parallelism` cores a job and `cores < 2^32` cores for
+    /// all jobs.
+    pub(super) fn new(
+        task: &Task,
+        volume_ns: u64,
+        response_ns: u64,
+        parallelism: u64,
+        cores: u64,
+    ) -> Self {
         let lanes = u128::from(response_ns.div_ceil(task.period_ns()).max(1));
-        let parallelism = u128::from(parallelism);
+        let (parallelism, response) = (u128::from(parallelism), u128::from(response_ns));
         Self {
-            volume: task.volume_ns().into(),
+            volume: u128::from(volume_ns).min(parallelism * response),
             period: lanes * u128::from(task.period_ns()),
-            response: response_ns.into(),
+            response,
             parallelism,
             lanes,
             cap: (lanes * parallelism).min(cores.into()),
@@ -95,18 +104,8 @@ impl Workload {
     /// Nothing overflows: times are below 2^64 and parallelism below 2^32, so
     /// every area is below 2^98; the one larger product saturates.
     pub(super) fn at(&self, window_ns: u64) -> Piece {
-        let area = self.cap * u128::from(window_ns);
         let body = self.lane(u128::from(window_ns)).times(self.lanes);
-        let cap = Piece {
-            value: area,
-            slope: self.cap,
-            span: None,
-        };
-        let piece = if area <= body.value {
-            cap.below(body)
-        } else {
-            body.below(cap)
-        };
+        let piece = body.least(self.over(window_ns));
         match self.ceiling {
             Some(ceiling) if piece.value >= ceiling => Piece {
                 value: ceiling,
@@ -122,16 +121,20 @@ impl Workload {
         }
     }
 
+    /// Returns what all cores that the jobs use could execute in a time.
+    pub(super) fn over(&self, time_ns: u64) -> Piece {
+        Piece {
+            value: self.cap * u128::from(time_ns),
+            slope: self.cap,
+            span: None,
+        }
+    }
+
     /// Returns the closed form for one lane, without the cap.
     fn lane(&self, window: u128) -> Piece {
         let area = self.parallelism * (window + self.response);
-        let Some(packed) = area.checked_sub(self.volume) else {
-            return Piece {
-                value: self.volume,
-                slope: 0,
-                span: Some(1),
-            };
-        };
+        // A job's volume fits into its response time.
+        let packed = area - self.volume;
         let pitch = self.parallelism * self.period;
         let (jobs, rest) = (packed / pitch, packed % pitch);
         let whole = jobs.saturating_mul(self.volume);
@@ -139,7 +142,7 @@ impl Workload {
             let piece = Piece {
                 value: whole.saturating_add(rest),
                 slope: self.parallelism,
-                span: Some((self.volume.min(pitch) - rest) / self.parallelism),
+                span: Some((self.volume - rest) / self.parallelism),
             };
             piece.or_one_flat_step()
         } else {
@@ -153,6 +156,50 @@ impl Workload {
 }
 
 impl Piece {
+    /// Nothing, for all windows.
+    pub(super) const NONE: Self = Self {
+        value: 0,
+        slope: 0,
+        span: None,
+    };
+
+    /// Returns the smaller of two pieces, as far as it surely stays so.
+    pub(super) fn least(self, other: Self) -> Self {
+        if self.value <= other.value {
+            self.below(other)
+        } else {
+            other.below(self)
+        }
+    }
+
+    /// Returns the sum of two pieces.
+    pub(super) fn and(self, other: Self) -> Self {
+        let span = match (self.span, other.span) {
+            (Some(one), Some(two)) => Some(one.min(two)),
+            (one, two) => one.or(two),
+        };
+        Self {
+            value: self.value.saturating_add(other.value),
+            slope: self.slope + other.slope,
+            span,
+        }
+    }
+
+    /// Returns how much longer `cores` cores must execute at least, after some time, until they
+    /// have executed this much; `None`: they have.
+    pub(super) fn lacks(self, cores: u128, time: u128) -> Option<u128> {
+        let gap = self.value.saturating_sub(cores * time);
+        if gap == 0 {
+            return None;
+        }
+        let whole_piece = self.span.unwrap_or(u128::MAX);
+        let ahead = match cores.checked_sub(self.slope) {
+            None | Some(0) => whole_piece,
+            Some(closing) => gap.div_ceil(closing).min(whole_piece),
+        };
+        Some(ahead.max(gap.div_ceil(cores)))
+    }
+
     /// Returns this piece as far as it surely stays below a higher one.
     fn below(self, higher: Self) -> Self {
         let until = match self.slope.checked_sub(higher.slope) {
@@ -198,17 +245,26 @@ mod tests {
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let one = Task::new(10, 10, vec![1, 2, 2, 1], &diamond).unwrap();
         let at = |workload: Workload, windows: [u64; 3]| windows.map(|l| workload.at(l).value);
-        assert_eq!(at(Workload::new(&one, 5, 2, 2), [8, 11, 14]), [6, 12, 12]);
+        assert_eq!(
+            at(Workload::new(&one, 6, 5, 2, 2), [8, 11, 14]),
+            [6, 12, 12]
+        );
 
         let chain = Task::new(10, 10, vec![2, 3], &[(0, 1)]).unwrap();
-        assert_eq!(at(Workload::new(&chain, 6, 2, 2), [4, 9, 14]), [5, 10, 10]);
-        assert_eq!(at(Workload::new(&chain, 6, 1, 2), [4, 9, 14]), [4, 5, 10]);
+        assert_eq!(
+            at(Workload::new(&chain, 5, 6, 2, 2), [4, 9, 14]),
+            [5, 10, 10]
+        );
+        assert_eq!(
+            at(Workload::new(&chain, 5, 6, 1, 2), [4, 9, 14]),
+            [4, 5, 10]
+        );
 
         let forks = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
         let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
-        let in_two = Workload::new(&one, 9, 2, 2).under_edf(10, 20);
+        let in_two = Workload::new(&one, 6, 9, 2, 2).under_edf(10, 20);
         assert_eq!(in_two.at(1000).value, 12);
-        let in_one = Workload::new(&two, 14, 2, 2).under_edf(20, 10);
+        let in_one = Workload::new(&two, 11, 14, 2, 2).under_edf(20, 10);
         assert_eq!(in_one.at(1000).value, 8);
     }
 
@@ -217,7 +273,7 @@ mod tests {
         for parallelism in 1..4 {
             for response in 10..22 {
                 let task = Task::new(9, 9, vec![2, 3, 5], &[(0, 1)]).unwrap();
-                let plain = Workload::new(&task, response, parallelism, 3);
+                let plain = Workload::new(&task, 10, response, parallelism, 3);
                 for workload in [plain, plain.under_edf(13, 30)] {
                     let values: Vec<u128> = (0..80).map(|l| workload.at(l).value).collect();
                     assert!(values.is_sorted(), "{values:?}");

@@ -1,8 +1,8 @@
 //! Worked examples: values from the papers, and schedules that show them.
 
 use sched_dag::analysis::{
-    Task, assign_intra_task, graham, intra_task, long_paths, melani_edf, melani_fp,
-    melani_fp_width, path_list, width,
+    Clip, Refusal, Task, assign_intra_task, covers, intra_task, multi_path, multi_path_edf,
+    multi_path_fp, width,
 };
 use sched_dag::{DagSpec, Policy, Preemption, Priority};
 
@@ -28,23 +28,29 @@ fn makespan(spec: &DagSpec, cores: u32, preemption: Preemption) -> u64 {
 fn e1_and_e11_one_fork_join() {
     let task = fork_join();
     assert_eq!((task.length_ns(), task.volume_ns()), (9, 21));
-    assert_eq!(path_list(&task), [9, 5, 4, 3]);
-    let bounds = |bound: fn(&Task, u32) -> Option<u64>| [1, 2, 3, 4].map(|m| bound(&task, m));
-    assert_eq!(bounds(graham), [21, 15, 13, 12].map(Some));
-    assert_eq!(bounds(long_paths), [21, 15, 12, 9].map(Some));
+    assert_eq!(covers(&task, 9), [9, 14, 18, 21]);
+    assert_eq!(
+        [1, 2, 3, 4].map(|m| multi_path(&task, m)),
+        [21, 15, 12, 9].map(Some)
+    );
     assert_eq!(task.bottom_levels(), [9, 7, 6, 5, 4, 1]);
     assert_eq!(task.by_bottom_level(), [0, 1, 2, 3, 4, 5]);
-    assert_eq!((graham(&task, 0), long_paths(&task, 0)), (None, None));
+    assert_eq!(multi_path(&task, 0), None);
 }
 
 #[test]
-fn e2_e3_and_e13_melani() {
+fn e2_e3_and_e13_two_dags() {
     let forks = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
     let one = Task::new(10, 10, vec![1, 2, 2, 1], &DIAMOND).unwrap();
     let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
-    assert_eq!(melani_fp(&[&one, &two], 2), Ok(vec![5, 14]));
-    assert_eq!(melani_fp_width(&[&one, &two], 2), Ok(vec![5, 14]));
-    assert_eq!(melani_edf(&[&one, &two], 2), Ok(vec![9, 14]));
+    let tasks = [&one, &two];
+    for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
+        assert_eq!(multi_path_fp(&tasks, 2, clip), Ok(vec![4, 14]));
+    }
+    // The commit, which comes from below, has bounds; see `e2_and_e3_two_dags`.
+    let position = 0;
+    let from_deadlines = multi_path_edf(&tasks, 2, Clip::Chains);
+    assert_eq!(from_deadlines, Err(Refusal::Fails { position }));
     assert_eq!(width(&fork_join()), Some(4));
 }
 
@@ -124,7 +130,7 @@ fn e12_graham_anomalies() {
         let spec = spec(1000, 1000, wcets, edges, 0);
         let finish = makespan(&spec, cores, Preemption::Disabled);
         let task = Task::new(1000, 1000, wcets.to_vec(), edges).unwrap();
-        assert!(Some(finish) <= long_paths(&task, cores));
+        assert!(Some(finish) <= multi_path(&task, cores));
         finish
     };
     assert_eq!(finish(&wcets, &edges, 3), 12);

@@ -139,7 +139,7 @@ pub(crate) fn prepare(
         ))
     })?;
     let signals = Signals::new(&plan);
-    let task_set = Arc::new(plan.task_set);
+    let task_set = plan.task_set;
     let runners = runner::runners(&task_set, plan.bodies, terms.budget_factor);
     let placement = Placement::new(runners, cores);
     let heap = crate::memory::heap::usage();

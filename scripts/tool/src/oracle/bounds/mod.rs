@@ -2,23 +2,37 @@
 //!
 //! A case gives task sets and what independent implementations computed for
 //! them; [`check`] computes the same with `sched_dag::analysis` and compares
-//! every quantity. The record types are those of `bounds.txt`:
+//! every quantity. There are two kinds of files, and a case is of one of them. In both it is
 //!
 //! ```text
 //! case NAME m ntasks
-//! then for each DAG:  dag T D nsub nedge / wcet c_0 .. / edge u v .. / len / vol /
-//!                     bottom_level (by subtask) / single M graham R long_paths R ..
-//! then for the set:   dm_order width melani_gfp_dm gfp_dm_width np_safe_gfp_dm
-//!                     melani_gedf gedf_capacity bonifaci_gedf federated
+//! then for each DAG:  dag T D nsub nedge / wcet c_0 .. / edge u v .. / its quantities
+//! then for the set:   its quantities
 //! end
 //! ```
 //!
+//! with the quantities, in `bounds.txt`,
+//!
+//! ```text
+//! of a DAG:    len / vol / bottom_level (by subtask) / single M graham R long_paths R ..
+//! of the set:  dm_order width melani_gfp_dm gfp_dm_width np_safe_gfp_dm
+//!              melani_gedf gedf_capacity bonifaci_gedf federated
+//! ```
+//!
+//! and in `multi_path.txt`
+//!
+//! ```text
+//! of a DAG:    cov (by chains) / multi_path M R ..
+//! of the set:  dm_order mp_gfp_dm mp_gfp_dm_clip mp_gedf mp_gedf_clip
+//! ```
+//!
 //! Bounds under fixed priorities are in the order of `dm_order`. A lone `-`
-//! says that a test does not accept or does not apply.
+//! says that a test does not accept or does not apply. The bounds of the first kind that
+//! the multi-path ones have replaced are in [`older`].
 
 use sched_dag::analysis::{
-    Federation, Task, bonifaci_edf, federated, gedf_capacity, graham, long_paths, melani_edf,
-    melani_fp, melani_fp_width, np_safe_fp, width,
+    Clip, Federation, Task, bonifaci_edf, covers, federated, gedf_capacity, multi_path,
+    multi_path_edf, multi_path_fp, width,
 };
 
 use replay::lines::{Line, Lines, Malformed, cases, quoted};
@@ -38,24 +52,42 @@ pub struct Case {
 #[derive(Debug)]
 struct ExpectedDag {
     task: Task,
-    length_ns: u64,
-    volume_ns: u64,
-    bottom_levels_ns: Vec<u64>,
-    /// Cores, Graham's bound, long-paths bound.
-    singles: Vec<(u32, u64, u64)>,
+    /// What is computed, in the words of the file, and its value.
+    quantities: Vec<(String, String)>,
 }
 
-/// The quantities of a set; each case has each of them once.
-const QUANTITIES: [&str; 9] = [
-    "dm_order",
-    "width",
-    "melani_gfp_dm",
-    "gfp_dm_width",
-    "np_safe_gfp_dm",
-    "melani_gedf",
-    "gedf_capacity",
-    "bonifaci_gedf",
-    "federated",
+/// The quantities of one kind of file; each case has each of them once.
+struct Form {
+    /// Those of a DAG, the first by which the kind is known, the last once a number of cores.
+    of_dag: &'static [&'static str],
+    of_set: &'static [&'static str],
+}
+
+const FORMS: [Form; 2] = [
+    Form {
+        of_dag: &["len", "vol", "bottom_level", "single"],
+        of_set: &[
+            "dm_order",
+            "width",
+            "melani_gfp_dm",
+            "gfp_dm_width",
+            "np_safe_gfp_dm",
+            "melani_gedf",
+            "gedf_capacity",
+            "bonifaci_gedf",
+            "federated",
+        ],
+    },
+    Form {
+        of_dag: &["cov", "multi_path"],
+        of_set: &[
+            "dm_order",
+            "mp_gfp_dm",
+            "mp_gfp_dm_clip",
+            "mp_gedf",
+            "mp_gedf_clip",
+        ],
+    },
 ];
 
 /// Reads all cases of a file.
@@ -84,25 +116,28 @@ pub fn check(case: &Case) -> Result<(), String> {
     Ok(())
 }
 
-fn check_dag(expected: &ExpectedDag) -> Result<(), String> {
-    let task = &expected.task;
-    compare("len", &expected.length_ns, &task.length_ns())?;
-    compare("vol", &expected.volume_ns, &task.volume_ns())?;
-    let (expected_levels, levels) = (&expected.bottom_levels_ns, task.bottom_levels());
-    compare("bottom_level", &list(expected_levels), &list(&levels))?;
-    for &(cores, by_graham, by_long_paths) in &expected.singles {
-        let compare = |what: &str, expected: u64, computed: Option<u64>| {
-            let computed = computed.map_or("-".to_owned(), |bound| bound.to_string());
-            compare(
-                &format!("single {cores} {what}"),
-                &expected.to_string(),
-                &computed,
-            )
-        };
-        compare("graham", by_graham, graham(task, cores))?;
-        compare("long_paths", by_long_paths, long_paths(task, cores))?;
+fn check_dag(dag: &ExpectedDag) -> Result<(), String> {
+    for (what, expected) in &dag.quantities {
+        compare(what, expected, &compute_of_dag(what, &dag.task))?;
     }
     Ok(())
+}
+
+/// Computes one quantity of a DAG, in the words of the file.
+fn compute_of_dag(what: &str, task: &Task) -> String {
+    let words: Vec<&str> = what.split(' ').collect();
+    let cores = |word: &str| word.parse().expect("a number of cores, as was read");
+    let bound = match words[..] {
+        ["len"] => Some(task.length_ns()),
+        ["vol"] => Some(task.volume_ns()),
+        ["bottom_level"] => return list(&task.bottom_levels()),
+        ["cov"] => return list(&covers(task, usize::MAX)),
+        ["multi_path", m] => multi_path(task, cores(m)),
+        ["single", m, "graham"] => Some(older::graham(task, cores(m))),
+        ["single", m, "long_paths"] => Some(older::long_paths(task, cores(m))),
+        _ => None,
+    };
+    bound.map_or("-".to_owned(), |bound| bound.to_string())
 }
 
 /// Computes one quantity of a set, in the words of the file.
@@ -112,16 +147,25 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
     let by_deadline: Vec<&Task> = order.iter().map(|&dag| tasks[dag]).collect();
     let accepted = |yes: bool| u8::from(yes).to_string();
     let bounds = |bounds: Option<Vec<u64>>| bounds.map(|bounds| list(&bounds));
+    let is_constrained = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
+    let by_priority = |clip: Clip| {
+        let bounds = multi_path_fp(&by_deadline, cores, clip).ok();
+        bounds.filter(|_| tasks.iter().all(is_constrained))
+    };
     let computed = match name {
         "dm_order" => Some(list(&order)),
         "width" => {
             let widths: Option<Vec<u64>> = tasks.iter().map(|task| width(task)).collect();
             bounds(widths)
         }
-        "melani_gfp_dm" => bounds(melani_fp(&by_deadline, cores).ok()),
-        "gfp_dm_width" => bounds(melani_fp_width(&by_deadline, cores).ok()),
-        "np_safe_gfp_dm" => bounds(np_safe_fp(&by_deadline, cores).ok()),
-        "melani_gedf" => bounds(melani_edf(tasks, cores).ok()),
+        "melani_gfp_dm" => bounds(older::melani_fp(&by_deadline, cores, older::Width::Ignored)),
+        "gfp_dm_width" => bounds(older::melani_fp(&by_deadline, cores, older::Width::Used)),
+        "np_safe_gfp_dm" => bounds(older::np_safe_fp(&by_deadline, cores)),
+        "melani_gedf" => bounds(older::melani_edf(tasks, cores, older::Width::Ignored)),
+        "mp_gfp_dm" => bounds(by_priority(Clip::Window)),
+        "mp_gfp_dm_clip" => bounds(by_priority(Clip::Waiting)),
+        "mp_gedf" => bounds(multi_path_edf(tasks, cores, Clip::Window).ok()),
+        "mp_gedf_clip" => bounds(multi_path_edf(tasks, cores, Clip::Waiting).ok()),
         "gedf_capacity" => gedf_capacity(tasks, cores).map(accepted),
         "bonifaci_gedf" => Some(accepted(bonifaci_edf(tasks, cores))),
         "federated" => federated(tasks, cores).map(|federation| words_of(&federation)),
@@ -159,19 +203,20 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     let count: u32 = at_least_one(header, words[2])?;
     let mut dags = Vec::new();
     let mut line = lines.expect("dag")?;
-    let mut following = parse_dag(&line, lines, &mut dags)?;
+    let (mut following, form) = parse_dag(&line, lines, &FORMS, &mut dags)?;
     for _ in 1..count {
         line = following;
         if line.kind != "dag" {
             let reason = format!("expected {count} `dag` records, found {}", dags.len());
             return Err(line.malformed(reason));
         }
-        following = parse_dag(&line, lines, &mut dags)?;
+        let forms = std::slice::from_ref(form);
+        (following, _) = parse_dag(&line, lines, forms, &mut dags)?;
     }
     let mut quantities: Vec<(&'static str, Vec<String>)> = Vec::new();
     line = following;
     while line.kind != "end" {
-        let Some(name) = QUANTITIES.iter().find(|name| **name == line.kind) else {
+        let Some(name) = form.of_set.iter().find(|name| **name == line.kind) else {
             let reason = format!("a set of DAGs has no quantity {}", quoted(line.kind));
             return Err(line.malformed(reason));
         };
@@ -183,7 +228,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     }
     line.exactly(0)?;
     let has = |name: &str| quantities.iter().any(|(known, _)| *known == name);
-    if let Some(missing) = QUANTITIES.iter().find(|name| !has(name)) {
+    if let Some(missing) = form.of_set.iter().find(|name| !has(name)) {
         return Err(line.malformed(format!("the case ends without `{missing}`")));
     }
     Ok(Case {
@@ -194,12 +239,13 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     })
 }
 
-/// Reads a DAG and returns the first record after it.
-fn parse_dag<'a>(
+/// Reads a DAG of one of the forms and returns the first record after it, and the form.
+fn parse_dag<'a, 'f>(
     header: &Line<'_>,
     lines: &mut Lines<'a>,
+    forms: &'f [Form],
     dags: &mut Vec<ExpectedDag>,
-) -> Result<Line<'a>, Malformed> {
+) -> Result<(Line<'a>, &'f Form), Malformed> {
     let words = header.exactly(4)?;
     let (period_ns, deadline_ns) = (header.number(words[0])?, header.number(words[1])?);
     let subtasks: u32 = at_least_one(header, words[2])?;
@@ -218,41 +264,66 @@ fn parse_dag<'a>(
     }
     let task = Task::new(period_ns, deadline_ns, wcets_ns, &edges)
         .map_err(|error| header.malformed(error.to_string()))?;
-    let length_ns = lines.expect("len")?.numbers(1)?[0];
-    let volume_ns = lines.expect("vol")?.numbers(1)?[0];
-    let bottom_levels_ns = lines.expect("bottom_level")?.numbers(subtasks)?;
-    let mut singles: Vec<(u32, u64, u64)> = Vec::new();
-    loop {
-        let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
-        if line.kind == "single" {
-            let single = parse_single(&line)?;
-            if singles.iter().any(|&(cores, ..)| cores == single.0) {
-                let reason = format!("`single {}` stands here twice", single.0);
-                return Err(line.malformed(reason));
-            }
-            singles.push(single);
-        } else if singles.is_empty() {
-            return Err(line.malformed("the dag before this has no `single` record"));
-        } else {
-            dags.push(ExpectedDag {
-                task,
-                length_ns,
-                volume_ns,
-                bottom_levels_ns,
-                singles,
-            });
-            return Ok(line);
+    let mut line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
+    let Some(form) = forms.iter().find(|form| form.of_dag[0] == line.kind) else {
+        let names = forms.iter().map(|form| format!("`{}`", form.of_dag[0]));
+        let names = names.collect::<Vec<_>>().join(" or ");
+        return Err(line.malformed(format!("expected {names}, found {}", quoted(line.kind))));
+    };
+    let (once, by_cores) = form.of_dag.split_at(form.of_dag.len() - 1);
+    let mut quantities = Vec::new();
+    for name in once {
+        if line.kind != *name {
+            return Err(line.malformed(format!("expected `{name}`, found {}", quoted(line.kind))));
         }
+        let values = match *name {
+            "bottom_level" => line.numbers::<u64>(subtasks)?,
+            "cov" => line.numbers::<u64>(line.words.len())?,
+            _ => line.numbers::<u64>(1)?,
+        };
+        quantities.push(((*name).to_owned(), list(&values)));
+        line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
     }
+    let mut seen = Vec::new();
+    while line.kind == by_cores[0] {
+        let (cores, values) = parse_by_cores(&line)?;
+        if seen.contains(&cores) {
+            let reason = format!("`{} {cores}` stands here twice", line.kind);
+            return Err(line.malformed(reason));
+        }
+        seen.push(cores);
+        quantities.extend(values);
+        line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
+    }
+    if seen.is_empty() {
+        let reason = format!("the dag before this has no `{}` record", by_cores[0]);
+        return Err(line.malformed(reason));
+    }
+    dags.push(ExpectedDag { task, quantities });
+    Ok((line, form))
 }
 
-fn parse_single(line: &Line<'_>) -> Result<(u32, u64, u64), Malformed> {
+/// Reads what a DAG takes alone on a number of cores.
+fn parse_by_cores(line: &Line<'_>) -> Result<(u32, Vec<(String, String)>), Malformed> {
+    let quantity = |what: &str, cores: u32, word: &str| {
+        let what = format!("{} {cores}{what}", line.kind);
+        Ok((what, line.number::<u64>(word)?.to_string()))
+    };
+    if line.kind == "multi_path" {
+        let words = line.exactly(2)?;
+        let cores = line.cores(words[0])?;
+        return Ok((cores, vec![quantity("", cores, words[1])?]));
+    }
     let words = line.exactly(5)?;
     if words[1] != "graham" || words[3] != "long_paths" {
         return Err(line.malformed("expected `single M graham R long_paths R`"));
     }
     let cores = line.cores(words[0])?;
-    Ok((cores, line.number(words[2])?, line.number(words[4])?))
+    let graham = quantity(" graham", cores, words[2])?;
+    Ok((
+        cores,
+        vec![graham, quantity(" long_paths", cores, words[4])?],
+    ))
 }
 
 /// Checks the form of a quantity's words and returns them in plain form.
@@ -297,5 +368,6 @@ fn at_least_one(line: &Line<'_>, word: &str) -> Result<u32, Malformed> {
     }
 }
 
+pub(crate) mod older;
 #[cfg(test)]
 mod tests;

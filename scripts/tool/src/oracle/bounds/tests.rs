@@ -3,13 +3,16 @@
 use super::{check, parse};
 
 const FILE: &str = include_str!("../../../../../tests/oracle/bounds.txt");
+const MULTI_PATH: &str = include_str!("../../../../../tests/oracle/multi_path.txt");
 
 #[test]
 fn all_public_cases_agree() {
-    let cases = parse(FILE).unwrap();
-    assert_eq!(cases.len(), 60);
-    for case in &cases {
-        assert_eq!(check(case), Ok(()), "{}", case.name);
+    for file in [FILE, MULTI_PATH] {
+        let cases = parse(file).unwrap();
+        assert_eq!(cases.len(), 60);
+        for case in &cases {
+            assert_eq!(check(case), Ok(()), "{}", case.name);
+        }
     }
 }
 

@@ -1,0 +1,320 @@
+//! The most work that a few disjoint chains of a graph can hold.
+//!
+//! Words: a *chain* is a set of subtasks of which any two are ordered; along a path of the
+//! graph it *takes* some subtasks and *passes* the others. The *cover* of `k` chains is the
+//! largest sum of WCETs that `k` disjoint chains take together: the length for one chain,
+//! the volume for as many as the graph is wide.
+//!
+//! Up to [`STEPS`] the covers are exact. Chains that may pass through subtasks are the
+//! paths of a flow, each subtask of which pays its WCET once; a flow one larger comes from
+//! a heaviest augmenting path (R. K. Ahuja, T. L. Magnanti, J. B. Orlin, "Network Flows",
+//! 1993, section 9.7). Its weights are found by sweeps along the topological order and back
+//! until nothing changes, which few sweeps suffice for. Beyond, chains are peeled off one
+//! by one, a longest path at a time: covers that are too small, and thus safe wherever a
+//! cover is subtracted.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::task::Task;
+
+/// How many subtasks and edges, summed over the chains, are looked at for exact covers, and
+/// for peeled ones beyond the second.
+const STEPS: usize = 1 << 17;
+
+/// One chain: the subtasks of a path, each with whether the chain takes it.
+pub(super) type Chain = Vec<(usize, bool)>;
+
+/// Returns the covers of 1, 2, .. chains: at most `most`, and no more than it takes to
+/// cover the volume.
+///
+/// Exact unless the graph is large.
+#[must_use]
+pub fn covers(task: &Task, most: usize) -> Vec<u64> {
+    let chains = most.min(task.subtask_count());
+    if !is_small(task, chains) {
+        let mut sum = 0;
+        let peeled = peel(task, chains);
+        return peeled
+            .iter()
+            .map(|chain| {
+                sum += weight(task, chain);
+                sum
+            })
+            .collect();
+    }
+    let mut flow = Flow::none(task);
+    let mut covers: Vec<u64> = Vec::new();
+    let mut sum = 0;
+    while covers.len() < chains && sum < task.volume_ns() {
+        sum += flow.augment();
+        covers.push(sum);
+    }
+    covers
+}
+
+/// Returns the chains behind the `count`-th of the covers of at most `most` chains.
+pub(super) fn covering(task: &Task, most: usize, count: usize) -> Vec<Chain> {
+    if is_small(task, most.min(task.subtask_count())) {
+        heaviest(task, count)
+    } else {
+        peel(task, count)
+    }
+}
+
+/// Returns `count` disjoint chains of the most work, whatever the size of the graph.
+pub(super) fn heaviest(task: &Task, count: usize) -> Vec<Chain> {
+    let mut flow = Flow::none(task);
+    for _ in 0..count {
+        flow.augment();
+    }
+    flow.into_chains()
+}
+
+/// Returns disjoint chains, each a longest path of what the earlier ones left: at most
+/// `most`, and fewer in a large graph.
+pub(super) fn peel(task: &Task, most: usize) -> Vec<Chain> {
+    let steps = (task.subtask_count() + task.edge_count()).max(1);
+    let mut weights = Vec::from(task.wcets_ns());
+    let mut left = task.volume_ns();
+    let mut chains = Vec::new();
+    while left > 0 && chains.len() < most.min((STEPS / steps).max(2)) {
+        let path = task.longest_path(&weights).into_iter();
+        let chain: Chain = path
+            .map(|subtask| (subtask, core::mem::take(&mut weights[subtask]) > 0))
+            .collect();
+        left -= weight(task, &chain);
+        chains.push(chain);
+    }
+    chains
+}
+
+/// Returns the work that a chain takes.
+pub(super) fn weight(task: &Task, chain: &Chain) -> u64 {
+    let taken = chain.iter().filter(|(_, takes)| *takes);
+    taken.map(|&(subtask, _)| task.wcets_ns()[subtask]).sum()
+}
+
+fn is_small(task: &Task, chains: usize) -> bool {
+    let steps = task.subtask_count() + task.edge_count();
+    steps.saturating_mul(chains) <= STEPS
+}
+
+/// A flow of chains. Each subtask has an entry and an exit; it is taken between them once,
+/// for its WCET, or passed any number of times, for nothing.
+struct Flow<'a> {
+    task: &'a Task,
+    taken: Vec<bool>,
+    passed: Vec<u32>,
+    /// The chains along each edge, in the order of the task's successors.
+    along: Vec<u32>,
+}
+
+/// How the heaviest way to an entry or exit comes there.
+#[derive(Clone, Copy)]
+enum Step {
+    /// It begins at this entry.
+    Begin,
+    /// Along an edge, from the exit of its predecessor.
+    Edge { from: usize, edge: usize },
+    /// From the entry of the same subtask: taking it, or passing it.
+    Through { takes: bool },
+    /// From the exit of the same subtask, which is then not taken, or not passed.
+    Undo { takes: bool },
+    /// Against an edge, from the entry of its successor.
+    UndoEdge { to: usize, edge: usize },
+}
+
+/// The heaviest ways to an entry, or to an exit, of each subtask.
+struct Ways {
+    weights: Vec<u64>,
+    steps: Vec<Step>,
+}
+
+impl Ways {
+    fn improve(&mut self, subtask: usize, weight: u64, step: Step) -> bool {
+        let is_heavier = weight > self.weights[subtask];
+        if is_heavier {
+            self.weights[subtask] = weight;
+            self.steps[subtask] = step;
+        }
+        is_heavier
+    }
+}
+
+impl<'a> Flow<'a> {
+    fn none(task: &'a Task) -> Self {
+        Self {
+            task,
+            taken: vec![false; task.subtask_count()],
+            passed: vec![0; task.subtask_count()],
+            along: vec![0; task.edge_count()],
+        }
+    }
+
+    /// Adds a chain so that the chains take the most, and returns how much more that is.
+    fn augment(&mut self) -> u64 {
+        let count = self.task.subtask_count();
+        let ways = |step| Ways {
+            weights: vec![0; count],
+            steps: vec![step; count],
+        };
+        let (mut entries, mut exits) = (ways(Step::Begin), ways(Step::Through { takes: false }));
+        // No way goes round, so each pair of sweeps settles a further turn of some way.
+        for _ in 0..=count {
+            self.sweep(&mut entries, &mut exits);
+            if !self.sweep_back(&mut entries, &mut exits) {
+                break;
+            }
+        }
+        let last = (0..count).max_by_key(|&v| (exits.weights[v], core::cmp::Reverse(v)));
+        let Some(last) = last.filter(|&v| exits.weights[v] > 0) else {
+            return 0;
+        };
+        self.follow(last, &entries, &exits);
+        exits.weights[last]
+    }
+
+    fn sweep(&self, entries: &mut Ways, exits: &mut Ways) {
+        for &v in self.task.topological_order() {
+            let here = entries.weights[v];
+            if !self.taken[v] {
+                let weight = here + self.task.wcets_ns()[v];
+                exits.improve(v, weight, Step::Through { takes: true });
+            }
+            exits.improve(v, here, Step::Through { takes: false });
+            for (edge, to) in self.task.edges_of(v) {
+                let step = Step::Edge { from: v, edge };
+                entries.improve(to, exits.weights[v], step);
+            }
+        }
+    }
+
+    fn sweep_back(&self, entries: &mut Ways, exits: &mut Ways) -> bool {
+        let mut changed = false;
+        for &v in self.task.topological_order().iter().rev() {
+            for (edge, to) in self.task.edges_of(v) {
+                if self.along[edge] > 0 {
+                    let step = Step::UndoEdge { to, edge };
+                    changed |= exits.improve(v, entries.weights[to], step);
+                }
+            }
+            if self.taken[v]
+                && let Some(weight) = exits.weights[v].checked_sub(self.task.wcets_ns()[v])
+            {
+                changed |= entries.improve(v, weight, Step::Undo { takes: true });
+            }
+            if self.passed[v] > 0 {
+                changed |= entries.improve(v, exits.weights[v], Step::Undo { takes: false });
+            }
+        }
+        changed
+    }
+
+    /// Adds the heaviest way to the exit of `last` to the flow.
+    fn follow(&mut self, last: usize, entries: &Ways, exits: &Ways) {
+        let (mut at, mut is_exit) = (last, true);
+        loop {
+            let steps = if is_exit {
+                &exits.steps
+            } else {
+                &entries.steps
+            };
+            match steps[at] {
+                Step::Begin => return,
+                Step::Edge { from, edge } => {
+                    self.along[edge] += 1;
+                    at = from;
+                }
+                Step::UndoEdge { to, edge } => {
+                    self.along[edge] -= 1;
+                    at = to;
+                }
+                Step::Through { takes: true } => self.taken[at] = true,
+                Step::Through { takes: false } => self.passed[at] += 1,
+                Step::Undo { takes: true } => self.taken[at] = false,
+                Step::Undo { takes: false } => self.passed[at] -= 1,
+            }
+            is_exit = !is_exit;
+        }
+    }
+
+    /// Takes the flow apart into its chains.
+    fn into_chains(mut self) -> Vec<Chain> {
+        let through = self.taken.iter().zip(&self.passed);
+        let mut begin: Vec<u32> = through.map(|(&t, &p)| u32::from(t) + p).collect();
+        for v in 0..begin.len() {
+            for (edge, to) in self.task.edges_of(v) {
+                begin[to] -= self.along[edge];
+            }
+        }
+        let mut chains = Vec::new();
+        for (first, &count) in begin.iter().enumerate() {
+            for _ in 0..count {
+                let mut chain = Chain::new();
+                let mut at = Some(first);
+                while let Some(v) = at {
+                    chain.push((v, core::mem::take(&mut self.taken[v])));
+                    let next = self
+                        .task
+                        .edges_of(v)
+                        .find(|&(edge, _)| self.along[edge] > 0);
+                    at = next.map(|(edge, to)| {
+                        self.along[edge] -= 1;
+                        to
+                    });
+                }
+                chains.push(chain);
+            }
+        }
+        chains
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{covering, covers, peel, weight};
+    use crate::analysis::Task;
+
+    /// The example in which peeling a longest path first goes wrong.
+    fn crossing() -> Task {
+        Task::new(99, 99, vec![3, 2, 2, 3], &[(0, 1), (2, 3), (0, 3)]).unwrap()
+    }
+
+    #[test]
+    fn covers_are_exact_where_peeling_is_not() {
+        let task = crossing();
+        assert_eq!(covers(&task, 9), [6, 10]);
+        let peeled: Vec<u64> = peel(&task, 2).iter().map(|c| weight(&task, c)).collect();
+        assert_eq!(peeled, [6, 2]);
+    }
+
+    #[test]
+    fn chains_are_disjoint_paths_that_hold_the_cover() {
+        // A grid of 6 rows and 5 columns, with weights that differ.
+        let at = |row: usize, column: usize| 5 * row + column;
+        let right = (0..6).flat_map(|r| (0..4).map(move |c| (at(r, c), at(r, c + 1))));
+        let down = (0..5).flat_map(|r| (0..5).map(move |c| (at(r, c), at(r + 1, c))));
+        let edges: Vec<(usize, usize)> = right.chain(down).collect();
+        let wcets = (0..30).map(|v| 1 + v * 7 % 13).collect();
+        let task = Task::new(999, 999, wcets, &edges).unwrap();
+        let covers = covers(&task, 30);
+        assert_eq!((covers.len(), covers[4]), (5, task.volume_ns()));
+        for (count, &cover) in (1..).zip(&covers) {
+            let chains = covering(&task, 30, count);
+            assert_eq!(chains.len(), count);
+            let mut taken = [0; 30];
+            for chain in &chains {
+                let pairs = chain.windows(2);
+                let mut pairs = pairs.map(|pair| (pair[0].0, pair[1].0));
+                assert!(pairs.all(|pair| edges.contains(&pair)), "{chain:?}");
+                for &(v, takes) in chain {
+                    taken[v] += u32::from(takes);
+                }
+            }
+            assert!(taken.iter().all(|&times| times <= 1), "{chains:?}");
+            let sum: u64 = chains.iter().map(|chain| weight(&task, chain)).sum();
+            assert_eq!(sum, cover);
+        }
+    }
+}

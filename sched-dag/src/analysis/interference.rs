@@ -1,0 +1,155 @@
+//! What the other DAGs may execute while a job lasts, in the forms that the equations need.
+//!
+//! The equation with `j` chains counts interference on at most `m - j` cores. So a DAG has
+//! a [`Workload`] for each number of cores up to those that a job of it can use. The clipped
+//! form asks for the work in some part of the window only, all together as long as the job
+//! waits: there no core executes more than that time, and neither does a chain of the
+//! other DAG, which is on one core at a time.
+
+use alloc::vec::Vec;
+
+use super::cover::{covers, peel, weight};
+use super::task::Task;
+use super::width::parallelism;
+use super::workload::{Piece, Workload};
+
+/// Which interference the multi-path equations count; each is a bound, the later the tighter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clip {
+    /// All that fits into the window.
+    Window,
+    /// On each core no more than the time that the job waits.
+    Waiting,
+    /// And no more than that of each chain.
+    Chains,
+}
+
+/// What of a DAG's graph enters equations, its own and those of others.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    /// The most cores that one job can use, at least 1 and at most all.
+    pub(super) parallelism: u64,
+    /// The most work of 1, 2, .. disjoint chains, for as many as there are cores.
+    pub(super) covers: Vec<u64>,
+    /// The work of some disjoint chains.
+    chains: Vec<u64>,
+}
+
+impl Shape {
+    pub(super) fn of(task: &Task, cores: u32) -> Self {
+        let parallelism = parallelism(task, cores);
+        let most = usize::try_from(parallelism).unwrap_or(usize::MAX);
+        let chains = peel(task, most);
+        Self {
+            parallelism,
+            covers: covers(task, most),
+            chains: chains.iter().map(|chain| weight(task, chain)).collect(),
+        }
+    }
+}
+
+/// A DAG that may outrank the one under analysis.
+pub(super) struct Other {
+    /// All of it, on at most 1, 2, .. cores.
+    whole: Vec<Workload>,
+    /// What its chains leave, likewise.
+    rest: Vec<Workload>,
+    chains: Vec<Workload>,
+}
+
+impl Other {
+    /// Describes the workloads of a DAG with a response-time bound, each changed by `limit`.
+    pub(super) fn new(
+        task: &Task,
+        shape: &Shape,
+        response_ns: u64,
+        cores: u64,
+        limit: impl Fn(Workload) -> Workload,
+    ) -> Self {
+        let by_cores = |volume_ns: u64| {
+            let counts = 1..=shape.parallelism;
+            let workload = counts.map(|count| {
+                // Where all that a job can use count, jobs that overlap may use more.
+                let all = if count < shape.parallelism {
+                    count
+                } else {
+                    cores
+                };
+                limit(Workload::new(task, volume_ns, response_ns, count, all))
+            });
+            workload.collect()
+        };
+        let left = task.volume_ns() - shape.chains.iter().sum::<u64>();
+        let chain = |&volume_ns| limit(Workload::new(task, volume_ns, response_ns, 1, cores));
+        Self {
+            whole: by_cores(task.volume_ns()),
+            rest: if left > 0 { by_cores(left) } else { Vec::new() },
+            chains: shape.chains.iter().map(chain).collect(),
+        }
+    }
+
+    /// Returns the workload on all cores.
+    pub(super) fn on_all_cores(&self) -> &Workload {
+        &self.whole[self.whole.len() - 1]
+    }
+
+    /// Adds for each `j` what may execute on `m - j` cores within a window, of which the job
+    /// waits for `waiting_ns`: all that fits in to `plain`, and the clipped to `clipped`.
+    pub(super) fn add_to(
+        &self,
+        (window_ns, waiting_ns): (u64, u64),
+        clip: Clip,
+        cores: usize,
+        plain: &mut [Piece],
+        clipped: &mut [Piece],
+    ) {
+        let times = (window_ns, waiting_ns);
+        let of_chains = (clip == Clip::Chains).then(|| self.of_chains(times));
+        let mut last = 0;
+        let mut pieces = [Piece::NONE; 2];
+        for (j, (plain, clipped)) in plain.iter_mut().zip(clipped).enumerate() {
+            let count = (cores - j).min(self.whole.len());
+            if count != last {
+                last = count;
+                pieces = self.pieces(times, count, of_chains);
+            }
+            *plain = plain.and(pieces[0]);
+            *clipped = clipped.and(pieces[1]);
+        }
+    }
+
+    /// Returns the workload on at most `cores` cores, plain and clipped, and on how many it
+    /// is at most.
+    pub(super) fn on(&self, times: (u64, u64), cores: usize) -> (usize, [u128; 2]) {
+        let count = cores.min(self.whole.len());
+        let pieces = self.pieces(times, count, Some(self.of_chains(times)));
+        (count, pieces.map(|piece| piece.value))
+    }
+
+    fn of_chains(&self, (window_ns, waiting_ns): (u64, u64)) -> Piece {
+        self.chains.iter().fold(Piece::NONE, |sum, chain| {
+            sum.and(chain.at(window_ns).least(chain.over(waiting_ns)))
+        })
+    }
+
+    fn pieces(
+        &self,
+        (window_ns, waiting_ns): (u64, u64),
+        count: usize,
+        of_chains: Option<Piece>,
+    ) -> [Piece; 2] {
+        let clipped = |workload: &Workload| {
+            let whole = workload.at(window_ns);
+            whole.least(workload.over(waiting_ns))
+        };
+        let whole = &self.whole[count - 1];
+        let waiting = of_chains.map(|of_chains| {
+            let rest = self.rest.get(count - 1).map_or(Piece::NONE, clipped);
+            clipped(whole).least(of_chains.and(rest))
+        });
+        [
+            whole.at(window_ns),
+            waiting.unwrap_or_else(|| clipped(whole)),
+        ]
+    }
+}

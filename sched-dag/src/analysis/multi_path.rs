@@ -1,0 +1,192 @@
+//! The multi-path bound: one job of a DAG at a time, alone or among others.
+//!
+//! Statement, proof and what was checked are in `docs/multi-path-bound.md`; here in short. Let
+//! `C_j` be the most work of `j + 1` disjoint chains of the DAG (see `cover`), and
+//! `B_j = volume - C_j`. Look at a job at any instant at which its longest remaining path
+//! does not shrink. Then a ready subtask waits, so all `m` cores are busy, and the
+//! remaining `j + 1` heaviest chains run on at most `j` of them. Such instants sum up to
+//! `x = r - length` if the job is not complete at `r`; so it is, if for some `j < m`
+//!
+//! - `(m - j) x >= B_j + blocking + sum of W_i(r)`, or
+//! - `(m - j) x >= max(1, B_j) + blocking + sum of W_i(r)`, each `W_i` clipped to what DAG `i`
+//!   can execute in `x`: on each of its cores, and of each of its chains.
+//!
+//! `W_i` counts at most `m - j` cores. With `j = 0` the first form is that of Melani et al.
+//! 2015, without others Graham's; with chains of greedy long paths it is that of He et al.
+//! 2022. So none of these can be better, but for the rounding: here divisions round up,
+//! since preemptions need not be at whole nanoseconds.
+//!
+//! Assumes: no core idles while a subtask is ready; `R <= T`, that is one job of the DAG at
+//! a time, which each solution is limited to. Any order inside the DAG.
+//!
+//! Trap: without `max(1, ..)` the second form "proves" `r = length` whenever `B_j = 0`: the
+//! clip then counts nothing.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::cover::covers;
+use super::interference::{Clip, Other};
+use super::non_preemptive::Blocking;
+use super::pipelined::Unsolved;
+use super::refusal::Refusal;
+use super::set::{Set, constrained};
+use super::task::Task;
+use super::workload::Piece;
+
+/// Bounds the response time of one job alone on `cores` cores; `None` without cores.
+#[must_use]
+pub fn multi_path(task: &Task, cores: u32) -> Option<u64> {
+    let most = usize::try_from(cores).ok()?;
+    alone(task, &covers(task, most), cores.into())
+}
+
+/// Bounds the response time of one job alone, with covers at hand.
+pub(super) fn alone(task: &Task, covers: &[u64], cores: u64) -> Option<u64> {
+    let left = (0..cores).zip(covers);
+    let left = left.map(|(j, cover)| (task.volume_ns() - cover).div_ceil(cores - j));
+    // A DAG without subtasks has no chain, and takes no time.
+    let waiting = left.min().or((cores > 0).then_some(0))?;
+    Some(task.length_ns() + waiting)
+}
+
+/// Bounds the response times under global fixed priorities, the DAGs given from the highest
+/// priority to the lowest; also of jobs that overlap.
+///
+/// # Errors
+///
+/// [`Refusal`] if there is no core, or a DAG has no bound within its deadline.
+pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
+    if cores == 0 {
+        return Err(Refusal::DoesNotApply);
+    }
+    let mut set = Set::new(tasks, cores);
+    set.clip = clip;
+    let order: Vec<usize> = (0..tasks.len()).collect();
+    set.solve(&order, |other, dag| other < dag).complete()
+}
+
+/// Bounds the response times under global EDF, in the order given: down from the
+/// deadlines, so it accepts a little less than [`answer()`](super::answer()).
+///
+/// # Errors
+///
+/// [`Refusal`] if a DAG has `D > T`, or no bound within its deadline.
+pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
+    if !constrained(tasks, cores) {
+        return Err(Refusal::DoesNotApply);
+    }
+    let mut set = Set::new(tasks, cores);
+    set.clip = clip;
+    set.deadlines_limit = true;
+    set.down_from_deadlines(|_, _| true)
+        .map_err(|(position, why)| why.at(position))
+}
+
+/// What of one DAG enters its equations, with `j` from 0 to one less than the covers.
+pub(super) struct Equations<'a> {
+    pub(super) task: &'a Task,
+    pub(super) covers: &'a [u64],
+    pub(super) cores: usize,
+    pub(super) blocking: &'a Blocking,
+    pub(super) clip: Clip,
+    /// The longest response time that is of use, at most a period.
+    pub(super) limit_ns: u64,
+}
+
+/// One of the inequalities: proven if `cores` times the waiting is at least `busy`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Form {
+    /// The cores that count: `m - j`.
+    pub(super) cores: u128,
+    pub(super) is_clipped: bool,
+    pub(super) busy: Piece,
+}
+
+impl Equations<'_> {
+    /// Returns the least response time that some form proves, if it is at least `start_ns`.
+    pub(super) fn solve(
+        &self,
+        others: &[Other],
+        start_ns: u64,
+        steps: &mut u64,
+    ) -> Result<u64, Unsolved> {
+        let start = alone(self.task, self.covers, self.cores as u64);
+        let mut window = start_ns.max(start.unwrap_or(0));
+        while window <= self.limit_ns {
+            *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
+            let waiting = u128::from(window - self.task.length_ns());
+            let forms = self.forms(others, window);
+            let lacks = forms.map(|form| form.busy.lacks(form.cores, waiting));
+            let least = lacks.map(|lack| lack.unwrap_or(0)).min();
+            // Without subtasks there are no forms, and nothing to wait for.
+            match least.unwrap_or(0) {
+                0 => return Ok(window),
+                lack => {
+                    let lack = u64::try_from(lack).map_err(|_| Unsolved::BeyondDeadline)?;
+                    window = window.checked_add(lack).ok_or(Unsolved::BeyondDeadline)?;
+                }
+            }
+        }
+        Err(Unsolved::BeyondDeadline)
+    }
+
+    /// Returns the forms at a window of at least the length.
+    pub(super) fn forms(&self, others: &[Other], window_ns: u64) -> impl Iterator<Item = Form> {
+        let times = (window_ns, window_ns - self.task.length_ns());
+        let mut plain = vec![Piece::NONE; self.covers.len()];
+        let mut clipped = plain.clone();
+        for other in others {
+            other.add_to(times, self.clip, self.cores, &mut plain, &mut clipped);
+        }
+        let has_clipped = !others.is_empty() && self.clip != Clip::Window;
+        let sums = plain.into_iter().zip(clipped).enumerate();
+        sums.flat_map(move |(j, (plain, clipped))| {
+            let left = u128::from(self.task.volume_ns() - self.covers[j]);
+            let form = |is_clipped: bool, own: u128, sum: Piece| {
+                let blocked = self.blocking.during(self.cores, j, is_clipped);
+                let value = sum.value.saturating_add(own).saturating_add(blocked);
+                Form {
+                    cores: (self.cores - j) as u128,
+                    is_clipped,
+                    busy: Piece { value, ..sum },
+                }
+            };
+            let clipped = has_clipped.then(|| form(true, left.max(1), clipped));
+            core::iter::once(form(false, left, plain)).chain(clipped)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Clip, multi_path, multi_path_fp};
+    use crate::analysis::Task;
+
+    #[test]
+    fn nothing_beside_the_chains_is_not_nothing_to_wait_for() {
+        let high = Task::new(100, 100, vec![3, 3], &[]).unwrap();
+        let low = Task::new(100, 100, vec![5], &[]).unwrap();
+        for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
+            assert_eq!(multi_path_fp(&[&high, &low], 2, clip), Ok(vec![3, 8]));
+        }
+    }
+
+    #[test]
+    fn interference_counts_only_while_the_job_waits() {
+        // One of two cores is always free for the chain, so at most 2 of the 9 matter.
+        let long = Task::new(100, 100, vec![9, 2], &[]).unwrap();
+        let low = Task::new(100, 100, vec![4, 4], &[(0, 1)]).unwrap();
+        let bounds = |clip| multi_path_fp(&[&long, &low], 2, clip).unwrap()[1];
+        assert_eq!((bounds(Clip::Window), bounds(Clip::Chains)), (14, 11));
+    }
+
+    #[test]
+    fn no_cores_and_no_subtasks() {
+        let none = Task::new(9, 9, vec![], &[]).unwrap();
+        assert_eq!(
+            (multi_path(&none, 2), multi_path(&none, 0)),
+            (Some(0), None)
+        );
+    }
+}

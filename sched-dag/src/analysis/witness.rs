@@ -1,0 +1,295 @@
+//! Witnesses: what it takes to check bounds without solving anything.
+//!
+//! [`witness()`] writes a text of lines of words. It begins with what was committed, in the
+//! analysis's own terms, and a hash of that; then come a few certificates of each graph, and
+//! of each bound the inequality that proves it with every term. `./scripts/check-witness`,
+//! whose text says what it requires of each line, computes each term again from the others.
+//!
+//! ```text
+//! machine CORES POLICY OVERHEAD_NS
+//! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
+//! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
+//! edge FROM TO
+//! hash FNV_1A                                 of all above
+//!
+//! graph DAG LENGTH VOLUME
+//! levels LEVEL..                              bottom levels by subtask
+//! cover SUBTASK.. / part SUBTASK..            chains; -1-v is a subtask v that is passed
+//!
+//! bound DAG R paths CHAINS CORES LEFT BLOCKED BUSY
+//! bound DAG R waiting CHAINS CORES LEFT BLOCKED BUSY
+//! chain SUBTASK..                             as `cover`
+//! other DAG R CORES W CLIPPED                 clipped only if `waiting`
+//!
+//! bound DAG R overlap OWN
+//! window X BUSY                               and `other` lines with W in that window
+//!
+//! bound DAG R priorities CORES
+//! path SUBTASK..                              each path of the DAG
+//!
+//! bound DAG R utilisation
+//! unproven DAG
+//! seal FNV_1A                                 of all above
+//! ```
+//!
+//! `cover` lines show that a DAG is no wider than there are of them; without any it may use
+//! all cores. `part` lines are disjoint chains, for the clipped form.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt::Write;
+
+use super::answer::{DagBound, Settings, Test};
+use super::cover::{Chain, covering, heaviest, peel};
+use super::interference::Other;
+use super::intra_task::each_path;
+use super::judge::{Case, with_case};
+use crate::policy::{Policy, Preemption};
+use crate::task_set::TaskSet;
+
+/// Writes a witness for the bounds that [`answer()`](super::answer()) gives.
+#[must_use]
+pub fn witness(task_set: &TaskSet, settings: &Settings) -> String {
+    let mut text = Text(String::new());
+    text.statement(task_set, settings);
+    text.hash("hash");
+    with_case(task_set, settings, |case, reasons| {
+        let bounds = case.verdict().bounds;
+        for dag in 0..case.members.len() {
+            text.graph(case, dag);
+        }
+        for (dag, bound) in bounds.iter().enumerate() {
+            match bound {
+                Some(bound) => text.bound(case, &bounds, dag, *bound),
+                None => text.line(format_args!("unproven {}", case.members[dag])),
+            }
+        }
+        for (dag, _) in reasons
+            .iter()
+            .enumerate()
+            .filter(|(_, reason)| reason.is_some())
+        {
+            text.line(format_args!("unproven {dag}"));
+        }
+    });
+    text.hash("seal");
+    text.0
+}
+
+struct Text(String);
+
+impl Text {
+    fn hash(&mut self, word: &str) {
+        let hash = fnv_1a(self.0.as_bytes());
+        self.line(format_args!("{word} {hash}"));
+    }
+
+    fn line(&mut self, words: core::fmt::Arguments<'_>) {
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(self.0, "{words}");
+    }
+
+    fn list(&mut self, word: &str, numbers: impl Iterator<Item = i128>) {
+        self.0.push_str(word);
+        for number in numbers {
+            let _ = write!(self.0, " {number}");
+        }
+        self.0.push('\n');
+    }
+
+    fn statement(&mut self, task_set: &TaskSet, settings: &Settings) {
+        let policy = match settings.policy {
+            Policy::StaticPriority => "static",
+            Policy::Edf => "edf",
+        };
+        let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
+        let (cores, overhead_ns) = (settings.cores, overhead_ns.unwrap_or(u64::MAX));
+        self.line(format_args!("machine {cores} {policy} {overhead_ns}"));
+        for (id, dag) in task_set.dags().iter().enumerate() {
+            let ids = || (0..).map(crate::ids::SubtaskId).take(dag.subtasks().len());
+            let edges: usize = ids().map(|from| dag.successors(from).len()).sum();
+            self.line(format_args!(
+                "dag {id} {} {} {} {} {edges} {:?}",
+                dag.period_ns(),
+                dag.relative_deadline_ns(),
+                dag.in_flight(),
+                dag.subtasks().len(),
+                dag.name(),
+            ));
+            for subtask in dag.subtasks() {
+                let keeps =
+                    subtask.is_non_preemptive() || settings.preemption == Preemption::Disabled;
+                let (wcet, priority) = (subtask.wcet_ns().unwrap_or(0), subtask.priority().0);
+                self.line(format_args!(
+                    "subtask {wcet} {priority} {}",
+                    u8::from(keeps)
+                ));
+            }
+            for from in ids() {
+                for to in dag.successors(from) {
+                    self.line(format_args!("edge {} {}", from.0, to.0));
+                }
+            }
+        }
+    }
+
+    fn graph(&mut self, case: &Case<'_>, dag: usize) {
+        let (task, shape) = (case.tasks[dag], &case.set.shapes[dag]);
+        let (length, volume) = (task.length_ns(), task.volume_ns());
+        self.line(format_args!(
+            "graph {} {length} {volume}",
+            case.members[dag]
+        ));
+        self.list("levels", task.bottom_levels().into_iter().map(i128::from));
+        if shape.parallelism < case.set.cores.into() {
+            self.chains("cover", &heaviest(task, most(shape.parallelism)));
+        }
+        self.chains("part", &peel(task, most(shape.parallelism)));
+    }
+
+    fn chains(&mut self, word: &str, chains: &[Chain]) {
+        for chain in chains {
+            let numbers = chain.iter().map(|&(subtask, takes)| {
+                let subtask = subtask as i128;
+                if takes { subtask } else { -1 - subtask }
+            });
+            self.list(word, numbers);
+        }
+    }
+
+    fn bound(
+        &mut self,
+        case: &Case<'_>,
+        bounds: &[Option<DagBound>],
+        dag: usize,
+        DagBound { bound_ns, test }: DagBound,
+    ) {
+        let (id, task) = (case.members[dag], case.tasks[dag]);
+        match test {
+            Test::Capacity | Test::SpeedUp => {
+                self.line(format_args!("bound {id} {bound_ns} utilisation"));
+            }
+            Test::IntraTask => self.priorities(case, dag, bound_ns),
+            _ => {
+                let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+                let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
+                let responses: Vec<Option<u64>> = responses.collect();
+                let others = case.set.interference(dag, &responses, may_outrank);
+                let others = others.unwrap_or_default();
+                let ids = (0..bounds.len()).filter(|&other| case.relation.may_outrank(other, dag));
+                let listed: Vec<Listed<'_>> = (ids.zip(&others))
+                    .map(|(other, workloads)| Listed {
+                        id: case.members[other],
+                        response_ns: responses[other].unwrap_or(u64::MAX),
+                        workloads,
+                    })
+                    .collect();
+                if bound_ns > task.period_ns() {
+                    self.overlap(case, dag, bound_ns, &others, &listed);
+                } else {
+                    self.paths(case, dag, bound_ns, &others, &listed);
+                }
+            }
+        }
+    }
+
+    fn paths(
+        &mut self,
+        case: &Case<'_>,
+        dag: usize,
+        bound_ns: u64,
+        others: &[Other],
+        listed: &[Listed<'_>],
+    ) {
+        let (id, task) = (case.members[dag], case.tasks[dag]);
+        let equations = case.set.equations(dag);
+        let waiting = bound_ns - task.length_ns();
+        let enough = |cores: u128| cores * u128::from(waiting);
+        let mut forms = equations.forms(others, bound_ns);
+        let Some(form) = forms.find(|form| form.busy.value <= enough(form.cores)) else {
+            return;
+        };
+        let (cores, busy) = (form.cores, form.busy.value);
+        let chains = equations.cores + 1 - usize::try_from(cores).unwrap_or(0);
+        let word = if form.is_clipped { "waiting" } else { "paths" };
+        let left = task.volume_ns() - equations.covers[chains - 1];
+        let left = if form.is_clipped { left.max(1) } else { left };
+        let blocked = equations
+            .blocking
+            .during(equations.cores, chains - 1, form.is_clipped);
+        self.line(format_args!(
+            "bound {id} {bound_ns} {word} {chains} {cores} {left} {blocked} {busy}"
+        ));
+        self.chains("chain", &covering(task, equations.covers.len(), chains));
+        for other in listed {
+            let count = usize::try_from(cores).unwrap_or(usize::MAX);
+            let (count, [all, clipped]) = other.workloads.on((bound_ns, waiting), count);
+            let (id, response) = (other.id, other.response_ns);
+            if form.is_clipped {
+                self.line(format_args!(
+                    "other {id} {response} {count} {all} {clipped}"
+                ));
+            } else {
+                self.line(format_args!("other {id} {response} {count} {all}"));
+            }
+        }
+    }
+
+    fn overlap(
+        &mut self,
+        case: &Case<'_>,
+        dag: usize,
+        bound_ns: u64,
+        others: &[Other],
+        listed: &[Listed<'_>],
+    ) {
+        let figures = &case.set.figures[dag];
+        let Ok((windows, own)) = figures.windows(others, bound_ns) else {
+            return;
+        };
+        self.line(format_args!(
+            "bound {} {bound_ns} overlap {own}",
+            case.members[dag]
+        ));
+        for (back, window) in windows.iter().enumerate() {
+            let window_ns = u64::try_from(*window).unwrap_or(u64::MAX);
+            let busy = figures.busy(back as u128, own, others, window_ns).value;
+            self.line(format_args!("window {window} {busy}"));
+            for other in listed {
+                let (count, [all, _]) = other.workloads.on((window_ns, 0), usize::MAX);
+                let (id, response) = (other.id, other.response_ns);
+                self.line(format_args!("other {id} {response} {count} {all}"));
+            }
+        }
+    }
+
+    fn priorities(&mut self, case: &Case<'_>, dag: usize, bound_ns: u64) {
+        let id = case.members[dag];
+        self.line(format_args!(
+            "bound {id} {bound_ns} priorities {}",
+            case.set.cores
+        ));
+        let task = case.tasks[dag];
+        each_path(task, |path| {
+            self.list("path", path.iter().map(|&subtask| subtask as i128));
+        });
+    }
+}
+
+/// A DAG that may outrank another, with its number in the commit.
+struct Listed<'a> {
+    id: usize,
+    response_ns: u64,
+    workloads: &'a Other,
+}
+
+fn most(parallelism: u64) -> usize {
+    usize::try_from(parallelism).unwrap_or(usize::MAX)
+}
+
+/// The hash of G. Fowler, L. C. Noll and P. Vo, with 64 bits.
+fn fnv_1a(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}

@@ -1,0 +1,89 @@
+//! Witnesses against the checker that shares no code with the analysis.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use sched_dag::analysis::{answer, witness};
+use sched_dag::{Policy, Preemption};
+
+use crate::random::{Random, Sample, sample};
+use crate::simulate::spec;
+use crate::{number_from, settings};
+
+/// How many witnesses get each of their numbers altered, of those that add something.
+const ALTERED: usize = 12;
+
+fn run(script: &str, files: &[String]) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts");
+    let mut command = Command::new("python3");
+    let output = command.arg(path.join(script)).args(files).output();
+    let output = output.expect("python3 checks witnesses; install it");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success(),
+        "{script} {files:?}: {said}{complaint}"
+    );
+    said
+}
+
+#[test]
+fn every_bound_has_a_witness_and_no_altered_one_passes() {
+    let folder = std::env::temp_dir().join(format!("witnesses-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let mut by_test: BTreeMap<String, u64> = BTreeMap::new();
+    let mut files = Vec::new();
+    let mut to_alter = Vec::new();
+    for seed in 0..=number_from("WITNESS_SETS", 1_000) {
+        let mut random = Random::new(seed);
+        let sample = match seed {
+            0 => full_core(),
+            _ => sample(&mut random),
+        };
+        let options = sched_dag::CommitOptions::new(sample.policy, sample.cores)
+            .with_construction(sched_dag::ConstructionPolicy::any_graph());
+        let Ok(verified) = sched_dag::verify(&sample.specs, &options) else {
+            continue;
+        };
+        let mut settings = settings((sample.policy, sample.preemption), sample.cores);
+        settings.overheads.dispatch_ns = random.within(0, 2.min(seed));
+        let path = folder.join(seed.to_string());
+        fs::write(&path, witness(&verified.task_set, &settings)).unwrap();
+        let file = path.to_string_lossy().into_owned();
+        let mut is_new = false;
+        for bound in answer(&verified.task_set, &settings)
+            .bounds
+            .iter()
+            .flatten()
+        {
+            let count = by_test.entry(bound.test.to_string()).or_default();
+            *count += 1;
+            is_new |= *count <= 2;
+        }
+        if is_new && to_alter.len() < ALTERED {
+            to_alter.push(file.clone());
+        }
+        files.push(file);
+    }
+    let said = run("check-witness", &files);
+    let proven: u64 = by_test.values().sum();
+    let checked = said.lines().filter(|line| line.contains("at most")).count();
+    assert_eq!(u64::try_from(checked), Ok(proven), "{said}");
+    println!("{} witnesses pass; bounds: {by_test:?}", files.len());
+    println!("{}", run("alter-witness", &to_alter).trim());
+    assert!(by_test.len() >= 8, "some test was never used: {by_test:?}");
+    fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Two DAGs that nearly use up one core, which only the utilisation proves.
+fn full_core() -> Sample {
+    let specs = [spec(6, 6, &[3], &[], 0), spec(9, 9, &[4], &[], 0)];
+    Sample {
+        specs: specs.to_vec(),
+        policy: Policy::Edf,
+        preemption: Preemption::Enabled,
+        cores: 1,
+    }
+}

@@ -1,0 +1,150 @@
+//! Published bounds that the multi-path ones have replaced, for comparison with them.
+//!
+//! They round down, as `bounds.txt` does, and find their fixed points by creeping up, which
+//! is slow where times are nanoseconds. All assume `D <= T`; priorities are the order given.
+//!
+//! - [`graham`]: R. L. Graham, SIAM J. Applied Mathematics 17(2), 1969;
+//! - [`long_paths`]: Q. He et al., RTSS 2022: path 0 is a longest path, path `j` a longest
+//!   one when the subtasks of the earlier paths weigh nothing;
+//! - [`melani_fp`], [`melani_edf`]: A. Melani et al., IEEE Trans. Computers 66(2), 2017;
+//! - [`np_safe_fp`]: the same with the blocking of subtasks that are never preempted.
+
+use std::cmp::Reverse;
+
+use sched_dag::analysis::{Task, parallelism};
+
+/// Whether a workload uses no more cores than the DAG is wide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Width {
+    /// It uses all cores, as published.
+    Ignored,
+    /// It does not: the bound of Bertogna and Cirinei (RTSS 2007) for chains.
+    Used,
+}
+
+impl Width {
+    fn of(self, task: &Task, cores: u32) -> u64 {
+        match self {
+            Self::Ignored => u64::from(cores),
+            Self::Used => parallelism(task, cores),
+        }
+    }
+}
+
+/// Returns Graham's bound on one job alone.
+pub(crate) fn graham(task: &Task, cores: u32) -> u64 {
+    task.length_ns() + (task.volume_ns() - task.length_ns()) / u64::from(cores)
+}
+
+/// Returns the bound of long paths on one job alone.
+pub(crate) fn long_paths(task: &Task, cores: u32) -> u64 {
+    let mut weights = task.wcets_ns().to_vec();
+    let mut rest = task.volume_ns();
+    let waits = (0..u64::from(cores)).map(|j| {
+        for subtask in task.longest_path(&weights) {
+            rest -= std::mem::take(&mut weights[subtask]);
+        }
+        rest / (u64::from(cores) - j)
+    });
+    task.length_ns() + waits.min().unwrap_or(0)
+}
+
+/// Bounds response times under fixed priorities; `None`: not accepted.
+pub(crate) fn melani_fp(tasks: &[&Task], cores: u32, width: Width) -> Option<Vec<u64>> {
+    by_priority(tasks, cores, width, |_| 0)
+}
+
+/// As [`melani_fp`], of subtasks that are never preempted.
+pub(crate) fn np_safe_fp(tasks: &[&Task], cores: u32) -> Option<Vec<u64>> {
+    by_priority(tasks, cores, Width::Ignored, |dag| {
+        let lower = tasks[dag + 1..].iter();
+        let mut wcets: Vec<u64> = lower.flat_map(|task| task.wcets_ns()).copied().collect();
+        wcets.sort_by_key(|&wcet| Reverse(wcet));
+        let largest = |count: u32| wcets.iter().take(count as usize).sum::<u64>();
+        let later = tasks[dag].most_subtasks_on_a_path().saturating_sub(1);
+        largest(cores) + later * largest(cores - 1)
+    })
+}
+
+/// Bounds response times under EDF; `None`: not accepted.
+pub(crate) fn melani_edf(tasks: &[&Task], cores: u32, width: Width) -> Option<Vec<u64>> {
+    if !are_constrained(tasks) {
+        return None;
+    }
+    let mut bounds: Vec<u64> = tasks.iter().map(|task| graham(task, cores)).collect();
+    loop {
+        let before = bounds.clone();
+        for dag in 0..tasks.len() {
+            let deadline = tasks[dag].relative_deadline_ns();
+            bounds[dag] = least(tasks[dag], cores, 0, |window| {
+                let others = (0..tasks.len()).filter(|&other| other != dag);
+                let workloads = others.map(|other| {
+                    let used = width.of(tasks[other], cores);
+                    let limit = due(tasks[other], used, bounds[other], deadline);
+                    workload(tasks[other], used, bounds[other], window).min(limit)
+                });
+                workloads.sum()
+            })?;
+        }
+        if bounds == before {
+            return Some(bounds);
+        }
+    }
+}
+
+fn by_priority(
+    tasks: &[&Task],
+    cores: u32,
+    width: Width,
+    blocking: impl Fn(usize) -> u64,
+) -> Option<Vec<u64>> {
+    let mut bounds: Vec<u64> = Vec::new();
+    for (dag, task) in tasks.iter().enumerate() {
+        let bound = least(task, cores, blocking(dag), |window| {
+            let workloads = tasks.iter().zip(&bounds).map(|(task, &bound)| {
+                let used = width.of(task, cores);
+                workload(task, used, bound, window)
+            });
+            workloads.sum()
+        })?;
+        bounds.push(bound);
+    }
+    Some(bounds).filter(|_| are_constrained(tasks))
+}
+
+fn are_constrained(tasks: &[&Task]) -> bool {
+    let one = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
+    tasks.iter().all(one)
+}
+
+/// Returns the least `r = length + (volume - length + blocking + interference(r)) / m`.
+fn least(task: &Task, cores: u32, blocking: u64, interference: impl Fn(u64) -> u64) -> Option<u64> {
+    let own = task.volume_ns() - task.length_ns() + blocking;
+    let mut response = task.length_ns();
+    while response <= task.relative_deadline_ns() {
+        let next = task.length_ns() + (own + interference(response)) / u64::from(cores);
+        if next <= response {
+            return Some(response);
+        }
+        response = next;
+    }
+    None
+}
+
+/// Returns the most that jobs done within `bound` execute in a window, on `p` cores.
+fn workload(task: &Task, p: u64, bound: u64, window: u64) -> u64 {
+    let (volume, pitch) = (task.volume_ns(), p * task.period_ns());
+    let area = (p * (window + bound)).checked_sub(volume);
+    let packed = area.map_or(volume, |area| {
+        area / pitch * volume + volume.min(area % pitch)
+    });
+    packed.min(p * window)
+}
+
+/// Returns the most that jobs with deadlines no later than one of `deadline` execute.
+fn due(task: &Task, p: u64, bound: u64, deadline: u64) -> u64 {
+    let (volume, own) = (task.volume_ns(), task.relative_deadline_ns());
+    let jobs = (deadline.checked_sub(own)).map_or(0, |gap| gap / task.period_ns() + 1);
+    let carried = (deadline + bound).saturating_sub(own + jobs * task.period_ns());
+    jobs * volume + volume.min(p * carried)
+}
