@@ -94,9 +94,11 @@ extern crate alloc;
 pub mod analysis;
 mod ids;
 pub mod journal;
+mod kept;
 pub mod law;
 mod nearest;
 mod order;
+pub mod placement;
 mod policy;
 mod priorities;
 mod recorder;
@@ -108,12 +110,13 @@ mod verify;
 pub mod virtual_time;
 
 pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
+pub use kept::Journal;
 pub use nearest::nearest;
 pub use policy::{
     Activation, JobOutcome, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions,
 };
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
-pub use recorder::Recorder;
+pub use recorder::{Events, Recorder};
 pub use scheduler::{DagStatistics, Decision, HandOff, Moment, Observer, Released, Scheduler};
 pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};

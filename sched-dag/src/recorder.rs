@@ -1,18 +1,40 @@
-//! The journal of a driver that has room for all events.
+//! Writes the journal of a driver that reads its clock once a step.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::journal::{Event, Subject, What};
+use crate::kept::Journal;
 use crate::policy::JobOutcome;
 use crate::scheduler::Observer;
 use crate::task_set::TaskSet;
 
+/// What events are written into.
+pub trait Events {
+    /// Writes down that something has happened.
+    fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject);
+}
+
+/// With room for all, as much as there is memory.
+impl Events for Vec<Event> {
+    fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
+        self.extend(Event::unpack(Event::words(time_ns, what, core, subject)));
+    }
+}
+
+/// In the memory that was taken before.
+impl Events for Journal {
+    #[inline]
+    fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
+        Self::write(self, core, what, time_ns, subject);
+    }
+}
+
 /// Writes down what the scheduler reports, and what the driver says that cores do, at
 /// the time that the driver has set last.
 #[derive(Clone, Debug)]
-pub struct Recorder {
+pub struct Recorder<J = Vec<Event>> {
     task_set: Arc<TaskSet>,
     /// The present instant on the scheduler's clock.
     pub now_ns: u64,
@@ -20,34 +42,45 @@ pub struct Recorder {
     /// last.
     here: CoreId,
     /// What has happened, in its order.
-    pub events: Vec<Event>,
+    pub events: J,
     is_closed: bool,
 }
 
 impl Recorder {
-    /// Begins at time 0; until an instance has ended, core 0 takes the steps.
+    /// Begins at time 0, with room for all events; until an instance has ended, core 0
+    /// takes the steps.
     #[must_use]
     pub const fn new(task_set: Arc<TaskSet>) -> Self {
+        Self::into(task_set, Vec::new())
+    }
+}
+
+impl<J> Recorder<J> {
+    /// Begins likewise, and writes into what there is.
+    #[must_use]
+    pub const fn into(task_set: Arc<TaskSet>, events: J) -> Self {
         Self {
             task_set,
             now_ns: 0,
             here: CoreId(0),
-            events: Vec::new(),
+            events,
             is_closed: false,
         }
     }
 
+    /// Writes nothing down any more.
+    pub const fn close(&mut self) {
+        self.is_closed = true;
+    }
+}
+
+impl<J: Events> Recorder<J> {
     /// Writes down what a core does with an instance.
     pub fn on_core(&mut self, what: What, instance: Instance, core: CoreId) {
         if matches!(what, What::Finish | What::Ended) {
             self.here = core;
         }
         self.write(what, self.now_ns, core, Subject::of(instance));
-    }
-
-    /// Writes nothing down any more.
-    pub const fn close(&mut self) {
-        self.is_closed = true;
     }
 
     fn of_job(&mut self, what: What, dag: DagId, job: u64) {
@@ -57,13 +90,12 @@ impl Recorder {
 
     fn write(&mut self, what: What, time_ns: u64, core: CoreId, subject: Subject) {
         if !self.is_closed {
-            let words = Event::words(time_ns, what, core, subject);
-            self.events.extend(Event::unpack(words));
+            self.events.write(core, what, time_ns, subject);
         }
     }
 }
 
-impl Observer for Recorder {
+impl<J: Events> Observer for Recorder<J> {
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
         if self.task_set.dag(dag).is_sporadic() {
             let subject = Subject::of_job(dag, job);

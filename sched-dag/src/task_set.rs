@@ -277,6 +277,15 @@ impl Subtask {
         self.budget_ns
     }
 
+    /// Returns how long an instance may execute for, `u64::MAX` if there is no limit: its
+    /// budget, else so many WCETs, or no limit if that is 0.
+    #[must_use]
+    pub fn most_execution_ns(&self, wcets: u64) -> u64 {
+        let wcet_ns = self.wcet_ns.filter(|_| wcets > 0);
+        let limit_ns = wcet_ns.map(|wcet_ns| wcet_ns.saturating_mul(wcets));
+        self.budget_ns.or(limit_ns).unwrap_or(u64::MAX)
+    }
+
     /// Returns the static priority, given or derived from the graph.
     #[must_use]
     pub const fn priority(&self) -> Priority {

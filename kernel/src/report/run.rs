@@ -4,10 +4,9 @@ use alloc::vec::Vec;
 use core::cell::OnceCell;
 
 use sched_dag::law::{self, Record, Tally, Terms, Violation};
-use sched_dag::{DagId, DagStatistics, TaskSet};
+use sched_dag::{DagId, DagStatistics, Journal, TaskSet};
 
 use crate::run::execution::{Execution, Snapshot};
-use crate::run::journal::Journal;
 
 /// A run that has ended: its model, its times and its counts.
 ///

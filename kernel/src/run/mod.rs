@@ -2,14 +2,12 @@
 //!
 //! `platform` takes what an app commits. `execution` holds the scheduler and brings each core
 //! to what it decides, `worker` is each core's loop, `containment` ends what is at fault.
-//! `contexts` keeps stacks, `journal` what has happened. `heartbeat` has a core take interrupts
-//! now and then; `occupation` holds a core for an instance that only stands for work.
+//! `contexts` keeps stacks. `heartbeat` has a core take interrupts now and then; `occupation` holds a core for an instance that only stands for work.
 
 pub(crate) mod containment;
 pub(crate) mod contexts;
 pub(crate) mod execution;
 pub(crate) mod heartbeat;
-pub(crate) mod journal;
 pub(crate) mod occupation;
 pub(crate) mod platform;
 pub(crate) mod worker;

@@ -21,6 +21,8 @@ pub(crate) struct Kernel {
     coincidence_ns: AtomicU64,
     /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
     budget_factor: AtomicU64,
+    /// The most events that journals from now on have room for.
+    most_events: AtomicU64,
     /// What a commit adds to WCETs: context switch, dispatch, interrupt.
     overheads_ns: [AtomicU64; 3],
 }
@@ -30,6 +32,7 @@ pub(crate) static KERNEL: Kernel = Kernel {
     preemptive: AtomicBool::new(true),
     coincidence_ns: AtomicU64::new(0),
     budget_factor: AtomicU64::new(0),
+    most_events: AtomicU64::new(u64::MAX),
     overheads_ns: [const { AtomicU64::new(0) }; 3],
 };
 
@@ -55,6 +58,12 @@ impl Kernel {
     /// Chooses the budget of subtasks that have a WCET only, in WCETs; 0 for none.
     pub(crate) fn set_budget_factor(&self, factor: u64) {
         self.budget_factor.store(factor, Ordering::Relaxed);
+    }
+
+    /// Lets journals from now on have room for at most so many events; `u64::MAX`: as
+    /// many as make sense.
+    pub(crate) fn set_most_events(&self, most: u64) {
+        self.most_events.store(most, Ordering::Relaxed);
     }
 
     /// Chooses how long decisions of the runs to come wait for further events of
@@ -129,6 +138,7 @@ impl Platform for Kernel {
         let terms = Terms {
             coincidence_ns: self.coincidence_ns.load(Ordering::Relaxed),
             budget_factor: self.budget_factor.load(Ordering::Relaxed),
+            most_events: self.most_events.load(Ordering::Relaxed),
         };
         execution::prepare(plan, options, terms)
     }

@@ -21,7 +21,7 @@ use crate::machine::{
 use crate::memory::{self, OutOfMemory};
 use crate::println;
 use crate::run::platform::KERNEL;
-use crate::run::{contexts, heartbeat, journal, worker};
+use crate::run::{contexts, heartbeat, worker};
 use crate::text::options::Options;
 use crate::text::{console, json};
 use crate::watch::panic;
@@ -216,7 +216,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
     let settings = settings::apply(&options)?;
-    journal::limit(settings.events);
+    KERNEL.set_most_events(settings.events);
     let machine = Machine {
         options,
         module: module_bytes(info),

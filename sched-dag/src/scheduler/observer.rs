@@ -68,44 +68,35 @@ pub trait Observer {
 
 impl Observer for () {}
 
-impl<O: Observer + ?Sized> Observer for &mut O {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        (**self).released(dag, job, release_ns);
-    }
+/// Passes every report on: to what is behind a reference, to both of a pair.
+macro_rules! pass_on {
+    ($($report:ident($($name:ident: $type:ty),+);)+) => {
+        impl<O: Observer + ?Sized> Observer for &mut O {
+            $(#[inline]
+            fn $report(&mut self, $($name: $type),+) {
+                (**self).$report($($name),+);
+            })+
+        }
 
-    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        (**self).queued(dag, job, release_ns);
-    }
+        impl<A: Observer, B: Observer> Observer for (A, B) {
+            $(#[inline]
+            fn $report(&mut self, $($name: $type),+) {
+                self.0.$report($($name),+);
+                self.1.$report($($name),+);
+            })+
+        }
+    };
+}
 
-    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        (**self).skipped(dag, job, release_ns);
-    }
-
-    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
-        (**self).signalled(dag, job, release_ns);
-    }
-
-    fn ready(&mut self, instance: Instance) {
-        (**self).ready(instance);
-    }
-
-    fn cancelled(&mut self, instance: Instance) {
-        (**self).cancelled(instance);
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        (**self).aborted(dag, job);
-    }
-
-    fn ended(&mut self, dag: DagId) {
-        (**self).ended(dag);
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        (**self).deadline_missed(dag, job, deadline_ns);
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        (**self).job_completed(dag, job, outcome);
-    }
+pass_on! {
+    released(dag: DagId, job: u64, release_ns: u64);
+    queued(dag: DagId, job: u64, release_ns: u64);
+    skipped(dag: DagId, job: u64, release_ns: u64);
+    signalled(dag: DagId, job: u64, release_ns: Option<u64>);
+    ready(instance: Instance);
+    cancelled(instance: Instance);
+    aborted(dag: DagId, job: u64);
+    ended(dag: DagId);
+    deadline_missed(dag: DagId, job: u64, deadline_ns: u64);
+    job_completed(dag: DagId, job: u64, outcome: JobOutcome);
 }

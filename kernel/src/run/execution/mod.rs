@@ -3,14 +3,13 @@
 //! Every event passes through here, under the one lock: a completion, by the
 //! core that finished, or the timer, on core 0. Each makes one step of the
 //! scheduler (completions, releases, one dispatch) and notes what each core is
-//! to run; [`placement`] then brings each core there.
+//! to run; [`sched_dag::placement`] then brings each core there.
 //!
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
 mod control;
 mod core_set;
 mod events;
-mod placement;
 mod runner;
 mod signals;
 mod status;
@@ -25,15 +24,14 @@ use alloc::format;
 use alloc::sync::Arc;
 
 use fass::{LaunchError, Plan};
-use sched_dag::{DagId, Instance, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::placement::Placement;
+use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
 use crate::run::contexts;
-use crate::run::journal::Journal;
 pub(crate) use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
 pub(crate) use events::{complete, fail, find_work, interrupt};
-use placement::Placement;
 pub(crate) use runner::Runner;
 use signals::Signals;
 pub(crate) use signals::raise;
@@ -115,6 +113,8 @@ pub(crate) struct Terms {
     pub(crate) coincidence_ns: u64,
     /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
     pub(crate) budget_factor: u64,
+    /// The most events that the journal has room for; `u64::MAX`: as many as make sense.
+    pub(crate) most_events: u64,
 }
 
 /// Prepares a plan to be run. Takes all memory that the run will need.
@@ -145,7 +145,11 @@ pub(crate) fn prepare(
     let heap = crate::memory::heap::usage();
     let execution = Execution {
         placement,
-        journal: Journal::new(&task_set, heap.capacity_bytes - heap.in_use_bytes),
+        journal: Journal::new(
+            &task_set,
+            heap.capacity_bytes - heap.in_use_bytes,
+            terms.most_events,
+        ),
         scheduler: Scheduler::new(Arc::clone(&task_set), options),
         task_set,
         background: None,

@@ -61,21 +61,9 @@ pub(super) fn runners(
         of_subtasks.map(move |(subtask, body)| {
             let job = 0;
             let first = Instance { dag, job, subtask };
-            let budget_ns = budget_ns(task_set, first, budget_factor);
+            let model = task_set.dag(dag).subtask(subtask);
+            let budget_ns = model.most_execution_ns(budget_factor);
             Box::new(Runner::new(body, task_set.vertex(first), first, budget_ns))
         })
     })
-}
-
-/// Returns how long an instance of a subtask may execute for, `u64::MAX` if there is no
-/// limit: its budget, else its WCET times the factor, or no limit if that is 0.
-pub(super) fn budget_ns(task_set: &TaskSet, instance: Instance, budget_factor: u64) -> u64 {
-    let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
-    subtask
-        .budget_ns()
-        .or_else(|| {
-            let wcet_ns = subtask.wcet_ns().filter(|_| budget_factor > 0)?;
-            Some(wcet_ns.saturating_mul(budget_factor))
-        })
-        .unwrap_or(u64::MAX)
 }

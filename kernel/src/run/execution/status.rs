@@ -2,12 +2,11 @@
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::Instance;
 use sched_dag::journal::Subject;
+use sched_dag::{Instance, Journal};
 
-use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS, runner};
+use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS};
 use crate::machine::this_core::Core;
-use crate::run::journal::Journal;
 
 /// Stands where the ids of an instance do, for none.
 const NOTHING: u64 = u64::MAX;
@@ -65,7 +64,9 @@ pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
 pub(crate) fn budget_ns(instance: Instance) -> u64 {
     let place = EXECUTION.lock();
     place.as_ref().map_or(u64::MAX, |execution| {
-        runner::budget_ns(execution.task_set(), instance, execution.budget_factor)
+        let dag = execution.task_set().dag(instance.dag);
+        let subtask = dag.subtask(instance.subtask);
+        subtask.most_execution_ns(execution.budget_factor)
     })
 }
 

@@ -5,10 +5,10 @@ use core::sync::atomic::Ordering;
 use alloc::boxed::Box;
 
 use sched_dag::journal::{Subject, What};
-use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
+use sched_dag::placement::Next;
+use sched_dag::{CoreId, Decision, HandOff, Instance, Journal, Vertex};
 
 use super::core_set::CoreSet;
-use super::placement::Next;
 use super::runner::Runner;
 use super::status::{is_finished, note_running};
 use super::time::{arm_next_event, here, instance_time_ns, since_epoch};
@@ -20,7 +20,6 @@ use crate::machine::this_core::Core;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, this_core, turns};
 use crate::run::contexts;
-use crate::run::journal::Journal;
 
 /// What comes of [`Execution::hand_off`].
 pub(super) enum Ended {

@@ -3,13 +3,12 @@
 use core::sync::atomic::Ordering;
 
 use sched_dag::journal::{Subject, What};
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, TaskSet};
+use sched_dag::{CoreId, DagId, Instance, JobOutcome, Journal, Observer, TaskSet};
 
 use super::Bodies;
 use super::JOBS_ENDED;
 use super::time::{instance_time_ns, since_epoch};
 use crate::machine::clock;
-use crate::run::journal::Journal;
 
 /// Writes what the scheduler reports into the journal, with the clock's time at that
 /// very moment: so a join's latency includes the wait for the lock.

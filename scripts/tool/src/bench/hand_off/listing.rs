@@ -32,14 +32,14 @@ const STEPS: [(&str, &[&str]); 11] = [
     ("the lock", &["spinlock.rs"]),
     (
         "journal: finish, ready, start",
-        &["kernel/src/run/journal/", "sched-dag/src/journal/"],
+        &["sched-dag/src/kept/", "sched-dag/src/journal/"],
     ),
     ("body: inputs, call, outputs", &["fass/src/", "poll_fn.rs"]),
     (
         "scheduler: completion, join, line",
         &["sched-dag/src/scheduler/"],
     ),
-    ("places of bodies", &["execution/placement.rs"]),
+    ("places of bodies", &["sched-dag/src/placement.rs"]),
     (
         "budget and alarm",
         &[

@@ -1,6 +1,6 @@
 //! A journal that is too small for its run.
 
-use sched_dag::{CommitOptions, DagId, DagSpec, Instance, Policy, SubtaskId, SubtaskSpec, verify};
+use crate::{CommitOptions, DagId, DagSpec, Instance, Policy, SubtaskId, SubtaskSpec, verify};
 
 use super::*;
 
@@ -40,7 +40,7 @@ fn run(journal: &mut Journal, job: u64) {
 
 /// A journal with room for 12 events, after all jobs.
 fn small() -> Journal {
-    let mut journal = Journal::new(&task_set(Some(JOBS)), 12 * 24 * 4);
+    let mut journal = Journal::new(&task_set(Some(JOBS)), 12 * 24 * 4, u64::MAX);
     (0..JOBS).for_each(|job| run(&mut journal, job));
     journal
 }
@@ -82,7 +82,7 @@ fn statistics_are_those_of_all_jobs() {
     assert_eq!(responses.per_mille(500), 6);
     // A journal that has room for all is counted after the run, more exactly.
     let task_set = task_set(Some(JOBS));
-    let mut large = Journal::new(&task_set, 1 << 20);
+    let mut large = Journal::new(&task_set, 1 << 20, u64::MAX);
     (0..JOBS).for_each(|job| run(&mut large, job));
     assert_eq!(large.lost(), 0);
     let all = large.statistics(&task_set).expect("all are there");
@@ -92,7 +92,7 @@ fn statistics_are_those_of_all_jobs() {
 
 #[test]
 fn a_dag_without_end_takes_no_more_than_its_room() {
-    let mut journal = Journal::new(&task_set(None), 1 << 16);
+    let mut journal = Journal::new(&task_set(None), 1 << 16, u64::MAX);
     let room = (1 << 16) / 4 / 24;
     (0..room as u64).for_each(|job| run(&mut journal, job));
     assert_eq!(journal.events().count(), room);
@@ -102,7 +102,7 @@ fn a_dag_without_end_takes_no_more_than_its_room() {
 #[test]
 fn what_is_forgotten_or_not_recorded_counts_as_lost() {
     let task_set = task_set(Some(JOBS));
-    let mut journal = Journal::new(&task_set, 1 << 20);
+    let mut journal = Journal::new(&task_set, 1 << 20, u64::MAX);
     run(&mut journal, 0);
     journal.record_events(false);
     assert!(journal.has_room() && !journal.is_recording());

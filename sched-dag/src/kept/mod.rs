@@ -1,10 +1,10 @@
-//! The journal of a run: what happened when, on all cores, in one list.
+//! The journal that a driver keeps of a run: what happened when, on all cores, in one list.
 //!
 //! Every event but a core's clock is read and written under the scheduler's lock, so
 //! the list is in the order in which the scheduler learnt of things, and needs neither
 //! atomics nor a lock of its own. It is written once a moment and read after the run:
 //! all times, breaches of the rules and statistics are computed from it then, by
-//! [`sched_dag::law`].
+//! [`law`](crate::law).
 //!
 //! # Memory
 //!
@@ -19,15 +19,11 @@
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::journal::{Event, Subject, What};
-use sched_dag::law::Tally;
-use sched_dag::{CoreId, Dag, TaskSet};
-
-/// The most events that a journal has room for, as the command line says;
-/// `u64::MAX`: as many as make sense.
-static MOST_EVENTS: AtomicU64 = AtomicU64::new(u64::MAX);
+use crate::ids::CoreId;
+use crate::journal::{Event, Subject, What};
+use crate::law::Tally;
+use crate::task_set::{Dag, TaskSet};
 
 /// Where a run has no last job, as many events as make sense: 6 MiB.
 const EVENTS_WITHOUT_END: usize = 1 << 18;
@@ -35,14 +31,9 @@ const EVENTS_WITHOUT_END: usize = 1 << 18;
 /// The finest resolution of statistics: 32 buckets a doubling.
 const FINEST: u32 = 5;
 
-/// Sets the most events that journals have room for, from now on.
-pub(crate) fn limit(most: u64) {
-    MOST_EVENTS.store(most, Ordering::Relaxed);
-}
-
 /// The events of a run, the latest ones if it is long.
 #[derive(Debug)]
-pub(crate) struct Journal {
+pub struct Journal {
     /// As many as there is room for; none while nothing is recorded.
     events: Vec<[u64; 3]>,
     /// The room while nothing is recorded.
@@ -58,10 +49,11 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Takes the memory for a run, of `free_bytes`.
-    pub(crate) fn new(task_set: &Arc<TaskSet>, free_bytes: usize) -> Self {
-        let needed = most_events(task_set);
-        let wished = usize::try_from(MOST_EVENTS.load(Ordering::Relaxed)).unwrap_or(usize::MAX);
+    /// Takes the memory for a run, of `free_bytes`, and for at most `most_events` events.
+    #[must_use]
+    pub fn new(task_set: &Arc<TaskSet>, free_bytes: usize, most_events: u64) -> Self {
+        let needed = events_of(task_set);
+        let wished = usize::try_from(most_events).unwrap_or(usize::MAX);
         let affordable = free_bytes / 4 / size_of::<[u64; 3]>();
         let room = needed.unwrap_or(EVENTS_WITHOUT_END);
         let mut room = room.min(wished).min(affordable);
@@ -86,7 +78,7 @@ impl Journal {
 
     /// Writes down that something has happened.
     #[inline]
-    pub(crate) fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
+    pub fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
         self.push(Event::words(time_ns, what, core, subject));
     }
 
@@ -118,7 +110,7 @@ impl Journal {
     }
 
     /// Records events from now on, or forgets those so far and records no more.
-    pub(crate) fn record_events(&mut self, on: bool) {
+    pub fn record_events(&mut self, on: bool) {
         if on == self.is_recording() {
             return;
         }
@@ -132,35 +124,40 @@ impl Journal {
         }
     }
 
-    pub(crate) fn is_recording(&self) -> bool {
+    /// Reports whether events are recorded.
+    #[must_use]
+    pub const fn is_recording(&self) -> bool {
         self.events.capacity() > 0
     }
 
     /// Reports whether there is room for events.
-    pub(crate) fn has_room(&self) -> bool {
+    #[must_use]
+    pub const fn has_room(&self) -> bool {
         self.is_recording() || self.put_away.capacity() > 0
     }
 
     /// Returns how many events are not there any more, or were not recorded.
-    pub(crate) const fn lost(&self) -> u64 {
+    #[must_use]
+    pub const fn lost(&self) -> u64 {
         self.lost
     }
 
     /// Returns the events that are left, in their order.
-    pub(crate) fn events(&self) -> impl DoubleEndedIterator<Item = Event> + Clone {
+    pub fn events(&self) -> impl DoubleEndedIterator<Item = Event> + Clone {
         let (newer, older) = self.events.split_at(self.oldest);
         let words = older.iter().chain(newer);
         words.filter_map(|words| Event::unpack(*words))
     }
 
     /// Returns how many events were written, and so the number of the next one.
-    pub(crate) const fn written(&self) -> u64 {
+    #[must_use]
+    pub const fn written(&self) -> u64 {
         self.lost + self.events.len() as u64
     }
 
     /// Copies the events before number `end`, from the latest of them back, and returns
     /// the number of the oldest one copied.
-    pub(crate) fn copy_back(&self, end: u64, buffer: &mut [Option<Event>]) -> u64 {
+    pub fn copy_back(&self, end: u64, buffer: &mut [Option<Event>]) -> u64 {
         let before = |count: usize| {
             let number = end.checked_sub(count as u64 + 1)?;
             let index = usize::try_from(number.checked_sub(self.lost)?).ok()?;
@@ -178,7 +175,8 @@ impl Journal {
 
     /// Computes the statistics of the run, which has ended; `None` if events were
     /// neither kept nor counted.
-    pub(crate) fn statistics(&self, task_set: &Arc<TaskSet>) -> Option<Tally> {
+    #[must_use]
+    pub fn statistics(&self, task_set: &Arc<TaskSet>) -> Option<Tally> {
         let mut tally = match &self.tally {
             Some(tally) => tally.clone(),
             None => Tally::new(task_set, FINEST),
@@ -189,7 +187,7 @@ impl Journal {
 }
 
 /// Returns how many events a run can have; `None` if there is no last job.
-fn most_events(task_set: &TaskSet) -> Option<usize> {
+fn events_of(task_set: &TaskSet) -> Option<usize> {
     let of_dag = |dag: &Dag| {
         // Released, due, queued or skipped, aborted, missed, completed, signalled.
         let a_job = dag.subtasks().len().checked_mul(6)?.checked_add(7)?;

@@ -13,12 +13,13 @@
 //! rests in the table, or is with a core, or lies on the stack of a suspended
 //! context.
 //!
-//! Everything here runs under the execution's lock; it is generic over bodies
-//! and contexts so that the tests run on the host.
+//! Drivers whose cores follow later share it, and call it under their one lock: the
+//! kernel, where a parked body is on the stack of a context, and Linux, where it is with a
+//! thread.
 
 use alloc::boxed::Box;
 
-use sched_dag::{CoreId, Vertex};
+use crate::ids::{CoreId, Vertex};
 
 /// Where a subtask's body is.
 #[derive(Debug)]
@@ -35,7 +36,7 @@ enum Place<Body, Parked> {
 
 /// What a core without a current instance does next.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Next<Body, Parked> {
+pub enum Next<Body, Parked> {
     /// Nothing is there for it to do.
     Nothing,
     /// It starts an instance of this subtask.
@@ -46,7 +47,7 @@ pub(super) enum Next<Body, Parked> {
 
 /// The places of all subtasks, and what each core has and should have.
 #[derive(Debug)]
-pub(super) struct Placement<Body, Parked> {
+pub struct Placement<Body, Parked> {
     places: Box<[Place<Body, Parked>]>,
     seats: Box<[Seat]>,
 }
@@ -75,7 +76,7 @@ fn some(vertex: Vertex) -> Option<Vertex> {
 
 impl<Body, Parked> Placement<Body, Parked> {
     /// Puts all bodies, those of each vertex in turn, to rest.
-    pub(super) fn new(bodies: impl Iterator<Item = Body>, cores: usize) -> Self {
+    pub fn new(bodies: impl Iterator<Item = Body>, cores: usize) -> Self {
         Self {
             places: bodies.map(Place::Resting).collect(),
             seats: alloc::vec![EMPTY_SEAT; cores].into_boxed_slice(),
@@ -83,13 +84,13 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Notes what the scheduler wants a core to run.
-    pub(super) fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
+    pub fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
         self.seats[core.index()].target = target.unwrap_or(NOTHING);
     }
 
     /// Notes that core `core` has finished its current instance.
     #[inline]
-    pub(super) fn finish(&mut self, core: usize, vertex: Vertex, body: Body) {
+    pub fn finish(&mut self, core: usize, vertex: Vertex, body: Body) {
         self.seats[core].current = NOTHING;
         let running = core::mem::replace(self.place(vertex), Place::Resting(body));
         debug_assert!(matches!(running, Place::Running));
@@ -100,11 +101,18 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// Notes that core `core`'s current instance was ended, and returns its
     /// vertex. Its body stays on the stack of a context that is never resumed.
-    pub(super) fn lose(&mut self, core: usize) -> Option<Vertex> {
+    pub fn lose(&mut self, core: usize) -> Option<Vertex> {
         let vertex = self.detach(core)?;
         *self.place(vertex) = Place::Lost;
         self.forget_target(core, vertex);
         Some(vertex)
+    }
+
+    /// Takes note that an instance has finished that no core has: on a driver where a
+    /// parked one may still be executed.
+    pub fn finish_parked(&mut self, vertex: Vertex, body: Body) {
+        *self.place(vertex) = Place::Resting(body);
+        self.forget_target(0, vertex);
     }
 
     /// The scheduler knows that the instance has ended: nobody is to run it.
@@ -121,26 +129,26 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Reports whether core `core` has an instance that it should give up.
-    pub(super) fn must_suspend(&self, core: usize) -> bool {
+    pub fn must_suspend(&self, core: usize) -> bool {
         let Seat { current, target } = self.seats[core];
         current != NOTHING && current != target
     }
 
     /// Reports whether core `core` has nothing and should have something.
-    pub(super) fn is_wanted(&self, core: usize) -> bool {
+    pub fn is_wanted(&self, core: usize) -> bool {
         let Seat { current, target } = self.seats[core];
         current == NOTHING && target != NOTHING
     }
 
     /// Takes core `core`'s current instance away from it, if it has one. To be
     /// followed by [`suspend`](Self::suspend), as soon as its context is known.
-    pub(super) fn detach(&mut self, core: usize) -> Option<Vertex> {
+    pub fn detach(&mut self, core: usize) -> Option<Vertex> {
         some(core::mem::replace(&mut self.seats[core].current, NOTHING))
     }
 
     /// Notes that `context` holds a detached instance. Returns the core
     /// that has been waiting for it, if there is one.
-    pub(super) fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
+    pub fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
         *self.place(vertex) = Place::Suspended(context);
         let mut seats = (0..).map(CoreId).zip(&self.seats);
         seats.find_map(|(core, seat)| (seat.target == vertex).then_some(core))
@@ -148,7 +156,7 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// Gives core `core`, which has no current instance, what it should have, if
     /// that is suspended.
-    pub(super) fn take_suspended(&mut self, core: usize) -> Option<Parked> {
+    pub fn take_suspended(&mut self, core: usize) -> Option<Parked> {
         let vertex = some(self.seats[core].target)?;
         let place = self.place(vertex);
         match core::mem::replace(place, Place::Running) {
@@ -164,7 +172,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Gives core `core`, which has no current instance, what it should have.
-    pub(super) fn next(&mut self, core: usize) -> Next<Body, Parked> {
+    pub fn next(&mut self, core: usize) -> Next<Body, Parked> {
         let Some(vertex) = some(self.seats[core].target) else {
             return Next::Nothing;
         };
@@ -186,7 +194,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Gives a core, which has no current instance, one of this subtask to
     /// start. `None`, and nothing is changed, if it is suspended.
     #[inline]
-    pub(super) fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
+    pub fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
         let place = self.place(vertex);
         match core::mem::replace(place, Place::Running) {
             Place::Resting(body) => {
@@ -204,12 +212,12 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Returns the vertex of core `core`'s current instance.
-    pub(super) fn current(&self, core: usize) -> Option<Vertex> {
+    pub fn current(&self, core: usize) -> Option<Vertex> {
         some(self.seats[core].current)
     }
 
     /// Returns the body of a subtask of which no instance has started.
-    pub(super) fn resting(&mut self, vertex: Vertex) -> Option<&mut Body> {
+    pub fn resting(&mut self, vertex: Vertex) -> Option<&mut Body> {
         match self.place(vertex) {
             Place::Resting(body) => Some(body),
             _ => None,
@@ -254,6 +262,17 @@ mod tests {
         let instance = cores.detach(0).unwrap();
         assert_eq!(cores.take_suspended(0), None);
         cores.suspend(instance, context)
+    }
+
+    #[test]
+    fn what_finishes_while_it_is_parked_is_wanted_nowhere() {
+        let mut cores = about_to_preempt();
+        assert_eq!(suspend(&mut cores, "the thread of x"), None);
+        cores.decide(1, Some(X));
+        cores.finish_parked(X, 'x');
+        assert!(!cores.is_wanted(1));
+        assert_eq!(cores.next(1), Next::Nothing);
+        assert_eq!(cores.resting(X), Some(&mut 'x'));
     }
 
     #[test]
