@@ -1,0 +1,54 @@
+//! Runs DAGs built with `fass` on Linux: the scheduler decides, and the kernel's classes
+//! carry it out.
+//!
+//! For our purposes a *worker* is a thread that runs instances. Each core of the machine
+//! has an *active* worker, pinned to its processor, which calls functions in place: from a
+//! completion that hands its core the next instance the same thread goes on. The *release
+//! thread* sleeps until the scheduler's next event. A worker whose instance loses its core
+//! is *demoted* to a lower level of SCHED_FIFO, and a *spare* one takes its place.
+//! `docs/linux.md` says what to set up, and who may delay what.
+//!
+//! # What is guaranteed
+//!
+//! - R1 to R4 of the task model, whatever Linux does to the threads: they hold by the order
+//!   of what the scheduler is told. [`Run::violations`] checks them.
+//! - R5 as far as Linux runs the threads that it is told to: a decision takes effect when it
+//!   has switched. [`Run::dispatch_violations`] checks it within a stated bound.
+//! - From the commit on, nothing is allocated for a release, a preemption or a completion;
+//!   a completion that concerns its own core makes no system call but to read clocks.
+//! - No thread holds the scheduler's lock below the level of what computes.
+//! - A panic in a function ends its DAG alone, in a program that unwinds.
+//! - No end of the program, however sudden, leaves anything at a raised level.
+//!
+//! # What is not
+//!
+//! - Anything about the time that Linux itself takes, interrupts included.
+//! - A demoted worker runs on while its core has nothing else, so it may finish what was
+//!   preempted. Were it stopped, it could keep the allocator's lock from all others.
+//! - A function whose budget is exceeded is not ended, only its DAG is: its thread goes
+//!   on, as a normal one, until the function returns.
+//! - An instance that waits in mid-function (reads a file, locks a mutex) leaves its core to
+//!   what was demoted there, and to other programs.
+#![deny(unsafe_code)]
+
+mod control;
+mod level;
+mod machine;
+mod platform;
+mod release;
+mod requests;
+mod run;
+mod state;
+#[allow(
+    unsafe_code,
+    reason = "system calls that the standard library does not offer"
+)]
+mod sys;
+mod team;
+mod warnings;
+mod worker;
+
+pub use control::Control;
+pub use machine::{Linux, Mechanism, StartError};
+pub use run::{Counts, Run};
+pub use state::Fault;

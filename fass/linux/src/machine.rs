@@ -1,0 +1,244 @@
+//! The machine as an app sees it: so many cores of this computer.
+
+use std::fmt;
+use std::io;
+use std::os::fd::AsFd;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use fass::{Overheads, Policy, Preemption, Signal};
+
+use crate::control::Control;
+use crate::level::{Levels, USUAL_TOP};
+use crate::platform::{HOST, Terms};
+use crate::run::{self, Run};
+use crate::sys;
+use crate::warnings;
+
+/// How the scheduler's decisions are carried out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mechanism {
+    /// By levels of SCHED_FIFO. What should run comes before all normal programs, and
+    /// is preempted by what the scheduler puts before it.
+    Fifo,
+    /// By threads like all others: nothing is preempted, and other programs have their
+    /// share of the cores. It needs no privilege.
+    Normal,
+}
+
+/// Cores of this computer, for the DAGs that are committed next.
+///
+/// Made with one core, static priorities and preemption; the builder's methods
+/// change that and are to be called before the commit. A program has one at a time.
+///
+/// # Examples
+///
+/// ```
+/// use std::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+/// use linux::{Linux, Mechanism};
+///
+/// let machine = Linux::new(1, Mechanism::Normal).expect("one processor is there");
+/// let dag = create_dag();
+/// dag.jobs(3);
+/// let period = Duration::from_millis(2);
+/// let named = SubtaskAttributes::named;
+/// dag.register_periodic_subtask(|| (20u64,), vec!["number"], period, named("source"));
+/// let sink = |(number,): (u64,)| assert_eq!(number, 20);
+/// dag.register_sink_subtask(sink, vec!["number"], period, named("sink"));
+/// finish_create_dags(&[dag]).unwrap();
+///
+/// let run = machine.run().unwrap();
+/// assert_eq!(run.statistics(sched_dag::DagId(0)).completed, 3);
+/// assert_eq!(run.violations().count(), 0);
+/// ```
+#[derive(Debug)]
+pub struct Linux {
+    warnings: Vec<String>,
+}
+
+/// Why a machine cannot be had, or has nothing to run: fact, offender, remedy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StartError(pub(crate) String);
+
+impl fmt::Display for StartError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for StartError {}
+
+impl Linux {
+    /// Takes the first `cores` processors of those that this program may use, and
+    /// checks what will hurt ([`warnings`](Self::warnings)).
+    ///
+    /// Where the program may not use SCHED_FIFO, it runs as by [`Mechanism::Normal`], and
+    /// commits answer for that.
+    ///
+    /// # Errors
+    ///
+    /// If there are fewer processors, or none is asked for.
+    ///
+    /// # Panics
+    ///
+    /// If the program has another platform, or another machine.
+    pub fn new(cores: u32, mechanism: Mechanism) -> Result<Self, StartError> {
+        let mut processors = sys::processors();
+        let there = processors.len();
+        if cores == 0 || there < cores as usize {
+            return Err(StartError(format!(
+                "{cores} cores are asked for, and this program may use {there}; do ask for 1 to \
+                 {there}, or give it more (`taskset`, or the cpuset of its control group)"
+            )));
+        }
+        processors.truncate(cores as usize);
+        let (mut levels, mut found) = (None, Vec::new());
+        if mechanism == Mechanism::Fifo {
+            match Levels::take(USUAL_TOP) {
+                Ok(taken) => levels = Some(taken),
+                Err(why) => found.push(warnings::no_privilege(USUAL_TOP, &why)),
+            }
+        }
+        if levels.is_some() {
+            found.extend(warnings::look(&processors));
+        }
+        let preemption = match levels {
+            Some(_) => Preemption::Enabled,
+            None => Preemption::Disabled,
+        };
+        static IS_OURS: OnceLock<bool> = OnceLock::new();
+        assert!(
+            IS_OURS.get_or_init(|| fass::install(&HOST).is_ok()),
+            "another platform is installed; `Linux` must be the program's only one"
+        );
+        let mut terms = HOST.terms();
+        assert!(
+            terms.is_none(),
+            "this program has a `Linux` already; drop it first"
+        );
+        *terms = Some(Terms {
+            policy: Policy::StaticPriority,
+            preemption,
+            processors: processors.into(),
+            levels,
+            overheads: Overheads::default(),
+            budget_factor: 0,
+        });
+        Ok(Self { warnings: found })
+    }
+
+    fn change(self, change: impl FnOnce(&mut Terms)) -> Self {
+        if let Some(terms) = HOST.terms().as_mut() {
+            change(terms);
+        }
+        self
+    }
+
+    /// Sets the scheduling policy.
+    #[must_use = "the machine itself is returned"]
+    pub fn policy(self, policy: Policy) -> Self {
+        self.change(|terms| terms.policy = policy)
+    }
+
+    /// Sets whether a started instance may lose its core. Without SCHED_FIFO it never
+    /// does, whatever is set.
+    #[must_use = "the machine itself is returned"]
+    pub fn preemption(self, preemption: Preemption) -> Self {
+        self.change(|terms| {
+            if terms.levels.is_some() {
+                terms.preemption = preemption;
+            }
+        })
+    }
+
+    /// Sets what commits add to WCETs before they answer, as measured on this computer.
+    #[must_use = "the machine itself is returned"]
+    pub fn overheads(self, overheads: Overheads) -> Self {
+        self.change(|terms| terms.overheads = overheads)
+    }
+
+    /// Sets the budget of subtasks that state a WCET only, in WCETs; 0, as at the start,
+    /// for none.
+    #[must_use = "the machine itself is returned"]
+    pub fn budget_factor(self, wcets: u64) -> Self {
+        self.change(|terms| terms.budget_factor = wcets)
+    }
+
+    /// Has the kernel end this program, by SIGKILL, when one of its threads has run at a
+    /// real-time level for so long without ever waiting. For tests, and whenever a
+    /// computer must not be lost to an error.
+    ///
+    /// # Errors
+    ///
+    /// The kernel's reason.
+    pub fn limit_real_time(&self, time: Duration) -> io::Result<()> {
+        sys::limit_real_time(u64::try_from(time.as_micros()).unwrap_or(u64::MAX))
+    }
+
+    /// Returns what will hurt here, a line each: fact and remedy.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Reports whether started instances may lose their cores.
+    #[must_use]
+    pub fn is_preemptive(&self) -> bool {
+        let terms = HOST.terms();
+        let preemption = terms.as_ref().map(|terms| terms.preemption);
+        preemption == Some(Preemption::Enabled)
+    }
+
+    /// Returns what changes the committed run from any thread; `None` if nothing is
+    /// committed.
+    #[must_use]
+    pub fn control(&self) -> Option<Control> {
+        HOST.team().map(Control::new)
+    }
+
+    /// Raises a signal whenever something arrives in a file that `poll` can wait for (a
+    /// pipe, a socket, a device), until the run ends. The signal's DAG is to read it.
+    ///
+    /// # Errors
+    ///
+    /// The kernel's reason: the file cannot be waited for.
+    ///
+    /// # Panics
+    ///
+    /// If the signal's DAG is not committed.
+    pub fn raise_on_input(&self, signal: &Signal, file: &impl AsFd) -> io::Result<()> {
+        let target = signal.target();
+        let Some((_, dag)) = target else {
+            panic!("a signal is connected before its dag is committed; commit the dag first");
+        };
+        let control = self.control();
+        let control = control.expect("what is committed can be controlled");
+        control.raise_on_input(dag, sys::Arrivals::of(file)?)
+    }
+
+    /// Runs the committed DAGs until each has ended all its jobs.
+    ///
+    /// # Errors
+    ///
+    /// If nothing has been committed since the last run.
+    ///
+    /// # Panics
+    ///
+    /// If the system has no more threads.
+    pub fn run(&self) -> Result<Run, StartError> {
+        let launched = HOST.take_launched().ok_or_else(|| {
+            StartError("nothing is committed; call finish_create_dags first".to_owned())
+        })?;
+        let run = run::run(launched);
+        HOST.forget();
+        Ok(run)
+    }
+}
+
+impl Drop for Linux {
+    fn drop(&mut self) {
+        *HOST.terms() = None;
+        HOST.forget();
+    }
+}

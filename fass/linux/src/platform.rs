@@ -1,0 +1,164 @@
+//! Linux as the platform that `fass` runs on: one for the program.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::time::Duration;
+
+use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions};
+
+use crate::level::Levels;
+use crate::requests::Request;
+use crate::state::State;
+use crate::sys;
+use crate::team::{Team, with_own_worker};
+
+/// What the commits to come run on.
+#[derive(Clone, Debug)]
+pub(crate) struct Terms {
+    pub(crate) policy: Policy,
+    pub(crate) preemption: Preemption,
+    pub(crate) processors: Box<[u32]>,
+    pub(crate) levels: Option<Levels>,
+    pub(crate) overheads: Overheads,
+    pub(crate) budget_factor: u64,
+}
+
+/// A plan that was committed.
+pub(crate) struct Launched {
+    pub(crate) team: Arc<Team>,
+    pub(crate) bounds_ns: Vec<Option<u64>>,
+    pub(crate) budget_factor: u64,
+}
+
+/// The platform of the program.
+pub(crate) struct Host {
+    terms: Mutex<Option<Terms>>,
+    launched: Mutex<Option<Launched>>,
+    /// The run that signals from outside are for.
+    team: RwLock<Option<Arc<Team>>>,
+}
+
+pub(crate) static HOST: Host = Host {
+    terms: Mutex::new(None),
+    launched: Mutex::new(None),
+    team: RwLock::new(None),
+};
+
+/// How much memory a journal may take its quarter of.
+const JOURNAL_BYTES: usize = 1 << 30;
+
+impl Host {
+    /// Returns what the next commit runs on; `None` before there is a machine.
+    pub(crate) fn terms(&self) -> MutexGuard<'_, Option<Terms>> {
+        self.terms.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes what was committed last.
+    pub(crate) fn take_launched(&self) -> Option<Launched> {
+        let mut launched = self.launched.lock();
+        let launched = launched.as_deref_mut();
+        launched.map_or(None, Option::take)
+    }
+
+    /// Returns the run that was committed last, until it has ended.
+    pub(crate) fn team(&self) -> Option<Arc<Team>> {
+        self.team.read().map_or(None, |team| team.clone())
+    }
+
+    /// Forgets the run.
+    pub(crate) fn forget(&self) {
+        self.team.clear_poison();
+        if let Ok(mut team) = self.team.write() {
+            *team = None;
+        }
+    }
+
+    fn of_terms<T>(&self, look: impl FnOnce(&Terms) -> T, otherwise: T) -> T {
+        self.terms().as_ref().map_or(otherwise, look)
+    }
+}
+
+impl Platform for Host {
+    fn policy(&self) -> Policy {
+        self.of_terms(|terms| terms.policy, Policy::StaticPriority)
+    }
+
+    fn preemption(&self) -> Preemption {
+        self.of_terms(|terms| terms.preemption, Preemption::Disabled)
+    }
+
+    fn cores(&self) -> u32 {
+        let count = |terms: &Terms| u32::try_from(terms.processors.len()).unwrap_or(u32::MAX);
+        self.of_terms(count, 1)
+    }
+
+    fn overheads(&self) -> Overheads {
+        self.of_terms(|terms| terms.overheads, Overheads::default())
+    }
+
+    #[inline]
+    fn now_ns(&self) -> u64 {
+        sys::now_ns()
+    }
+
+    fn execute_for(&self, duration: Duration, how: Occupation) {
+        let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        if how == Occupation::Hold && with_own_worker(|worker| worker.hold(ns)).is_some() {
+            return;
+        }
+        let end_ns = sys::own_processor_time_ns().saturating_add(ns);
+        while sys::own_processor_time_ns() < end_ns {
+            std::hint::spin_loop();
+        }
+    }
+
+    fn raise(&self, plan: u64, dag: DagId) {
+        assert!(
+            with_own_worker(|_| ()).is_none(),
+            "a subtask raises a signal that it was not registered with; register it by \
+             `dag.using(signal.raising())`"
+        );
+        if let Some(team) = self.team().filter(|team| team.plan == plan) {
+            team.request(dag, Request::Signal);
+        }
+    }
+
+    fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
+        let Some(terms) = self.terms().clone() else {
+            let line = "there is no `Linux` yet; make one before the commit";
+            return Err(LaunchError::new(line));
+        };
+        if self.team().is_some() {
+            let line =
+                "other DAGs are committed already; run them first, or commit all in one call";
+            return Err(LaunchError::new(line));
+        }
+        let options = SchedulerOptions {
+            policy: terms.policy,
+            preemption: terms.preemption,
+            cores: self.cores(),
+        };
+        let task_set = plan.task_set;
+        let journal = Journal::new(&task_set, JOURNAL_BYTES, u64::MAX);
+        let scheduler = Scheduler::new(task_set, options);
+        let state = State::new(
+            scheduler,
+            plan.bodies,
+            journal,
+            terms.processors,
+            terms.levels,
+        );
+        let team = Arc::new(Team::new(state, plan.number));
+        if let Ok(mut place) = self.team.write() {
+            *place = Some(Arc::clone(&team));
+        }
+        let launched = Launched {
+            team,
+            bounds_ns: plan.bounds_ns,
+            budget_factor: terms.budget_factor,
+        };
+        let mut place = self.launched.lock().unwrap_or_else(PoisonError::into_inner);
+        *place = Some(launched);
+        Ok(())
+    }
+}

@@ -1,0 +1,167 @@
+//! The release thread: the clock of the scheduler.
+//!
+//! It sleeps until the scheduler's next event, at an absolute time, so that releases keep
+//! to the nominal grid whatever one of them was late by. Others wake it earlier with a
+//! request, or if the next event has become an earlier one. It makes the step and calls
+//! the workers; it runs nothing itself.
+//!
+//! # Budgets
+//!
+//! A budget is in processor time, which a thread takes only while it has a processor.
+//! Reading that clock is a system call, so no instance does it at its start: this thread
+//! looks often enough, as often as the shortest budget, and begins to count when it
+//! first sees the instance. So an instance ends after its budget, and no later than the
+//! shortest budget of all after that. Its thread cannot be ended: it is demoted for good.
+
+use std::sync::atomic::Ordering;
+
+use sched_dag::journal::What;
+use sched_dag::{CoreId, Vertex};
+
+use crate::level::Role;
+use crate::state::{Fault, State};
+use crate::sys;
+use crate::team::Team;
+
+/// What was seen of an instance that has a budget.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    /// The subtask and the job.
+    what: Option<(Vertex, u64)>,
+    /// The processor time of its thread then.
+    processor_ns: u64,
+}
+
+/// The budgets of a run's subtasks, and what was seen of the instances on each core.
+#[derive(Debug)]
+pub(crate) struct Budgets {
+    by_vertex: Box<[u64]>,
+    shortest_ns: u64,
+    seen: Box<[Seen]>,
+}
+
+impl Budgets {
+    /// Takes each subtask's budget, or so many of its WCETs; 0: then it has none.
+    pub(crate) fn new(state: &State, wcets: u64) -> Self {
+        let dags = state.task_set.dags().iter();
+        let subtasks = dags.flat_map(|dag| dag.subtasks());
+        let by_vertex: Box<[u64]> = subtasks.map(|s| s.most_execution_ns(wcets)).collect();
+        Self {
+            shortest_ns: by_vertex.iter().copied().min().unwrap_or(u64::MAX),
+            seen: vec![Seen::default(); state.active.len()].into(),
+            by_vertex,
+        }
+    }
+
+    /// Looks at what runs. Returns a core whose instance has exceeded its budget, or when
+    /// to look again.
+    fn look(&mut self, team: &Team, state: &State, now_ns: u64) -> Result<u64, CoreId> {
+        if self.shortest_ns == u64::MAX {
+            return Ok(u64::MAX);
+        }
+        let mut next_ns = now_ns.saturating_add(self.shortest_ns);
+        for (core, seen) in (0..).map(CoreId).zip(&mut self.seen) {
+            let Some(vertex) = state.placement.current(core.index()) else {
+                continue;
+            };
+            let budget_ns = self.by_vertex[vertex.index()];
+            let worker = &team.workers[state.active[core.index()]];
+            let processor_ns = worker.thread().and_then(sys::processor_time_ns);
+            let (Some(processor_ns), true) = (processor_ns, budget_ns < u64::MAX) else {
+                continue;
+            };
+            let what = Some((vertex, state.scheduler.instance_of(vertex).job));
+            if seen.what != what {
+                *seen = Seen { what, processor_ns };
+            }
+            let used_ns = processor_ns.saturating_sub(seen.processor_ns);
+            if used_ns > budget_ns {
+                *seen = Seen::default();
+                return Err(core);
+            }
+            // Not before it can have used up the rest.
+            let rest_ns = budget_ns - used_ns + 1;
+            next_ns = next_ns.min(now_ns.saturating_add(rest_ns));
+        }
+        Ok(next_ns)
+    }
+}
+
+impl Team {
+    /// Makes the scheduler's steps until all jobs have ended.
+    pub(crate) fn release(&self, mut budgets: Budgets) {
+        sys::make_timers_exact();
+        if let Some(levels) = self.levels {
+            levels.bring(sys::thread(), Role::Release);
+        }
+        self.say_ready();
+        let mut seen;
+        loop {
+            seen = self.alarm.load(Ordering::Acquire);
+            let mut state = self.lock();
+            let is_over = self.step_in_time(&mut state, &mut budgets);
+            self.call(state);
+            if is_over {
+                return;
+            }
+            let looks_at_ns = self.looks_at_ns.load(Ordering::Relaxed);
+            let until_ns = (looks_at_ns < u64::MAX).then_some(looks_at_ns);
+            // Early returns are harmless: the step finds nothing due.
+            if sys::now_ns() < looks_at_ns {
+                sys::wait(&self.alarm, seen, until_ns);
+            }
+        }
+    }
+
+    /// Makes one step, and reports whether all jobs have ended.
+    fn step_in_time(&self, state: &mut State, budgets: &mut Budgets) -> bool {
+        if sys::now_ns() < state.epoch_ns {
+            // What is asked for before time 0 is done then.
+            self.looks_at_ns.store(state.epoch_ns, Ordering::Relaxed);
+            return false;
+        }
+        state.step(&self.workers, |moment, mut observer| {
+            self.requests.serve(moment, &mut observer);
+        });
+        let look_ns = loop {
+            match budgets.look(self, state, sys::now_ns()) {
+                Ok(look_ns) => break look_ns,
+                Err(core) => self.abandon(state, core),
+            }
+        };
+        let next_ns = state.scheduler.next_event_ns();
+        let next_ns = next_ns.map_or(u64::MAX, |ns| ns.saturating_add(state.epoch_ns));
+        let next_ns = next_ns.min(look_ns);
+        self.looks_at_ns.store(next_ns, Ordering::Relaxed);
+        let is_over = state.scheduler.is_finished();
+        if is_over {
+            self.over.store(1, Ordering::Release);
+            self.workers.iter().for_each(|worker| worker.call());
+            sys::wake(&self.over, i32::MAX);
+        }
+        is_over
+    }
+
+    /// Ends a core's instance, which has exceeded its budget, and with it its DAG.
+    fn abandon(&self, state: &mut State, core: CoreId) {
+        let number = state.active[core.index()];
+        let Some(vertex) = state.placement.current(core.index()) else {
+            return;
+        };
+        // If it has just ended, it was in time after all.
+        if !self.workers[number].demote(self.levels, Role::Abandoned) {
+            return;
+        }
+        state.note(What::Ended, core, vertex);
+        state.placement.lose(core.index());
+        state.seats[number] = None;
+        state.abandoned.push(number);
+        state.replace(core, &self.workers);
+        let instance = state.scheduler.instance_of(vertex);
+        let cause = "its budget was exceeded".to_owned();
+        state.faults.push(Fault { instance, cause });
+        state.step(&self.workers, |moment, mut observer| {
+            moment.fail(instance, &mut observer);
+        });
+    }
+}

@@ -1,0 +1,201 @@
+//! A run: its threads while it goes on, and what it leaves behind.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::{self, JoinHandle};
+
+use sched_dag::law::{self, Record, Terms, Violation};
+use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, TaskSet};
+
+use crate::platform::Launched;
+use crate::release::Budgets;
+use crate::state::Fault;
+use crate::sys;
+use crate::team::Team;
+
+/// The stack of each worker. All of it is locked in memory, if memory is.
+const STACK_BYTES: usize = 512 * 1024;
+
+/// Time between the start of a run and its first release.
+const LEAD_NS: u64 = 1_000_000;
+
+/// How often the run's threads did what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Completions that handed their core the next instance: same thread, no wake.
+    pub hand_offs: u64,
+    /// Calls of workers that sleep or are about to: one wake of the kernel's each.
+    pub calls: u64,
+    /// Instances that lost their core to a more urgent one.
+    pub preemptions: u64,
+}
+
+/// A run that has ended: its model, its times and its counts.
+///
+/// See [`Linux`](crate::Linux).
+#[derive(Debug)]
+pub struct Run {
+    task_set: Arc<TaskSet>,
+    options: SchedulerOptions,
+    statistics: Vec<DagStatistics>,
+    journal: Journal,
+    record: Record,
+    faults: Vec<Fault>,
+    counts: Counts,
+    epoch_ns: u64,
+    bounds_ns: Vec<Option<u64>>,
+}
+
+/// Starts the threads of a committed plan, waits for the end of all its jobs, and
+/// returns what happened.
+pub(crate) fn run(launched: Launched) -> Run {
+    let team = launched.team;
+    let threads: Vec<_> = (0..team.workers.len())
+        .map(|number| worker(&team, number))
+        .collect();
+    team.wait_until_ready(threads.len());
+    let mut state = team.lock();
+    state.epoch_ns = sys::now_ns() + LEAD_NS;
+    let epoch_ns = state.epoch_ns;
+    let budgets = Budgets::new(&state, launched.budget_factor);
+    drop(state);
+    let of_release = Arc::clone(&team);
+    let release = thread::Builder::new()
+        .name("fass-release".into())
+        .spawn(move || of_release.release(budgets))
+        .expect("the system has a thread to release jobs");
+    while !team.is_over() {
+        sys::wait(&team.over, 0, None);
+    }
+    let mut state = team.lock();
+    let abandoned = std::mem::take(&mut state.abandoned);
+    // Nobody writes any more: those that were abandoned see that they were.
+    let empty = Journal::new(&state.task_set, 0, 0);
+    let journal = std::mem::replace(&mut state.recorder.events, empty);
+    let task_set = Arc::clone(&state.task_set);
+    let statistics = (0..).map(DagId).take(task_set.dags().len());
+    let statistics = statistics
+        .map(|dag| *state.scheduler.statistics(dag))
+        .collect();
+    let counts = Counts {
+        hand_offs: team.hand_offs.load(Ordering::Relaxed),
+        calls: team.calls.load(Ordering::Relaxed),
+        preemptions: state.preemptions,
+    };
+    let (options, faults) = (state.scheduler.options(), std::mem::take(&mut state.faults));
+    state.abandoned.clone_from(&abandoned);
+    drop(state);
+    for (number, thread) in threads.into_iter().enumerate() {
+        if !abandoned.contains(&number) {
+            join(thread);
+        }
+    }
+    join(release);
+    let is_whole = journal.lost() == 0;
+    let record = Record::of_events(&task_set, is_whole, journal.events());
+    Run {
+        record: record.expect("the times of a journal's events fit into memory"),
+        task_set,
+        options,
+        statistics,
+        journal,
+        faults,
+        counts,
+        epoch_ns,
+        bounds_ns: launched.bounds_ns,
+    }
+}
+
+fn worker(team: &Arc<Team>, number: usize) -> JoinHandle<()> {
+    let team = Arc::clone(team);
+    thread::Builder::new()
+        .name(format!("fass-worker-{number}"))
+        .stack_size(STACK_BYTES)
+        .spawn(move || team.work(number))
+        .expect("the system has a thread for each core and each subtask")
+}
+
+fn join(thread: JoinHandle<()>) {
+    if let Err(panic) = thread.join() {
+        std::panic::resume_unwind(panic);
+    }
+}
+
+impl Run {
+    /// Returns the model that was run.
+    #[must_use]
+    pub fn task_set(&self) -> &TaskSet {
+        &self.task_set
+    }
+
+    /// Returns the times of all jobs and instances, in nanoseconds from the instant from
+    /// which releases count; of the latest whole jobs if there were too many.
+    #[must_use]
+    pub const fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// Returns the journal: what has happened, in its order.
+    #[must_use]
+    pub const fn journal(&self) -> &Journal {
+        &self.journal
+    }
+
+    /// Returns a DAG's counters.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn statistics(&self, dag: DagId) -> &DagStatistics {
+        &self.statistics[dag.index()]
+    }
+
+    /// Returns the response time that the commit has proven of a DAG, if it has.
+    #[must_use]
+    pub fn bound_ns(&self, dag: DagId) -> Option<u64> {
+        self.bounds_ns.get(dag.index()).copied().flatten()
+    }
+
+    /// Returns the faults that have ended DAGs, in their order.
+    #[must_use]
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
+    /// Returns how often the threads did what.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Returns the instant from which releases count, on the clock of [`fass::now_ns`].
+    #[must_use]
+    pub const fn epoch_ns(&self) -> u64 {
+        self.epoch_ns
+    }
+
+    /// Returns every breach of rules R1 to R4, and whether each instance had one life and
+    /// each core one instance at a time. However long something takes is right.
+    pub fn violations(&self) -> impl Iterator<Item = Violation> {
+        let terms = self.terms(u64::MAX);
+        law::violations(&self.task_set, terms, self.journal.events()).into_iter()
+    }
+
+    fn terms(&self, tolerance_ns: u64) -> Terms {
+        Terms {
+            is_whole: self.journal.lost() == 0,
+            ..Terms::whole(tolerance_ns)
+        }
+    }
+
+    /// Returns every breach of R5 that lasts for longer than `bound_ns`: a decision takes
+    /// effect when Linux has switched threads. `None` if events are lost.
+    #[must_use]
+    pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
+        (self.journal.lost() == 0).then(|| {
+            let (terms, events) = (self.terms(bound_ns), self.journal.events());
+            law::dispatch_violations(&self.task_set, &self.options, terms, events)
+        })
+    }
+}

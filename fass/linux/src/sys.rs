@@ -1,0 +1,210 @@
+//! What the standard library does not offer of Linux: the only `unsafe` code of the crate.
+//!
+//! The symbols are those of the C library, which the standard library links anyway. Each
+//! function checks what it gets back and is safe to call with any arguments.
+
+use std::io;
+use std::os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd};
+use std::sync::atomic::AtomicU32;
+
+unsafe extern "C" {
+    fn clock_gettime(clock: i32, time: *mut Time) -> i32;
+    fn epoll_create1(flags: i32) -> i32;
+    fn epoll_ctl(epoll: i32, operation: i32, file: i32, event: *const Interest) -> i32;
+    fn epoll_wait(epoll: i32, events: *mut Interest, most: i32, timeout_ms: i32) -> i32;
+    fn mlockall(flags: i32) -> i32;
+    fn prctl(option: i32, ...) -> i32;
+    fn sched_getaffinity(thread: i32, bytes: usize, mask: *mut u64) -> i32;
+    fn sched_setaffinity(thread: i32, bytes: usize, mask: *const u64) -> i32;
+    fn sched_setscheduler(thread: i32, policy: i32, level: *const i32) -> i32;
+    fn setrlimit(resource: i32, limits: *const [u64; 2]) -> i32;
+    fn syscall(number: i64, ...) -> i64;
+}
+
+/// `struct timespec`.
+#[repr(C)]
+struct Time {
+    s: i64,
+    ns: i64,
+}
+
+/// `struct epoll_event`.
+#[repr(C)]
+#[cfg_attr(target_arch = "x86_64", repr(packed))]
+struct Interest {
+    events: u32,
+    data: u64,
+}
+
+const CLOCK_MONOTONIC: i32 = 1;
+const CLOCK_THREAD: i32 = 3;
+
+#[cfg(target_arch = "x86_64")]
+const SYS_GETTID: i64 = 186;
+#[cfg(target_arch = "x86_64")]
+const SYS_FUTEX: i64 = 202;
+#[cfg(not(target_arch = "x86_64"))]
+const SYS_GETTID: i64 = 178;
+#[cfg(not(target_arch = "x86_64"))]
+const SYS_FUTEX: i64 = 98;
+
+/// The kernel's number of a thread.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ThreadId(pub(crate) i32);
+
+/// A set of processors, as many as Linux has at most.
+type Mask = [u64; 128];
+
+/// Returns the calling thread's number.
+pub(crate) fn thread() -> ThreadId {
+    // SAFETY: the call takes no arguments and touches no memory.
+    let id = unsafe { syscall(SYS_GETTID) };
+    ThreadId(i32::try_from(id).expect("thread numbers are below 2^22"))
+}
+
+fn time_of(clock: i32) -> Option<u64> {
+    let mut time = Time { s: 0, ns: 0 };
+    // SAFETY: `time` is a `timespec` that lives through the call.
+    let result = unsafe { clock_gettime(clock, &raw mut time) };
+    let (s, ns) = (u64::try_from(time.s).ok()?, u64::try_from(time.ns).ok()?);
+    (result == 0).then(|| s * 1_000_000_000 + ns)
+}
+
+/// Returns the time of the clock that never jumps.
+#[inline]
+pub(crate) fn now_ns() -> u64 {
+    time_of(CLOCK_MONOTONIC).expect("every Linux has this clock")
+}
+
+/// Returns the processor time that the calling thread has taken.
+pub(crate) fn own_processor_time_ns() -> u64 {
+    time_of(CLOCK_THREAD).expect("every thread has this clock")
+}
+
+/// Returns the processor time that a thread of this program has taken; `None` if there is
+/// none of that number.
+pub(crate) fn processor_time_ns(thread: ThreadId) -> Option<u64> {
+    // How the kernel numbers threads' clocks, clock_getcpuclockid(3): bit 2 is for a
+    // thread, 2 for the time that the scheduler counts.
+    time_of(!thread.0 << 3 | 4 | 2)
+}
+
+/// Returns the processors that this program may use.
+pub(crate) fn processors() -> Vec<u32> {
+    let mut mask: Mask = [0; 128];
+    // SAFETY: the kernel writes at most as many bytes as the mask has.
+    let bytes = unsafe { sched_getaffinity(0, size_of::<Mask>(), mask.as_mut_ptr()) };
+    let is_in = |number: &u32| mask[(number / 64) as usize] >> (number % 64) & 1 == 1;
+    (0..128 * 64)
+        .filter(|number| bytes >= 0 && is_in(number))
+        .collect()
+}
+
+/// Lets a thread run on one processor only.
+pub(crate) fn pin(thread: ThreadId, processor: u32) -> io::Result<()> {
+    let mut mask: Mask = [0; 128];
+    mask[(processor / 64) as usize % 128] = 1 << (processor % 64);
+    // SAFETY: the kernel reads as many bytes as the mask has.
+    let result = unsafe { sched_setaffinity(thread.0, size_of::<Mask>(), mask.as_ptr()) };
+    checked(result)
+}
+
+/// Puts a thread of this program at a level of SCHED_FIFO. What it starts is not there.
+pub(crate) fn set_level(thread: ThreadId, level: i32) -> io::Result<()> {
+    const FIFO: i32 = 1;
+    const RESET_ON_FORK: i32 = 0x4000_0000;
+    // SAFETY: the kernel reads one `sched_param`, which is a number.
+    let result = unsafe { sched_setscheduler(thread.0, FIFO | RESET_ON_FORK, &raw const level) };
+    checked(result)
+}
+
+/// Puts a thread of this program into the class that all programs begin in.
+pub(crate) fn set_normal(thread: ThreadId) -> io::Result<()> {
+    let level = 0;
+    // SAFETY: the kernel reads one `sched_param`, which is a number.
+    let result = unsafe { sched_setscheduler(thread.0, 0, &raw const level) };
+    checked(result)
+}
+
+/// Sleeps until the word is woken, or until a time on the clock; not at all if the word has
+/// another value. May return early.
+pub(crate) fn wait(word: &AtomicU32, value: u32, until_ns: Option<u64>) {
+    const WAIT_UNTIL: i64 = 9 | 128;
+    let time = until_ns.map(|ns| Time {
+        s: i64::try_from(ns / 1_000_000_000).unwrap_or(i64::MAX),
+        ns: i64::try_from(ns % 1_000_000_000).unwrap_or(0),
+    });
+    let time = time.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
+    let (none, any) = (std::ptr::null::<u32>(), u32::MAX);
+    // SAFETY: FUTEX_WAIT_BITSET reads the word and, if there is one, the `timespec`; both
+    // live through the call.
+    unsafe { syscall(SYS_FUTEX, word.as_ptr(), WAIT_UNTIL, value, time, none, any) };
+}
+
+/// Wakes a thread that waits for the word, or all.
+pub(crate) fn wake(word: &AtomicU32, most: i32) {
+    const WAKE: i64 = 1 | 128;
+    // SAFETY: FUTEX_WAKE takes the word's address and reads nothing.
+    unsafe { syscall(SYS_FUTEX, word.as_ptr(), WAKE, most) };
+}
+
+/// Lets the calling thread's timers be exact, where real-time levels do not do that.
+pub(crate) fn make_timers_exact() {
+    const TIMER_SLACK: i32 = 29;
+    // SAFETY: the option takes a number.
+    unsafe { prctl(TIMER_SLACK, 1_u64) };
+}
+
+/// Keeps all memory of the program, also what it will have, from being paged out.
+pub(crate) fn lock_memory() -> io::Result<()> {
+    const CURRENT_AND_FUTURE: i32 = 3;
+    // SAFETY: the call takes flags and changes no contents of memory.
+    checked(unsafe { mlockall(CURRENT_AND_FUTURE) })
+}
+
+/// Lets the kernel end the program when one of its threads has been at a real-time level
+/// for so long without ever waiting.
+pub(crate) fn limit_real_time(microseconds: u64) -> io::Result<()> {
+    const RLIMIT_RTTIME: i32 = 15;
+    let limits = [microseconds; 2];
+    // SAFETY: the kernel reads one `rlimit`, which is two numbers.
+    checked(unsafe { setrlimit(RLIMIT_RTTIME, &raw const limits) })
+}
+
+/// What waits for something new in a file.
+pub(crate) struct Arrivals(OwnedFd);
+
+impl Arrivals {
+    /// Begins to watch an open file.
+    pub(crate) fn of(file: &impl AsFd) -> io::Result<Self> {
+        const CLOSE_ON_EXEC: i32 = 0o200_0000;
+        const ADD: i32 = 1;
+        const INPUT_ARRIVES: u32 = 1 | 1 << 31;
+        // SAFETY: the call takes flags.
+        let epoll = unsafe { epoll_create1(CLOSE_ON_EXEC) };
+        checked(epoll)?;
+        // SAFETY: the kernel has just opened it for us, and nobody else has its number.
+        let arrivals = Self(unsafe { OwnedFd::from_raw_fd(epoll) });
+        let interest = Interest {
+            events: INPUT_ARRIVES,
+            data: 0,
+        };
+        // SAFETY: the kernel reads one `epoll_event`.
+        checked(unsafe { epoll_ctl(epoll, ADD, file.as_fd().as_raw_fd(), &raw const interest) })?;
+        Ok(arrivals)
+    }
+
+    /// Waits, and reports whether anything has arrived since the last time.
+    pub(crate) fn wait(&self, most_ms: i32) -> bool {
+        let mut event = Interest { events: 0, data: 0 };
+        // SAFETY: the kernel writes at most one `epoll_event`.
+        unsafe { epoll_wait(self.0.as_raw_fd(), &raw mut event, 1, most_ms) == 1 }
+    }
+}
+
+fn checked(result: i32) -> io::Result<()> {
+    match result {
+        0.. => Ok(()),
+        _ => Err(io::Error::last_os_error()),
+    }
+}

@@ -1,0 +1,162 @@
+//! A thread that runs instances, as the others see it: its mode, and what it sleeps on.
+//!
+//! A worker that is preempted is *demoted*, never stopped: when its core has nothing more
+//! urgent it runs on, so a lock that it holds (the allocator's, an output stream's) is
+//! given back, and nobody waits for it forever.
+//!
+//! # Demoted workers and the scheduler's lock
+//!
+//! A worker that is at a low level must not hold the scheduler's lock: its core would
+//! compute something more urgent, and all others wait. So nobody who is demoted takes it:
+//! a worker that has finished first says so in its mode. If it was demoted before, it
+//! raises itself above all that compute. If it is to be demoted just then, by the
+//! lock's owner, that one sees the mode and lets it be. The two may cross; then the owner
+//! raises it again, before it gives the lock back. On the way of an instance that is not
+//! preempted all that is one exchange of a word.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use crate::level::{Levels, Role};
+use crate::sys::{self, ThreadId};
+
+/// It runs no instance: it waits, or has the scheduler's lock, or is about to take it.
+const REPORTS: u32 = 0;
+/// It runs an instance as its core should.
+const RUNS: u32 = 1;
+/// It runs an instance that has lost its core.
+const DEMOTED: u32 = 2;
+
+/// What is shared of a worker.
+#[derive(Debug, Default)]
+pub(crate) struct Worker {
+    thread: OnceLock<ThreadId>,
+    mode: AtomicU32,
+    /// Whether it sleeps until its mode changes.
+    holds: AtomicBool,
+    /// 1 if it is to look for work.
+    call: AtomicU32,
+}
+
+impl Worker {
+    /// Says which thread it is. To be called by that thread, first of all.
+    pub(crate) fn begin(&self) {
+        let _ = self.thread.set(sys::thread());
+    }
+
+    /// Returns its thread's number, once it has begun.
+    pub(crate) fn thread(&self) -> Option<ThreadId> {
+        self.thread.get().copied()
+    }
+
+    /// Brings its thread to a level, if there are levels.
+    pub(crate) fn bring(&self, levels: Option<Levels>, role: Role) {
+        if let (Some(levels), Some(thread)) = (levels, self.thread()) {
+            levels.bring(thread, role);
+        }
+    }
+
+    /// Makes it look for work.
+    pub(crate) fn call(&self) {
+        self.call.store(1, Ordering::Release);
+        sys::wake(&self.call, 1);
+    }
+
+    /// Sleeps until it is called. By itself.
+    pub(crate) fn wait_for_call(&self) {
+        while self.call.swap(0, Ordering::Acquire) == 0 {
+            sys::wait(&self.call, 0, None);
+        }
+    }
+
+    /// Takes note that it runs an instance from now on. Under the lock.
+    pub(crate) fn run(&self) {
+        self.mode.store(RUNS, Ordering::Relaxed);
+    }
+
+    /// Gets ready to take the lock, after an instance has ended. By itself. Reports
+    /// whether it has raised itself for that; then it is to lower itself under the lock.
+    pub(crate) fn report(&self, levels: Option<Levels>) -> bool {
+        let was_demoted = self.mode.swap(REPORTS, Ordering::AcqRel) == DEMOTED;
+        if was_demoted {
+            self.bring(levels, Role::Report);
+        }
+        was_demoted
+    }
+
+    /// Demotes it to a role, and reports whether it has: not if its instance has just
+    /// ended. Under the lock.
+    pub(crate) fn demote(&self, levels: Option<Levels>, role: Role) -> bool {
+        let changed =
+            self.mode
+                .compare_exchange(RUNS, DEMOTED, Ordering::AcqRel, Ordering::Acquire);
+        if changed.is_err() {
+            return false;
+        }
+        self.bring(levels, role);
+        if self.mode.load(Ordering::Acquire) != DEMOTED {
+            // It has raised itself, perhaps before we lowered it.
+            self.bring(levels, Role::Report);
+        }
+        self.tell_holder();
+        true
+    }
+
+    /// Lets it run again what it ran when it was demoted. Under the lock.
+    pub(crate) fn promote(&self, levels: Option<Levels>) {
+        // If its instance has ended meanwhile, it is about to report that.
+        let _ = self
+            .mode
+            .compare_exchange(DEMOTED, RUNS, Ordering::AcqRel, Ordering::Acquire);
+        self.bring(levels, Role::Run);
+        self.tell_holder();
+    }
+
+    fn tell_holder(&self) {
+        if self.holds.load(Ordering::SeqCst) {
+            sys::wake(&self.mode, 1);
+        }
+    }
+
+    /// Sleeps for so long of the time in which it is not demoted. By itself.
+    pub(crate) fn hold(&self, mut left_ns: u64) {
+        self.holds.store(true, Ordering::SeqCst);
+        while left_ns > 0 {
+            if self.mode.load(Ordering::SeqCst) == DEMOTED {
+                sys::wait(&self.mode, DEMOTED, None);
+                continue;
+            }
+            let from_ns = sys::now_ns();
+            sys::wait(&self.mode, RUNS, Some(from_ns.saturating_add(left_ns)));
+            left_ns = left_ns.saturating_sub(sys::now_ns() - from_ns);
+        }
+        self.holds.store(false, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_just_ended_is_not_demoted() {
+        let worker = Worker::default();
+        worker.begin();
+        worker.run();
+        assert!(worker.demote(None, Role::Demoted));
+        assert!(!worker.demote(None, Role::Demoted), "it is demoted already");
+        worker.promote(None);
+        assert!(worker.demote(None, Role::Demoted));
+        worker.report(None);
+        worker.promote(None);
+        assert!(!worker.demote(None, Role::Demoted), "it has reported");
+    }
+
+    #[test]
+    fn a_call_before_the_wait_is_not_lost() {
+        let worker = Worker::default();
+        worker.call();
+        worker.wait_for_call();
+        assert_eq!(worker.call.load(Ordering::Relaxed), 0);
+    }
+}

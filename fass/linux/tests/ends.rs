@@ -1,0 +1,146 @@
+//! What is left behind when the program ends, in whatever way; and what it needs to begin.
+//!
+//! The program under test is this very test program, started anew with a part to play.
+
+use std::fs;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+use linux::{Linux, Mechanism};
+
+const PART: &str = "FASS_LINUX_PART";
+
+/// Starts the part: a run that never ends, or what a stranger is told.
+fn play(part: &str, prepare: impl FnOnce(&mut Command)) -> Child {
+    let program = std::env::current_exe().expect("the program is there");
+    let mut command = Command::new(program);
+    command
+        .args(["--exact", "part", "--nocapture"])
+        .env(PART, part);
+    command.stdout(Stdio::piped()).stderr(Stdio::null());
+    prepare(&mut command);
+    command.spawn().expect("it starts")
+}
+
+#[test]
+fn part() {
+    match std::env::var(PART).as_deref() {
+        Ok("endless") => run_endlessly(),
+        Ok("stranger") => {
+            let machine = Linux::new(1, Mechanism::Fifo).expect("a processor is there");
+            println!("preemptive: {}", machine.is_preemptive());
+            println!("{}", machine.warnings().join("\n"));
+        }
+        _ => {}
+    }
+}
+
+/// A run whose function also starts a program of its own.
+fn run_endlessly() {
+    let machine = Linux::new(1, Mechanism::Fifo).expect("a processor is there");
+    machine
+        .limit_real_time(Duration::from_secs(5))
+        .expect("a limit may be set");
+    let dag = create_dag();
+    let period = Duration::from_millis(5);
+    dag.period(period).relative_deadline(period);
+    let mut children = Vec::new();
+    let function = move |job| {
+        if job == 0 {
+            let child = Command::new("sleep").arg("20").spawn().expect("it starts");
+            println!("\nchild {}", child.id());
+            children.push(child);
+        }
+    };
+    dag.register_untyped_subtask(function, SubtaskAttributes::named("starts"));
+    finish_create_dags(&[dag]).expect("the DAG is right");
+    machine.run().expect("it is committed");
+}
+
+/// Returns the scheduling class of each thread of a process, 0 being that of all programs.
+fn classes(process: u32) -> Vec<String> {
+    let folder = format!("/proc/{process}/task");
+    let threads = fs::read_dir(folder).into_iter().flatten().flatten();
+    let class = |thread: fs::DirEntry| {
+        let stat = fs::read_to_string(thread.path().join("stat")).ok()?;
+        // The fields after the name, which may have blanks; the 41st of all, proc(5).
+        let (_, fields) = stat.rsplit_once(") ")?;
+        fields.split(' ').nth(41 - 3).map(str::to_owned)
+    };
+    threads.filter_map(class).collect()
+}
+
+#[test]
+fn a_kill_leaves_nothing_at_a_raised_level() {
+    use std::io::{BufRead as _, BufReader};
+    let mut program = play("endless", |_| ());
+    let lines = BufReader::new(program.stdout.take().expect("it is piped")).lines();
+    let mut words = lines.map_while(Result::ok);
+    let child = words.find_map(|line| line.strip_prefix("child ")?.parse::<u32>().ok());
+    let child = child.expect("the function starts a program");
+    let threads = classes(program.id());
+    let is_raised = threads.iter().any(|class| class == "1");
+    let was_fifo = Linux::new(1, Mechanism::Fifo)
+        .expect("one is there")
+        .is_preemptive();
+    assert_eq!(is_raised, was_fifo, "{threads:?}");
+    assert_eq!(
+        classes(child),
+        ["0"],
+        "what a function starts is at no level"
+    );
+    program.kill().expect("it lives");
+    let status = program.wait().expect("it has ended");
+    assert_eq!(status.signal(), Some(9));
+    assert!(!Path::new(&format!("/proc/{}/task", program.id())).exists());
+    assert_eq!(classes(child), ["0"]);
+    Command::new("kill")
+        .arg(child.to_string())
+        .status()
+        .expect("`kill` is there");
+}
+
+#[test]
+fn a_stranger_is_told_what_it_may_not() {
+    const NOBODY: u32 = 65_534;
+    // Only root can become somebody else.
+    let as_nobody = |command: &mut Command| {
+        if fs::metadata("/proc/self").is_ok_and(|own| {
+            use std::os::unix::fs::MetadataExt as _;
+            own.uid() == 0
+        }) {
+            let copy = std::env::temp_dir().join(format!("fass-ends-{}", std::process::id()));
+            fs::copy(std::env::current_exe().expect("it is there"), &copy).expect("it fits");
+            *command = Command::new(copy);
+            command
+                .args(["--exact", "part", "--nocapture"])
+                .env(PART, "stranger");
+            command
+                .stdout(Stdio::piped())
+                .stderr(Stdio::null())
+                .uid(NOBODY)
+                .gid(NOBODY);
+        }
+    };
+    let program = play("stranger", as_nobody);
+    let output = program.wait_with_output().expect("it has ended");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("preemptive: false"), "{text}");
+    assert!(
+        text.contains("SCHED_FIFO is refused (Operation not permitted"),
+        "{text}"
+    );
+    assert!(text.contains("; do run it as root, or `setcap"), "{text}");
+}
+
+#[test]
+fn more_cores_than_there_are_is_an_error_with_a_remedy() {
+    let error = Linux::new(100_000, Mechanism::Normal).expect_err("nobody has so many");
+    let text = error.to_string();
+    assert!(text.starts_with("100000 cores are asked for, and this program may use "));
+    assert!(text.contains("; do ask for 1 to "), "{text}");
+    assert!(Linux::new(0, Mechanism::Normal).is_err());
+}

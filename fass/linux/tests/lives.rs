@@ -1,0 +1,176 @@
+//! What can happen to a run from within and from outside, and what goes on regardless.
+
+mod support;
+
+use std::io::{Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+
+use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+use linux::Mechanism;
+use sched_dag::DagId;
+use support::{alone, ms, ticking};
+
+const BOTH: [Mechanism; 2] = [Mechanism::Fifo, Mechanism::Normal];
+
+#[test]
+fn a_panic_ends_its_dag_alone() {
+    for mechanism in BOTH {
+        let alone = alone(2, mechanism);
+        let faulty = create_dag();
+        faulty
+            .name("faulty")
+            .jobs(20)
+            .period(ms(2))
+            .relative_deadline(ms(2));
+        let function = |job| assert!(job < 5, "out of numbers");
+        faulty.register_untyped_subtask(function, SubtaskAttributes::named("counts"));
+        let healthy = ticking("healthy", 20, ms(2), 1, 100);
+        finish_create_dags(&[faulty, healthy]).unwrap();
+        let run = alone.machine.run().unwrap();
+        assert_eq!(run.violations().count(), 0);
+        let [fault] = run.faults() else {
+            panic!("one fault is meant, not {:?}", run.faults());
+        };
+        assert_eq!((fault.instance.job, &*fault.cause), (5, "out of numbers"));
+        assert_eq!(run.statistics(DagId(0)).completed, 5);
+        assert_eq!(run.statistics(DagId(1)).completed, 20);
+    }
+}
+
+#[test]
+fn an_endless_function_loses_its_core_after_its_budget() {
+    for mechanism in BOTH {
+        let alone = alone(1, mechanism);
+        let may_end = Arc::new(AtomicBool::new(false));
+        let endless = create_dag();
+        endless
+            .name("endless")
+            .jobs(20)
+            .period(ms(5))
+            .relative_deadline(ms(5));
+        let flag = Arc::clone(&may_end);
+        let function = move |job| while job == 2 && !flag.load(Relaxed) {};
+        let attributes = SubtaskAttributes::named("waits").priority(0).budget(ms(4));
+        endless.register_untyped_subtask(function, attributes);
+        let healthy = ticking("healthy", 20, ms(5), 1, 100);
+        finish_create_dags(&[endless, healthy]).unwrap();
+        let run = alone.machine.run().unwrap();
+        may_end.store(true, Relaxed);
+        assert_eq!(run.violations().count(), 0);
+        assert_eq!(run.faults().len(), 1, "{:?}", run.faults());
+        assert_eq!(run.faults()[0].instance.job, 2);
+        assert_eq!(run.statistics(DagId(0)).completed, 2);
+        assert_eq!(run.statistics(DagId(1)).completed, 20);
+    }
+}
+
+#[test]
+fn s1_signals_come_from_other_threads_and_from_files() {
+    let alone = alone(1, Mechanism::Fifo);
+    let (mut near, far) = UnixStream::pair().unwrap();
+    let heard = Arc::new(AtomicU64::new(0));
+    let dag = create_dag();
+    dag.name("answer").jobs(2).relative_deadline(ms(5));
+    let (count, mut source) = (Arc::clone(&heard), far.try_clone().unwrap());
+    let function = move || {
+        let mut byte = [0];
+        if count.fetch_add(1, Relaxed) == 0 {
+            source.read_exact(&mut byte).unwrap();
+        }
+    };
+    let named = SubtaskAttributes::named("answer");
+    let signal = dag.register_sporadic_subtask(function, Vec::new(), ms(1), named);
+    finish_create_dags(&[dag]).unwrap();
+    alone.machine.raise_on_input(&signal, &far).unwrap();
+    let (first, of_thread) = (Arc::clone(&heard), signal.clone());
+    std::thread::spawn(move || {
+        near.write_all(b"x").unwrap();
+        while first.load(Relaxed) == 0 {
+            std::thread::yield_now();
+        }
+        of_thread.raise();
+    });
+    let run = alone.machine.run().unwrap();
+    assert_eq!(run.violations().count(), 0);
+    assert_eq!(run.statistics(DagId(0)).completed, 2);
+    assert_eq!(heard.load(Relaxed), 2);
+}
+
+#[test]
+fn a_dag_is_paused_resumed_and_stopped_from_outside() {
+    let alone = alone(1, Mechanism::Fifo);
+    let endless = create_dag();
+    endless
+        .name("endless")
+        .period(ms(1))
+        .relative_deadline(ms(1));
+    let ticks = Arc::new(AtomicU64::new(0));
+    let count = Arc::clone(&ticks);
+    let function = move |_job| {
+        count.fetch_add(1, Relaxed);
+    };
+    endless.register_untyped_subtask(function, SubtaskAttributes::named("tick"));
+    finish_create_dags(&[endless]).unwrap();
+    let control = alone.machine.control().unwrap();
+    std::thread::spawn(move || {
+        let wait_for = |more: u64| {
+            let until = ticks.load(Relaxed) + more;
+            while ticks.load(Relaxed) < until {
+                std::thread::sleep(ms(1));
+            }
+        };
+        wait_for(3);
+        control.pause(DagId(0));
+        std::thread::sleep(ms(20));
+        control.resume(DagId(0));
+        wait_for(3);
+        control.stop(DagId(0));
+    });
+    let run = alone.machine.run().unwrap();
+    assert_eq!(run.violations().count(), 0);
+    let statistics = run.statistics(DagId(0));
+    assert!(
+        statistics.skips > 0 && statistics.completed >= 6,
+        "{statistics:?}"
+    );
+}
+
+#[test]
+fn after_a_run_there_can_be_another() {
+    for _ in 0..3 {
+        let alone = alone(1, Mechanism::Normal);
+        finish_create_dags(&[ticking("tick", 3, ms(1), 0, 10)]).unwrap();
+        assert_eq!(
+            alone.machine.run().unwrap().statistics(DagId(0)).completed,
+            3
+        );
+        let error = alone.machine.run().unwrap_err();
+        assert!(error.to_string().starts_with("nothing is committed"));
+        finish_create_dags(&[ticking("tick", 2, ms(1), 0, 10)]).unwrap();
+        assert_eq!(
+            alone.machine.run().unwrap().statistics(DagId(0)).completed,
+            2
+        );
+    }
+}
+
+#[test]
+fn a_held_core_is_given_up_like_a_computing_one() {
+    let alone = alone(1, Mechanism::Fifo);
+    let is_preemptive = alone.machine.is_preemptive();
+    let holds = create_dag();
+    holds
+        .name("holds")
+        .jobs(3)
+        .period(ms(30))
+        .relative_deadline(ms(30));
+    let hold = |_job| fass::execute_for(ms(10), fass::Occupation::Hold);
+    holds.register_untyped_subtask(hold, SubtaskAttributes::named("hold").priority(5));
+    finish_create_dags(&[holds, ticking("tick", 30, ms(3), 0, 100)]).unwrap();
+    let run = alone.machine.run().unwrap();
+    assert_eq!(run.violations().count(), 0);
+    assert_eq!(run.statistics(DagId(0)).completed, 3);
+    assert_eq!(run.counts().preemptions > 0, is_preemptive);
+}

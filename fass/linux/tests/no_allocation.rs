@@ -1,0 +1,72 @@
+//! Between the first job and the last nothing is allocated.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use fass::{Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use linux::{Linux, Mechanism};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+#[allow(unsafe_code, reason = "an allocator that counts")]
+// SAFETY: all is left to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Relaxed);
+        // SAFETY: the caller keeps the contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller keeps the contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn jobs_allocate_nothing_preempted_or_not() {
+    const JOBS: u64 = 40;
+    let ms = Duration::from_millis;
+    for mechanism in [Mechanism::Fifo, Mechanism::Normal] {
+        let machine = Linux::new(1, mechanism).unwrap();
+        machine.limit_real_time(Duration::from_secs(5)).unwrap();
+        let seen = Arc::new([AtomicU64::new(0), AtomicU64::new(0)]);
+        let stamps = Arc::clone(&seen);
+        let dag = create_dag();
+        dag.name("dag").jobs(JOBS);
+        let mut job = 0;
+        let source = move || {
+            job += 1;
+            match job {
+                2 => stamps[0].store(ALLOCATIONS.load(Relaxed), Relaxed),
+                JOBS => stamps[1].store(ALLOCATIONS.load(Relaxed), Relaxed),
+                _ => {}
+            }
+            (job,)
+        };
+        let named = SubtaskAttributes::named;
+        dag.register_periodic_subtask(source, vec!["job"], ms(2), named("source"));
+        let sink = |(_,): (u64,)| execute_for(Duration::from_micros(50), Occupation::Spin);
+        dag.register_sink_subtask(sink, vec!["job"], ms(2), named("sink"));
+        let long = create_dag();
+        long.name("long")
+            .jobs(8)
+            .period(ms(10))
+            .relative_deadline(ms(10));
+        let function = |_job| execute_for(Duration::from_millis(3), Occupation::Spin);
+        long.register_untyped_subtask(function, named("long").priority(9));
+        finish_create_dags(&[dag, long]).unwrap();
+        let run = machine.run().unwrap();
+        assert_eq!(run.violations().count(), 0);
+        let [first, last] = [&seen[0], &seen[1]].map(|count| count.load(Relaxed));
+        assert!(first > 0);
+        assert_eq!(last - first, 0, "allocations within {JOBS} jobs");
+    }
+}

@@ -1,0 +1,62 @@
+//! One machine at a time, that cannot take the computer from others for long.
+
+#![allow(dead_code, reason = "each test program uses its part of it")]
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
+use linux::{Linux, Mechanism};
+
+/// A machine, and the right to be the only one.
+pub(crate) struct Alone {
+    pub(crate) machine: Linux,
+    _right: MutexGuard<'static, ()>,
+}
+
+/// Makes the only machine of the program.
+pub(crate) fn alone(cores: u32, mechanism: Mechanism) -> Alone {
+    static RIGHT: Mutex<()> = Mutex::new(());
+    let right = RIGHT.lock().unwrap_or_else(PoisonError::into_inner);
+    let there = std::thread::available_parallelism().map_or(1, |count| count.get());
+    let cores = cores.min(u32::try_from(there).unwrap_or(1));
+    let machine = Linux::new(cores, mechanism).expect("so many processors are there");
+    machine
+        .limit_real_time(Duration::from_secs(5))
+        .expect("a limit may be set");
+    Alone {
+        machine,
+        _right: right,
+    }
+}
+
+impl Alone {
+    /// Changes the machine before the commit.
+    pub(crate) fn with(self, change: impl FnOnce(Linux) -> Linux) -> Self {
+        Self {
+            machine: change(self.machine),
+            ..self
+        }
+    }
+}
+
+pub(crate) fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+/// Computes for a time.
+pub(crate) fn spin(us: u64) {
+    execute_for(Duration::from_micros(us), Occupation::Spin);
+}
+
+/// A DAG of one subtask that computes for `us` in each of its jobs.
+pub(crate) fn ticking(name: &str, jobs: u64, period: Duration, priority: u32, us: u64) -> Dag {
+    let dag = create_dag();
+    dag.name(name)
+        .jobs(jobs)
+        .period(period)
+        .relative_deadline(period);
+    let attributes = SubtaskAttributes::named(name).priority(priority);
+    dag.register_untyped_subtask(move |_job| spin(us), attributes);
+    dag
+}
