@@ -8,10 +8,10 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use common::random::nth;
 use fass::{Dag, Occupation, SubtaskAttributes, Untyped, create_dag};
 use replay::{Epoch, Scale};
 use sched_dag::DagSpec;
-use soak::random::nth;
 
 use crate::execution::{Execution, Times};
 use crate::file::{FileDag, Set};

@@ -8,8 +8,8 @@ use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
 
+use common::random::{nth, scale};
 use replay::lines::quoted;
-use soak::random::{nth, scale};
 
 /// A millionth, the finest fraction of a WCET.
 const WHOLE: u64 = 1_000_000;

@@ -2,42 +2,31 @@
 
 use core::time::Duration;
 
+use common::random::{Random, nth};
+
 /// The execution times of one parallel subtask, job by job.
 ///
-/// The generator is SplitMix64 (Steele, Lea, Flood, OOPSLA 2014,
-/// doi 10.1145/2660193.2660195). Each parallel subtask has its own, so what one
-/// draws does not depend on when another runs.
+/// Each parallel subtask has its own generator, so what one draws does not depend on when
+/// another runs.
 #[derive(Clone, Debug)]
 pub struct ExecutionTimes {
-    state: u64,
+    random: Random,
 }
 
 impl ExecutionTimes {
     /// Starts the sequence of parallel subtask `branch` for `seed`.
     #[must_use]
     pub fn new(seed: u64, branch: usize) -> Self {
-        let mut seeds = Self { state: seed };
-        let state = (0..=branch).fold(0, |_, _| seeds.next_u64());
-        Self { state }
+        let seed = nth(seed, branch as u64);
+        Self {
+            random: Random::new(seed),
+        }
     }
 
     /// Draws the next time: uniform from 1 to 50 ms, in nanoseconds.
     pub fn next_time(&mut self) -> Duration {
-        const LEAST_NS: u64 = 1_000_000;
-        const MOST_NS: u64 = 50_000_000;
-        let choices = u128::from(MOST_NS - LEAST_NS + 1);
-        // The high part of the product maps the draw to the range without the
-        // bias of a remainder (it is below 2^-38 here).
-        let drawn = (u128::from(self.next_u64()) * choices) >> 64;
-        Duration::from_nanos(LEAST_NS + u64::try_from(drawn).unwrap_or(0))
-    }
-
-    fn next_u64(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.state;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
+        let drawn = self.random.within(1_000_000..=50_000_000);
+        Duration::from_nanos(drawn)
     }
 }
 

@@ -14,7 +14,6 @@
 
 extern crate alloc;
 
-mod arity;
 mod draw;
 mod execution;
 mod sink;

@@ -8,7 +8,9 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use fass::{Dag, SubtaskAttributes};
 
-use crate::{BUDGET, RELATIVE_DEADLINE, WCET_OF_ENDS, each_arity};
+use common::each_arity;
+
+use crate::{BUDGET, RELATIVE_DEADLINE, WCET_OF_ENDS};
 
 /// How many joins the sink has seen.
 #[derive(Clone, Debug, Default)]

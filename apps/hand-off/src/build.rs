@@ -9,8 +9,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use common::each_arity;
 use fass::{Dag, Occupation, SubtaskAttributes, VecToSubs, create_dag};
-use fork_join::each_arity;
 
 use crate::shape::Shape;
 use crate::stamps::{Pen, Stamps};

@@ -7,6 +7,8 @@
 
 use alloc::vec::Vec;
 
+use common::random::Random;
+
 /// The number of subtasks side by side in a layered graph.
 pub const LAYER: usize = 32;
 
@@ -64,7 +66,7 @@ impl Shape {
 
 fn layered(sink: usize, seed: u64) -> Vec<(usize, usize)> {
     const DRAWS: usize = 3;
-    let mut state = seed;
+    let mut random = Random::new(seed);
     let mut edges = Vec::with_capacity(sink * DRAWS);
     let mut has_successor = alloc::vec![false; sink];
     for subtask in 1..sink {
@@ -75,7 +77,7 @@ fn layered(sink: usize, seed: u64) -> Vec<(usize, usize)> {
         }
         let mut predecessors = [0; DRAWS].map(|_: usize| {
             // The high 5 bits: a number below 32.
-            let place = usize::try_from(draw(&mut state) >> 59).unwrap_or(0);
+            let place = usize::try_from(random.number() >> 59).unwrap_or(0);
             1 + (layer - 1) * LAYER + place
         });
         predecessors.sort_unstable();
@@ -89,15 +91,6 @@ fn layered(sink: usize, seed: u64) -> Vec<(usize, usize)> {
     let ends = (1..sink).filter(|subtask| !has_successor[*subtask]);
     edges.extend(ends.map(|subtask| (subtask, sink)));
     edges
-}
-
-/// SplitMix64.
-fn draw(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut mixed = *state;
-    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    mixed ^ (mixed >> 31)
 }
 
 #[cfg(test)]

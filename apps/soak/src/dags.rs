@@ -16,8 +16,8 @@ use fork_join::compute;
 
 use fass::{Dag, Occupation, OverrunPolicy, SubtaskAttributes, Untyped, create_dag};
 
-use crate::random::{nth, scale};
 use crate::set::{DagPlan, LEAST_PERCENT};
+use common::random::{nth, scale};
 
 /// What the instances of a round have counted themselves.
 #[derive(Clone, Debug, Default)]

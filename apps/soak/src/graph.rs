@@ -6,7 +6,7 @@
 
 use alloc::vec::Vec;
 
-use crate::random::Random;
+use common::random::Random;
 
 /// An edge: the earlier subtask and the later one, by number.
 pub(crate) type Edge = (usize, usize);

@@ -19,7 +19,6 @@ extern crate alloc;
 mod account;
 mod dags;
 mod graph;
-pub mod random;
 mod set;
 mod shares;
 

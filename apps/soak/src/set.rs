@@ -14,8 +14,8 @@
 use alloc::vec::Vec;
 
 use crate::graph::{self, Edge};
-use crate::random::{Random, nth};
 use crate::shares::share_out;
+use common::random::{Random, nth};
 
 /// The shortest execution time of a subtask, in percent of its WCET.
 pub const LEAST_PERCENT: u64 = 40;
@@ -131,7 +131,7 @@ fn draw_dag(size: u64, load: u64, random: &mut Random) -> DagPlan {
         .map(|share| SubtaskPlan {
             wcet_ns: (period_ns / 1000 * share / 1000).max(LEAST_WCET_NS),
             non_preemptive: random.once_in(16),
-            seed: random.next(),
+            seed: random.number(),
         })
         .collect();
     let edges = graph::draw(subtasks.len(), random);

@@ -8,7 +8,7 @@
 
 use alloc::vec::Vec;
 
-use crate::random::Random;
+use common::random::Random;
 
 /// Shares `total` out: as many shares as limits, each at most its limit.
 ///

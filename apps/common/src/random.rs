@@ -11,36 +11,37 @@ const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A sequence of random numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct Random {
+pub struct Random {
     state: u64,
 }
 
 impl Random {
     /// Starts the sequence of `seed`.
-    pub(crate) const fn new(seed: u64) -> Self {
+    #[must_use]
+    pub const fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
     /// Draws any number.
-    pub(crate) fn next(&mut self) -> u64 {
+    pub fn number(&mut self) -> u64 {
         let number = nth(self.state, 0);
         self.state = self.state.wrapping_add(INCREMENT);
         number
     }
 
     /// Draws a number from `range`, each with the same probability.
-    pub(crate) fn within(&mut self, range: RangeInclusive<u64>) -> u64 {
-        scale(self.next(), range)
+    pub fn within(&mut self, range: RangeInclusive<u64>) -> u64 {
+        scale(self.number(), range)
     }
 
     /// Draws an index into a list of `length` items, which is not empty.
-    pub(crate) fn index(&mut self, length: usize) -> usize {
+    pub fn index(&mut self, length: usize) -> usize {
         let last = (length as u64).saturating_sub(1);
         usize::try_from(self.within(0..=last)).unwrap_or(0)
     }
 
     /// Is true once in `count` times.
-    pub(crate) fn once_in(&mut self, count: u64) -> bool {
+    pub fn once_in(&mut self, count: u64) -> bool {
         self.within(1..=count) == 1
     }
 }
@@ -69,9 +70,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_sequence_is_that_of_the_paper() {
+        // The first numbers of SplitMix64 for the seed 0, as Java's SplittableRandom has them.
+        assert_eq!(
+            [nth(0, 0), nth(0, 1)],
+            [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4]
+        );
+    }
+
+    #[test]
     fn the_nth_number_needs_not_those_before() {
         let mut random = Random::new(7);
-        let drawn: Vec<_> = (0..100).map(|_| random.next()).collect();
+        let drawn: Vec<_> = (0..100).map(|_| random.number()).collect();
         assert!((0..).zip(&drawn).all(|(n, &number)| nth(7, n) == number));
     }
 
