@@ -113,7 +113,7 @@ pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use nearest::nearest;
 pub use policy::{
-    Activation, JobOutcome, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions,
+    Activation, JobOutcome, Order, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions,
 };
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use recorder::{Events, Recorder};

@@ -73,6 +73,17 @@ pub enum OverrunPolicy {
     Abort,
 }
 
+/// Whether the commit may fix an order in which a DAG's subtasks use the cores.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Order {
+    /// It may not: the policy decides at every instant.
+    #[default]
+    Free,
+    /// It adds precedence edges, those of a schedule of the WCETs on all cores, if these prove a
+    /// shorter response time. All subtasks need a WCET.
+    Fixed,
+}
+
 /// How a scheduler orders instances, and for how many cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SchedulerOptions {

@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
 
-use crate::policy::{Activation, OverrunPolicy, Priority};
+use crate::policy::{Activation, Order, OverrunPolicy, Priority};
 
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
@@ -28,6 +28,8 @@ pub struct DagSpec {
     pub in_flight: Option<u32>,
     /// What happens at a release beyond `in_flight`.
     pub overrun: OverrunPolicy,
+    /// Whether the commit may fix an order of the subtasks.
+    pub order: Order,
     /// The number of jobs to release; `None`: without end.
     pub jobs: Option<u64>,
     /// The subtasks in the order of their registration.

@@ -79,6 +79,7 @@ fn build_dag(
         .relative_deadline(time(spec.relative_deadline_ns))
         .offset(time(Some(spec.offset_ns)))
         .overrun(spec.overrun)
+        .order(spec.order)
         .jobs(settings.length.jobs(spec));
     if let Some(jobs) = spec.in_flight {
         dag.in_flight(jobs);

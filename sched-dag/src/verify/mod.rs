@@ -13,6 +13,7 @@ mod cycles;
 mod fault;
 mod fault_text;
 mod findings;
+mod fixed_order;
 mod graph;
 mod interner;
 mod label;
@@ -73,13 +74,7 @@ pub fn verify(specs: &[DagSpec], options: &CommitOptions) -> Result<Verified, Re
     latest::check(specs, &mut topologies, &mut findings);
     let mut shapes = Vec::with_capacity(specs.len());
     for (dag, topology) in topologies.into_iter().enumerate() {
-        shapes.push(shape::check(
-            specs,
-            dag,
-            topology,
-            options.construction,
-            &mut findings,
-        ));
+        shapes.push(shape::check(specs, dag, topology, options, &mut findings));
     }
     let task_set = if findings.has_faults() {
         None

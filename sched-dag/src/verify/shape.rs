@@ -6,13 +6,15 @@ use alloc::vec::Vec;
 use super::cycles;
 use super::fault::Fault;
 use super::findings::Findings;
+use super::fixed_order;
 use super::graph::Graph;
 use super::label::{DagLabel, SubtaskLabel};
-use super::options::ConstructionPolicy;
+use super::options::{CommitOptions, ConstructionPolicy};
 use super::states;
 use super::topics::Topology;
 use super::warning::Warning;
 use crate::ids::{SubtaskId, to_u32};
+use crate::policy::Order;
 use crate::spec::DagSpec;
 use crate::task_set::StatePrecedence;
 
@@ -24,19 +26,14 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// Adds the precedence of shared states to the graph, of which `edges` are the edges.
-    fn add(&mut self, precedences: Vec<StatePrecedence>, mut edges: Vec<(u32, u32)>) {
-        if precedences.is_empty() {
+    /// Adds more edges to the graph, of which `edges` are the edges.
+    fn add(&mut self, edges: &mut Vec<(u32, u32)>, more: Vec<(u32, u32)>) {
+        if more.is_empty() {
             return;
         }
-        edges.extend(
-            precedences
-                .iter()
-                .map(|added| (added.earlier.0, added.later.0)),
-        );
-        self.graph = Graph::new(self.graph.len(), &edges);
+        edges.extend(more);
+        self.graph = Graph::new(self.graph.len(), edges);
         self.topological_order = self.graph.topological_order();
-        self.state_precedences = precedences;
     }
 }
 
@@ -45,7 +42,7 @@ pub(super) fn check(
     specs: &[DagSpec],
     dag: usize,
     mut topology: Topology<'_>,
-    policy: ConstructionPolicy,
+    options: &CommitOptions,
     findings: &mut Findings,
 ) -> Shape {
     let spec = &specs[dag];
@@ -54,7 +51,7 @@ pub(super) fn check(
     let check = Check {
         specs,
         dag,
-        policy,
+        policy: options.construction,
         graph: &graph,
     };
     check.connection(findings);
@@ -80,8 +77,15 @@ pub(super) fn check(
     };
     // Last, so that all other checks judge the graph that the author stated.
     if shape.topological_order.len() == shape.graph.len() {
-        let precedences = states::order_users(spec, &shape.graph);
-        shape.add(precedences, topology.edges);
+        let edges = &mut topology.edges;
+        shape.state_precedences = states::order_users(spec, &shape.graph);
+        let precedences = shape.state_precedences.iter();
+        let precedences = precedences.map(|added| (added.earlier.0, added.later.0));
+        shape.add(edges, precedences.collect());
+        if spec.order == Order::Fixed {
+            let fixed = fixed_order::edges(spec, &shape.graph, options.cores);
+            shape.add(edges, fixed);
+        }
     }
     shape
 }

@@ -14,7 +14,7 @@ mod witnesses;
 mod worked;
 
 use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer};
-use sched_dag::{DagId, Policy, Preemption, SubtaskId};
+use sched_dag::{DagId, Order, Policy, Preemption, SubtaskId};
 
 use random::{Random, Sample, sample};
 use simulate::{commit, responses, spec};
@@ -330,4 +330,31 @@ fn overheads_are_charged_to_every_subtask() {
         answer(&task_set, &with).bounds[0].unwrap().bound_ns,
         20 + 2 * 8
     );
+}
+
+#[test]
+fn a_fixed_order_is_taken_where_it_proves_more() {
+    let bound = |order: Order, wcets: &[u64]| {
+        let mut spec = spec(100, 100, wcets, &[], 0);
+        spec.order = order;
+        // Under EDF, so that no priorities within the DAG help.
+        let task_set = commit(&[spec], Policy::Edf, 2);
+        let added: usize = (0..)
+            .map(SubtaskId)
+            .take(wcets.len())
+            .map(|subtask| task_set.dags()[0].successors(subtask).len())
+            .sum();
+        (
+            answer(&task_set, &settings((Policy::Edf, Preemption::Enabled), 2)).bounds[0]
+                .unwrap()
+                .bound_ns,
+            added,
+        )
+    };
+    // Three of 2 after two of 3, on two cores: 3 + 2 + 2, in whatever order they are taken.
+    let wcets = [3, 3, 2, 2, 2];
+    assert_eq!(bound(Order::Free, &wcets), (8, 0));
+    assert_eq!(bound(Order::Fixed, &wcets), (7, 3));
+    // Here one job alone takes no longer anyway.
+    assert_eq!(bound(Order::Fixed, &[5, 5]), (5, 0));
 }

@@ -1,6 +1,6 @@
 //! Random task sets from a seed, without any other crate.
 
-use sched_dag::{DagSpec, Policy, Preemption, Priority};
+use sched_dag::{DagSpec, Order, Policy, Preemption, Priority};
 
 use crate::simulate::spec;
 
@@ -58,6 +58,9 @@ pub(crate) fn sample(random: &mut Random) -> Sample {
             };
             subtask.priority = u32::try_from(number).ok().map(Priority);
             subtask.non_preemptive = mixed && random.within(0, 1) == 0;
+        }
+        if random.within(0, 3) == 0 {
+            spec.order = Order::Fixed;
         }
         if random.within(0, 9) == 0 {
             spec.in_flight = u32::try_from(random.within(1, 2)).ok();

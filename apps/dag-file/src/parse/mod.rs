@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use replay::lines::{Line, Lines, Malformed, quoted};
 use replay::repeated;
 use replay::shown::is_seen;
-use sched_dag::{DagSpec, OverrunPolicy, Priority, SubtaskSpec};
+use sched_dag::{DagSpec, Order, OverrunPolicy, Priority, SubtaskSpec};
 
 use keys::Keys;
 
@@ -295,10 +295,22 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
                     }
                 }
             }
+            "order" => {
+                spec.order = match keys.value(key)? {
+                    "free" => Order::Free,
+                    "fixed" => Order::Fixed,
+                    other => {
+                        let other = quoted(other);
+                        return Err(
+                            line.malformed(format!("order: {other} is neither free nor fixed"))
+                        );
+                    }
+                }
+            }
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`period`, `deadline`, `offset`, `overrun`, `in-flight`",
+                    "`period`, `deadline`, `offset`, `overrun`, `order`, `in-flight`",
                 ));
             }
         }

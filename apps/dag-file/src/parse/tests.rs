@@ -9,7 +9,7 @@ fn refusal(text: &str) -> String {
 const GOOD: &str = "\
 # Two sets.
 set first
-dag camera period 25ms deadline 100ms offset 1ms overrun skip in-flight 4 # all keys
+dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4 # all keys
 subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms
 subtask show wcet 500us priority 6
 edge grab -> show
@@ -38,7 +38,7 @@ fn a_file_is_read_and_written_back() {
 
     let written = file.to_string();
     assert_eq!(parse(&written).unwrap().to_string(), written);
-    let kept = "dag camera period 25ms deadline 100ms offset 1ms overrun skip in-flight 4\n\
+    let kept = "dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4\n\
                 subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms\n";
     assert!(written.contains(kept), "{written}");
 }

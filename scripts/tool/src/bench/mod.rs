@@ -6,16 +6,19 @@
 //! virtual time have. The exit code is 0 if all limits hold, 1 if one does not, and 2
 //! for a refused command line.
 //!
+//! - [`bounds`]: random sets of DAGs that the analysis proves;
 //! - [`scheduler`]: the commit, and the cost of a dispatched instance;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
 //! - [`makespan`]: task graphs on the machine, next to their published optima;
 //! - [`native`]: the scheduler on this host's own processors.
 
+pub mod bounds;
 pub mod hand_off;
 pub mod join_latency;
 pub mod makespan;
 pub mod native;
+mod plots;
 pub mod scheduler;
 
 use std::ffi::OsString;
@@ -30,6 +33,11 @@ static BENCH: Menu = Menu {
     word: "WHAT",
     about: "Measures one part of the project.",
     choices: &[
+        Choice {
+            name: "bounds",
+            about: "random sets that the analysis proves, by load and cores",
+            work: bounds::run,
+        },
         Choice {
             name: "scheduler",
             about: "the commit of a large DAG, and the cost of a dispatched instance",

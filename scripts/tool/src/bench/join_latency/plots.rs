@@ -1,11 +1,9 @@
 //! Pictures: drawn by a Python script, if there is what it needs.
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
-use crate::system;
+use crate::bench::plots;
 
 /// The pictures in the order of the report: file, title, what to see in it.
 pub(super) const PICTURES: [(&str, &str, &str); 5] = [
@@ -55,33 +53,7 @@ pub(super) fn draw(out: &Path) -> Result<(), String> {
         // Those of earlier figures would be wrong; mostly there are none.
         let _ = fs::remove_file(out.join("plots").join(file));
     }
-    let python = |program: &str, words: &[&OsStr]| {
-        let mut command = Command::new(program);
-        command.args(words).stdin(Stdio::null()).output()
-    };
-    // A Python of the person's own may hide the system's, which the package
-    // manager installs matplotlib for.
-    let mut programs = ["python3", "/usr/bin/python3"].into_iter();
-    let has_matplotlib = |program: &&str| {
-        let output = python(program, &["-c".as_ref(), "import matplotlib".as_ref()]);
-        output.is_ok_and(|output| output.status.success())
-    };
-    let Some(program) = programs.find(has_matplotlib) else {
-        return Err(
-            "no plots: python3 with matplotlib is missing; install it (Debian, Ubuntu: \
-                    apt-get install python3-matplotlib; else: pip install matplotlib) and run \
-                    this again, nothing is measured twice"
-                .into(),
-        );
-    };
-    let script = system::workspace().join("scripts/plot/join_latency.py");
-    let output = python(program, &[script.as_os_str(), out.as_os_str()]);
-    let output = output.map_err(|error| format!("no plots: cannot start {program}: {error}"))?;
-    if output.status.success() {
-        return Ok(());
-    }
-    let said = String::from_utf8_lossy(&output.stderr);
-    Err(format!("no plots: {}: {}", script.display(), said.trim()))
+    plots::draw("join_latency.py", out)
 }
 
 /// Returns a picture as the address of its own contents, if it was drawn.

@@ -1,0 +1,89 @@
+//! How many random sets of DAGs are proven, by the load that they are.
+//!
+//! For each number of cores and each load, from a tenth of the cores to all of them, the
+//! same random sets are analysed twice: by the commit's answer, and by the forms that it
+//! had before the multi-path bound (those of the oracle, with the width refinement, and the
+//! utilisation tests, which both have). Nothing is measured in time, so the table is the
+//! same on every host.
+//!
+//! - [`draw`]: the random sets;
+//! - [`curves`]: what is proven of them;
+//! - [`stg`]: bounds of published task graphs alone, also with a fixed order.
+
+mod curves;
+mod draw;
+mod stg;
+
+use std::ffi::OsString;
+use std::fs;
+use std::process::ExitCode;
+
+use super::plots;
+use crate::files;
+use crate::options::{Command, Opt, Takes};
+use curves::{Point, measure};
+
+static TABLE: Command = Command {
+    invocation: "./scripts/bench bounds",
+    about: "Counts the random sets of DAGs that the analysis proves, with the multi-path bound \
+            and by the forms before it.",
+    positional: None,
+    options: &[
+        Opt::new("cores", Takes::numbers(1..=64), "The numbers of cores.").or("4,8,16"),
+        Opt::new(
+            "sets",
+            Takes::number(1..=1_000_000),
+            "Random sets for each number of cores and load.",
+        )
+        .or("200"),
+        Opt::new("seed", Takes::number(0..=u64::MAX), "Seed of the sets.").or("1"),
+        Opt::new(
+            "out",
+            Takes::File("DIR"),
+            "Write the table as DIR/bounds.csv, too, and draw DIR/plots/bounds.svg.",
+        ),
+    ],
+    notes: "\
+A set has 2 to 2 m DAGs of 5 to 20 subtasks with D = T and deadline-monotonic priorities;
+its load is the sum of volume / T over the cores.
+
+Exit code: 0 counted; 1 a set was proven before and is not now, or nothing can be written;
+2 the command line is refused.
+",
+};
+
+/// Runs `bench bounds` with the words after its name.
+pub(super) fn run(words: &[OsString]) -> ExitCode {
+    let options = match TABLE.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    if let Err(line) = options.check_distinct(&["cores"]) {
+        return TABLE.refuse(&line);
+    }
+    let cores = options.text("cores").unwrap_or_default().split(',');
+    let cores = cores.filter_map(|number| number.parse().ok());
+    let sets = options.number("sets").unwrap_or(200);
+    let seed = options.number("seed").unwrap_or(1);
+    let points: Vec<Point> = cores.flat_map(|cores| measure(cores, sets, seed)).collect();
+    print!("{}", curves::table(&points));
+    match stg::measure() {
+        Ok(means) => print!("{}", stg::table(&means)),
+        Err(line) => return TABLE.fail(&line),
+    }
+    if let Some(out) = options.path("out") {
+        let file = out.join("bounds.csv");
+        let written = fs::create_dir_all(out).and_then(|()| fs::write(&file, curves::csv(&points)));
+        if let Err(error) = written {
+            return TABLE.fail(&format!("`--out {}`: {error}", files::place(out)));
+        }
+        match plots::draw("bounds.py", out) {
+            Ok(()) => println!("{}", out.join("plots/bounds.svg").display()),
+            Err(line) => println!("{line}"),
+        }
+    }
+    match points.iter().map(|point| point.lost).sum() {
+        0 => ExitCode::SUCCESS,
+        lost => TABLE.fail(&format!("{lost} sets were proven before and are not now")),
+    }
+}
