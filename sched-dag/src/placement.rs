@@ -92,11 +92,17 @@ impl<Body, Parked> Placement<Body, Parked> {
     #[inline]
     pub fn finish(&mut self, core: usize, vertex: Vertex, body: Body) {
         self.seats[core].current = NOTHING;
+        self.put(vertex, body);
+        self.forget_target(core, vertex);
+    }
+
+    /// Puts the body of an instance that has run to rest.
+    #[inline]
+    fn put(&mut self, vertex: Vertex, body: Body) {
         let running = core::mem::replace(self.place(vertex), Place::Resting(body));
         debug_assert!(matches!(running, Place::Running));
         // It holds nothing, which the compiler need not find out each time.
         core::mem::forget(running);
-        self.forget_target(core, vertex);
     }
 
     /// Notes that core `core`'s current instance was ended, and returns its
@@ -211,6 +217,28 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
+    /// Notes that a core has finished its current instance, which was its target, and
+    /// should have one of subtask `next`; gives it that to start. `None` if that is
+    /// suspended: then the core has nothing yet.
+    #[inline]
+    pub fn exchange(
+        &mut self,
+        core: CoreId,
+        finished: Vertex,
+        body: Body,
+        next: Vertex,
+    ) -> Option<Body> {
+        self.put(finished, body);
+        let started = self.start(core, next);
+        if started.is_none() {
+            self.seats[core.index()] = Seat {
+                current: NOTHING,
+                target: next,
+            };
+        }
+        started
+    }
+
     /// Returns the vertex of core `core`'s current instance.
     pub fn current(&self, core: usize) -> Option<Vertex> {
         some(self.seats[core].current)
@@ -286,6 +314,26 @@ mod tests {
         cores.finish(1, X, 'x');
         assert_eq!(cores.next(1), Next::Nothing);
         assert_eq!(cores.current(0), Some(Y));
+    }
+
+    #[test]
+    fn a_core_exchanges_what_it_has_finished_for_what_it_should_have() {
+        let mut cores = Cores::new(['x', 'y'].into_iter(), 2);
+        cores.decide(0, Some(X));
+        assert_eq!(cores.next(0), Next::Start(X, 'x'));
+        assert_eq!(cores.exchange(CoreId(0), X, 'x', Y), Some('y'));
+        assert_eq!(
+            (cores.current(0), cores.resting(X)),
+            (Some(Y), Some(&mut 'x'))
+        );
+        // The next job's instance of the same subtask.
+        assert_eq!(cores.exchange(CoreId(0), Y, 'y', Y), Some('y'));
+        let mut cores = about_to_preempt();
+        suspend(&mut cores, "context of x");
+        assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+        assert_eq!(cores.exchange(CoreId(0), Y, 'y', X), None);
+        assert!(cores.current(0).is_none() && cores.is_wanted(0));
+        assert_eq!(cores.next(0), Next::Continue("context of x"));
     }
 
     #[test]

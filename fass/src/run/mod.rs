@@ -8,7 +8,6 @@
 #[allow(unsafe_code, reason = "the one cell type of the job slots")]
 pub(crate) mod cell;
 pub(crate) mod effect;
-pub(crate) mod gate;
 pub(crate) mod latest;
 pub(crate) mod message;
 pub(crate) mod plan;

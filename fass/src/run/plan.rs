@@ -6,14 +6,9 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::convert::Infallible;
-use core::pin::Pin;
-use core::task::{Context, Poll, Waker};
-
 use sched_dag::{DagId, TaskSet};
 
 use super::effect::Effect;
-use super::gate::Gate;
 use super::staleness::Staleness;
 
 /// A committed set of DAGs, ready to be scheduled.
@@ -69,23 +64,30 @@ pub struct Plan {
 /// # is_send::<Body>();
 /// ```
 pub struct Body {
-    future: Box<dyn SubtaskFuture>,
-    gate: Gate,
+    subtask: Box<dyn Subtask>,
+    /// The job that it runs, or has panicked in; [`NO_JOB`] else.
+    job: u64,
     /// What its completions do beyond the DAG.
     effects: Vec<Box<dyn Effect>>,
 }
 
-/// The future of a subtask, which never ends.
-pub(crate) trait SubtaskFuture: Future<Output = Infallible> + Send + Unpin {
+/// Stands where a job's number does, for none: no run gets so far.
+const NO_JOB: u64 = u64::MAX;
+
+/// A subtask, as its body drives it.
+pub(crate) trait Subtask: Send {
+    /// Grants a job, and takes that turn to its end.
+    fn take_turn(&mut self, job: u64);
+
     /// Gives up what has arrived for a job that the subtask will not run.
     fn discard(&mut self, job: u64);
 }
 
 impl Body {
-    pub(crate) fn new(future: Box<dyn SubtaskFuture>, gate: Gate) -> Self {
+    pub(crate) fn new(subtask: Box<dyn Subtask>) -> Self {
         Self {
-            future,
-            gate,
+            subtask,
+            job: NO_JOB,
             effects: Vec::new(),
         }
     }
@@ -119,17 +121,13 @@ impl Body {
     /// ```
     pub fn run(&mut self, job: u64) {
         assert!(
-            self.gate.is_closed(),
+            self.job == NO_JOB,
             "the subtask panicked in job {} and cannot continue",
-            self.gate.job()
+            self.job
         );
-        self.gate.open(job);
-        let mut context = Context::from_waker(Waker::noop());
-        match Pin::new(&mut *self.future).poll(&mut context) {
-            // The future waits at the gate only, so it is back there.
-            Poll::Pending => debug_assert!(self.gate.is_closed()),
-            Poll::Ready(never) => match never {},
-        }
+        self.job = job;
+        self.subtask.take_turn(job);
+        self.job = NO_JOB;
     }
 
     /// Publishes the effects that the last [`run`](Self::run) prepared outside the DAG:
@@ -184,14 +182,14 @@ impl Body {
     /// }
     /// ```
     pub fn discard(&mut self, job: u64) {
-        self.future.discard(job);
+        self.subtask.discard(job);
     }
 }
 
 impl core::fmt::Debug for Body {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Body")
-            .field("last_job", &self.gate.job())
+            .field("effects", &self.effects.len())
             .finish_non_exhaustive()
     }
 }

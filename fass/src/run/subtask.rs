@@ -13,10 +13,9 @@
 use alloc::boxed::Box;
 use core::convert::Infallible;
 use core::pin::{Pin, pin};
-use core::task::{Context, Poll, ready};
+use core::task::{Context, Poll, Waker, ready};
 
-use super::gate::Gate;
-use super::plan::{Body, SubtaskFuture};
+use super::plan::{Body, Subtask};
 use super::topic::Wiring;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
@@ -31,11 +30,7 @@ where
     Args: VecToSubs,
     Ret: VecToPubs,
 {
-    Box::new(move |wiring, subtask| {
-        let gate = Gate::new();
-        let future = create_subtask(f, wiring, subtask, &gate);
-        Body::new(Box::new(future), gate)
-    })
+    Box::new(move |wiring, subtask| Body::new(Box::new(create_subtask(f, wiring, subtask))))
 }
 
 /// Makes the future of one subtask. Its ends of the topics exist on return.
@@ -43,7 +38,6 @@ fn create_subtask<F, Args, Ret>(
     f: F,
     wiring: &mut Wiring,
     subtask: usize,
-    gate: &Gate,
 ) -> Turns<F, Args::Subs, Ret::Pubs>
 where
     F: FnMut(Args) -> Ret + Send + 'static,
@@ -52,8 +46,8 @@ where
 {
     Turns {
         f,
-        subs: <Args as VecToSubs>::gen_subs(wiring.ports(subtask, gate)),
-        pubs: <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask, gate)),
+        subs: <Args as VecToSubs>::gen_subs(wiring.ports(subtask)),
+        pubs: <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask)),
     }
 }
 
@@ -75,6 +69,7 @@ where
 {
     type Output = Infallible;
 
+    #[inline(always)]
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Infallible> {
         let Self { f, subs, pubs } = self.get_mut();
         let args = ready!(pin!(subs.recv_all()).poll(context));
@@ -86,11 +81,20 @@ where
     }
 }
 
-impl<F, Subs: MulRecv, Pubs: MulSend> SubtaskFuture for Turns<F, Subs, Pubs>
+impl<F, Subs: MulRecv, Pubs: MulSend> Subtask for Turns<F, Subs, Pubs>
 where
     F: FnMut(Subs::Items) -> Pubs::Items,
     Self: Send,
 {
+    fn take_turn(&mut self, job: u64) {
+        self.subs.grant(job);
+        self.pubs.grant(job);
+        match Pin::new(self).poll(&mut Context::from_waker(Waker::noop())) {
+            Poll::Pending => {}
+            Poll::Ready(never) => match never {},
+        }
+    }
+
     fn discard(&mut self, job: u64) {
         self.subs.discard_all(job);
     }

@@ -21,7 +21,6 @@ use core::any::Any;
 use sched_dag::DagSpec;
 
 use super::cell::{Reader, Writer, ring};
-use super::gate::Gate;
 use super::latest::{AnyLatest, Stage};
 use super::message::Message;
 
@@ -226,10 +225,9 @@ impl Wiring {
     }
 
     /// Returns the ends of subtask number `subtask`, to be taken port by port.
-    pub(crate) fn ports<'w>(&'w mut self, subtask: usize, gate: &Gate) -> Ports<'w> {
+    pub(crate) fn ports<'w>(&'w mut self, subtask: usize) -> Ports<'w> {
         Ports {
             wiring: self,
-            gate: gate.clone(),
             subtask,
             next: 0,
         }
@@ -279,16 +277,11 @@ impl Wiring {
 /// ```
 pub struct Ports<'w> {
     wiring: &'w mut Wiring,
-    gate: Gate,
     subtask: usize,
     next: usize,
 }
 
 impl Ports<'_> {
-    pub(crate) fn gate(&self) -> Gate {
-        self.gate.clone()
-    }
-
     /// Takes the end of the next input port.
     pub(crate) fn subscriber<T: Message>(&mut self) -> Subscriber<T> {
         let edge = self.wiring.edges_of_inputs[self.subtask][self.next];

@@ -23,7 +23,6 @@ use core::future::ready;
 use core::pin::Pin;
 use core::task::{Context, Poll};
 
-use super::gate::Gate;
 use super::message::{Message, MessageType};
 use super::topic::{Ports, Publisher, Subscriber};
 
@@ -60,6 +59,15 @@ pub trait MulRecv {
     /// }
     /// ```
     fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send;
+
+    /// Grants an instance: the next `recv_all` returns the inputs of `job`, once.
+    ///
+    /// ```
+    /// fn granted<Subs: fass::MulRecv>(subs: &mut Subs, job: u64) {
+    ///     subs.grant(job);
+    /// }
+    /// ```
+    fn grant(&mut self, job: u64);
 
     /// Gives up the inputs of `job` that have arrived, which no instance will take.
     /// Runs no code of the app and waits for nothing.
@@ -105,6 +113,15 @@ pub trait MulSend {
     /// }
     /// ```
     fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send;
+
+    /// Grants an instance: the next `send_all` is of `job`.
+    ///
+    /// ```
+    /// fn granted<Pubs: fass::MulSend>(pubs: &mut Pubs, job: u64) {
+    ///     pubs.grant(job);
+    /// }
+    /// ```
+    fn grant(&mut self, job: u64);
 }
 
 /// An argument tuple, from which a subtask's subscribers are generated.
@@ -218,22 +235,27 @@ pub trait VecToPubs: Sized + Send + 'static {
 /// receives::<fass::Subscribers<(fass::Subscriber<i32>,)>>();
 /// ```
 pub struct Subscribers<Ends> {
-    gate: Gate,
+    /// The job that is granted and not yet begun: the *gate* is open for it.
+    granted: Option<u64>,
     ends: Ends,
 }
 
-/// The publishers of a subtask: a tuple of [`Publisher`]s behind the gate.
+/// The publishers of a subtask: a tuple of [`Publisher`]s.
 ///
 /// ```
 /// fn sends<P: fass::MulSend<Items = (i32,)>>() {}
 /// sends::<fass::Publishers<(fass::Publisher<i32>,)>>();
 /// ```
 pub struct Publishers<Ends> {
-    gate: Gate,
+    /// The job that was granted last.
+    job: u64,
     ends: Ends,
 }
 
-/// The future that waits at the gate. It is `core::future::PollFn` but for being
+/// The future that waits at the gate: the one place where a subtask's future ever waits.
+/// Values that arrive open nothing; only a grant does. So an instance cannot begin before
+/// the platform says that its predecessors are complete (R2), and once begun it reaches its
+/// end in the same poll (R3). It is `core::future::PollFn` but for being
 /// compiled into its caller, also where that is compiled for size.
 struct AtTheGate<F>(F);
 
@@ -263,11 +285,16 @@ macro_rules! implement_arity {
                 fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send {
                     AtTheGate(move || {
                         let ($($end,)*) = &mut self.ends;
-                        match self.gate.pass() {
+                        match self.granted.take() {
                             Some(job) => Poll::Ready(($($end.recv(job),)*)),
                             None => Poll::Pending,
                         }
                     })
+                }
+
+                #[inline]
+                fn grant(&mut self, job: u64) {
+                    self.granted = Some(job);
                 }
 
                 fn discard_all(&mut self, job: u64) {
@@ -281,12 +308,16 @@ macro_rules! implement_arity {
 
                 #[inline]
                 fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send {
-                    let job = self.gate.job();
+                    let job = self.job;
                     let ($($item,)*) = items;
                     let ($($end,)*) = &mut self.ends;
                     $($end.send(job, $item);)*
-                    self.gate.close();
                     ready(())
+                }
+
+                #[inline]
+                fn grant(&mut self, job: u64) {
+                    self.job = job;
                 }
             }
 
@@ -299,7 +330,7 @@ macro_rules! implement_arity {
 
                 fn gen_subs(mut ports: Ports<'_>) -> Self::Subs {
                     Subscribers {
-                        gate: ports.gate(),
+                        granted: None,
                         ends: ($(ports.subscriber::<$Item>(),)*),
                     }
                 }
@@ -314,7 +345,7 @@ macro_rules! implement_arity {
 
                 fn gen_pubs(mut ports: Ports<'_>) -> Self::Pubs {
                     Publishers {
-                        gate: ports.gate(),
+                        job: 0,
                         ends: ($(ports.publisher::<$Item>(),)*),
                     }
                 }

@@ -252,18 +252,18 @@ impl Parked {
     /// Has the context begin anew with `entry`, on an empty stack, when it next runs.
     /// All that it did before is forgotten.
     pub(crate) fn restart(&mut self, entry: extern "C" fn() -> !) {
-        let registers = Registers {
-            rip: entry as *const () as u64,
-            cs: u64::from(super::descriptors::CODE),
-            rflags: Registers::INTERRUPTS_ENABLED,
-            // As after a call: a function expects the stack to be 8 off.
-            rsp: self.0.stack_top - 8,
-            ..Registers::default()
-        };
         self.0.set_budget_end(u64::MAX);
         // SAFETY: `&mut self` is the one holder of a context that does not run
         // (context invariant).
-        unsafe { self.0.registers().write(registers) };
+        let registers = unsafe { &mut *self.0.registers() };
+        // What a function finds in the others means nothing to it.
+        registers.rbp = 0;
+        registers.rip = entry as *const () as u64;
+        registers.cs = u64::from(super::descriptors::CODE);
+        registers.rflags = Registers::INTERRUPTS_ENABLED;
+        // As after a call: a function expects the stack to be 8 off.
+        registers.rsp = self.0.stack_top - 8;
+        registers.ss = 0;
     }
 
     /// Notes that the context is suspended from `now_ns` on.

@@ -79,21 +79,34 @@ impl Journal {
     /// Writes down that something has happened.
     #[inline]
     pub fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
-        self.push(Event::words(time_ns, what, core, subject));
+        self.write_all(core, [(what, time_ns, subject)]);
     }
 
+    /// Writes down several things that have happened on one core: room for all is looked
+    /// at once.
     #[inline]
-    fn push(&mut self, words: [u64; 3]) {
-        if self.events.len() == self.events.capacity() {
-            self.replace_oldest(words);
+    pub fn write_all<const N: usize>(&mut self, core: CoreId, happened: [(What, u64, Subject); N]) {
+        let words =
+            happened.map(|(what, time_ns, subject)| Event::words(time_ns, what, core, subject));
+        if self.events.capacity() - self.events.len() >= N {
+            self.events.extend(words);
         } else {
-            self.events.push(words);
+            // By values, so that the words need not lie in memory for the other case.
+            for [time_ns, job, rest] in words {
+                self.replace_oldest(time_ns, job, rest);
+            }
         }
     }
 
+    /// Writes an event in place of the oldest one, if no room is left.
     #[cold]
     #[inline(never)]
-    fn replace_oldest(&mut self, words: [u64; 3]) {
+    fn replace_oldest(&mut self, time_ns: u64, job: u64, rest: u64) {
+        let words = [time_ns, job, rest];
+        if self.events.len() < self.events.capacity() {
+            self.events.push(words);
+            return;
+        }
         self.lost += 1;
         let Some(oldest) = self.events.get_mut(self.oldest) else {
             self.is_complete = false;

@@ -46,6 +46,18 @@ fn small() -> Journal {
 }
 
 #[test]
+fn what_is_written_together_is_kept_one_by_one_where_room_ends() {
+    let mut journal = Journal::new(&task_set(Some(JOBS)), 4 * 24 * 4, u64::MAX);
+    let subject = Subject::of_job(DagId(0), 0);
+    let at = |time_ns| (What::Released, time_ns, subject);
+    for time_ns in [0, 3, 6] {
+        journal.write_all(CoreId(0), [0, 1, 2].map(|more| at(time_ns + more)));
+    }
+    let times: Vec<u64> = journal.events().map(|event| event.time_ns).collect();
+    assert_eq!((times, journal.lost()), (vec![5, 6, 7, 8], 5));
+}
+
+#[test]
 fn keeps_the_latest_events_and_counts_the_lost_ones() {
     let journal = small();
     assert_eq!(

@@ -20,7 +20,8 @@
 //! idle last is taken first. Virtual time goes either way, the short one where
 //! exactly one instance finishes; so its tests compare both with one reference.
 
-use super::vertices::Phase;
+use super::instances::line_up;
+use super::vertices::{Phase, Vertices};
 use super::{Decision, OWED, Observer, Scheduler};
 use crate::ids::{CoreId, Vertex};
 
@@ -54,14 +55,30 @@ impl Scheduler {
         vertex: Vertex,
         observer: &mut impl Observer,
     ) -> HandOff {
-        if !self.ends_shortly(now_ns, core, vertex, observer) {
-            return HandOff::Open;
-        }
-        let Some(key) = self.ready.pop() else {
+        let (done, is_untold) = self.pass_on(now_ns, core, vertex, observer);
+        tell(done, is_untold, observer)
+    }
+
+    /// Does the same, except that the observer is *not* told that an instance has become
+    /// ready if that is the only one and the core begins it: for drivers to which that and
+    /// the start are one moment. Reports whether that is so.
+    ///
+    /// # Panics
+    ///
+    /// As [`hand_off`](Self::hand_off).
+    #[inline(always)]
+    pub fn pass_on(
+        &mut self,
+        now_ns: u64,
+        core: CoreId,
+        vertex: Vertex,
+        observer: &mut impl Observer,
+    ) -> (HandOff, bool) {
+        let done = self.end_shortly(now_ns, core, vertex, core, observer);
+        if let HandOff::Idle = done.0 {
             self.cores.free(core);
-            return HandOff::Idle;
-        };
-        HandOff::To(Vertex(key.vertex()), self.give(core, key))
+        }
+        done
     }
 
     /// Does the same on behalf of another core: the instance has finished on
@@ -83,16 +100,16 @@ impl Scheduler {
         idle: CoreId,
         observer: &mut impl Observer,
     ) -> HandOff {
-        if !self.ends_shortly(now_ns, core, vertex, observer) {
-            return HandOff::Open;
+        let (done, is_untold) = self.end_shortly(now_ns, core, vertex, idle, observer);
+        if let HandOff::Open = done {
+            return done;
         }
         self.cores.take_this(idle);
         self.cores.free(core);
-        let Some(key) = self.ready.pop() else {
+        if let HandOff::Idle = done {
             self.cores.free(idle);
-            return HandOff::Idle;
-        };
-        HandOff::To(Vertex(key.vertex()), self.give(idle, key))
+        }
+        tell(done, is_untold, observer)
     }
 
     /// Fetches into this processor's cache what the completion of the instance on
@@ -108,38 +125,103 @@ impl Scheduler {
         }
     }
 
-    /// Ends an instance, and reports whether one core is all there is to it: then
-    /// that core is neither idle nor has it anything else to do yet. Otherwise it is
-    /// idle.
+    /// Ends the instance on `core`, and gives `taker` the first in line if one core is
+    /// all there is to it: then `core` is not idle yet, and `taker` not taken from the
+    /// idle ones. If more is to be decided, `core` is idle. Reports whether the observer
+    /// has still to be told that the instance given is ready.
     #[inline(always)]
-    fn ends_shortly(
+    fn end_shortly(
         &mut self,
         now_ns: u64,
         core: CoreId,
         vertex: Vertex,
+        taker: CoreId,
         observer: &mut impl Observer,
-    ) -> bool {
+    ) -> (HandOff, bool) {
         self.now_ns = self.now_ns.max(now_ns);
+        let ending = self.vertices.get(vertex.0);
         // Otherwise a dispatch is owed from before, or the instance was to move.
-        let is_short = self.fresh == 0 && self.vertices.get(vertex.0).phase == Phase::Running(core);
-        if !is_short {
+        if self.fresh != 0 || ending.phase != Phase::Running(core) {
             self.finish(self.instance_of(vertex), observer);
-            return false;
+            return (HandOff::Open, false);
         }
-        self.end(vertex.0, observer);
-        if !self.concerns_one_core() {
+        let is_quiet = self.now_ns < self.quiet_until_ns;
+        if ending.only_passes_on && is_quiet {
+            let (fresh, next) = self.vertices.pass_on(vertex.0);
+            match fresh {
+                0 => return (self.give_first(taker), false),
+                1 => return self.pass(next, taker, observer),
+                _ => self.line_up_successors(vertex.0, observer),
+            }
+        } else {
+            self.end(vertex.0, observer);
+        }
+        let concerns_others = self.fresh > 1 && self.cores.count() > 1;
+        if concerns_others || self.now_ns >= self.quiet_until_ns {
             self.cores.free(core);
             self.fresh |= OWED;
-            return false;
+            return (HandOff::Open, false);
         }
         self.fresh = 0;
-        true
+        (self.give_first(taker), false)
     }
 
-    /// Reports whether the instant can end with a hand-off.
-    #[inline]
-    fn concerns_one_core(&self) -> bool {
-        let concerns_others = self.fresh > 1 && self.cores.count() > 1;
-        !concerns_others && self.now_ns < self.quiet_until_ns
+    /// Gives a core the one instance that has just become ready, without putting it in
+    /// line, unless that has a more urgent one.
+    #[inline(always)]
+    fn pass(
+        &mut self,
+        number: u32,
+        taker: CoreId,
+        observer: &mut impl Observer,
+    ) -> (HandOff, bool) {
+        let next = self.vertices.get_mut(number);
+        let instance = next.present_instance();
+        let key = (self.ready).key(number, next, || {
+            self.dags[next.dag.index()].jobs.job(next.progress)
+        });
+        if !self.ready.is_empty() {
+            next.phase = Phase::Ready;
+            self.ready.insert(key);
+            observer.ready(instance);
+            return (self.give_first(taker), false);
+        }
+        next.phase = Phase::Running(taker);
+        self.cores.run(taker, key, next.is_preemptible);
+        let core = taker;
+        let decision = Decision::Start { core, instance };
+        (HandOff::To(Vertex(number), decision), true)
     }
+
+    /// Puts all successors of a vertex in line that its end has made ready.
+    #[inline(never)]
+    fn line_up_successors(&mut self, vertex: u32, observer: &mut impl Observer) {
+        for place in Vertices::successors(self.vertices.get(vertex)) {
+            if let Some((number, next)) = self.vertices.ready_successor(place) {
+                let job = self.dags[next.dag.index()].jobs.job(next.progress);
+                line_up(number, next, job, &mut self.ready, observer);
+                self.fresh += 1;
+            }
+        }
+    }
+
+    /// Gives a core the first in line.
+    #[inline]
+    fn give_first(&mut self, taker: CoreId) -> HandOff {
+        match self.ready.pop() {
+            Some(key) => HandOff::To(Vertex(key.vertex()), self.give(taker, key)),
+            None => HandOff::Idle,
+        }
+    }
+}
+
+/// Tells the observer what it has not been told.
+#[inline]
+fn tell(done: HandOff, is_untold: bool, observer: &mut impl Observer) -> HandOff {
+    if let HandOff::To(_, decision) = done
+        && is_untold
+    {
+        observer.ready(decision.instance());
+    }
+    done
 }

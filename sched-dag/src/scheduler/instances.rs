@@ -35,7 +35,7 @@ impl Scheduler {
                 self.fresh |= OWED;
             }
             Phase::Preempted if in_flight => {
-                let key = self.ready.key(number, vertex, jobs.job(vertex.progress));
+                let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
                 self.ready.remove(key);
             }
             _ => panic!("{instance} {event} and has not started; complete each once, or fail it"),
@@ -78,10 +78,11 @@ impl Scheduler {
         for &subtask in self.task_set.dag(dag).topological_order() {
             let number = self.task_set.first_vertex(dag) + subtask.0;
             let vertex = self.vertices.get_mut(number);
+            vertex.only_passes_on = false;
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == Phase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
-                self.ready.remove(self.ready.key(number, vertex, job));
+                self.ready.remove(self.ready.key(number, vertex, || job));
                 observer.cancelled(vertex.instance(job));
                 vertex.phase = Phase::Absent;
                 self.ending.push(number);
@@ -129,9 +130,10 @@ impl Scheduler {
         let is_cut = jobs.is_cut(sequence);
         let overlaps = sequence + 1 < jobs.next;
         let job = jobs.job_mut(sequence);
-        job.unfinished -= 1;
+        let successors = Vertices::successors(&ended);
+        job.unfinished -= u32::from(successors.is_empty());
         let is_last = job.unfinished == 0;
-        for place in Vertices::successors(&ended) {
+        for place in successors {
             let next = vertices.successor(place);
             if let Some(successor) = vertices.arrive(next, sequence) {
                 if is_cut {
@@ -174,6 +176,11 @@ impl Scheduler {
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);
         let outcome = if state.jobs.is_aborted(sequence) {
+            if !state.jobs.is_ended() {
+                let first = self.task_set.first_vertex(dag) as usize;
+                let subtasks = self.task_set.dag(dag).subtasks().len();
+                self.vertices.allow_passing_on(first..first + subtasks);
+            }
             JobOutcome::Aborted
         } else if state.jobs.is_ended() {
             JobOutcome::DagEnded
@@ -216,7 +223,7 @@ impl Scheduler {
 
 /// Puts the next instance of a vertex, which is ready, in line.
 #[inline(always)]
-fn line_up(
+pub(super) fn line_up(
     number: u32,
     vertex: &mut Vertex,
     job: &Job,
@@ -225,6 +232,6 @@ fn line_up(
 ) {
     vertex.phase = Phase::Ready;
     vertex.job = job.number;
-    ready.insert(ready.key(number, vertex, job));
+    ready.insert(ready.key(number, vertex, || job));
     observer.ready(vertex.instance(job));
 }

@@ -32,6 +32,8 @@ pub(super) struct Jobs {
     in_flight: Box<[Job]>,
     /// The most jobs in flight, J.
     limit: u64,
+    /// How many subtasks have no successors.
+    ends: u32,
     /// The sequence number of the oldest job in flight.
     pub(super) oldest: u64,
     /// The sequence number of the next job to be released.
@@ -65,7 +67,8 @@ pub(super) struct Job {
     pub(super) release_ns: u64,
     /// Its absolute deadline.
     pub(super) deadline_ns: u64,
-    /// The instances that have not ended.
+    /// The instances without successors that have not ended. Each other one ends before
+    /// some of these.
     pub(super) unfinished: u32,
     /// Its slot, counted over all DAGs.
     pub(super) slot: u32,
@@ -80,9 +83,12 @@ impl Jobs {
             slot,
             ..Job::default()
         });
+        let subtasks = dag.topological_order().iter();
+        let ends = subtasks.filter(|&&subtask| dag.successors(subtask).is_empty());
         Self {
             in_flight: slots.collect(),
             limit: u64::from(dag.in_flight()),
+            ends: to_u32(ends.count()),
             oldest: 0,
             next: 0,
             judged: 0,
@@ -195,12 +201,13 @@ impl Jobs {
         self.first_waiting += 1;
         self.next += 1;
         let missed = number < self.judged_waiting;
+        let unfinished = self.ends;
         let job = self.job_mut(sequence);
         *job = Job {
             number,
             release_ns,
             deadline_ns: release_ns + dag.relative_deadline_ns(),
-            unfinished: to_u32(dag.subtasks().len()),
+            unfinished,
             slot: job.slot,
             missed,
         };

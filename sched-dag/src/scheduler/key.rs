@@ -43,12 +43,21 @@ impl Key {
 
     /// Makes the key of a vertex's next instance, which is of `job`.
     #[inline]
-    pub(super) fn new(order: Order, number: u32, vertex: &Vertex, job: &Job) -> Self {
-        match order {
-            Order::Rank => Self::of_rank(vertex.rank, number),
-            Order::Job => Self::by_job(number, vertex),
-            Order::Deadline => Self::of_parts(job.deadline_ns, job.slot, number),
+    pub(super) fn new<'j>(
+        order: Order,
+        number: u32,
+        vertex: &Vertex,
+        job: impl FnOnce() -> &'j Job,
+    ) -> Self {
+        // The usual one is told apart by one comparison.
+        if order == Order::Rank {
+            return Self::of_rank(vertex.rank, number);
         }
+        if order == Order::Job {
+            return Self::by_job(number, vertex);
+        }
+        let job = job();
+        Self::of_parts(job.deadline_ns, job.slot, number)
     }
 
     /// Makes the key of a vertex under the order `Rank`.

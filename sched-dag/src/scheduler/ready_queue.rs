@@ -91,10 +91,21 @@ impl ReadyQueue {
         }
     }
 
-    /// Returns the key of a vertex's next instance, which is of `job`.
+    /// Returns the key of a vertex's next instance, which is of the job that `job` finds.
     #[inline]
-    pub(super) fn key(&self, number: u32, vertex: &Vertex, job: &Job) -> Key {
+    pub(super) fn key<'j>(
+        &self,
+        number: u32,
+        vertex: &Vertex,
+        job: impl FnOnce() -> &'j Job,
+    ) -> Key {
         Key::new(self.order, number, vertex, job)
+    }
+
+    /// Reports whether none waits.
+    #[inline]
+    pub(super) const fn is_empty(&self) -> bool {
+        self.front.is_none() && self.others == 0
     }
 
     /// Returns the smallest key.
@@ -112,8 +123,7 @@ impl ReadyQueue {
     /// Puts an instance in line.
     #[inline]
     pub(super) fn insert(&mut self, key: Key) {
-        let is_empty = self.front.is_none() && self.others == 0;
-        if is_empty {
+        if self.is_empty() {
             self.front = key;
         } else {
             self.insert_among_others(key);

@@ -10,7 +10,8 @@
 //! *slot* is its sequence number modulo the number of slots of its DAG.
 //!
 //! Each vertex has a counter for each slot: the predecessors that have not
-//! finished yet, and for a source the release. Each has its *progress*: the
+//! finished yet, and for a source the release. The only one of a DAG of one slot is
+//! kept in the vertex itself. Each has its *progress*: the
 //! sequence number of the job that it has to do next. An instance (s, v) is
 //! ready when its counter is 0 and v's progress is s. Whichever of both comes
 //! last makes it ready, exactly once.
@@ -58,9 +59,14 @@ pub(super) struct Vertex {
     pub(super) subtask: SubtaskId,
     /// Whether a started instance may lose its core.
     pub(super) is_preemptible: bool,
+    /// Whether the end of its instance is told to its successors and to nobody else:
+    /// it has some, its job is the only one in flight, and is not cut.
+    pub(super) only_passes_on: bool,
     /// What a counter begins with.
     initial: u32,
-    /// Where its counters begin, and the mask of the slots.
+    /// Its counter, if it has one slot.
+    counter: u32,
+    /// Where its counters begin if it has several, and the mask of the slots.
     counters: u32,
     slot_mask: u32,
     /// Where its successors begin and end.
@@ -73,7 +79,7 @@ pub(super) struct Vertices {
     vertices: Box<[Vertex]>,
     /// The successors of all vertices, those of one together.
     successors: Box<[u32]>,
-    /// The counters of all vertices, those of one together.
+    /// The counters of all vertices of several slots, those of one together.
     counters: Box<[u32]>,
 }
 
@@ -101,17 +107,22 @@ impl Vertices {
                     subtask,
                     is_preemptible: preemption == Preemption::Enabled
                         && !attributes.is_non_preemptive(),
+                    only_passes_on: false,
                     initial,
+                    counter: initial,
                     counters: to_u32(counters.len()),
                     slot_mask: to_u32(dag.slots() - 1),
                     successors: [from, to_u32(successors.len())],
                 });
-                counters.extend((0..dag.slots()).map(|_| initial));
+                if dag.slots() > 1 {
+                    counters.extend((0..dag.slots()).map(|_| initial));
+                }
             }
         }
         all.vertices = vertices.into_boxed_slice();
         all.successors = successors.into_boxed_slice();
         all.counters = counters.into_boxed_slice();
+        all.allow_passing_on(0..all.vertices.len());
         all
     }
 
@@ -132,8 +143,16 @@ impl Vertices {
     pub(super) fn touch(&mut self, vertex: u32) {
         let vertex = &mut self.vertices[vertex as usize];
         vertex.phase = black_box(vertex.phase);
-        let counter = &mut self.counters[vertex.counter(vertex.progress)];
+        let counter = vertex.counter(&mut self.counters, vertex.progress);
         *counter = black_box(*counter);
+    }
+
+    /// Takes note that no job of these vertices' DAG is cut any more.
+    pub(super) fn allow_passing_on(&mut self, vertices: Range<usize>) {
+        for vertex in &mut self.vertices[vertices] {
+            let [from, to] = vertex.successors;
+            vertex.only_passes_on = vertex.slot_mask == 0 && from < to;
+        }
     }
 
     /// Ends the instance that a vertex is doing. What thereby may have become
@@ -145,8 +164,43 @@ impl Vertices {
         let ended = *own;
         own.phase = Phase::Absent;
         own.progress += 1;
-        self.counters[ended.counter(ended.progress)] = ended.initial;
+        *own.counter(&mut self.counters, ended.progress) = ended.initial;
         ended
+    }
+
+    /// Does so for a vertex that [only passes on](Vertex::only_passes_on), and tells its
+    /// successors. Returns how many of them are ready by that, and one of these.
+    #[inline(always)]
+    pub(super) fn pass_on(&mut self, vertex: u32) -> (u32, u32) {
+        let own = &mut self.vertices[vertex as usize];
+        let (job, [mut place, end]) = (own.job, own.successors);
+        own.phase = Phase::Absent;
+        own.progress += 1;
+        own.counter = own.initial;
+        let (mut count, mut last) = (0, vertex);
+        // It has some, so the end need not be looked at before the first.
+        loop {
+            let number = self.successors[place as usize];
+            let next = &mut self.vertices[number as usize];
+            next.counter -= 1;
+            if next.counter == 0 {
+                next.job = job;
+                count += 1;
+                last = number;
+            }
+            place += 1;
+            if place >= end {
+                return (count, last);
+            }
+        }
+    }
+
+    /// Returns the vertex that is the successor at a place, if it waits for nothing
+    /// else. All have one slot.
+    pub(super) fn ready_successor(&mut self, place: usize) -> Option<(u32, &mut Vertex)> {
+        let number = self.successors[place];
+        let vertex = &mut self.vertices[number as usize];
+        (vertex.counter == 0).then_some((number, vertex))
     }
 
     /// Returns where the successors of a vertex stand, for [`successor`](Self::successor).
@@ -167,7 +221,7 @@ impl Vertices {
     #[inline]
     pub(super) fn arrive(&mut self, vertex: u32, sequence: u64) -> Option<&mut Vertex> {
         let vertex = &mut self.vertices[vertex as usize];
-        let counter = &mut self.counters[vertex.counter(sequence)];
+        let counter = vertex.counter(&mut self.counters, sequence);
         *counter -= 1;
         (*counter == 0 && vertex.progress == sequence).then_some(vertex)
     }
@@ -176,7 +230,7 @@ impl Vertices {
     /// no predecessor.
     pub(super) fn next_is_ready(&mut self, vertex: u32) -> Option<&mut Vertex> {
         let vertex = &mut self.vertices[vertex as usize];
-        (self.counters[vertex.counter(vertex.progress)] == 0).then_some(vertex)
+        (*vertex.counter(&mut self.counters, vertex.progress) == 0).then_some(vertex)
     }
 }
 
@@ -201,15 +255,18 @@ impl Vertex {
         }
     }
 
+    /// Returns the counter of a job, which is its own or one of `counters`.
     #[inline]
-    fn counter(&self, sequence: u64) -> usize {
+    fn counter<'a>(&'a mut self, counters: &'a mut [u32], sequence: u64) -> &'a mut u32 {
+        if self.slot_mask == 0 {
+            return &mut self.counter;
+        }
         let slot = sequence & u64::from(self.slot_mask);
         #[allow(
             clippy::cast_possible_truncation,
             reason = "the slot is less than a count that came from a u32"
         )]
-        {
-            self.counters as usize + slot as usize
-        }
+        let place = self.counters as usize + slot as usize;
+        &mut counters[place]
     }
 }

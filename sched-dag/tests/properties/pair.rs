@@ -134,7 +134,11 @@ impl Side {
             .collect();
         let (scheduler, log) = (&mut self.scheduler, &mut self.log);
         let done = if idle.is_empty() || random.chance(30) {
-            scheduler.hand_off(now_ns, core, vertex, log)
+            let (done, is_untold) = scheduler.pass_on(now_ns, core, vertex, log);
+            if is_untold && let HandOff::To(_, decision) = done {
+                log.ready(decision.instance());
+            }
+            done
         } else {
             let idle = idle[random.below(idle.len())];
             scheduler.anticipate(core);

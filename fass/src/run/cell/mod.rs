@@ -11,8 +11,9 @@
 //! takes `&mut self`; so at any time at most one thread acts for each side.
 //!
 //! Which slot a job gets carries no meaning; what identifies a value is its job
-//! number. Both ends go round the ring in the order of jobs, so that each looks
-//! at the right slot at once; after a job was cancelled they may look at all of
+//! number. One slot is *near*: it is all there is where one job is in flight, and taken
+//! first where several may be. Both ends go round the others in the order of jobs, so that
+//! each looks at the right slot at once; after a job was cancelled they may look at all of
 //! them. (A slot could be chosen by `k mod J` only if jobs in flight were
 //! consecutive. They are not where an overrun skips releases: with J = 2, jobs
 //! 1 and 3 can be in flight together.)
@@ -64,6 +65,7 @@
 //! > `SET` with `Release`. After `SET` nobody writes. Readers read only after
 //! > an `Acquire` load gave `SET`.
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -83,34 +85,39 @@ const fn turn_of(job: u64) -> u64 {
 }
 
 /// Makes the ring of one edge with at least `slots` slots and returns its two ends.
-/// They are a power of two, so that going round takes no comparison.
+/// Besides the near one they are a power of two, so that going round takes no comparison.
 ///
 /// # Panics
 ///
 /// If `slots` is 0.
 pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
     assert!(slots > 0, "an edge needs at least one slot");
-    let slots: Arc<[Slot<T>]> = (0..slots.next_power_of_two())
-        .map(|_| Slot::empty())
-        .collect();
+    let others = match slots {
+        1 => 0,
+        _ => (slots - 1).next_power_of_two(),
+    };
+    let ring = Arc::new(Ring {
+        near: Slot::empty(),
+        others: (0..others).map(|_| Slot::empty()).collect(),
+    });
     let writer = Writer {
-        slots: Arc::clone(&slots),
+        ring: Arc::clone(&ring),
         next: 0,
     };
-    (writer, Reader { slots, next: 0 })
+    (writer, Reader { ring, next: 0 })
 }
 
 /// The writing end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Writer<T> {
-    slots: Arc<[Slot<T>]>,
-    /// The slot to look at first, counted on and on.
+    ring: Arc<Ring<T>>,
+    /// The other slot to look at first, counted on and on.
     next: usize,
 }
 
 /// The reading end of an edge. There is one, and it cannot be cloned.
 pub(crate) struct Reader<T> {
-    slots: Arc<[Slot<T>]>,
-    /// The slot to look at first, counted on and on.
+    ring: Arc<Ring<T>>,
+    /// The other slot to look at first, counted on and on.
     next: usize,
 }
 
@@ -119,7 +126,7 @@ impl<T> Writer<T> {
     /// are taken. Drops the value in a slot that was given up, if it takes that.
     #[inline]
     pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
-        let slot = match first(&self.slots, &mut self.next, EMPTY_SLOT) {
+        let slot = match self.ring.near(EMPTY_SLOT) {
             Some(slot) => slot,
             None => match self.make_room() {
                 Some(slot) => slot,
@@ -137,7 +144,7 @@ impl<T> Writer<T> {
     /// Finds an empty slot, or makes one so that was given up.
     #[cold]
     fn make_room(&mut self) -> Option<&Slot<T>> {
-        let slot = search(&self.slots, &mut self.next, |turn| turn & 1 == 0)?;
+        let slot = (self.ring).search(&mut self.next, |turn| turn & 1 == 0)?;
         if slot.turn.load(Ordering::Relaxed) == GIVEN_UP {
             // First, so that the value is not dropped again should its `drop` panic.
             slot.turn.store(EMPTY_SLOT, Ordering::Relaxed);
@@ -177,14 +184,20 @@ impl<T> Reader<T> {
     #[inline]
     fn slot_of(&mut self, job: u64) -> Option<&Slot<T>> {
         let turn = turn_of(job);
-        match first(&self.slots, &mut self.next, turn) {
+        match self.ring.near(turn) {
             Some(slot) => Some(slot),
-            None => search(&self.slots, &mut self.next, |other| other == turn),
+            None => (self.ring).search(&mut self.next, |other| other == turn),
         }
     }
 }
 
-/// A slot, which the two ends share.
+/// The slots of one edge, which its two ends share.
+struct Ring<T> {
+    near: Slot<T>,
+    others: Box<[Slot<T>]>,
+}
+
+/// A place for one value.
 struct Slot<T> {
     turn: AtomicU64,
     value: UnsafeCell<MaybeUninit<T>>,
@@ -195,40 +208,27 @@ struct Slot<T> {
 // shared, which is why `T: Send` is enough.
 unsafe impl<T: Send> Sync for Slot<T> {}
 
-/// Returns slot `next` if it has the given turn, as it nearly always does, and moves
-/// `next` behind it. Its look at the turn is an `Acquire`.
-#[inline]
-fn first<'s, T>(slots: &'s [Slot<T>], next: &mut usize, turn: u64) -> Option<&'s Slot<T>> {
-    let slot = at(slots, *next)?;
-    if slot.turn.load(Ordering::Acquire) != turn {
-        return None;
+impl<T> Ring<T> {
+    /// Returns the near slot if it has the given turn, as it nearly always does. Its look
+    /// at the turn is an `Acquire`.
+    #[inline]
+    fn near(&self, turn: u64) -> Option<&Slot<T>> {
+        (self.near.turn.load(Ordering::Acquire) == turn).then_some(&self.near)
     }
-    *next = next.wrapping_add(1);
-    Some(slot)
-}
 
-/// Finds a slot whose turn is meant as [`first`] does, from slot `next` on and round
-/// the ring once.
-#[cold]
-fn search<'s, T>(
-    slots: &'s [Slot<T>],
-    next: &mut usize,
-    is_meant: impl Fn(u64) -> bool,
-) -> Option<&'s Slot<T>> {
-    for _ in 0..slots.len() {
-        let slot = at(slots, *next)?;
-        *next = next.wrapping_add(1);
-        if is_meant(slot.turn.load(Ordering::Acquire)) {
-            return Some(slot);
+    /// Finds a slot whose turn is meant, by such a look, from other slot `next` on, and
+    /// moves `next` behind it.
+    #[cold]
+    fn search(&self, next: &mut usize, is_meant: impl Fn(u64) -> bool) -> Option<&Slot<T>> {
+        for _ in 0..self.others.len() {
+            let slot = (self.others).get(*next & (self.others.len() - 1))?;
+            *next = next.wrapping_add(1);
+            if is_meant(slot.turn.load(Ordering::Acquire)) {
+                return Some(slot);
+            }
         }
+        is_meant(self.near.turn.load(Ordering::Acquire)).then_some(&self.near)
     }
-    None
-}
-
-/// Returns the slot that a count gets to, round and round the ring.
-#[inline]
-fn at<T>(slots: &[Slot<T>], count: usize) -> Option<&Slot<T>> {
-    slots.get(count & slots.len().wrapping_sub(1))
 }
 
 impl<T> Slot<T> {

@@ -55,17 +55,19 @@ pub(crate) fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     if finished.body.has_effects() {
         execution.signals.take(&mut finished.body, finish_ns);
     }
-    let finished_ns = instance_time_ns(finish_ns);
-    execution.note_finish(here, finished, finished_ns);
+    execution
+        .watcher
+        .note_finish(finished, instance_time_ns(finish_ns));
     let mut woken = None;
     if execution.may_hand_off && execution.signals.are_none() {
-        match execution.hand_off(core, vertex, finished_ns) {
+        match execution.hand_off(core, vertex) {
             Ended::HandedOff(successor) => return Work::Run(successor),
             Ended::Open => woken = Some(execution.step(finish_ns, Event::Time)),
             Ended::WithNews => woken = Some(execution.announce()),
             Ended::Quiet => {}
         }
     } else {
+        execution.watcher.settle(here);
         let instance = execution.scheduler.instance_of(vertex);
         woken = Some(execution.step(finish_ns, Event::Completed(instance)));
     }
@@ -85,7 +87,7 @@ pub(crate) fn fail(now_ns: u64) {
         return;
     };
     let core = this_core::get();
-    let Some(vertex) = execution.placement.lose(core.index as usize) else {
+    let Some(vertex) = execution.watcher.placement.lose(core.index as usize) else {
         return;
     };
     let instance = execution.scheduler.instance_of(vertex);
@@ -93,6 +95,7 @@ pub(crate) fn fail(now_ns: u64) {
     let ended_ns = since_epoch(clock::now_ns());
     let here = CoreId(core.index);
     execution
+        .watcher
         .journal
         .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);

@@ -40,6 +40,7 @@ pub(crate) use status::{
     try_names, with_journal,
 };
 pub(crate) use time::{arm_next_event, since_epoch};
+use watcher::Watcher;
 
 /// What a core is to do next.
 pub(crate) enum Work {
@@ -65,15 +66,11 @@ enum Event {
     Control(Control),
 }
 
-type Bodies = Placement<Box<Runner>, Parked>;
-
 /// A run, from its launch until it is taken out.
 pub(crate) struct Execution {
-    task_set: Arc<TaskSet>,
     scheduler: Scheduler,
-    /// The bodies, and which core has which.
-    placement: Bodies,
-    journal: Journal,
+    /// What the scheduler's reports change.
+    watcher: Watcher,
     /// What core 0 does when nothing is assigned to it, while something is.
     background: Option<Parked>,
     /// When the next dispatch is due, on the clock, if it waits for further events
@@ -144,14 +141,20 @@ pub(crate) fn prepare(
     let placement = Placement::new(runners, cores);
     let heap = crate::memory::heap::usage();
     let execution = Execution {
-        placement,
-        journal: Journal::new(
-            &task_set,
-            heap.capacity_bytes - heap.in_use_bytes,
-            terms.most_events,
-        ),
         scheduler: Scheduler::new(Arc::clone(&task_set), options),
-        task_set,
+        watcher: Watcher {
+            journal: Journal::new(
+                &task_set,
+                heap.capacity_bytes - heap.in_use_bytes,
+                terms.most_events,
+            ),
+            placement,
+            task_set,
+            instant_ns: 0,
+            has_job_news: false,
+            finished: None,
+            finish_ns: 0,
+        },
         background: None,
         dispatch_due_ns: None,
         coincidence_ns: terms.coincidence_ns,
@@ -200,11 +203,11 @@ impl Execution {
 
     /// Returns what has happened.
     pub(crate) const fn journal(&self) -> &Journal {
-        &self.journal
+        &self.watcher.journal
     }
 
     /// Returns the model.
     pub(crate) const fn task_set(&self) -> &Arc<TaskSet> {
-        &self.task_set
+        &self.watcher.task_set
     }
 }

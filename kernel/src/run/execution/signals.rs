@@ -9,8 +9,6 @@ use alloc::vec::Vec;
 use fass::{Body, Plan};
 use sched_dag::{DagId, Moment, Observer};
 
-use super::time::here;
-use super::watcher::Watcher;
 use super::{EXECUTION, Event, Execution, status};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, this_core};
@@ -64,23 +62,9 @@ impl Signals {
 impl Execution {
     /// Begins to pass signals on, those from before at time 0.
     pub(super) fn begin_signals(&mut self) {
-        let Self {
-            task_set,
-            scheduler,
-            placement,
-            journal,
-            signals,
-            ..
-        } = self;
-        let mut watcher = Watcher {
-            journal,
-            placement,
-            task_set,
-            here: here(),
-            has_job_news: false,
-        };
-        signals.has_begun = true;
-        signals.send(&mut scheduler.at(0), &mut watcher);
+        self.signals.has_begun = true;
+        let mut moment = self.scheduler.at(0);
+        self.signals.send(&mut moment, &mut self.watcher);
     }
 }
 

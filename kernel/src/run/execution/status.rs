@@ -74,11 +74,15 @@ pub(crate) fn budget_ns(instance: Instance) -> u64 {
 /// be done shortly: nothing is completed meanwhile.
 pub(crate) fn with_journal<R>(look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
     let mut place = EXECUTION.lock();
-    place.as_mut().map(|execution| look(&mut execution.journal))
+    place
+        .as_mut()
+        .map(|execution| look(&mut execution.watcher.journal))
 }
 
 /// Looks at the journal of the run, if there is one and nobody is at work on it.
 pub(crate) fn try_journal<R>(look: impl FnOnce(&Journal) -> R) -> Option<R> {
     let place = EXECUTION.try_lock()?;
-    place.as_ref().map(|execution| look(&execution.journal))
+    place
+        .as_ref()
+        .map(|execution| look(&execution.watcher.journal))
 }

@@ -6,13 +6,12 @@ use alloc::boxed::Box;
 
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Next;
-use sched_dag::{CoreId, Decision, HandOff, Instance, Journal, Vertex};
+use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
 
 use super::core_set::CoreSet;
 use super::runner::Runner;
 use super::status::{is_finished, note_running};
 use super::time::{arm_next_event, here, instance_time_ns, since_epoch};
-use super::watcher::Watcher;
 use super::{EPOCH_NS, Event, Execution, FINISHED, NEXT_EVENT_NS, Work};
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
@@ -35,50 +34,46 @@ pub(super) enum Ended {
 }
 
 impl Execution {
-    /// Notes that this core has finished its instance.
-    #[inline]
-    pub(super) fn note_finish(&mut self, here: CoreId, finished: Box<Runner>, finish_ns: u64) {
-        self.journal
-            .write(here, What::Finish, finish_ns, finished.subject());
-        let vertex = finished.vertex;
-        self.placement.finish(here.index(), vertex, finished);
-    }
-
     /// Tells the scheduler that this core has finished an instance, and gives
     /// the core the next one at once if nothing else is to be decided.
     #[inline]
-    pub(super) fn hand_off(&mut self, core: &Core, finished: Vertex, finish_ns: u64) -> Ended {
+    pub(super) fn hand_off(&mut self, core: &Core, vertex: Vertex) -> Ended {
         let here = CoreId(core.index);
-        let Self {
-            task_set,
-            scheduler,
-            placement,
-            journal,
-            ..
-        } = self;
-        let mut watcher = Watcher {
-            journal,
-            placement,
-            task_set,
-            here,
-            has_job_news: false,
-        };
-        let done = scheduler.hand_off(finish_ns, here, finished, &mut watcher);
-        let has_job_news = watcher.has_job_news;
+        let watcher = &mut self.watcher;
+        let finish_ns = watcher.finish_ns;
+        // Another core's completion may have been later and come first.
+        let instant_ns = finish_ns.max(self.scheduler.now_ns());
+        watcher.instant_ns = instant_ns;
+        let (done, is_fresh) = (self.scheduler).pass_on(finish_ns, here, vertex, watcher);
+        if let HandOff::To(next, decision) = done
+            && let Some(finished) = watcher.finished.take()
+        {
+            let from = finished.subject();
+            let finish = (What::Finish, finish_ns, from);
+            let Some(mut runner) = watcher.placement.exchange(here, vertex, finished, next) else {
+                // It is suspended, so it has been ready before.
+                watcher.journal.write_all(here, [finish]);
+                return Ended::Quiet;
+            };
+            runner.instance.job = decision.instance().job;
+            let to = runner.subject();
+            note_running(core, Some(to));
+            let start = (What::Start, begin(core, &runner), to);
+            if is_fresh {
+                let ready = (What::Ready, instant_ns, to);
+                watcher.journal.write_all(here, [finish, ready, start]);
+            } else {
+                watcher.journal.write_all(here, [finish, start]);
+            }
+            return Ended::HandedOff(runner);
+        }
+        watcher.settle(here);
         match done {
             HandOff::Open => return Ended::Open,
-            HandOff::To(vertex, decision) => {
-                if !has_job_news && let Some(mut runner) = placement.start(here, vertex) {
-                    runner.instance.job = decision.instance().job;
-                    note_running(core, Some(runner.subject()));
-                    begin(core, journal, &runner);
-                    return Ended::HandedOff(runner);
-                }
-                placement.set_target(here, Some(vertex));
-            }
+            HandOff::To(next, _) => watcher.placement.set_target(here, Some(next)),
             HandOff::Idle => {}
         }
-        if has_job_news {
+        if core::mem::take(&mut watcher.has_job_news) {
             Ended::WithNews
         } else {
             Ended::Quiet
@@ -90,33 +85,26 @@ impl Execution {
     pub(super) fn step(&mut self, now_ns: u64, event: Event) -> CoreSet {
         let here = here();
         let Self {
-            task_set,
             scheduler,
-            placement,
-            journal,
+            watcher,
             dispatch_due_ns,
             coincidence_ns,
             may_hand_off,
             signals,
             ..
         } = self;
-        let mut watcher = Watcher {
-            journal,
-            placement,
-            task_set,
-            here,
-            has_job_news: false,
-        };
-        let mut moment = scheduler.at(since_epoch(now_ns));
+        let instant_ns = since_epoch(now_ns);
+        watcher.instant_ns = instant_ns.max(scheduler.now_ns());
+        let mut moment = scheduler.at(instant_ns);
         match event {
             Event::Time => {}
             Event::Completed(instance) => {
-                moment.complete(instance, &mut watcher);
-                signals.send(&mut moment, &mut watcher);
+                moment.complete(instance, watcher);
+                signals.send(&mut moment, watcher);
             }
-            Event::Failed(instance) => moment.fail(instance, &mut watcher),
-            Event::Signalled(dag) => moment.signal(dag, &mut watcher),
-            Event::Control(control) => control.apply(&mut moment, &mut watcher),
+            Event::Failed(instance) => moment.fail(instance, watcher),
+            Event::Signalled(dag) => moment.signal(dag, watcher),
+            Event::Control(control) => control.apply(&mut moment, watcher),
         }
         // What happens before time 0 releases nothing yet.
         let waits_until_ns = now_ns.saturating_add(*coincidence_ns);
@@ -130,23 +118,25 @@ impl Execution {
         *may_hand_off = *coincidence_ns == 0;
         let mut woken = CoreSet::default();
         let mut preempted = None;
-        for decision in moment.release_due(&mut watcher).dispatch() {
+        for decision in moment.release_due(watcher).dispatch() {
             let (core, instance) = (decision.core(), decision.instance());
-            let vertex = task_set.vertex(instance);
+            let vertex = watcher.task_set.vertex(instance);
             if let Decision::Preempt { .. } = decision {
-                placement.set_target(core, None);
+                watcher.placement.set_target(core, None);
                 preempted = Some(core);
             } else {
-                placement.set_target(core, Some(vertex));
+                watcher.placement.set_target(core, Some(vertex));
                 if preempted == Some(core) {
                     let time_ns = since_epoch(clock::now_ns());
-                    journal.write(core, What::Request, time_ns, Subject::of(instance));
+                    let subject = Subject::of(instance);
+                    (watcher.journal).write(core, What::Request, time_ns, subject);
                 }
             }
             if core != here {
                 woken.insert(core.0);
             }
         }
+        watcher.has_job_news = false;
         woken.insert_all(&self.announce());
         woken
     }
@@ -179,11 +169,13 @@ impl Execution {
     /// Finds what this core, which runs nothing, is to do.
     pub(super) fn find_work(&mut self, core: &Core) -> Work {
         let here = core.index as usize;
-        match self.placement.next(here) {
+        match self.watcher.placement.next(here) {
             Next::Start(vertex, mut runner) => {
                 runner.instance.job = self.scheduler.instance_of(vertex).job;
                 note_running(core, Some(runner.subject()));
-                begin(core, &mut self.journal, &runner);
+                let start_ns = begin(core, &runner);
+                let subject = runner.subject();
+                (self.watcher.journal).write(CoreId(core.index), What::Start, start_ns, subject);
                 Work::Run(runner)
             }
             Next::Continue(context) => {
@@ -202,7 +194,7 @@ impl Execution {
 
     /// Returns the instance that a core has.
     pub(super) fn current(&self, core: usize) -> Option<Instance> {
-        let vertex = self.placement.current(core)?;
+        let vertex = self.watcher.placement.current(core)?;
         Some(self.scheduler.instance_of(vertex))
     }
 
@@ -212,16 +204,16 @@ impl Execution {
         let core = this_core::get();
         let here = core.index as usize;
         let is_background = core.context().is_background();
-        let leaves_background = is_background && self.placement.is_wanted(here);
-        if !self.placement.must_suspend(here) && !leaves_background {
+        let leaves_background = is_background && self.watcher.placement.is_wanted(here);
+        if !self.watcher.placement.must_suspend(here) && !leaves_background {
             return None;
         }
-        let suspended = self.placement.detach(here);
+        let suspended = self.watcher.placement.detach(here);
         if let Some(vertex) = suspended {
             // Not when the interrupt came: its step has left events since then.
             let time_ns = since_epoch(clock::now_ns());
             let instance = self.scheduler.instance_of(vertex);
-            self.journal.write(
+            self.watcher.journal.write(
                 CoreId(core.index),
                 What::Suspend,
                 time_ns,
@@ -231,7 +223,7 @@ impl Execution {
             turns::leave(core);
             timer::set(Alarm::Hold, u64::MAX);
         }
-        let next = match self.placement.take_suspended(here) {
+        let next = match self.watcher.placement.take_suspended(here) {
             Some(context) => {
                 self.note_resumed(core, &context, now_ns);
                 context
@@ -243,7 +235,7 @@ impl Execution {
         match suspended {
             Some(vertex) => {
                 last.note_suspended(now_ns);
-                self.placement.suspend(vertex, last)
+                self.watcher.placement.suspend(vertex, last)
             }
             None => {
                 self.background = Some(last);
@@ -260,17 +252,18 @@ impl Execution {
         let here = CoreId(core.index);
         if let Some(instance) = self.current(here.index()) {
             let time_ns = since_epoch(clock::now_ns());
-            self.journal
+            self.watcher
+                .journal
                 .write(here, What::Resume, time_ns, Subject::of(instance));
         }
     }
 }
 
-/// Stamps the start of the instance that this core begins as soon as the lock is free.
-/// Start and finish are stamped with interrupts disabled, so that no preemption can
-/// stand between a stamp and what it says.
+/// Lets this core begin an instance as soon as the lock is free, and returns when, on the
+/// run's time. Start and finish are stamped with interrupts disabled, so that no preemption
+/// can stand between a stamp and what it says.
 #[inline]
-fn begin(core: &Core, journal: &mut Journal, runner: &Runner) {
+fn begin(core: &Core, runner: &Runner) -> u64 {
     let now_ns = clock::now_ns();
     let budget_end_ns = match runner.budget_ns {
         u64::MAX => u64::MAX,
@@ -281,7 +274,5 @@ fn begin(core: &Core, journal: &mut Journal, runner: &Runner) {
         }
     };
     core.context().set_budget_end(budget_end_ns);
-    let start_ns = instance_time_ns(now_ns);
-    let here = CoreId(core.index);
-    journal.write(here, What::Start, start_ns, runner.subject());
+    instance_time_ns(now_ns)
 }

@@ -2,42 +2,74 @@
 
 use core::sync::atomic::Ordering;
 
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+
 use sched_dag::journal::{Subject, What};
+use sched_dag::placement::Placement;
 use sched_dag::{CoreId, DagId, Instance, JobOutcome, Journal, Observer, TaskSet};
 
-use super::Bodies;
-use super::JOBS_ENDED;
-use super::time::{instance_time_ns, since_epoch};
-use crate::machine::clock;
+use super::time::here;
+use super::{JOBS_ENDED, Runner};
+use crate::machine::context::Parked;
 
-/// Writes what the scheduler reports into the journal, with the clock's time at that
-/// very moment: so a join's latency includes the wait for the lock.
-pub(super) struct Watcher<'a> {
-    pub(super) journal: &'a mut Journal,
-    pub(super) placement: &'a mut Bodies,
-    pub(super) task_set: &'a TaskSet,
-    /// The core that takes the step.
-    pub(super) here: CoreId,
+/// Writes what the scheduler reports into the journal, with the time of the instant that
+/// the scheduler is told of: at a completion when the function returned, so a join's
+/// latency includes the wait for the lock.
+pub(super) struct Watcher {
+    pub(super) journal: Journal,
+    /// The bodies, and which core has which.
+    pub(super) placement: Placement<Box<Runner>, Parked>,
+    pub(super) task_set: Arc<TaskSet>,
+    /// The instant, on the run's time.
+    pub(super) instant_ns: u64,
     /// Whether anything has happened to a job as a whole.
     pub(super) has_job_news: bool,
+    /// What this core has just finished, as long as nothing else is reported, and when.
+    pub(super) finished: Option<Box<Runner>>,
+    pub(super) finish_ns: u64,
 }
 
-impl Watcher<'_> {
-    /// Writes down what has happened now to a whole job.
+impl Watcher {
+    /// Notes that this core has just finished something.
+    #[inline]
+    pub(super) fn note_finish(&mut self, finished: Box<Runner>, finish_ns: u64) {
+        let before = self.finished.replace(finished);
+        debug_assert!(before.is_none());
+        // The compiler need not find that out each time.
+        core::mem::forget(before);
+        self.finish_ns = finish_ns;
+    }
+
+    /// Writes down what has happened to a whole job.
     fn of_job(&mut self, what: What, dag: DagId, job: u64) {
         self.has_job_news = true;
-        let now_ns = since_epoch(clock::now_ns());
-        let subject = Subject::of_job(dag, job);
-        self.journal.write(self.here, what, now_ns, subject);
+        self.note(what, self.instant_ns, Subject::of_job(dag, job));
+    }
+
+    /// Writes down what has happened.
+    fn note(&mut self, what: What, time_ns: u64, subject: Subject) {
+        let here = here();
+        self.settle(here);
+        self.journal.write(here, what, time_ns, subject);
+    }
+
+    /// Writes down that this core, `here`, has just finished something, if it has, and puts
+    /// that at rest.
+    #[inline]
+    pub(super) fn settle(&mut self, here: CoreId) {
+        if let Some(finished) = self.finished.take() {
+            let (vertex, subject) = (finished.vertex, finished.subject());
+            (self.journal).write(here, What::Finish, self.finish_ns, subject);
+            self.placement.finish(here.index(), vertex, finished);
+        }
     }
 }
 
-impl Observer for Watcher<'_> {
+impl Observer for Watcher {
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
         if self.task_set.dag(dag).is_sporadic() {
-            let subject = Subject::of_job(dag, job);
-            self.journal
-                .write(self.here, What::Due, release_ns, subject);
+            self.note(What::Due, release_ns, Subject::of_job(dag, job));
         }
         self.of_job(What::Released, dag, job);
     }
@@ -70,18 +102,12 @@ impl Observer for Watcher<'_> {
         self.of_job(what, dag, job);
     }
 
-    #[inline]
     fn ready(&mut self, instance: Instance) {
-        let now_ns = instance_time_ns(clock::now_ns());
-        let subject = Subject::of(instance);
-        self.journal.write(self.here, What::Ready, now_ns, subject);
+        self.note(What::Ready, self.instant_ns, Subject::of(instance));
     }
 
     fn cancelled(&mut self, instance: Instance) {
-        let now_ns = since_epoch(clock::now_ns());
-        let subject = Subject::of(instance);
-        self.journal
-            .write(self.here, What::Cancelled, now_ns, subject);
+        self.note(What::Cancelled, self.instant_ns, Subject::of(instance));
         let vertex = self.task_set.vertex(instance);
         if let Some(runner) = self.placement.resting(vertex) {
             runner.body.discard(instance.job);
