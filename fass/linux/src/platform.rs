@@ -8,6 +8,7 @@ use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions};
 
 use crate::level::Levels;
 use crate::requests::Request;
+use crate::run::Launched;
 use crate::state::State;
 use crate::sys;
 use crate::team::{Team, with_own_worker};
@@ -20,13 +21,6 @@ pub(crate) struct Terms {
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
     pub(crate) overheads: Overheads,
-    pub(crate) budget_factor: u64,
-}
-
-/// A plan that was committed.
-pub(crate) struct Launched {
-    pub(crate) team: Arc<Team>,
-    pub(crate) bounds_ns: Vec<Option<u64>>,
     pub(crate) budget_factor: u64,
 }
 

@@ -7,7 +7,6 @@ use std::thread::{self, JoinHandle};
 use sched_dag::law::{self, Record, Terms, Violation};
 use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, TaskSet};
 
-use crate::platform::Launched;
 use crate::release::Budgets;
 use crate::state::Fault;
 use crate::sys;
@@ -18,6 +17,13 @@ const STACK_BYTES: usize = 512 * 1024;
 
 /// Time between the start of a run and its first release.
 const LEAD_NS: u64 = 1_000_000;
+
+/// A plan that was committed.
+pub(crate) struct Launched {
+    pub(crate) team: Arc<Team>,
+    pub(crate) bounds_ns: Vec<Option<u64>>,
+    pub(crate) budget_factor: u64,
+}
 
 /// How often the run's threads did what.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -23,14 +23,11 @@
 //! clip then counts nothing.
 
 use alloc::vec;
-use alloc::vec::Vec;
 
 use super::cover::covers;
 use super::interference::{Clip, Other};
 use super::non_preemptive::Blocking;
 use super::pipelined::Unsolved;
-use super::refusal::Refusal;
-use super::set::{Set, constrained};
 use super::task::Task;
 use super::workload::Piece;
 
@@ -48,39 +45,6 @@ pub(super) fn alone(task: &Task, covers: &[u64], cores: u64) -> Option<u64> {
     // A DAG without subtasks has no chain, and takes no time.
     let waiting = left.min().or((cores > 0).then_some(0))?;
     Some(task.length_ns() + waiting)
-}
-
-/// Bounds the response times under global fixed priorities, the DAGs given from the highest
-/// priority to the lowest; also of jobs that overlap.
-///
-/// # Errors
-///
-/// [`Refusal`] if there is no core, or a DAG has no bound within its deadline.
-pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
-    if cores == 0 {
-        return Err(Refusal::DoesNotApply);
-    }
-    let mut set = Set::new(tasks, cores);
-    set.clip = clip;
-    let order: Vec<usize> = (0..tasks.len()).collect();
-    set.solve(&order, |other, dag| other < dag).complete()
-}
-
-/// Bounds the response times under global EDF, in the order given: down from the
-/// deadlines, so it accepts a little less than [`answer()`](super::answer()).
-///
-/// # Errors
-///
-/// [`Refusal`] if a DAG has `D > T`, or no bound within its deadline.
-pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
-    if !constrained(tasks, cores) {
-        return Err(Refusal::DoesNotApply);
-    }
-    let mut set = Set::new(tasks, cores);
-    set.clip = clip;
-    set.deadlines_limit = true;
-    set.down_from_deadlines(|_, _| true)
-        .map_err(|(position, why)| why.at(position))
 }
 
 /// What of one DAG enters its equations, with `j` from 0 to one less than the covers.
@@ -160,26 +124,8 @@ impl Equations<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Clip, multi_path, multi_path_fp};
+    use super::multi_path;
     use crate::analysis::Task;
-
-    #[test]
-    fn nothing_beside_the_chains_is_not_nothing_to_wait_for() {
-        let high = Task::new(100, 100, vec![3, 3], &[]).unwrap();
-        let low = Task::new(100, 100, vec![5], &[]).unwrap();
-        for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
-            assert_eq!(multi_path_fp(&[&high, &low], 2, clip), Ok(vec![3, 8]));
-        }
-    }
-
-    #[test]
-    fn interference_counts_only_while_the_job_waits() {
-        // One of two cores is always free for the chain, so at most 2 of the 9 matter.
-        let long = Task::new(100, 100, vec![9, 2], &[]).unwrap();
-        let low = Task::new(100, 100, vec![4, 4], &[(0, 1)]).unwrap();
-        let bounds = |clip| multi_path_fp(&[&long, &low], 2, clip).unwrap()[1];
-        assert_eq!((bounds(Clip::Window), bounds(Clip::Chains)), (14, 11));
-    }
 
     #[test]
     fn no_cores_and_no_subtasks() {

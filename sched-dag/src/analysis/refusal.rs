@@ -3,7 +3,6 @@
 use core::fmt;
 
 use super::pipelined::Unsolved;
-use super::set::Solution;
 
 /// Why a sufficient test did not prove a set of DAGs schedulable.
 ///
@@ -24,16 +23,6 @@ pub enum Refusal {
         /// The position of the DAG in the order given.
         position: usize,
     },
-}
-
-impl Solution {
-    /// Returns the bounds if there is one for each DAG.
-    pub(super) fn complete(self) -> Result<alloc::vec::Vec<u64>, Refusal> {
-        match self.first_failing {
-            Some((position, why)) => Err(why.at(position)),
-            None => Ok(self.responses.into_iter().flatten().collect()),
-        }
-    }
 }
 
 impl Unsolved {

@@ -21,6 +21,7 @@ use alloc::vec::Vec;
 use super::interference::{Clip, Other, Shape};
 use super::multi_path::{Equations, alone};
 use super::pipelined::{Figures, STEP_LIMIT, Unsolved};
+use super::refusal::Refusal;
 use super::task::Task;
 use super::workload::Workload;
 
@@ -47,6 +48,16 @@ pub(super) struct Solution {
     pub(super) first_failing: Option<(usize, Unsolved)>,
     /// Why a DAG has no response time, by DAG.
     pub(super) failures: Vec<Option<Failure>>,
+}
+
+impl Solution {
+    /// Returns the bounds if there is one for each DAG.
+    pub(super) fn complete(self) -> Result<Vec<u64>, Refusal> {
+        match self.first_failing {
+            Some((position, why)) => Err(why.at(position)),
+            None => Ok(self.responses.into_iter().flatten().collect()),
+        }
+    }
 }
 
 /// Why a DAG has no response-time bound.
