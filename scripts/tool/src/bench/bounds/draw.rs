@@ -59,7 +59,8 @@ fn dag(random: &mut Random) -> DagSpec {
     DagSpec {
         subtasks: (0..subtasks)
             .map(|_| SubtaskSpec {
-                wcet_ns: Some(random.within(1, 100)),
+                // In us, so that it does not matter that the forms before rounded down.
+                wcet_ns: Some(1_000 * random.within(1, 100)),
                 ..SubtaskSpec::default()
             })
             .collect(),
