@@ -122,14 +122,10 @@ const CASES: &[Case] = &[
 /// a new one without a case fails here.
 #[test]
 fn every_sentence_has_a_case() {
-    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let rooms = fs::read_dir(sources).expect("the sources").flatten();
-    let rooms = rooms.filter(|entry| entry.path().is_dir());
-    let files = rooms.flat_map(|room| fs::read_dir(room.path()).expect("a room").flatten());
     let expected: Vec<&str> = CASES.iter().flat_map(|case| case.says).copied().collect();
     let mut sentences = 0;
-    for file in files {
-        let source = fs::read_to_string(file.path()).expect("a source");
+    for file in files_in(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src")) {
+        let source = fs::read_to_string(file).expect("a source");
         let attributes = source.split("on_unimplemented(").skip(1);
         for line in attributes.filter_map(|attribute| attribute.split("message = ").nth(1)) {
             let message = line.split('"').nth(1).expect("a text");
@@ -142,6 +138,17 @@ fn every_sentence_has_a_case() {
         }
     }
     assert!(sentences >= 7, "only {sentences} sentences were found");
+}
+
+fn files_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("a folder").flatten();
+    let within = entries
+        .map(|entry| entry.path())
+        .map(|path| match path.is_dir() {
+            true => files_in(&path),
+            false => vec![path],
+        });
+    within.flatten().collect()
 }
 
 #[test]
