@@ -109,7 +109,7 @@ pub use api::state::{Read, State, StateValue, Update};
 pub use api::untyped::Untyped;
 pub use api::uses::Uses;
 pub use api::using::Using;
-pub use commit::answer::{Answer, Unproven, Verdict};
+pub use commit::answer::{Answer, SinkAnswer, Unproven, Verdict};
 pub use commit::fault::{CommitError, Fault};
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;

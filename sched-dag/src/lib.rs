@@ -7,7 +7,9 @@
 //! a *sink*. Every *period* T, from an *offset* O on, the DAG releases a *job*:
 //! job k at its *nominal release time* r = O + kT. Job k shall be complete at
 //! its *absolute deadline* r + D, where the *relative deadline* D may be smaller
-//! than, equal to, or larger than T. An *instance* is the part of one job that
+//! than, equal to, or larger than T. Each sink may have a relative deadline of its own,
+//! D_s <= D; a subtask's is the least D_s of the sinks that it reaches, and a sink reaches
+//! itself. An *instance* is the part of one job that
 //! one subtask does: one execution of its function.
 //!
 //! An instance is *ready* when nothing but cores holds it back. A *dispatch*
@@ -31,14 +33,14 @@
 //!   at one instant, when it finishes. Nothing that happens within a function
 //!   releases an edge.
 //! - **R4, job completion.** A job finishes when the last of its sinks does. It
-//!   meets its deadline if that is at or before r + D. A miss is noticed when
-//!   the deadline has passed, not when the job ends.
+//!   meets its deadlines if each sink s finishes at or before r + D_s. A miss is
+//!   noticed when the deadline has passed, not when the job ends.
 //! - **R5, dispatch.** With preemption, at every instant the instances with the
 //!   smallest keys run, as many as there are cores; but one of a non-preemptive
 //!   subtask, once started, keeps its core, and without preemption every one
 //!   does. The key under static priority is (priority, DAG, job, subtask), where
 //!   the smaller number is the higher priority; under EDF it is (absolute
-//!   deadline, DAG, job, subtask). It is the same in every comparison. No core
+//!   deadline, DAG, job, subtask), the deadline being the subtask's. It is the same in every comparison. No core
 //!   idles while an instance is ready. At one instant all completions come
 //!   first, then all releases, then one dispatch.
 //!

@@ -89,6 +89,9 @@ pub struct SubtaskSpec {
     pub priority: Option<Priority>,
     /// Whether a started instance keeps its core although preemption is on.
     pub non_preemptive: bool,
+    /// Of a sink, the time after a release by which it shall have finished; `None`:
+    /// its DAG's.
+    pub relative_deadline_ns: Option<u64>,
     /// One port an argument, in order.
     pub inputs: Vec<TopicPort>,
     /// One port a return value, in order.

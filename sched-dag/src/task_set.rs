@@ -60,6 +60,7 @@ pub struct Subtask {
     pub(crate) budget_ns: Option<u64>,
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
+    pub(crate) relative_deadline_ns: u64,
 }
 
 /// For each subtask a list of neighbours, all lists in one allocation.
@@ -151,10 +152,17 @@ impl Dag {
         self.period_ns
     }
 
-    /// Returns the time after a release by which the job shall be complete, never 0.
+    /// Returns the time after a release by which the job shall be complete, the largest
+    /// of its sinks' deadlines, never 0.
     #[must_use]
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
+    }
+
+    /// Returns the least relative deadline of its sinks.
+    pub(crate) fn least_deadline_ns(&self) -> u64 {
+        let of_subtasks = self.subtasks.iter().map(|of| of.relative_deadline_ns);
+        of_subtasks.min().unwrap_or(self.relative_deadline_ns)
     }
 
     /// Returns the time of the first nominal release, of a sporadic DAG the
@@ -218,7 +226,8 @@ impl Dag {
         &self.sources
     }
 
-    /// Returns the subtasks without successor, ascending, never empty.
+    /// Returns the subtasks without successor, ascending, never empty; also those that
+    /// state a deadline and precede another sink only because of a shared state.
     #[must_use]
     pub fn sinks(&self) -> &[SubtaskId] {
         &self.sinks
@@ -296,6 +305,13 @@ impl Subtask {
     #[must_use]
     pub const fn is_non_preemptive(&self) -> bool {
         self.non_preemptive
+    }
+
+    /// Returns the time after a release by which the most urgent of the sinks that it
+    /// reaches shall have finished; a sink reaches itself. Never 0.
+    #[must_use]
+    pub const fn relative_deadline_ns(&self) -> u64 {
+        self.relative_deadline_ns
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod support;
 
-use sched_dag::{Policy, Preemption, SchedulerOptions};
+use sched_dag::{DagStatistics, Policy, Preemption, SchedulerOptions};
 use support::{PREEMPTIVE, assert_events, dag, instance, run, scheduler};
 
 const DIAMOND: &[(usize, usize)] = &[(0, 1), (0, 2), (1, 3), (2, 3)];
@@ -151,6 +151,51 @@ fn r4_a_miss_is_noticed_when_the_deadline_passes() {
         &events,
         "6 missed 0.0 of 5
          50 ended 0.0 Missed",
+    );
+}
+
+/// Deadlines 9 of the DAG, 3 and 5 of sinks 1 and 2.
+fn with_sinks(execution_ns: [u64; 4]) -> (Vec<String>, Vec<DagStatistics>) {
+    let mut spec = dag(100, 9, 1, &[0, 1, 2, 3], &[(0, 1), (0, 2), (0, 3)]);
+    spec.subtasks[1].relative_deadline_ns = Some(3);
+    spec.subtasks[2].relative_deadline_ns = Some(5);
+    run(&[spec], cores(4), |instance| {
+        execution_ns[instance.subtask.index()]
+    })
+}
+
+#[test]
+fn r4_a_job_meets_its_deadlines_if_each_sink_meets_its_own() {
+    for (execution_ns, events) in [
+        ([1, 2, 4, 8], "9 ended 0.0 Met"),
+        ([1, 3, 4, 8], "4 missed 0.0 of 3\n9 ended 0.0 Missed"),
+        ([1, 2, 5, 8], "6 missed 0.0 of 5\n9 ended 0.0 Missed"),
+        // The job is missed once, however many of its sinks are late.
+        ([1, 7, 5, 9], "4 missed 0.0 of 3\n10 ended 0.0 Missed"),
+    ] {
+        let (happened, statistics) = with_sinks(execution_ns);
+        let is_met = events.ends_with("Met");
+        assert_eq!(
+            happened.iter().any(|event| event.contains("missed")),
+            !is_met
+        );
+        assert_events(&happened, events);
+        assert_eq!(statistics[0].misses, u64::from(!is_met));
+    }
+}
+
+#[test]
+fn r5_between_jobs_of_one_dag_with_one_deadline_the_older_one_goes_first() {
+    // Job 0's subtask 1 and job 1's subtask 0 are due at 14.
+    let mut spec = dag(10, 14, 2, &[0, 0], &[]);
+    spec.subtasks[0].relative_deadline_ns = Some(4);
+    let (events, _) = run(&[spec], edf(), |instance| [1, 12][instance.subtask.index()]);
+    assert_events(
+        &events,
+        "0 start 0.0.0 on 0
+         1 start 0.0.1 on 0
+         13 start 0.1.0 on 0
+         14 start 0.1.1 on 0",
     );
 }
 

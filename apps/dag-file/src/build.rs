@@ -115,6 +115,11 @@ fn build_dag(
     for &(earlier, later) in &spec.edges {
         dag.precede(&subtasks[earlier], &subtasks[later]);
     }
+    for (subtask, spec) in subtasks.iter().zip(&spec.subtasks) {
+        if spec.relative_deadline_ns.is_some() {
+            dag.sink_deadline(subtask, time(spec.relative_deadline_ns));
+        }
+    }
     dag
 }
 

@@ -59,7 +59,12 @@ fn line_of(set: &Set, fault: &Fault) -> usize {
             let ends = (Some(subtask), Some(subtask));
             edge_line(dag, ends).unwrap_or(dag.line)
         }),
-        Fault::WcetExceedsDeadline { dag, subtask, .. } => set
+        Fault::WcetExceedsDeadline { dag, subtask, .. }
+        | Fault::ZeroSinkDeadline { dag, sink: subtask }
+        | Fault::SinkDeadlineBeyondDag {
+            dag, sink: subtask, ..
+        }
+        | Fault::DeadlineOfNoSink { dag, subtask, .. } => set
             .dags
             .get(dag.id.index())
             .map(|dag| subtask_line(dag, subtask.id).unwrap_or(dag.line)),
@@ -132,6 +137,22 @@ mod tests {
             ["line 1:", "line 1:", "line 3:", "line 4:"],
             "{found:#?}"
         );
+    }
+
+    #[test]
+    fn a_wrong_deadline_is_told_with_the_line_of_its_subtask() {
+        let text = "dag x period 9ms\nsubtask a wcet 1ms deadline 5ms\n\
+                    subtask b wcet 1ms deadline 0ns\nsubtask c wcet 1ms deadline 10ms\n\
+                    edge a -> b\nend";
+        let found = faults(text, Length::Jobs(1)).join("\n");
+        let words = [
+            "line 2: subtask `a` of dag `x` has a relative deadline and is no sink, for subtask `b`",
+            "line 3: subtask `b` of dag `x` has a relative deadline of 0; give it at least 1 ns",
+            "line 4: subtask `c` of dag `x` has a relative deadline of 10ms, longer than its dag's",
+        ];
+        for words in words {
+            assert!(found.contains(words), "{found}");
+        }
     }
 
     #[test]

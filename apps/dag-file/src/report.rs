@@ -3,13 +3,14 @@
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use dag_file::Set;
-use fass::{Answer, Verdict};
+use fass::{Answer, SinkAnswer, Verdict};
 use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
 use sched_dag::law::Violation;
-use sched_dag::{DagId, DagStatistics};
+use sched_dag::{DagId, DagStatistics, Instance, SubtaskId};
 
 /// The figures of one set.
 pub(crate) struct Report {
@@ -25,6 +26,14 @@ struct DagReport {
     answer: Verdict,
     statistics: DagStatistics,
     responses: Distribution,
+    /// If there are several.
+    sinks: Vec<SinkReport>,
+}
+
+struct SinkReport {
+    answer: SinkAnswer,
+    misses: u64,
+    responses: Distribution,
 }
 
 impl Report {
@@ -37,6 +46,7 @@ impl Report {
             answer: answer.verdict.clone(),
             statistics: *run.statistics(id),
             responses: responses(id, run),
+            sinks: sinks(id, answer, run),
         });
         let shown = |violation: &Violation| println!("violation: {violation}");
         Self {
@@ -73,6 +83,19 @@ impl Report {
                     }
                 }
             });
+            for sink in &dag.sinks {
+                json::emit("dag_sink", |line| {
+                    line.text("set", &self.set)
+                        .text("dag", &dag.name)
+                        .text("sink", &sink.answer.sink.name)
+                        .number("relative_deadline_ns", sink.relative_deadline_ns())
+                        .number("deadline_misses", sink.misses)
+                        .object("response_time_ns", |object| sink.responses.describe(object));
+                    if let Some(bound_ns) = sink.bound_ns() {
+                        line.number("bound_ns", bound_ns);
+                    }
+                });
+            }
         }
         json::emit("dag_set", |line| {
             line.text("set", &self.set)
@@ -93,19 +116,18 @@ impl Report {
             "dag", "jobs", "min", "median", "p99", "max", "bound", "max/bound", "misses"
         );
         for dag in &self.dags {
-            let none = || "-".to_string();
-            println!(
-                "{:<14}{:>6}{:>12}{:>12}{:>12}{:>12}{:>12}{:>10}{:>8}",
-                dag.name,
-                dag.statistics.completed,
-                Ns(dag.responses.min()),
-                Ns(dag.responses.median()),
-                Ns(dag.responses.p99()),
-                Ns(dag.responses.max()),
-                dag.bound_ns().map_or_else(none, |ns| Ns(ns).to_string()),
-                dag.tightness_permille().map_or_else(none, percent),
-                dag.statistics.misses
+            let jobs = dag.statistics.completed;
+            print_row(
+                &dag.name,
+                jobs,
+                &dag.responses,
+                dag.bound_ns(),
+                dag.statistics.misses,
             );
+            for sink in &dag.sinks {
+                let name = format!("  {}", sink.answer.sink.name);
+                print_row(&name, jobs, &sink.responses, sink.bound_ns(), sink.misses);
+            }
         }
         for dag in &self.dags {
             if let Verdict::NotProven(unproven) = &dag.answer {
@@ -134,15 +156,50 @@ impl Report {
 
 impl DagReport {
     fn bound_ns(&self) -> Option<u64> {
-        u64::try_from(self.answer.bound()?.as_nanos()).ok()
+        in_ns(self.answer.bound()?)
     }
 
-    /// Returns the longest response time in thousandths of the bound.
     fn tightness_permille(&self) -> Option<u64> {
-        let longest = u128::from(self.responses.max()) * 1000;
-        let permille = longest.checked_div(u128::from(self.bound_ns()?))?;
-        u64::try_from(permille).ok()
+        tightness_permille(&self.responses, self.bound_ns()?)
     }
+}
+
+impl SinkReport {
+    fn bound_ns(&self) -> Option<u64> {
+        in_ns(self.answer.bound?)
+    }
+
+    fn relative_deadline_ns(&self) -> u64 {
+        in_ns(self.answer.relative_deadline).unwrap_or(u64::MAX)
+    }
+}
+
+fn in_ns(time: Duration) -> Option<u64> {
+    u64::try_from(time.as_nanos()).ok()
+}
+
+/// Returns the longest response time in thousandths of the bound.
+fn tightness_permille(responses: &Distribution, bound_ns: u64) -> Option<u64> {
+    let longest = u128::from(responses.max()) * 1000;
+    let permille = longest.checked_div(u128::from(bound_ns))?;
+    u64::try_from(permille).ok()
+}
+
+fn print_row(name: &str, jobs: u64, times: &Distribution, bound_ns: Option<u64>, misses: u64) {
+    let none = || "-".to_string();
+    let tightness = bound_ns.and_then(|bound_ns| tightness_permille(times, bound_ns));
+    println!(
+        "{:<14}{:>6}{:>12}{:>12}{:>12}{:>12}{:>12}{:>10}{:>8}",
+        name,
+        jobs,
+        Ns(times.min()),
+        Ns(times.median()),
+        Ns(times.p99()),
+        Ns(times.max()),
+        bound_ns.map_or_else(none, |ns| Ns(ns).to_string()),
+        tightness.map_or_else(none, percent),
+        misses
+    );
 }
 
 fn percent(permille: u64) -> String {
@@ -160,5 +217,34 @@ fn responses(dag: DagId, run: &Run) -> Distribution {
     Distribution::new(jobs.filter_map(|(job, times)| {
         let completion_ns = run.record().completion_ns(dag, job)?;
         Some(completion_ns.saturating_sub(times.release_ns?))
+    }))
+}
+
+/// Returns the figures of a DAG's sinks, if there are several.
+fn sinks(dag: DagId, answer: &Answer, run: &Run) -> Vec<SinkReport> {
+    if answer.sinks.len() < 2 {
+        return Vec::new();
+    }
+    let report = |answer: &SinkAnswer| SinkReport {
+        answer: answer.clone(),
+        misses: run.sink_misses(dag, answer.sink.id),
+        responses: sink_responses(dag, answer.sink.id, run),
+    };
+    answer.sinks.iter().map(report).collect()
+}
+
+/// Returns the response times of a sink in all jobs in which it has finished.
+fn sink_responses(dag: DagId, subtask: SubtaskId, run: &Run) -> Distribution {
+    let vertex = |job| run.task_set().vertex(Instance { dag, job, subtask });
+    if run.record().first_job(dag) > 0
+        && let Some(times) = run.times()
+        && let Some(response_time) = &times.subtask(vertex(0)).response_time
+    {
+        return Distribution::counted(response_time.clone());
+    }
+    let jobs = run.record().numbered(dag);
+    Distribution::new(jobs.filter_map(|(job, times)| {
+        let sink = run.record().instance(Instance { dag, job, subtask })?;
+        Some(sink.finish_ns?.saturating_sub(times.release_ns?))
     }))
 }

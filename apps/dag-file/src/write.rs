@@ -68,6 +68,9 @@ fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>
     if spec.non_preemptive {
         out.write_str(" non-preemptive")?;
     }
+    if let Some(deadline_ns) = spec.relative_deadline_ns {
+        write!(out, " deadline {}", Time(deadline_ns))?;
+    }
     for (number, sample_ns) in more.samples_ns.iter().enumerate() {
         let separator = if number == 0 { " samples " } else { "," };
         write!(out, "{separator}{}", Time(*sample_ns))?;

@@ -7,6 +7,7 @@
 //! case NAME m edf(0/1) preemptive(0/1) ndags
 //! dag T D O K nsub nedge        then nsub lines:  sub wcet prio e_0 .. e_{K-1}
 //!                               then nedge lines: edge u v
+//! sink v D_v                    for sinks with a deadline of their own, D_v <= D
 //! x dag job subtask start finish preemptions      (each instance once)
 //! j dag job release finish response missed(0/1)   (each job once)
 //! end

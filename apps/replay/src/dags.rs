@@ -154,6 +154,10 @@ pub fn build(
                 dag.precede(&subtasks[earlier.index()], later);
             }
         }
+        for sink in model.sinks() {
+            let deadline_ns = model.subtask(*sink).relative_deadline_ns();
+            dag.sink_deadline(&subtasks[sink.index()], scale.duration(deadline_ns)?);
+        }
         Ok(dag)
     })
     .collect()

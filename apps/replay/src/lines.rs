@@ -72,6 +72,14 @@ impl<'a> Lines<'a> {
         None
     }
 
+    /// Returns the next record if it is of this kind; else it stays the next one.
+    pub fn next_if(&mut self, kind: &str) -> Option<Line<'a>> {
+        let mut ahead = self.clone();
+        let line = ahead.next_line().filter(|line| line.kind == kind)?;
+        *self = ahead;
+        Some(line)
+    }
+
     /// Returns the next record, which must be of this kind.
     ///
     /// # Errors

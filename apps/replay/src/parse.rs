@@ -112,6 +112,9 @@ fn parse_dag(
         }
         spec.edges.push((ends[0], ends[1]));
     }
+    while let Some(line) = lines.next_if("sink") {
+        parse_sink(&line, &mut spec)?;
+    }
     Ok((
         spec,
         CaseDag {
@@ -145,6 +148,19 @@ fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(Priority, Vec<u64>), Mal
         executions_ns.push(execution_ns);
     }
     Ok((Priority(line.number(priority)?), executions_ns))
+}
+
+/// Reads the deadline of a sink.
+fn parse_sink(line: &Line<'_>, spec: &mut DagSpec) -> Result<(), Malformed> {
+    let &[sink, deadline] = line.exactly(2)? else {
+        return Err(line.malformed("expected 2 words"));
+    };
+    let sink = in_range(line, "subtask", line.number(sink)?, spec.subtasks.len())?;
+    fill(
+        line,
+        &mut spec.subtasks[sink].relative_deadline_ns,
+        line.number(deadline)?,
+    )
 }
 
 /// Verifies DAGs that the record `line` begins.

@@ -10,6 +10,8 @@ use crate::pin::Pinning;
 pub struct Report {
     /// The counters of each DAG.
     pub statistics: Vec<DagStatistics>,
+    /// For each DAG, in how many jobs each of its sinks was late.
+    pub sink_misses: Vec<Vec<u64>>,
     /// Whether the workers were pinned.
     pub pinning: Pinning,
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 
 use sched_dag::Recorder;
-use sched_dag::{CoreId, DagId, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{CoreId, Dag, DagId, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::execute::Execute;
 use crate::pin::{Pinning, pin, processors};
@@ -166,7 +166,14 @@ fn run_watched<B: Execute, W: Watch>(
         (scheduler, watch) = team.into_parts();
     }
     let ids = (0..).map(DagId).zip(dags);
+    let sink_misses = |(dag, model): (DagId, &Dag)| {
+        let sinks = model.sinks().iter();
+        sinks
+            .map(|&sink| scheduler.sink_misses(dag, sink))
+            .collect()
+    };
     let report = Report {
+        sink_misses: ids.clone().map(sink_misses).collect(),
         statistics: ids.map(|(dag, _)| *scheduler.statistics(dag)).collect(),
         pinning: start.pinning(),
     };

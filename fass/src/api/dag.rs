@@ -16,7 +16,6 @@ use core::time::Duration;
 
 use sched_dag::{Activation, Order, OverrunPolicy};
 
-use super::untyped::Untyped;
 use crate::draft::Draft;
 use crate::draft::attributes::SubtaskAttributes;
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -247,10 +246,12 @@ impl Dag {
             .register(f, &input_topics, &output_topics, attributes);
     }
 
-    /// Registers the sink: a function that returns nothing, whose completion
-    /// completes the job, by `relative_deadline` after the release.
+    /// Registers a sink: a function that returns nothing and shall have finished by
+    /// `relative_deadline` after the release. The job is complete with its last sink.
     ///
-    /// `input_topics` names one topic for each element of `Args`.
+    /// `input_topics` names one topic for each element of `Args`. If a DAG has several
+    /// sinks ([`finish_create_dags_with`](crate::finish_create_dags_with)), each has its
+    /// own deadline.
     ///
     /// ```
     /// use core::time::Duration;
@@ -276,73 +277,7 @@ impl Dag {
     {
         let mut draft = self.open();
         let subtask = draft.register(f, &input_topics, &[], attributes);
-        draft.set_deadline(relative_deadline, subtask);
-    }
-
-    /// Registers a subtask without types, for a graph that is known only at run
-    /// time: a function of the job's number, with any number of edges.
-    ///
-    /// Its edges are those stated with [`precede`](Self::precede). Without one
-    /// leading to it, it is a source. The DAG's [`period`](Self::period) and
-    /// [`relative_deadline`](Self::relative_deadline) are stated for themselves.
-    /// The guarantees are the same as for typed subtasks: the function is called
-    /// when all predecessors of its job are complete, and successors follow when
-    /// it has returned.
-    ///
-    /// ```
-    /// use core::time::Duration;
-    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-    ///
-    /// let machine = virtual_time::VirtualTime::new();
-    /// let dag = create_dag();
-    /// dag.jobs(3).period(Duration::from_millis(10));
-    /// dag.relative_deadline(Duration::from_millis(10));
-    /// let wcets_ms = [1, 4, 2, 3];
-    /// let edges = [(0, 1), (0, 2), (1, 3), (2, 3)];
-    ///
-    /// let work = |ms| {
-    ///     let time = Duration::from_millis(ms);
-    ///     move |_job| fass::execute_for(time, fass::Occupation::Hold)
-    /// };
-    /// let register = |ms| dag.register_untyped_subtask(work(ms), SubtaskAttributes::default());
-    /// let subtasks = wcets_ms.map(register);
-    /// for (earlier, later) in edges {
-    ///     dag.precede(&subtasks[earlier], &subtasks[later]);
-    /// }
-    /// finish_create_dags(&[dag]).unwrap();
-    /// assert_eq!(machine.run().jobs.len(), 3);
-    /// ```
-    #[track_caller]
-    pub fn register_untyped_subtask<F>(&self, f: F, attributes: SubtaskAttributes) -> Untyped
-    where
-        F: FnMut(u64) + Send + 'static,
-    {
-        Untyped {
-            subtask: self.open().register_untyped(f, attributes),
-            draft: Rc::clone(&self.draft),
-        }
-    }
-
-    /// Adds an edge: of each job, `later` starts only when `earlier` is complete.
-    ///
-    /// See [`register_untyped_subtask`](Self::register_untyped_subtask). What is
-    /// wrong with the graph is reported at the commit.
-    ///
-    /// # Panics
-    ///
-    /// Also if one of the two is a subtask of another DAG: there are no edges
-    /// between DAGs.
-    #[track_caller]
-    pub fn precede(&self, earlier: &Untyped, later: &Untyped) -> &Self {
-        for end in [earlier, later] {
-            assert!(
-                Rc::ptr_eq(&end.draft, &self.draft),
-                "{end:?} is a subtask of another dag; an edge joins two subtasks of one"
-            );
-        }
-        let edge = (earlier.subtask, later.subtask);
-        self.open().spec.edges.push(edge);
-        self
+        draft.set_sink_deadline(relative_deadline, &subtask);
     }
 
     /// Sets the time between two releases, for a DAG of untyped subtasks. (A
@@ -359,7 +294,8 @@ impl Dag {
     }
 
     /// Sets the time after its release by which a job shall be complete, for a
-    /// DAG of untyped subtasks. (A typed sink states it itself.)
+    /// DAG of untyped subtasks. It is the deadline of each sink that states none. (A
+    /// typed sink states its own, which may be shorter.)
     ///
     /// ```
     /// use core::time::Duration;
@@ -367,7 +303,7 @@ impl Dag {
     /// ```
     #[track_caller]
     pub fn relative_deadline(&self, relative_deadline: Duration) -> &Self {
-        self.open().replace_deadline(relative_deadline);
+        self.open().set_dag_deadline(relative_deadline);
         self
     }
 

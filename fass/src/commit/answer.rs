@@ -67,6 +67,39 @@ pub struct Answer {
     pub dag: DagLabel,
     /// What is known.
     pub verdict: Verdict,
+    /// What is known of each sink, in the order of registration.
+    pub sinks: Vec<SinkAnswer>,
+}
+
+/// What is known at commit about the deadline of one sink.
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{ConstructionPolicy, SubtaskAttributes, create_dag, finish_create_dags_with};
+///
+/// # let machine = virtual_time::VirtualTime::new().policy(fass::Policy::Edf);
+/// let ms = Duration::from_millis;
+/// let taking = |name, time| SubtaskAttributes::named(name).wcet(ms(time));
+/// let dag = create_dag();
+/// dag.name("arm");
+/// dag.register_periodic_subtask(|| (1, 2), vec!["angle", "record"], ms(20), taking("plan", 1));
+/// dag.register_sink_subtask(|_: (i32,)| (), vec!["angle"], ms(4), taking("act", 2));
+/// dag.register_sink_subtask(|_: (i32,)| (), vec!["record"], ms(20), taking("log", 9));
+///
+/// let commit = finish_create_dags_with(&[dag], ConstructionPolicy::any_graph()).unwrap();
+/// let [act, log] = &commit.answers()[0].sinks[..] else { panic!("it has two") };
+/// assert_eq!((act.relative_deadline, act.bound), (ms(4), Some(ms(3))));
+/// assert_eq!((log.relative_deadline, log.bound), (ms(20), Some(ms(12))));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SinkAnswer {
+    /// The sink.
+    pub sink: SubtaskLabel,
+    /// By when it shall have finished, from the nominal release.
+    pub relative_deadline: Duration,
+    /// The most time from a job's nominal release to the sink's finish, if the DAG is
+    /// proven.
+    pub bound: Option<Duration>,
 }
 
 /// Whether a DAG is proven to meet its deadlines.
@@ -196,6 +229,7 @@ impl Unproven {
                 lacking.map(|(id, _)| id).collect()
             }
             Reason::SubtaskBeyondPeriod { subtask } => vec![subtask],
+            Reason::PathBeyondDeadline { sink, .. } | Reason::NoSinkBound { sink } => vec![sink],
             _ => Vec::new(),
         };
         let labels = subtasks.into_iter();
@@ -242,8 +276,11 @@ impl Answers {
                     Verdict::NotProven(Unproven::new(task_set, dag, reason))
                 }
             };
-            let dag = dag_label(task_set, dag);
-            Answer { dag, verdict }
+            Answer {
+                sinks: sinks(task_set, dag, &answer.sinks_ns[dag.index()]),
+                dag: dag_label(task_set, dag),
+                verdict,
+            }
         });
         Self {
             of_dags: of_dags.collect(),
@@ -260,8 +297,13 @@ impl Answers {
     /// Returns the bounds, for the platform.
     pub(crate) fn bounds_ns(&self) -> Vec<Option<u64>> {
         let bounds = self.of_dags.iter().map(|answer| answer.verdict.bound());
-        let bounds = bounds.map(|bound| u64::try_from(bound?.as_nanos()).ok());
-        bounds.collect()
+        bounds.map(in_ns).collect()
+    }
+
+    /// Returns the bounds of sinks, for the platform.
+    pub(crate) fn sink_bounds_ns(&self) -> Vec<Vec<Option<u64>>> {
+        let of_dag = |answer: &Answer| answer.sinks.iter().map(|sink| in_ns(sink.bound)).collect();
+        self.of_dags.iter().map(of_dag).collect()
     }
 
     /// Returns the warnings that follow: DAG and reason of what is certain.
@@ -272,6 +314,21 @@ impl Answers {
             certain.then(|| (answer.dag.clone(), unproven.to_string()))
         })
     }
+}
+
+fn in_ns(bound: Option<Duration>) -> Option<u64> {
+    u64::try_from(bound?.as_nanos()).ok()
+}
+
+fn sinks(task_set: &TaskSet, dag: DagId, bounds_ns: &[Option<u64>]) -> Vec<SinkAnswer> {
+    let model = task_set.dag(dag);
+    let sinks = model.sinks().iter().zip(bounds_ns);
+    let answers = sinks.map(|(&sink, bound_ns)| SinkAnswer {
+        sink: subtask_label(task_set, dag, sink),
+        relative_deadline: Duration::from_nanos(model.subtask(sink).relative_deadline_ns()),
+        bound: bound_ns.map(Duration::from_nanos),
+    });
+    answers.collect()
 }
 
 fn dag_label(task_set: &TaskSet, id: DagId) -> DagLabel {
@@ -313,6 +370,17 @@ impl fmt::Display for Unproven {
             (Reason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
                 f,
                 "{subtask} alone takes more than a period; split it or lengthen the period"
+            ),
+            (Reason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
+                f,
+                "the longest path to {sink} alone takes {:?}, which is more than the relative \
+                 deadline of that sink; shorten the path or relax the deadline",
+                Duration::from_nanos(*length_ns)
+            ),
+            (Reason::NoSinkBound { .. }, [sink, ..], _) => write!(
+                f,
+                "no test bounds the response time of {sink} by the relative deadline of that sink \
+                 (it may still meet it); add cores or relax the deadline"
             ),
             (Reason::DelayedBy { .. }, _, Some(other)) => write!(
                 f,

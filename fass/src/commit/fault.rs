@@ -122,17 +122,6 @@ pub enum Fault {
         /// The subtask.
         subtask: SubtaskLabel,
     },
-    /// Two sinks of one DAG state different relative deadlines.
-    DeadlinesDiffer {
-        /// The DAG.
-        dag: DagLabel,
-        /// The subtask that states the second deadline.
-        subtask: SubtaskLabel,
-        /// The relative deadline stated first, in nanoseconds.
-        first_ns: u64,
-        /// The other relative deadline, in nanoseconds.
-        second_ns: u64,
-    },
     /// The DAG demands a proof that it meets its deadlines, and there is none.
     /// Found only where nothing else is wrong.
     NotProven {
@@ -166,7 +155,6 @@ impl Fault {
             Self::ActivationsDiffer { .. } => "activations_differ",
             Self::LatestNotCommitted { .. } => "latest_not_committed",
             Self::SignalNotCommitted { .. } => "signal_not_committed",
-            Self::DeadlinesDiffer { .. } => "deadlines_differ",
             Self::NotProven { .. } => "not_proven",
             Self::Model(fault) => fault.code(),
             Self::NotLaunched(_) => "not_launched",
@@ -208,16 +196,6 @@ impl Fault {
                 second_ns,
             },
             Flaw::ActivationsDiffer { subtask } => Self::ActivationsDiffer { dag, subtask },
-            Flaw::DeadlinesDiffer {
-                subtask,
-                first_ns,
-                second_ns,
-            } => Self::DeadlinesDiffer {
-                dag,
-                subtask,
-                first_ns,
-                second_ns,
-            },
         }
     }
 }
@@ -297,18 +275,6 @@ impl fmt::Display for Fault {
                 f,
                 "{subtask} of {dag} may raise the signal of a dag that is not in the commit; \
                  commit both dags in one call"
-            ),
-            Self::DeadlinesDiffer {
-                dag,
-                subtask,
-                first_ns,
-                second_ns,
-            } => write!(
-                f,
-                "{subtask} gives {dag} a relative deadline of {:?} where {:?} were given before; \
-                 a DAG has one deadline, give the same to every sink",
-                Duration::from_nanos(*second_ns),
-                Duration::from_nanos(*first_ns)
             ),
             Self::NotProven { dag, unproven } => write!(
                 f,

@@ -143,12 +143,7 @@ pub fn finish_create_dags_with(
     }
     let staleness = staleness::of_all(dags, &task_set, &answers.of_dags);
     let task_set = Arc::new(task_set);
-    let plan = tie(
-        dags,
-        Arc::clone(&task_set),
-        answers.bounds_ns(),
-        staleness.clone(),
-    );
+    let plan = tie(dags, Arc::clone(&task_set), &answers, staleness.clone());
     match platform.launch(plan) {
         Ok(()) => Ok(Commit {
             warnings,

@@ -9,6 +9,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::{DagId, DagSpec, SubtaskSpec, TaskSet};
 
+use super::answer::Answers;
 use crate::api::dag::Dag;
 use crate::run::plan::{Body, Plan};
 use crate::run::staleness::Staleness;
@@ -22,7 +23,7 @@ static PLANS: AtomicU64 = AtomicU64::new(0);
 pub(crate) fn tie(
     dags: &[Dag],
     task_set: Arc<TaskSet>,
-    bounds_ns: Vec<Option<u64>>,
+    answers: &Answers,
     staleness: Vec<Staleness>,
 ) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
@@ -68,7 +69,8 @@ pub(crate) fn tie(
         task_set,
         number,
         bodies,
-        bounds_ns,
+        bounds_ns: answers.bounds_ns(),
+        sink_bounds_ns: answers.sink_bounds_ns(),
         staleness,
     }
 }

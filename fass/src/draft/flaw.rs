@@ -30,9 +30,4 @@ pub(crate) enum Flaw {
     ActivationsDiffer {
         subtask: SubtaskLabel,
     },
-    DeadlinesDiffer {
-        subtask: SubtaskLabel,
-        first_ns: u64,
-        second_ns: u64,
-    },
 }

@@ -39,6 +39,8 @@ pub(crate) struct Draft {
     /// What only this crate can find wrong.
     pub(crate) flaws: Vec<Flaw>,
     pub(crate) is_committed: bool,
+    /// Whether the relative deadline is the DAG's own, rather than its sinks' longest.
+    pub(crate) states_deadline: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
     pub(crate) demands_proof: bool,
     /// The topics whose latest values are offered.
@@ -131,10 +133,12 @@ impl Draft {
         self.spec.period_ns = period_ns.or(self.spec.period_ns);
     }
 
-    /// Replaces the relative deadline, whatever a sink said before.
-    pub(crate) fn replace_deadline(&mut self, deadline: Duration) {
-        let deadline_ns = self.convert(deadline, None, "relative deadline");
-        self.spec.relative_deadline_ns = deadline_ns.or(self.spec.relative_deadline_ns);
+    /// States the DAG's own relative deadline.
+    pub(crate) fn set_dag_deadline(&mut self, deadline: Duration) {
+        if let Some(deadline_ns) = self.convert(deadline, None, "relative deadline") {
+            self.spec.relative_deadline_ns = Some(deadline_ns);
+            self.states_deadline = true;
+        }
     }
 
     pub(crate) fn set_offset(&mut self, offset: Duration) {
@@ -166,17 +170,24 @@ impl Draft {
         }
     }
 
-    pub(crate) fn set_deadline(&mut self, deadline: Duration, subtask: SubtaskLabel) {
-        let Some(deadline_ns) = self.convert(deadline, Some(&subtask), "relative deadline") else {
+    /// States the relative deadline of a sink. The DAG's is that of the sink which has the
+    /// longest, unless it states its own.
+    pub(crate) fn set_sink_deadline(&mut self, deadline: Duration, sink: &SubtaskLabel) {
+        let Some(deadline_ns) = self.convert(deadline, Some(sink), "relative deadline") else {
             return;
         };
-        let first_ns = *self.spec.relative_deadline_ns.get_or_insert(deadline_ns);
-        if first_ns != deadline_ns {
-            self.flaws.push(Flaw::DeadlinesDiffer {
-                subtask,
-                first_ns,
-                second_ns: deadline_ns,
-            });
+        self.spec.subtasks[sink.id.index()].relative_deadline_ns = Some(deadline_ns);
+        if !self.states_deadline {
+            let longest_ns = self.spec.relative_deadline_ns.max(Some(deadline_ns));
+            self.spec.relative_deadline_ns = longest_ns;
+        }
+    }
+
+    /// Returns how messages call a subtask that is registered.
+    pub(crate) fn label(&self, subtask: usize) -> SubtaskLabel {
+        SubtaskLabel {
+            id: SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX)),
+            name: self.spec.subtasks[subtask].name.clone(),
         }
     }
 

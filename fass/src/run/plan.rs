@@ -39,6 +39,8 @@ pub struct Plan {
     /// The response time of each DAG that the commit has proven, if it has
     /// ([`Commit::answers`](crate::Commit::answers)).
     pub bounds_ns: Vec<Option<u64>>,
+    /// The same of each sink, in the order of [`Dag::sinks`](sched_dag::Dag::sinks).
+    pub sink_bounds_ns: Vec<Vec<Option<u64>>>,
     /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
     /// passes between DAGs, for platforms that show it.
     pub staleness: Vec<Staleness>,

@@ -38,13 +38,13 @@ pub struct JobRecord {
     pub release_ns: u64,
     /// When the release took place; later than `release_ns` if it had to queue.
     pub released_at_ns: u64,
-    /// The absolute deadline.
+    /// The absolute deadline of the whole job, the latest one of its sinks'.
     pub deadline_ns: u64,
     /// When the job ended, if it did.
     pub finish_ns: Option<u64>,
     /// How the job ended, if it did.
     pub outcome: Option<JobOutcome>,
-    /// Whether the deadline passed before the job was complete.
+    /// Whether the deadline of a sink passed before that had finished.
     pub has_missed: bool,
 }
 

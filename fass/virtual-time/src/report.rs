@@ -48,6 +48,9 @@ pub struct Report {
     pub events: Vec<Event>,
     /// The scheduler's counters, one set for each DAG.
     pub statistics: Vec<DagStatistics>,
+    /// For each DAG, in how many jobs each of its sinks was late, in the order of
+    /// [`Dag::sinks`](sched_dag::Dag::sinks).
+    pub sink_misses: Vec<Vec<u64>>,
     /// The time of the last event.
     pub end_ns: u64,
     pub(crate) task_set: Arc<TaskSet>,

@@ -14,7 +14,7 @@ use sched_dag::Recorder;
 use sched_dag::journal::What;
 use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
 use sched_dag::{
-    CoreId, DagId, DagLabel, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions,
+    CoreId, Dag, DagId, DagLabel, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions,
     SubtaskLabel, TaskSet,
 };
 
@@ -125,6 +125,13 @@ impl Session {
     fn report(&self) -> Report {
         let scheduler = self.driver.scheduler();
         let dags = (0..).map(DagId).zip(self.task_set.dags());
+        let sink_misses = |(dag, model): (DagId, &Dag)| {
+            let sinks = model.sinks().iter();
+            sinks
+                .map(|&sink| scheduler.sink_misses(dag, sink))
+                .collect()
+        };
+        let sink_misses = dags.clone().map(sink_misses).collect();
         let statistics = dags.map(|(dag, _)| *scheduler.statistics(dag)).collect();
         let Recording {
             journal, panics, ..
@@ -135,6 +142,7 @@ impl Session {
             panics: panics.clone(),
             events: journal.events.clone(),
             statistics,
+            sink_misses,
             end_ns: journal.now_ns,
             task_set: Arc::clone(&self.task_set),
             options: scheduler.options(),

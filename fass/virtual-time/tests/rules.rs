@@ -2,7 +2,9 @@
 
 mod support;
 
-use fass::{Policy, Preemption, SubtaskAttributes, create_dag};
+use fass::{
+    ConstructionPolicy, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags_with,
+};
 use support::{commit, diamond, ms, named, pair};
 use virtual_time::{Event, JobOutcome, Report, Rule, SubtaskId, VirtualTime, What};
 
@@ -91,6 +93,60 @@ fn r4_a_job_meets_its_deadline_up_to_and_including_it() {
         assert_eq!(report.statistics[0].misses, misses);
         assert_eq!(report.violations(), []);
     }
+}
+
+/// One source, a quick sink with a short deadline and a slow one; the slow one is
+/// registered first, so that nothing but its deadline puts it last.
+fn two_ends(name: &str, quick_deadline: u64, jobs: u64) -> fass::Dag {
+    let dag = create_dag();
+    dag.name(name).jobs(jobs);
+    let topics = [format!("{name} record"), format!("{name} angle")];
+    let read = || {
+        support::execute(ms(1));
+        (1, 2)
+    };
+    let outputs = topics.iter().map(String::as_str).collect();
+    dag.register_periodic_subtask(read, outputs, ms(20), named("read"));
+    for (topic, end, deadline, takes) in [
+        (&topics[0], "log", 20, 8),
+        (&topics[1], "act", quick_deadline, 2),
+    ] {
+        let sink = move |_: (i32,)| support::execute(ms(takes));
+        dag.register_sink_subtask(sink, vec![topic], ms(deadline), named(end));
+    }
+    dag
+}
+
+#[test]
+fn r4_each_sink_has_its_own_deadline_and_the_job_ends_with_the_last() {
+    for (deadline, outcome, misses) in [(3, JobOutcome::Met, 0), (2, JobOutcome::Missed, 2)] {
+        let machine = VirtualTime::new().policy(Policy::Edf);
+        let dag = two_ends("arm", deadline, 2);
+        finish_create_dags_with(&[dag], ConstructionPolicy::any_graph()).unwrap();
+        let report = machine.run();
+        let job = report.jobs[1];
+        assert_eq!((job.outcome, job.has_missed), (Some(outcome), misses > 0));
+        assert_eq!(
+            (job.response_time_ns(), job.deadline_ns),
+            (Some(11 * MS), 40 * MS)
+        );
+        assert_eq!(report.statistics[0].misses, misses);
+        assert_eq!(report.sink_misses, [[0, misses]]);
+        assert_eq!(report.violations(), []);
+    }
+}
+
+#[test]
+fn r5_edf_puts_what_leads_to_the_more_urgent_sink_first() {
+    let machine = VirtualTime::new().policy(Policy::Edf);
+    let dags = [two_ends("arm", 4, 1), two_ends("leg", 3, 1)];
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+    let report = machine.run();
+    let starts = ["leg", "arm"].map(|dag| {
+        ["read", "act", "log"].map(|subtask| report.subtask(dag, subtask)[0].start_ns.unwrap() / MS)
+    });
+    assert_eq!(starts, [[0, 1, 14], [3, 4, 6]]);
+    assert_eq!(report.violations(), []);
 }
 
 #[test]

@@ -14,7 +14,7 @@ use alloc::format;
 use alloc::string::String;
 use core::cell::{Cell, RefCell};
 
-use sched_dag::DagId;
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use super::ending::Ending;
 use crate::report::Ns;
@@ -29,9 +29,11 @@ pub(crate) struct BoundVerdict {
     complaint: RefCell<Option<String>>,
 }
 
-/// The jobs of a DAG that took longer than is proven.
+/// The jobs of a DAG that took longer than is proven, until all of them or one sink had
+/// finished.
 struct Exceeded {
     dag: DagId,
+    sink: Option<SubtaskId>,
     jobs: u64,
     /// The longest of them.
     job: u64,
@@ -56,8 +58,13 @@ impl BoundVerdict {
     /// only if there are any.
     pub(crate) fn note(&self, run: &Run) {
         let dags = (0..).map(DagId).take(run.task_set().dags().len());
-        for exceeded in dags.filter_map(|dag| Exceeded::find(run, dag)) {
-            let text = exceeded.report(run.task_set().dag(exceeded.dag).name());
+        let ends = dags.flat_map(|dag| {
+            let sinks = run.task_set().dag(dag).sinks();
+            let several = sinks.iter().filter(|_| sinks.len() > 1).copied().map(Some);
+            several.chain([None]).map(move |sink| (dag, sink))
+        });
+        for exceeded in ends.filter_map(|(dag, sink)| Exceeded::find(run, dag, sink)) {
+            let text = exceeded.report(run.task_set());
             self.complaint.borrow_mut().get_or_insert(text);
         }
     }
@@ -71,17 +78,19 @@ impl BoundVerdict {
 
 impl Exceeded {
     /// Looks at a DAG's jobs that are complete.
-    fn find(run: &Run, dag: DagId) -> Option<Self> {
-        let bound_ns = run.bound_ns(dag)?;
+    fn find(run: &Run, dag: DagId, sink: Option<SubtaskId>) -> Option<Self> {
+        let bound_ns = match sink {
+            Some(sink) => run.sink_bound_ns(dag, sink)?,
+            None => run.bound_ns(dag)?,
+        };
         let record = run.record();
+        let end_ns = |job| match sink {
+            Some(subtask) => record.instance(Instance { dag, job, subtask })?.finish_ns,
+            None => record.completion_ns(dag, job),
+        };
         let complete = |(job, times): (u64, &sched_dag::law::JobRecord)| {
             times.outcome?;
-            Some((
-                record
-                    .completion_ns(dag, job)?
-                    .saturating_sub(times.release_ns?),
-                job,
-            ))
+            Some((end_ns(job)?.saturating_sub(times.release_ns?), job))
         };
         let responses = record.numbered(dag).filter_map(complete);
         let late = responses.filter(|(response_ns, _)| *response_ns > bound_ns);
@@ -90,6 +99,7 @@ impl Exceeded {
         });
         // Of jobs that are not recorded any more, the longest one is known.
         if record.first_job(dag) > 0
+            && sink.is_none()
             && let Some(times) = run.times()
             && times.dag(dag).longest().0 > bound_ns
         {
@@ -99,6 +109,7 @@ impl Exceeded {
         let (response_ns, job) = longest;
         (jobs > 0).then_some(Self {
             dag,
+            sink,
             jobs,
             job,
             response_ns,
@@ -107,9 +118,14 @@ impl Exceeded {
     }
 
     /// Prints it, and returns it in words.
-    fn report(&self, name: &str) -> String {
+    fn report(&self, task_set: &TaskSet) -> String {
+        let dag = task_set.dag(self.dag);
+        let name = dag.name();
+        let sink = self.sink.map_or(String::new(), |sink| {
+            format!("sink `{}` of ", dag.subtask(sink).name())
+        });
         let text = format!(
-            "dag `{name}` took {} in job {}, beyond its proven bound of {}; a WCET, or \
+            "{sink}dag `{name}` took {} in job {}, beyond its proven bound of {}; a WCET, or \
              `overheads_ns`, is stated too small",
             Ns(self.response_ns),
             self.job,
@@ -117,9 +133,11 @@ impl Exceeded {
         );
         crate::println!("bound exceeded: {text}");
         json::emit("bound_exceeded", |line| {
-            line.number("dag", self.dag.0)
-                .text("dag_name", name)
-                .number("jobs", self.jobs)
+            line.number("dag", self.dag.0).text("dag_name", name);
+            if let Some(sink) = self.sink {
+                line.number("sink", sink.0);
+            }
+            line.number("jobs", self.jobs)
                 .number("job", self.job)
                 .number("response_ns", self.response_ns)
                 .number("bound_ns", self.bound_ns);

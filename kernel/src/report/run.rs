@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 use core::cell::OnceCell;
 
 use sched_dag::law::{self, Record, Tally, Terms, Violation};
-use sched_dag::{DagId, DagStatistics, Journal, TaskSet};
+use sched_dag::{DagId, DagStatistics, Journal, SubtaskId, TaskSet};
 
 use crate::run::execution::{Execution, Snapshot};
 
@@ -139,6 +139,32 @@ impl Run {
     #[must_use]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
         self.execution.scheduler().statistics(dag)
+    }
+
+    /// Returns how many jobs a sink has missed its deadline in, those included that
+    /// were not released in time.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG, or the subtask is no sink of it.
+    ///
+    /// ```no_run
+    /// use sched_dag::DagId;
+    ///
+    /// fn print_misses(run: &kernel::Run, dag: DagId) {
+    ///     for &sink in run.task_set().dag(dag).sinks() {
+    ///         kernel::println!("sink {}: {} misses", sink.0, run.sink_misses(dag, sink));
+    ///     }
+    /// }
+    /// ```
+    #[must_use]
+    pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
+        self.execution.scheduler().sink_misses(dag, sink)
+    }
+
+    /// Returns the response time that the commit has proven for a sink, if it has.
+    pub(crate) fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
+        self.execution.sink_bound_ns(dag, sink)
     }
 
     /// Returns the response time that the commit has proven for a DAG, if it has.

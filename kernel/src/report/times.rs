@@ -6,7 +6,8 @@ use sched_dag::{DagId, Instance, SubtaskId};
 use super::run::Run;
 use crate::text::json::{self, Object};
 
-/// Prints the statistics of a run: a line for each DAG, and one for each subtask.
+/// Prints the statistics of a run: a line for each DAG, for each subtask, and for each of
+/// several sinks.
 pub(crate) fn dump(run: &Run) {
     let Some(times) = run.times() else {
         crate::println!("there are no statistics, for not all events were recorded");
@@ -40,6 +41,19 @@ pub(crate) fn dump(run: &Run) {
                         describe(&of_subtask.execution_time, object);
                     });
             });
+            if let Some(response_time) = &of_subtask.response_time {
+                json::emit("times_sink", |line| {
+                    line.number("dag", dag.0)
+                        .number("subtask", subtask.0)
+                        .text("name", model.name())
+                        .number("relative_deadline_ns", model.relative_deadline_ns())
+                        .number("misses", run.sink_misses(dag, subtask))
+                        .object("response_time_ns", |object| describe(response_time, object));
+                    if let Some(bound_ns) = run.sink_bound_ns(dag, subtask) {
+                        line.number("bound_ns", bound_ns);
+                    }
+                });
+            }
         }
     }
 }

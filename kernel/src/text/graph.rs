@@ -64,6 +64,9 @@ pub(crate) fn describe(line: &mut Object<'_, '_>, number: u32, dag: &Dag) {
         .text("overrun", overrun)
         .list("subtasks", subtasks(dag))
         .list("edges", edges(dag));
+    if dag.sinks().len() > 1 {
+        line.list("sinks", sinks(dag));
+    }
 }
 
 fn subtasks(dag: &Dag) -> impl Iterator<Item = impl fmt::Display> {
@@ -86,6 +89,13 @@ fn edges(dag: &Dag) -> impl Iterator<Item = impl fmt::Display> {
     subtasks.flat_map(move |from| {
         let successors = dag.successors(from).iter();
         successors.map(move |to| fmt::from_fn(move |f| write!(f, "[{},{}]", from.0, to.0)))
+    })
+}
+
+fn sinks(dag: &Dag) -> impl Iterator<Item = impl fmt::Display> {
+    dag.sinks().iter().map(|sink| {
+        let deadline_ns = dag.subtask(*sink).relative_deadline_ns();
+        fmt::from_fn(move |f| write!(f, "[{},{deadline_ns}]", sink.0))
     })
 }
 

@@ -29,6 +29,11 @@ pub struct Answer {
     ///
     /// A bound stands for itself: DAGs that are not proven do not weaken it.
     pub bounds: Vec<Option<DagBound>>,
+    /// The bound of each sink of each DAG, in the order of [`Dag::sinks`]: the most time
+    /// from a job's nominal release to the sink's finish. `None`: its DAG is not proven.
+    ///
+    /// [`Dag::sinks`]: crate::Dag::sinks
+    pub sinks_ns: Vec<Vec<Option<u64>>>,
     /// Why a DAG has no bound, in the order of the commit; `None`: it has one.
     pub reasons: Vec<Option<Reason>>,
     /// The first DAG that is not proven, and why; `None` if all are.
@@ -90,6 +95,18 @@ pub enum Reason {
         /// The length, overheads included.
         length_ns: u64,
     },
+    /// Certain to miss at WCETs: the longest path to a sink is longer than its deadline.
+    PathBeyondDeadline {
+        /// The sink.
+        sink: SubtaskId,
+        /// The length, overheads included.
+        length_ns: u64,
+    },
+    /// The job has a bound, but this sink none that is within its own deadline.
+    NoSinkBound {
+        /// The sink.
+        sink: SubtaskId,
+    },
     /// Certain to fall behind at WCETs: a subtask needs more than a period.
     SubtaskBeyondPeriod {
         /// The subtask.
@@ -131,7 +148,10 @@ impl Reason {
     pub const fn is_certain(&self) -> bool {
         matches!(
             self,
-            Self::LengthBeyondDeadline { .. } | Self::SubtaskBeyondPeriod { .. } | Self::Overload
+            Self::LengthBeyondDeadline { .. }
+                | Self::PathBeyondDeadline { .. }
+                | Self::SubtaskBeyondPeriod { .. }
+                | Self::Overload
         )
     }
 }
@@ -172,6 +192,19 @@ impl fmt::Display for Reason {
                 "its longest path alone takes {:?}, which is more than its relative deadline; \
                  shorten the path or relax the deadline",
                 Duration::from_nanos(*length_ns)
+            ),
+            Self::PathBeyondDeadline { sink, length_ns } => write!(
+                f,
+                "the longest path to subtask {} alone takes {:?}, which is more than the relative \
+                 deadline of that sink; shorten the path or relax the deadline",
+                sink.0,
+                Duration::from_nanos(*length_ns)
+            ),
+            Self::NoSinkBound { sink } => write!(
+                f,
+                "no test bounds the response time of subtask {} by the relative deadline of that \
+                 sink (it may still meet it); add cores or relax the deadline",
+                sink.0
             ),
             Self::SubtaskBeyondPeriod { subtask } => write!(
                 f,

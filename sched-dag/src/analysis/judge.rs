@@ -15,7 +15,8 @@
 //!   subtask of `k` waits, whatever runs on the cores belongs to `k` or wins
 //!   over that subtask, so its DAG is among those counted.
 //! - *EDF.* Every DAG may outrank every other. If `D <= T` for all DAGs, only
-//!   jobs with a deadline no later are counted.
+//!   jobs with a deadline no later are counted; but all where sinks have deadlines of
+//!   their own, as then a job has more than one.
 //! - *No preemption at all.* Lower-ranked subtasks block besides; those of
 //!   DAGs that count in full are counted already.
 //! - *Preemption for some subtasks and not for others.* A subtask preempted
@@ -46,7 +47,8 @@ use super::non_preemptive::Blocking;
 use super::pipelined::Unsolved;
 use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
-use super::set::{Failure, Set, Solution, constrained};
+use super::set::{Failure, Set, constrained};
+use super::sinks;
 use super::task::{Task, TaskError};
 use crate::ids::{DagId, SubtaskId};
 use crate::order::sorted_by_key;
@@ -59,7 +61,8 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
     let dags = task_set.dags();
     with_case(task_set, settings, |case, mut reasons| {
         let mut bounds: Vec<Option<DagBound>> = dags.iter().map(|_| None).collect();
-        let verdict = case.verdict();
+        let mut verdict = case.verdict();
+        let sinks_ns = sinks::bounds(case, dags, &mut verdict);
         let first_failing = first_unknown(&reasons).or(verdict.first_failing);
         for (position, &dag) in case.members.iter().enumerate() {
             bounds[dag] = verdict.bounds[position];
@@ -67,6 +70,7 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
         }
         Answer {
             bounds,
+            sinks_ns,
             reasons,
             first_failing,
         }
@@ -149,7 +153,7 @@ pub(super) struct Case<'a> {
     /// Those of this case; elsewhere a DAG is a position in this list.
     pub(super) members: &'a [usize],
     pub(super) tasks: &'a [&'a Task],
-    settings: &'a Settings,
+    pub(super) settings: &'a Settings,
     pub(super) relation: Relation,
     /// The most urgent DAG first.
     order: Vec<usize>,
@@ -181,18 +185,19 @@ impl<'a> Case<'a> {
         case
     }
 
-    fn dag(&self, dag: usize) -> &'a Dag {
+    pub(super) fn dag(&self, dag: usize) -> &'a Dag {
         &self.all[self.members[dag]]
     }
 
-    fn id(&self, dag: usize) -> DagId {
+    pub(super) fn id(&self, dag: usize) -> DagId {
         dag_id(self.members[dag])
     }
 
-    /// Answers for the DAGs of this case, by their positions in it; names them
-    /// by their positions in the commit.
+    /// Answers for the jobs of the DAGs of this case, by their positions in it; names
+    /// them by their positions in the commit.
     pub(super) fn verdict(&self) -> Answer {
-        let solution = self.solve();
+        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
+        let solution = self.set.solve(&self.order, may_outrank);
         let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
             .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
             .collect();
@@ -226,6 +231,7 @@ impl<'a> Case<'a> {
         });
         Answer {
             bounds,
+            sinks_ns: Vec::new(),
             reasons,
             first_failing,
         }
@@ -263,6 +269,7 @@ impl<'a> Case<'a> {
         self.set.known = known.collect();
         self.set.deadlines_limit = self.settings.policy == Policy::Edf
             && self.relation.preemption != Mixture::Some
+            && !self.relation.ranks_sinks
             && constrained(self.tasks, self.settings.cores);
         let counts_in_full =
             |other, dag| self.relation.may_outrank(other, dag) && !self.set.deadlines_limit;
@@ -277,11 +284,6 @@ impl<'a> Case<'a> {
                     Blocking::by(wcets.collect(), self.settings.cores, self.tasks[dag]);
             }
         }
-    }
-
-    fn solve(&self) -> Solution {
-        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
-        self.set.solve(&self.order, may_outrank)
     }
 
     /// Names the test behind a response time of the set's equations.
@@ -306,7 +308,8 @@ impl<'a> Case<'a> {
     /// Returns the utilisation test that accepts the whole set, if one does.
     fn vouching_test(&self) -> Option<Test> {
         let (tasks, cores) = (self.tasks, self.settings.cores);
-        if self.relation.preemption != Mixture::All || !constrained(tasks, cores) {
+        let applies = self.relation.preemption == Mixture::All && !self.relation.ranks_sinks;
+        if !applies || !constrained(tasks, cores) {
             return None;
         }
         let (capacity, speed_up) = match self.settings.policy {

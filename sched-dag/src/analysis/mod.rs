@@ -21,6 +21,7 @@
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
 //! | `federated` | dedicated cores, as an offer | Li 2014; Baruah 2015 |
+//! | `sinks` | sinks with deadlines of their own | derived here |
 //! | `judge`, `relation`, `answer`, `overheads` | the verdict at commit | |
 //! | `witness` | what it takes to check the bounds | |
 //!
@@ -79,6 +80,7 @@ mod ratio;
 mod refusal;
 mod relation;
 mod set;
+mod sinks;
 mod task;
 mod width;
 mod witness;

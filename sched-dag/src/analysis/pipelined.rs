@@ -61,11 +61,15 @@ pub(super) struct Figures {
     period: u128,
     deadline: u128,
     volume: u128,
+    /// What of the volume may delay the chain in its last job.
+    last_volume: u128,
     length: u128,
     largest: u128,
     cores: usize,
     /// The most cores that one job can use, at most `cores`.
     parallelism: u128,
+    /// The response-time bound of all jobs, if it is known already.
+    whole: Option<u128>,
     /// Whether a younger job's subtask may win over an older job's.
     pub(super) younger_may_win: bool,
     /// Non-preemptible work of lower rank.
@@ -88,12 +92,32 @@ impl Figures {
             period: task.period_ns().into(),
             deadline: task.relative_deadline_ns().into(),
             volume: task.volume_ns().into(),
+            last_volume: task.volume_ns().into(),
             length: task.length_ns().into(),
             largest: task.largest_wcet_ns().into(),
             cores,
             parallelism: shape.parallelism.into(),
+            whole: None,
             younger_may_win: false,
             blocking: Blocking::default(),
+        }
+    }
+
+    /// Returns the figures of one sink of the task: the longest path to it, what of its
+    /// own job may delay it, its deadline, and the bound of all jobs of the task.
+    pub(super) fn of_sink(
+        &self,
+        length_ns: u64,
+        volume_ns: u64,
+        deadline_ns: u64,
+        whole_ns: u64,
+    ) -> Self {
+        Self {
+            deadline: self.deadline.min(deadline_ns.into()),
+            last_volume: volume_ns.into(),
+            length: length_ns.into(),
+            whole: Some(whole_ns.into()),
+            ..self.clone()
         }
     }
 
@@ -151,7 +175,7 @@ impl Figures {
         others: &[Other],
         steps: &mut u64,
     ) -> Result<(), Unsolved> {
-        let own = self.other_jobs(response)?;
+        let own = self.other_jobs(self.whole.unwrap_or(response))?;
         for back in 0..=OVERLAP_LIMIT {
             let index = usize::try_from(back).map_err(|_| Unsolved::Limit)?;
             if index == windows.len() {
@@ -217,7 +241,7 @@ impl Figures {
 
     /// Returns what the cores execute at most while a chain over `back` releases waits.
     pub(super) fn busy(&self, back: u128, own: u128, others: &[Other], window_ns: u64) -> Piece {
-        let constant = ((back + 1) * self.volume - self.chain(back))
+        let constant = (back * self.volume + self.last_volume - self.chain(back))
             .saturating_add(own)
             .saturating_add(self.blocking.along_a_chain(self.cores, back));
         let pieces = others

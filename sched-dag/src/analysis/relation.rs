@@ -16,6 +16,8 @@ pub(super) struct Relation {
     pub(super) preemption: Mixture,
     /// Per DAG the most and the least urgent priority, as numbers.
     priorities: Vec<(u32, u32)>,
+    /// Whether subtasks of one job may have different deadlines, under EDF.
+    pub(super) ranks_sinks: bool,
 }
 
 /// Which subtasks can be preempted.
@@ -32,6 +34,10 @@ impl Relation {
             policy,
             preemption: mixture(dags, preemption),
             priorities: dags.iter().map(priority_range).collect(),
+            ranks_sinks: policy == Policy::Edf
+                && dags
+                    .iter()
+                    .any(|dag| dag.least_deadline_ns() != dag.relative_deadline_ns()),
         }
     }
 
@@ -70,7 +76,11 @@ impl Relation {
     /// Reports whether a younger job of a DAG may win over an older one.
     pub(super) fn younger_may_win(&self, dag: usize) -> bool {
         let (most, least) = self.priorities[dag];
-        let unequal = self.policy == Policy::StaticPriority && most != least;
+        let unequal = match self.policy {
+            Policy::StaticPriority => most != least,
+            // It may have a subtask that leads to a more urgent sink.
+            Policy::Edf => self.ranks_sinks,
+        };
         unequal || self.preemption != Mixture::All
     }
 }

@@ -213,21 +213,33 @@ impl<'a> Set<'a> {
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Result<Vec<Other>, usize> {
+        let deadline_ns = self.tasks[dag].relative_deadline_ns();
+        let limit_ns = self.deadlines_limit.then_some(deadline_ns);
+        self.interference_up_to(dag, limit_ns, responses, may_outrank)
+    }
+
+    /// Does the same; with a limit only jobs that are due no later than that count.
+    pub(super) fn interference_up_to(
+        &self,
+        dag: usize,
+        limit_ns: Option<u64>,
+        responses: &[Option<u64>],
+        may_outrank: impl Fn(usize, usize) -> bool,
+    ) -> Result<Vec<Other>, usize> {
         let others = (0..self.tasks.len()).filter(|&other| other != dag && may_outrank(other, dag));
         let others = others.map(|other| {
             let response = responses[other].ok_or(other)?;
-            Ok(self.other(other, response, dag))
+            Ok(self.other(other, response, limit_ns))
         });
         others.collect()
     }
 
-    /// Describes what a DAG with a response-time bound may execute next to `dag`.
-    pub(super) fn other(&self, other: usize, response_ns: u64, dag: usize) -> Other {
+    /// Describes what a DAG with a response-time bound may execute next to another one.
+    fn other(&self, other: usize, response_ns: u64, limit_ns: Option<u64>) -> Other {
         let (task, shape) = (self.tasks[other], &self.shapes[other]);
-        let deadline = self.tasks[dag].relative_deadline_ns();
-        let limit = |workload: Workload| match self.deadlines_limit {
-            true => workload.under_edf(task.relative_deadline_ns(), deadline),
-            false => workload,
+        let limit = |workload: Workload| match limit_ns {
+            Some(limit_ns) => workload.under_edf(task.least_deadline_ns(), limit_ns),
+            None => workload,
         };
         Other::new(task, shape, response_ns, self.cores.into(), limit)
     }

@@ -29,6 +29,7 @@ use crate::task_set::Dag;
 pub struct Task {
     period_ns: u64,
     relative_deadline_ns: u64,
+    least_deadline_ns: u64,
     wcets_ns: Box<[u64]>,
     /// `starts[v]..starts[v + 1]` is the range of `v`'s successors.
     starts: Box<[usize]>,
@@ -130,14 +131,18 @@ impl Task {
             starts.push(successors.len());
         }
         let order = order.iter().map(|id| id.index()).collect();
-        Self::assemble(
+        let task = Self::assemble(
             dag.period_ns(),
             dag.relative_deadline_ns(),
             wcets_ns,
             starts,
             successors,
             order,
-        )
+        )?;
+        Ok(Self {
+            least_deadline_ns: dag.least_deadline_ns(),
+            ..task
+        })
     }
 
     fn assemble(
@@ -161,6 +166,7 @@ impl Task {
         let mut task = Self {
             period_ns,
             relative_deadline_ns,
+            least_deadline_ns: relative_deadline_ns,
             wcets_ns: wcets_ns.into(),
             starts: starts.into(),
             successors: successors.into(),
@@ -182,6 +188,12 @@ impl Task {
     #[must_use]
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
+    }
+
+    /// Returns the least relative deadline of a sink, never 0.
+    #[must_use]
+    pub const fn least_deadline_ns(&self) -> u64 {
+        self.least_deadline_ns
     }
 
     /// Returns the WCETs by subtask.

@@ -6,7 +6,7 @@
 //! whose text says what it requires of each line, computes each term again from the others.
 //!
 //! ```text
-//! machine CORES POLICY OVERHEAD_NS
+//! machine CORES POLICY OVERHEAD_NS            static, edf, or edf-sinks: jobs of several deadlines
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
 //! edge FROM TO
@@ -98,8 +98,12 @@ impl Text {
     }
 
     fn statement(&mut self, task_set: &TaskSet, settings: &Settings) {
+        let mut dags = task_set.dags().iter();
+        let has_sink_deadlines =
+            dags.any(|dag| dag.least_deadline_ns() != dag.relative_deadline_ns());
         let policy = match settings.policy {
             Policy::StaticPriority => "static",
+            Policy::Edf if has_sink_deadlines => "edf-sinks",
             Policy::Edf => "edf",
         };
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);

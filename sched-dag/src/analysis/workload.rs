@@ -16,6 +16,11 @@
 //! - `N = max(0, (D_k - D) / T + 1)` (floor),
 //! - `WE = N V + min(V, p max(0, D_k - N T - (D - R)))`.
 //!
+//! Where sinks have deadlines of their own, `D` is the least of them and may be less than
+//! `R`: a job counts as soon as one of its subtasks may win, and then as a whole. The
+//! job before the `N` whole ones then ends `R - D` after its least deadline, which is
+//! what the same expression says with `D - R` below 0.
+//!
 //! The paper has `p = m`. A smaller `p`, as the width of the DAG or the cores that
 //! count, is a refinement of our own: the worst case packs each job into a rectangle
 //! as wide as the job can be. The same holds for a part of a DAG, such as a chain,
@@ -82,7 +87,7 @@ impl Workload {
     }
 
     /// Adds the limit that EDF gives with respect to a job of relative deadline
-    /// `deadline_ns`; `own_deadline_ns` is this task's, `>= response`.
+    /// `deadline_ns`; `own_deadline_ns` is the least of this task's.
     ///
     /// Only for tasks with a relative deadline no longer than the period.
     pub(super) fn under_edf(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
@@ -90,10 +95,7 @@ impl Workload {
         let jobs = other
             .checked_sub(own)
             .map_or(0, |gap| gap / self.period + 1);
-        let slack = own.saturating_sub(self.response);
-        let carried_in = other
-            .saturating_sub(jobs * self.period)
-            .saturating_sub(slack);
+        let carried_in = (other + self.response).saturating_sub(own + jobs * self.period);
         let carried = self.volume.min(self.parallelism * carried_in);
         self.ceiling = Some(jobs.saturating_mul(self.volume).saturating_add(carried));
         self

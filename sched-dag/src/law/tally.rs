@@ -4,21 +4,22 @@
 //! each job with its end. What it keeps is a [`Histogram`] of each time that is asked
 //! about, and the times of the jobs in flight.
 //!
-//! - *Response time*, of a DAG's jobs: from the nominal release to the last finish.
+//! - *Response time*, of a DAG's jobs: from the nominal release to the last finish. If a
+//!   DAG has several sinks, also of each sink's instances, to its finish.
 //! - *Release jitter*, of a DAG's jobs: from the nominal release to the release.
 //! - *Join latency*, of a subtask's instances: from the last predecessor's finish to
 //!   the start. A source has none.
 //! - *Execution time*, of a subtask's instances: from the start to the finish, without
 //!   the time for which it was suspended.
 //!
-//! Only complete jobs count in the response time: neither aborted nor cut short.
+//! Only complete jobs count in a DAG's response time: neither aborted nor cut short.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec;
 
 use super::Histogram;
-use crate::ids::{DagId, Instance, Vertex};
+use crate::ids::{DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::journal::{Event, What};
 use crate::task_set::{Dag, TaskSet};
 
@@ -54,6 +55,8 @@ pub struct OfSubtask {
     pub join_latency: Histogram,
     /// From the start to the finish, without the time of suspensions.
     pub execution_time: Histogram,
+    /// From the nominal release to the finish, of each of several sinks.
+    pub response_time: Option<Histogram>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -87,13 +90,18 @@ impl Tally {
             instances: vec![Times::default(); dag.in_flight() as usize * dag.subtasks().len()]
                 .into(),
         };
-        let of_subtask = || OfSubtask {
+        let of_subtask = |is_sink: bool| OfSubtask {
             join_latency: Histogram::new(bits),
             execution_time: Histogram::new(bits),
+            response_time: is_sink.then(|| Histogram::new(bits)),
         };
+        let subtasks = task_set.dags().iter().flat_map(|dag| {
+            let ids = (0..to_u32(dag.subtasks().len())).map(SubtaskId);
+            ids.map(move |id| of_subtask(judged_sinks(dag).binary_search(&id).is_ok()))
+        });
         Self {
             dags: task_set.dags().iter().map(of_dag).collect(),
-            subtasks: (0..task_set.vertices()).map(|_| of_subtask()).collect(),
+            subtasks: subtasks.collect(),
             task_set: Arc::clone(task_set),
         }
     }
@@ -106,7 +114,8 @@ impl Tally {
             size_of::<OfDag>() + (dag.in_flight() as usize).saturating_mul(job)
         };
         let places: usize = task_set.dags().iter().map(in_flight).sum();
-        let histograms = 2 * (task_set.dags().len() + task_set.vertices());
+        let sinks = task_set.dags().iter().map(|dag| judged_sinks(dag).len());
+        let histograms = 2 * (task_set.dags().len() + task_set.vertices()) + sinks.sum::<usize>();
         places.saturating_add(histograms * Histogram::size_of(bits))
     }
 
@@ -254,8 +263,19 @@ impl OfDag {
                 }
                 let job = &mut self.open[place];
                 job.last_finish_ns = event.time_ns.max(job.last_finish_ns);
+                if let Some(response_time) = &mut statistics.response_time {
+                    response_time.add(event.time_ns.saturating_sub(job.release_ns));
+                }
             }
             _ => {}
         }
+    }
+}
+
+/// Returns the sinks whose response times differ from the DAG's.
+fn judged_sinks(dag: &Dag) -> &[SubtaskId] {
+    match dag.sinks() {
+        [_] => &[],
+        several => several,
     }
 }

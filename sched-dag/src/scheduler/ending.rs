@@ -55,7 +55,7 @@ impl Scheduler {
         if self.is_ended(dag) {
             return;
         }
-        self.judge(dag, observer);
+        self.judge(dag, None, observer);
         let state = &mut self.dags[dag.index()];
         let (cut_short, dropped) = state.jobs.end_all();
         state.statistics.cut_short += cut_short;

@@ -158,6 +158,9 @@ impl Scheduler {
         }
         let concerns_others = self.fresh > 1 && self.cores.count() > 1;
         if concerns_others || self.now_ns >= self.quiet_until_ns {
+            if self.now_ns >= self.quiet_until_ns {
+                self.judge_ended(vertex.0, observer);
+            }
             self.cores.free(core);
             self.fresh |= OWED;
             return (HandOff::Open, false);

@@ -17,6 +17,9 @@ impl Scheduler {
     pub(super) fn finish(&mut self, instance: Instance, observer: &mut impl Observer) {
         let vertex = self.take_off(instance, "is completed");
         self.end(vertex, observer);
+        if self.now_ns >= self.quiet_until_ns {
+            self.judge_ended(vertex, observer);
+        }
     }
 
     /// Takes a started instance from its core, or out of line if it has none,
@@ -149,7 +152,7 @@ impl Scheduler {
             self.go_on_to_next_job(number, observer);
         }
         if is_last {
-            self.end_job(dag, sequence, observer);
+            self.end_job(dag, sequence, number, observer);
         }
     }
 
@@ -169,9 +172,10 @@ impl Scheduler {
         }
     }
 
-    /// Ends the oldest job of a DAG, all of whose instances have ended (R4).
-    fn end_job(&mut self, dag: DagId, sequence: u64, observer: &mut impl Observer) {
-        self.judge(dag, observer);
+    /// Ends the oldest job of a DAG, all of whose instances have ended, that of the vertex
+    /// `last` at this instant (R4).
+    fn end_job(&mut self, dag: DagId, sequence: u64, last: u32, observer: &mut impl Observer) {
+        self.judge(dag, Some(last), observer);
         let state = &mut self.dags[dag.index()];
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);
@@ -195,16 +199,6 @@ impl Scheduler {
         state.jobs.end_oldest();
         observer.job_completed(dag, job.number, outcome);
         self.set_timer(dag);
-    }
-
-    /// Notices all deadlines of a DAG that have passed.
-    pub(super) fn judge(&mut self, dag: DagId, observer: &mut impl Observer) {
-        let model = self.task_set.dag(dag);
-        let state = &mut self.dags[dag.index()];
-        while let Some((job, deadline_ns)) = state.jobs.take_late(model, self.now_ns) {
-            state.statistics.count_miss();
-            observer.deadline_missed(dag, job, deadline_ns);
-        }
     }
 
     /// Notes when something happens next to a DAG without a completion.

@@ -17,11 +17,11 @@
 //! kept, pending or as a waiting job, so at most one sporadic job waits, and it
 //! is the latest that was due.
 //!
-//! *Judging* a job is to find out whether it meets its deadline; jobs are
-//! judged in the order of their numbers, each once.
+//! The module `judging` holds jobs against their deadlines.
 
 use alloc::boxed::Box;
 
+use super::judging::Deadline;
 use crate::ids::to_u32;
 use crate::task_set::Dag;
 
@@ -38,24 +38,22 @@ pub(super) struct Jobs {
     pub(super) oldest: u64,
     /// The sequence number of the next job to be released.
     pub(super) next: u64,
-    /// The sequence number of the first job in flight that is not judged.
-    judged: u64,
     /// The sequence number of the first job in flight that is not aborted.
     pub(super) aborted: u64,
     /// Whether the DAG is ended: no job is released, and none in flight starts
     /// a further instance.
     ended: bool,
     /// The first job that is not due yet.
-    next_due: u64,
+    pub(super) next_due: u64,
     /// Its nominal release time; `None`: there is no further job, or, of a
     /// sporadic DAG, no signal for it yet.
     next_due_ns: Option<u64>,
     /// The nominal release time of the latest job that was due.
     last_due_ns: u64,
     /// The first job that waits; all up to `next_due` do.
-    first_waiting: u64,
-    /// The first waiting job that is not judged.
-    judged_waiting: u64,
+    pub(super) first_waiting: u64,
+    /// How far jobs are judged by each deadline, ascending.
+    pub(super) deadlines: Box<[Deadline]>,
 }
 
 /// A job in flight.
@@ -91,14 +89,13 @@ impl Jobs {
             ends: to_u32(ends.count()),
             oldest: 0,
             next: 0,
-            judged: 0,
             aborted: 0,
             ended: false,
             next_due: 0,
             next_due_ns: due_ns(dag, 0),
             last_due_ns: 0,
             first_waiting: 0,
-            judged_waiting: 0,
+            deadlines: Deadline::all(dag),
         }
     }
 
@@ -200,7 +197,10 @@ impl Jobs {
         let release_ns = self.waiting_release_ns(dag, number);
         self.first_waiting += 1;
         self.next += 1;
-        let missed = number < self.judged_waiting;
+        let missed = self.deadlines[0].has_judged_waiting(number);
+        for deadline in &mut self.deadlines {
+            deadline.release(number, sequence);
+        }
         let unfinished = self.ends;
         let job = self.job_mut(sequence);
         *job = Job {
@@ -211,10 +211,6 @@ impl Jobs {
             slot: job.slot,
             missed,
         };
-        if missed {
-            // Judged in order: so all in flight are.
-            self.judged = self.next;
-        }
         sequence
     }
 
@@ -227,7 +223,7 @@ impl Jobs {
     }
 
     /// Returns the nominal release time of a waiting job.
-    fn waiting_release_ns(&self, dag: &Dag, number: u64) -> u64 {
+    pub(super) fn waiting_release_ns(&self, dag: &Dag, number: u64) -> u64 {
         if dag.is_sporadic() {
             debug_assert_eq!(number + 1, self.next_due, "one sporadic job waits");
             self.last_due_ns
@@ -237,14 +233,13 @@ impl Jobs {
     }
 
     /// Marks the oldest job in flight that is not aborted, and returns its
-    /// sequence number. It is judged by that.
+    /// sequence number.
     pub(super) fn abort_oldest(&mut self) -> Option<u64> {
         let sequence = self.aborted.max(self.oldest);
         if sequence == self.next {
             return None;
         }
         self.aborted = sequence + 1;
-        self.judged = self.judged.max(self.aborted);
         Some(sequence)
     }
 
@@ -263,13 +258,12 @@ impl Jobs {
     }
 
     /// Drops all that waits and all that is ahead, and lets those in flight
-    /// start no further instance. All jobs are judged by that. Returns how many
-    /// were in flight and not aborted, and how many waited.
+    /// start no further instance. Returns how many were in flight and not aborted,
+    /// and how many waited.
     pub(super) fn end_all(&mut self) -> (u64, u64) {
         let cut_short = self.next - self.aborted.max(self.oldest);
         let dropped = self.waiting();
         self.ended = true;
-        self.judged = self.next;
         self.next_due_ns = None;
         self.first_waiting = self.next_due;
         (cut_short, dropped)
@@ -278,36 +272,6 @@ impl Jobs {
     /// Takes the oldest job out of flight, all of whose instances have ended.
     pub(super) fn end_oldest(&mut self) {
         self.oldest += 1;
-        self.judged = self.judged.max(self.oldest);
-    }
-
-    /// Returns the first job that is not judged and is in flight or waits, with
-    /// its deadline.
-    fn first_unjudged(&self, dag: &Dag) -> Option<(u64, u64)> {
-        if self.judged < self.next {
-            let job = self.job(self.judged);
-            return Some((job.number, job.deadline_ns));
-        }
-        let number = self.first_waiting.max(self.judged_waiting);
-        (number < self.next_due).then(|| {
-            let release_ns = self.waiting_release_ns(dag, number);
-            (number, release_ns + dag.relative_deadline_ns())
-        })
-    }
-
-    /// Judges the next job whose deadline has passed before `now_ns`: it is
-    /// late. Returns it with its deadline.
-    pub(super) fn take_late(&mut self, dag: &Dag, now_ns: u64) -> Option<(u64, u64)> {
-        let late = self
-            .first_unjudged(dag)
-            .filter(|&(_, deadline_ns)| deadline_ns < now_ns)?;
-        if self.judged < self.next {
-            self.job_mut(self.judged).missed = true;
-            self.judged += 1;
-        } else {
-            self.judged_waiting = late.0 + 1;
-        }
-        Some(late)
     }
 
     /// Returns when something happens to these jobs without a completion: a
@@ -317,10 +281,7 @@ impl Jobs {
         if self.releasable().is_some() {
             return Some(now_ns);
         }
-        // The deadline itself is still in time; the next instant is not.
-        let late_ns = self
-            .first_unjudged(dag)
-            .map(|(_, deadline_ns)| deadline_ns + 1);
+        let late_ns = self.first_unjudged(dag).map(|unjudged| unjudged.late_ns());
         match (self.next_due_ns, late_ns) {
             (Some(due_ns), Some(late_ns)) => Some(due_ns.min(late_ns)),
             (due_ns, late_ns) => due_ns.or(late_ns),

@@ -14,10 +14,13 @@
 //! | `Rank` | rank of (priority, DAG, subtask) | 0 | 0 |
 //! | `Job` | rank of (priority, DAG) | sequence number | of the job |
 //! | `Deadline` | absolute | deadline | slot |
+//! | `SinkDeadline` | absolute | deadline | rank of (DAG, relative deadline) |
 //!
 //! Two jobs of one DAG have different deadlines, since it has a period, and a
 //! slot is of one DAG and counts DAG by DAG; so (deadline, slot, vertex) is the
-//! order of (deadline, DAG, job, subtask).
+//! order of (deadline, DAG, job, subtask). Where sinks have deadlines of their own, two
+//! jobs of a DAG may have an absolute deadline in common: the older one by the longer
+//! relative deadline. So there the longer one has the smaller rank.
 
 use super::jobs::Job;
 use super::vertices::Vertex;
@@ -29,8 +32,10 @@ pub(super) enum Order {
     Rank,
     /// Subtasks of one DAG may have the same rank; then the older job is first.
     Job,
-    /// The earlier absolute deadline is first.
+    /// The earlier absolute deadline is first, and all subtasks of a job have the same.
     Deadline,
+    /// The same, and sinks have deadlines of their own.
+    SinkDeadline,
 }
 
 /// An instance's place in the order of dispatch; the smaller key goes first.
@@ -41,20 +46,25 @@ impl Key {
     /// Stands where there is no key; it is larger than any.
     pub(super) const NONE: Self = Self(u128::MAX);
 
-    /// Makes the key of a vertex's next instance, which is of `job`.
+    /// Makes the key of a vertex's next instance, which is of `job`; for the order
+    /// `SinkDeadline` from the relative deadline of each rank.
     #[inline]
     pub(super) fn new<'j>(
         order: Order,
+        deadlines_ns: &[u64],
         number: u32,
         vertex: &Vertex,
         job: impl FnOnce() -> &'j Job,
     ) -> Self {
-        // The usual one is told apart by one comparison.
+        // The usual one is told apart by one comparison, and the next one by another.
         if order == Order::Rank {
             return Self::of_rank(vertex.rank, number);
         }
-        if order == Order::Job {
-            return Self::by_job(number, vertex);
+        if order != Order::Deadline {
+            return match order {
+                Order::SinkDeadline => Self::by_sink(deadlines_ns, number, vertex, job()),
+                _ => Self::by_job(number, vertex),
+            };
         }
         let job = job();
         Self::of_parts(job.deadline_ns, job.slot, number)
@@ -71,6 +81,13 @@ impl Key {
     fn by_job(number: u32, vertex: &Vertex) -> Self {
         let [high, low] = halves(vertex.progress);
         Self::of_parts(u64::from(vertex.rank) << 32 | u64::from(high), low, number)
+    }
+
+    /// Apart for the same reason.
+    #[inline(never)]
+    fn by_sink(deadlines_ns: &[u64], number: u32, vertex: &Vertex, job: &Job) -> Self {
+        let deadline_ns = job.release_ns + deadlines_ns[vertex.rank as usize];
+        Self::of_parts(deadline_ns, vertex.rank, number)
     }
 
     #[inline]

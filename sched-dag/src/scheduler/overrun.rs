@@ -48,13 +48,13 @@ impl Scheduler {
     /// Releases all jobs of a DAG that are due, and notices deadlines that have
     /// passed.
     pub(super) fn serve(&mut self, dag: DagId, observer: &mut impl Observer) {
-        self.judge(dag, observer);
+        self.judge(dag, None, observer);
         self.release_waiting(dag, observer);
         while let Some((job, release_ns)) = self.take_due(dag) {
             self.release_or_overrun(dag, job, release_ns, observer);
             // Another one is due only if the driver came late. Then deadlines
             // have passed that were not known of before.
-            self.judge(dag, observer);
+            self.judge(dag, None, observer);
         }
         self.set_timer(dag);
     }

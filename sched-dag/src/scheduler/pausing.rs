@@ -51,7 +51,7 @@ impl Scheduler {
             return;
         }
         // What was late before the pause is a miss.
-        self.judge(dag, observer);
+        self.judge(dag, None, observer);
         self.dags[dag.index()].is_paused = true;
         while self.waiting(dag) > 0 {
             self.skip_oldest_waiting(dag, observer);

@@ -16,7 +16,7 @@
 //! one word, which is at hand without any call. That holds unless two
 //! subtasks of one DAG share a priority and jobs of that DAG overlap, because
 //! then the job comes before the subtask. In that case the rest is a heap. Under
-//! EDF it is a heap of jobs.
+//! EDF it is a heap of jobs or, where sinks have deadlines of their own, of instances.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -27,7 +27,7 @@ use super::heap::IndexedHeap;
 use super::jobs::Job;
 use super::key::{Key, Order};
 use super::vertices::{Vertex, Vertices};
-use crate::ids::to_u32;
+use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::{sorted, sorted_by_key};
 use crate::policy::Policy;
 use crate::task_set::{Dag, TaskSet};
@@ -40,6 +40,8 @@ pub(super) struct ReadyQueue {
     /// How many are in the rest.
     others: u32,
     order: Order,
+    /// Under `SinkDeadline` the relative deadline of each rank, else nothing.
+    deadlines_ns: Box<[u64]>,
     rest: Rest,
 }
 
@@ -70,23 +72,35 @@ enum Rest {
 impl ReadyQueue {
     /// Makes the queue for a set and a policy; gives vertices their ranks.
     pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut Vertices) -> Self {
+        let in_any_order = |count| Rest::Keyed(IndexedHeap::new(count));
         if policy == Policy::Edf {
-            let rest = Rest::ByDeadline(ByDeadline::new(task_set));
-            return Self::of(Order::Deadline, rest);
+            if task_set
+                .dags()
+                .iter()
+                .all(|dag| deadlines_ns(dag).len() == 1)
+            {
+                let rest = Rest::ByDeadline(ByDeadline::new(task_set));
+                return Self::of(Order::Deadline, rest);
+            }
+            return Self {
+                deadlines_ns: rank_by_deadline(task_set, vertices).into(),
+                ..Self::of(Order::SinkDeadline, in_any_order(vertices.len()))
+            };
         }
         if task_set.dags().iter().all(has_ranks) {
             let order = rank(vertices, Order::Rank);
             return Self::of(Order::Rank, ranked(&order));
         }
         rank(vertices, Order::Job);
-        Self::of(Order::Job, Rest::Keyed(IndexedHeap::new(vertices.len())))
+        Self::of(Order::Job, in_any_order(vertices.len()))
     }
 
-    const fn of(order: Order, rest: Rest) -> Self {
+    fn of(order: Order, rest: Rest) -> Self {
         Self {
             front: Key::NONE,
             others: 0,
             order,
+            deadlines_ns: Box::default(),
             rest,
         }
     }
@@ -99,7 +113,7 @@ impl ReadyQueue {
         vertex: &Vertex,
         job: impl FnOnce() -> &'j Job,
     ) -> Key {
-        Key::new(self.order, number, vertex, job)
+        Key::new(self.order, &self.deadlines_ns, number, vertex, job)
     }
 
     /// Reports whether none waits.
@@ -264,6 +278,32 @@ fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
         vertex.rank = rank;
     }
     order
+}
+
+/// Replaces each vertex's priority by its place in the order of (DAG, relative deadline,
+/// the longest first), and returns the relative deadline of each place.
+fn rank_by_deadline(task_set: &TaskSet, vertices: &mut Vertices) -> Vec<u64> {
+    let mut of_ranks = Vec::new();
+    for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
+        let first = task_set.first_vertex(id);
+        let of_dag = deadlines_ns(dag);
+        for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
+            let own_ns = attributes.relative_deadline_ns();
+            let longer = of_dag.partition_point(|&longer_ns| longer_ns > own_ns);
+            vertices.get_mut(first + subtask.0).rank = to_u32(of_ranks.len() + longer);
+        }
+        of_ranks.extend(of_dag);
+    }
+    of_ranks
+}
+
+/// Returns the relative deadlines of a DAG's subtasks, each once, the longest first.
+fn deadlines_ns(dag: &Dag) -> Vec<u64> {
+    let of_subtasks = dag.subtasks().iter().map(|of| of.relative_deadline_ns());
+    let mut deadlines_ns = sorted(&of_subtasks.collect::<Vec<_>>());
+    deadlines_ns.dedup();
+    deadlines_ns.reverse();
+    deadlines_ns
 }
 
 /// Makes the rest for vertices in the order of their ranks.

@@ -151,7 +151,9 @@ fn check_subtasks(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     for (index, subtask) in spec.subtasks.iter().enumerate() {
         let label = || (DagLabel::new(specs, dag), SubtaskLabel::new(spec, index));
-        match (subtask.wcet_ns, spec.relative_deadline_ns) {
+        check_sink_deadline(specs, dag, index, findings);
+        let deadlines_ns = [subtask.relative_deadline_ns, spec.relative_deadline_ns];
+        match (subtask.wcet_ns, deadlines_ns.into_iter().flatten().min()) {
             (Some(0), _) => {
                 let (dag, subtask) = label();
                 findings.warnings.push(Warning::ZeroWcet { dag, subtask });
@@ -187,6 +189,32 @@ fn check_subtasks(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
                 );
             }
         }
+    }
+}
+
+/// Checks what a subtask states of its own deadline. That it is a sink's is checked with
+/// the graph.
+fn check_sink_deadline(specs: &[DagSpec], dag: usize, index: usize, findings: &mut Findings) {
+    let spec = &specs[dag];
+    let Some(relative_deadline_ns) = spec.subtasks[index].relative_deadline_ns else {
+        return;
+    };
+    let (label, sink) = (DagLabel::new(specs, dag), SubtaskLabel::new(spec, index));
+    if relative_deadline_ns == 0 && spec.relative_deadline_ns != Some(0) {
+        findings.fault(dag, Fault::ZeroSinkDeadline { dag: label, sink });
+    } else if let Some(of_dag_ns) = spec.relative_deadline_ns
+        && of_dag_ns > 0
+        && relative_deadline_ns > of_dag_ns
+    {
+        findings.fault(
+            dag,
+            Fault::SinkDeadlineBeyondDag {
+                dag: label,
+                sink,
+                relative_deadline_ns,
+                of_dag_ns,
+            },
+        );
     }
 }
 

@@ -142,6 +142,21 @@ pub enum Fault {
     MissingDeadline { dag: DagLabel },
     /// A relative deadline of 0.
     ZeroDeadline { dag: DagLabel },
+    /// A sink with a relative deadline of 0.
+    ZeroSinkDeadline { dag: DagLabel, sink: SubtaskLabel },
+    /// A sink whose relative deadline is longer than its DAG's.
+    SinkDeadlineBeyondDag {
+        dag: DagLabel,
+        sink: SubtaskLabel,
+        relative_deadline_ns: u64,
+        of_dag_ns: u64,
+    },
+    /// A subtask with a relative deadline and a successor.
+    DeadlineOfNoSink {
+        dag: DagLabel,
+        subtask: SubtaskLabel,
+        successor: SubtaskLabel,
+    },
     /// A subtask that alone cannot meet the deadline.
     WcetExceedsDeadline {
         dag: DagLabel,
@@ -264,6 +279,9 @@ impl Fault {
             Self::ZeroPeriod { .. } => "zero_period",
             Self::MissingDeadline { .. } => "missing_deadline",
             Self::ZeroDeadline { .. } => "zero_deadline",
+            Self::ZeroSinkDeadline { .. } => "zero_sink_deadline",
+            Self::SinkDeadlineBeyondDag { .. } => "sink_deadline_beyond_dag",
+            Self::DeadlineOfNoSink { .. } => "deadline_of_no_sink",
             Self::WcetExceedsDeadline { .. } => "wcet_exceeds_deadline",
             Self::ZeroJobs { .. } => "zero_jobs",
             Self::ZeroInFlight { .. } => "zero_in_flight",

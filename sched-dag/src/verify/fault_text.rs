@@ -104,6 +104,31 @@ impl Display for Fault {
                     "{dag} has a relative deadline of 0; give it at least 1 ns"
                 )
             }
+            Self::ZeroSinkDeadline { dag, sink } => write!(
+                f,
+                "{sink} of {dag} has a relative deadline of 0; give it at least 1 ns"
+            ),
+            Self::SinkDeadlineBeyondDag {
+                dag,
+                sink,
+                relative_deadline_ns,
+                of_dag_ns,
+            } => write!(
+                f,
+                "{sink} of {dag} has a relative deadline of {:?}, longer than its dag's of {:?}; shorten \
+                 it, or extend the dag's",
+                Duration::from_nanos(*relative_deadline_ns),
+                Duration::from_nanos(*of_dag_ns)
+            ),
+            Self::DeadlineOfNoSink {
+                dag,
+                subtask,
+                successor,
+            } => write!(
+                f,
+                "{subtask} of {dag} has a relative deadline and is no sink, for {successor} follows it; \
+                 give the deadline to a sink"
+            ),
             Self::WcetExceedsDeadline {
                 dag,
                 subtask,

@@ -91,6 +91,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
             .collect();
         ranks(&wcets_ns, &graph.successors, &topological_order)
     };
+    let deadlines_ns = deadlines_ns(spec, &graph.successors, &topological_order);
     let subtasks = spec
         .subtasks
         .iter()
@@ -104,25 +105,52 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
                 None => subtask.priority.expect("given to all subtasks of the dag"),
             },
             non_preemptive: subtask.non_preemptive,
+            relative_deadline_ns: deadlines_ns[index],
         });
+    // One that states a deadline is a sink, though a shared state may put it before another.
+    let is_sink = |subtask: &SubtaskId| {
+        let states_deadline = spec.subtasks[subtask.index()]
+            .relative_deadline_ns
+            .is_some();
+        states_deadline || graph.successors.of(*subtask).is_empty()
+    };
+    let sinks: Box<[SubtaskId]> = graph.subtasks().filter(is_sink).collect();
+    let of_sinks_ns = sinks.iter().map(|sink| deadlines_ns[sink.index()]);
     Dag {
         name: spec.name.clone(),
         activation: spec.activation,
         period_ns: spec.period_ns.expect("verified to be given"),
-        relative_deadline_ns: spec.relative_deadline_ns.expect("verified to be given"),
+        relative_deadline_ns: of_sinks_ns.max().expect("verified to have a sink"),
         offset_ns: spec.offset_ns,
         in_flight: u32::try_from(in_flight(spec)).expect("verified to fit the instance limit"),
         overrun: spec.overrun,
         jobs: spec.jobs,
         subtasks: subtasks.collect(),
         sources: without_neighbours(&graph.predecessors),
-        sinks: without_neighbours(&graph.successors),
+        sinks,
         predecessors: graph.predecessors,
         successors: graph.successors,
         topological_order: topological_order.into_boxed_slice(),
         state_precedences: state_precedences.into_boxed_slice(),
         topics: topics_of(spec),
     }
+}
+
+/// Returns for each subtask the least relative deadline of the sinks that it reaches.
+fn deadlines_ns(spec: &DagSpec, successors: &Adjacency, order: &[SubtaskId]) -> Vec<u64> {
+    let whole_ns = spec.relative_deadline_ns.expect("verified to be given");
+    let stated = spec
+        .subtasks
+        .iter()
+        .map(|subtask| subtask.relative_deadline_ns);
+    let mut deadlines_ns: Vec<u64> = stated.map(|own_ns| own_ns.unwrap_or(whole_ns)).collect();
+    for subtask in order.iter().rev() {
+        for next in successors.of(*subtask) {
+            let least_ns = deadlines_ns[subtask.index()].min(deadlines_ns[next.index()]);
+            deadlines_ns[subtask.index()] = least_ns;
+        }
+    }
+    deadlines_ns
 }
 
 fn without_neighbours(adjacency: &Adjacency) -> Box<[SubtaskId]> {

@@ -57,6 +57,7 @@ pub(super) fn check(
     check.connection(findings);
     check.sources(findings);
     check.sinks(&topology.unread, findings);
+    check.deadlines(findings);
     let topological_order = graph.topological_order();
     if topological_order.len() < graph.len() {
         for cycle in cycles::shortest_cycles(&graph) {
@@ -235,6 +236,23 @@ impl Check<'_> {
                         meant: None,
                     },
                 );
+            }
+        }
+    }
+
+    /// Of subtasks only sinks have deadlines of their own.
+    fn deadlines(&self, findings: &mut Findings) {
+        let stated = &self.specs[self.dag].subtasks;
+        for subtask in self.graph.subtasks() {
+            if stated[subtask.index()].relative_deadline_ns.is_some()
+                && let Some(&successor) = self.graph.successors.of(subtask).first()
+            {
+                let fault = Fault::DeadlineOfNoSink {
+                    dag: self.dag_label(),
+                    subtask: self.label(subtask),
+                    successor: self.label(successor),
+                };
+                findings.fault(self.dag, fault);
             }
         }
     }

@@ -100,6 +100,14 @@ fn draw_dag(random: &mut Random, cores: u64, share: u64, pipelined: bool) -> Dag
         (period, period - random.within(0, period / 4))
     };
     let mut spec = spec(period, deadline, &wcets, &edges, 0);
+    if random.within(0, 5) == 0 {
+        for subtask in 0..subtasks {
+            if edges.iter().all(|&(from, _)| from != subtask) && random.within(0, 2) > 0 {
+                let least = longest.min(deadline).max(deadline / 4);
+                spec.subtasks[subtask].relative_deadline_ns = Some(random.within(least, deadline));
+            }
+        }
+    }
     spec.offset_ns = random.within(0, 2) * random.within(0, period);
     spec
 }

@@ -40,6 +40,14 @@ pub(crate) fn commit(specs: &[DagSpec], policy: Policy, cores: u32) -> TaskSet {
     }
 }
 
+/// The largest response times that were seen.
+pub(crate) struct Observed {
+    /// Of each DAG's jobs.
+    pub(crate) dags: Vec<u64>,
+    /// Of each DAG's subtasks: from the nominal release to their finish.
+    pub(crate) subtasks: Vec<Vec<u64>>,
+}
+
 /// Runs until `until_ns` with the given execution times, and returns each
 /// DAG's largest observed response time, of jobs unfinished at the end so far.
 pub(crate) fn responses(
@@ -48,6 +56,22 @@ pub(crate) fn responses(
     until_ns: u64,
     execution_ns: impl FnMut(Instance) -> u64,
 ) -> Vec<u64> {
+    observe(
+        task_set,
+        (policy, preemption, cores),
+        until_ns,
+        execution_ns,
+    )
+    .dags
+}
+
+/// Does as [`responses`], and watches subtasks, too.
+pub(crate) fn observe(
+    task_set: &TaskSet,
+    (policy, preemption, cores): (Policy, Preemption, u32),
+    until_ns: u64,
+    execution_ns: impl FnMut(Instance) -> u64,
+) -> Observed {
     let options = SchedulerOptions {
         policy,
         preemption,
@@ -60,6 +84,9 @@ pub(crate) fn responses(
         now_ns: 0,
         releases: vec![Vec::new(); task_set.dags().len()],
         largest: vec![0; task_set.dags().len()],
+        of_subtasks: (task_set.dags().iter())
+            .map(|dag| vec![0; dag.subtasks().len()])
+            .collect(),
     };
     let end = driver.run_until(until_ns, &mut watch);
     assert!(!matches!(end, End::TimeOverflow(_)), "{end:?}");
@@ -68,7 +95,10 @@ pub(crate) fn responses(
             *largest = (*largest).max(until_ns - release_ns);
         }
     }
-    watch.largest
+    Observed {
+        dags: watch.largest,
+        subtasks: watch.of_subtasks,
+    }
 }
 
 struct Watch<F> {
@@ -77,6 +107,7 @@ struct Watch<F> {
     /// The jobs in flight of each DAG: number and nominal release.
     releases: Vec<Vec<(u64, u64)>>,
     largest: Vec<u64>,
+    of_subtasks: Vec<Vec<u64>>,
 }
 
 impl<F> Observer for Watch<F> {
@@ -98,7 +129,13 @@ impl<F: FnMut(Instance) -> u64> Workload for Watch<F> {
         (self.execution_ns)(instance)
     }
 
-    fn finished(&mut self, _: Instance, _: sched_dag::CoreId, now_ns: u64) {
+    fn finished(&mut self, instance: Instance, _: sched_dag::CoreId, now_ns: u64) {
+        let mut flying = self.releases[instance.dag.index()].iter();
+        let (_, release_ns) = flying
+            .find(|(job, _)| *job == instance.job)
+            .expect("released");
+        let largest = &mut self.of_subtasks[instance.dag.index()][instance.subtask.index()];
+        *largest = (*largest).max(now_ns - release_ns);
         // A job completes right after its last instance, at the same instant.
         self.now_ns = now_ns;
     }

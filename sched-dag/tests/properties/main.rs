@@ -32,6 +32,8 @@ struct Outcome {
     jobs: Vec<Vec<JobOutcome>>,
     /// For each DAG.
     statistics: Vec<DagStatistics>,
+    /// For each DAG and subtask how many jobs it was late in, if it is a sink.
+    sink_misses: Vec<Vec<Option<u64>>>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,6 +95,12 @@ fn first_difference(expected: &Outcome, happened: &Outcome) -> Option<String> {
                 "dag {dag} job {job}:\nexpected {one:?}\nhappened {other:?}"
             ));
         }
+    }
+    if expected.sink_misses != happened.sink_misses {
+        let (expected, happened) = (&expected.sink_misses, &happened.sink_misses);
+        return Some(format!(
+            "misses of sinks:\nexpected {expected:?}\nhappened {happened:?}"
+        ));
     }
     (expected.statistics != happened.statistics).then(|| {
         let (expected, happened) = (&expected.statistics, &happened.statistics);

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use sched_dag::virtual_time::Workload;
-use sched_dag::{CoreId, DagId, Instance, Observer, Scheduler};
+use sched_dag::{CoreId, DagId, Instance, Observer, Scheduler, SubtaskId};
 
 use crate::set::{Dag, Set};
 use crate::{InstanceOutcome, JobOutcome, Outcome};
@@ -65,7 +65,16 @@ impl<'a> Record<'a> {
         if let Some(contradiction) = self.contradiction {
             return Err(contradiction);
         }
+        let sink_misses = |(id, dag): (DagId, &Dag)| {
+            let of_sink = |sink: u32| scheduler.sink_misses(id, SubtaskId(sink));
+            let subtasks = (0..).zip(0..dag.subtasks.len());
+            subtasks
+                .map(|(number, subtask)| dag.is_sink(subtask).then(|| of_sink(number)))
+                .collect()
+        };
+        let dags = (0..).map(DagId).zip(&self.set.dags);
         Ok(Outcome {
+            sink_misses: dags.map(sink_misses).collect(),
             instances: self.instances,
             jobs: self.jobs,
             statistics,

@@ -43,6 +43,8 @@ pub(crate) struct Subtask {
     pub(crate) executions_ns: Vec<u64>,
     /// The job in which it fails at the end of its execution, if it starts.
     pub(crate) fails_in: Option<u64>,
+    /// Of a sink, its own relative deadline.
+    pub(crate) deadline_ns: Option<u64>,
 }
 
 /// Whether releases may find no room.
@@ -150,10 +152,11 @@ fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
             non_preemptive: random.chance(often_non_preemptive),
             executions_ns: (0..jobs).map(|_| random.between(1, longest)).collect(),
             fails_in: None,
+            deadline_ns: None,
         })
         .collect();
     let period_ns = random.between(1, 24);
-    Dag {
+    let mut dag = Dag {
         period_ns,
         deadline_ns: if random.chance(40) {
             period_ns
@@ -182,7 +185,15 @@ fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
         signals_ns: None,
         pauses_ns: Vec::new(),
         stop_ns: None,
+    };
+    if random.chance(50) {
+        for subtask in 0..dag.subtasks.len() {
+            if dag.is_sink(subtask) && random.chance(70) {
+                dag.subtasks[subtask].deadline_ns = Some(random.between(1, dag.deadline_ns));
+            }
+        }
     }
+    dag
 }
 
 /// Draws edges along a random order, so that indices are not sorted by
@@ -211,6 +222,10 @@ impl Set {
 }
 
 impl Dag {
+    pub(crate) fn is_sink(&self, subtask: usize) -> bool {
+        self.edges.iter().all(|&(from, _)| from != subtask)
+    }
+
     pub(crate) fn is_paused_at(&self, now_ns: u64) -> bool {
         let pauses = self.pauses_ns.iter();
         pauses
@@ -222,6 +237,7 @@ impl Dag {
         let subtask = |subtask: &Subtask| SubtaskSpec {
             priority: Some(Priority(subtask.priority)),
             non_preemptive: subtask.non_preemptive,
+            relative_deadline_ns: subtask.deadline_ns,
             ..SubtaskSpec::default()
         };
         DagSpec {
@@ -292,6 +308,11 @@ impl fmt::Display for Set {
             }
             for (from, to) in &dag.edges {
                 writeln!(f, "edge {from} {to}")?;
+            }
+            for (subtask, of) in dag.subtasks.iter().enumerate() {
+                if let Some(deadline_ns) = of.deadline_ns {
+                    writeln!(f, "sink {subtask} {deadline_ns}")?;
+                }
             }
             if let Some(signals_ns) = &dag.signals_ns {
                 writeln!(f, "    signals at {signals_ns:?}")?;

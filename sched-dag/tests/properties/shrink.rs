@@ -72,6 +72,9 @@ fn steps(set: &Set) -> Vec<Set> {
             set.dags[dag].period_ns = to
         });
         for subtask in 0..set.dags[dag].subtasks.len() {
+            if set.dags[dag].subtasks[subtask].deadline_ns.is_some() {
+                add(&|set| set.dags[dag].subtasks[subtask].deadline_ns = None);
+            }
             if set.dags[dag].subtasks[subtask].fails_in.is_some() {
                 add(&|set| set.dags[dag].subtasks[subtask].fails_in = None);
             }

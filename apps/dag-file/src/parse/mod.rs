@@ -342,6 +342,7 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
             "wcet" => spec.wcet_ns = Some(keys.time_ns(key)?),
             "priority" => spec.priority = Some(Priority(keys.number(key)?)),
             "non-preemptive" => spec.non_preemptive = true,
+            "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
             "samples" => {
                 let words = keys.value(key)?.split(',');
                 let times = words.map(|word| {
@@ -350,7 +351,10 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
                 samples_ns = times.collect::<Result<Vec<_>, _>>()?.into();
             }
             other => {
-                return Err(keys.unknown(other, "`wcet`, `priority`, `non-preemptive`, `samples`"));
+                return Err(keys.unknown(
+                    other,
+                    "`wcet`, `priority`, `non-preemptive`, `deadline`, `samples`",
+                ));
             }
         }
     }

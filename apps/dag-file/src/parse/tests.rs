@@ -11,7 +11,7 @@ const GOOD: &str = "\
 set first
 dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4 # all keys
 subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms
-subtask show wcet 500us priority 6
+subtask show wcet 500us priority 6 deadline 30ms
 edge grab -> show
 
 set second
@@ -32,6 +32,8 @@ fn a_file_is_read_and_written_back() {
     assert_eq!(&*camera.subtasks[0].samples_ns, [1_000_000, 2_000_000]);
     assert_eq!(camera.spec.relative_deadline_ns, Some(100_000_000));
     assert_eq!(camera.spec.in_flight, Some(4));
+    let show = &camera.spec.subtasks[1];
+    assert_eq!(show.relative_deadline_ns, Some(30_000_000));
     // Without a deadline it is the period.
     let alone = &file.sets[1].dags[0];
     assert_eq!(alone.spec.relative_deadline_ns, Some(1_000_000_000));

@@ -22,10 +22,11 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
 use sched_dag::placement::Placement;
-use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
@@ -86,6 +87,7 @@ pub(crate) struct Execution {
     signals: Signals,
     /// What the commit has proven of each DAG.
     bounds_ns: Box<[Option<u64>]>,
+    sink_bounds_ns: Box<[Vec<Option<u64>>]>,
 }
 
 static EXECUTION: SpinLock<Option<Execution>> = SpinLock::new(None);
@@ -162,6 +164,7 @@ pub(crate) fn prepare(
         may_hand_off: terms.coincidence_ns == 0,
         signals,
         bounds_ns: plan.bounds_ns.into(),
+        sink_bounds_ns: plan.sink_bounds_ns.into(),
     };
     *EXECUTION.lock() = Some(execution);
     Ok(())
@@ -199,6 +202,12 @@ impl Execution {
     /// Returns the response time that is proven of a DAG, if one is.
     pub(crate) fn bound_ns(&self, dag: DagId) -> Option<u64> {
         self.bounds_ns.get(dag.index()).copied().flatten()
+    }
+
+    /// Returns the response time that is proven of a sink, if one is.
+    pub(crate) fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
+        let place = self.task_set().dag(dag).sinks().binary_search(&sink).ok()?;
+        *self.sink_bounds_ns.get(dag.index())?.get(place)?
     }
 
     /// Returns what has happened.

@@ -21,7 +21,8 @@ struct Model<'a> {
 }
 
 impl Ranking for Model<'_> {
-    /// Static priority: (priority, DAG, job, subtask). EDF: the deadline instead.
+    /// Static priority: (priority, DAG, job, subtask). EDF: the deadline instead, that of
+    /// the most urgent sink that the subtask reaches.
     fn key(&self, instance: Instance) -> Key {
         let Instance { dag, job, subtask } = instance;
         let model = self.task_set.dag(dag);
@@ -33,7 +34,7 @@ impl Ranking for Model<'_> {
                     true => due_ns().unwrap_or(u64::MAX),
                     false => model.grid_ns(job),
                 };
-                release_ns.saturating_add(model.relative_deadline_ns())
+                release_ns.saturating_add(model.subtask(subtask).relative_deadline_ns())
             }
         };
         (urgency, instance)

@@ -1,4 +1,4 @@
-//! Rules R1 and R4: when a job is released, complete, and late.
+//! Rules R1 and R4: when a job is released, and when it is complete.
 //!
 //! R1: a job is released, queued or skipped at or after its nominal release, and not
 //! both released and skipped; sporadic ones are due at least T apart, and never before
@@ -6,13 +6,9 @@
 //! out at the nominal instant or, if it was queued, when an older job ends.
 //!
 //! R4: a job is complete with the last of its instances, which must all be over, in the
-//! scheduler's step that the last one brings about, within the tolerance. It has missed
-//! its deadline if and only if the last finish is later than that. A core may finish in
-//! time while another one is just noticing the miss: that is a breach only if more than
-//! the tolerance lies between. Where times are exact, a miss is noticed at once.
-//!
-//! A job that was aborted, or cut short by its DAG's end, is complete with its last
-//! instance, too; whether it missed its deadline is not judged.
+//! scheduler's step that the last one brings about, within the tolerance. So is one that
+//! was aborted, or cut short by its DAG's end. Whether it is late is the affair of
+//! `deadlines`.
 
 use alloc::collections::BTreeMap;
 
@@ -33,8 +29,8 @@ pub(super) struct Job {
     queued: Option<Moment>,
     skipped: Option<Moment>,
     pub(super) aborted: Option<Moment>,
-    missed: Option<Moment>,
-    completed: Option<Moment>,
+    pub(super) missed: Option<Moment>,
+    pub(super) completed: Option<Moment>,
     pub(super) lives: BTreeMap<SubtaskId, Life>,
 }
 
@@ -64,12 +60,6 @@ impl Job {
             before: event.what,
             before_ns: earlier.time_ns,
         })
-    }
-
-    /// Returns when the last instance had finished; `None` if one has not.
-    fn finish_ns(&self, subtasks: u32) -> Option<u64> {
-        let finish_ns = |subtask| Some(self.lives.get(&SubtaskId(subtask))?.finish?.time_ns);
-        latest((0..subtasks).map(finish_ns))
     }
 }
 
@@ -295,58 +285,6 @@ impl Replay<'_> {
         })
     }
 
-    /// R4 for a deadline, once the job is complete.
-    fn missed_wrongly(&self, dag: DagId, job: u64) -> Option<Violation> {
-        let of_dag = &self.dags[dag.index()];
-        let known = of_dag.jobs.get(&job)?;
-        let relative_deadline_ns = self.task_set.dag(dag).relative_deadline_ns();
-        let deadline_ns = known.release_ns?.saturating_add(relative_deadline_ns);
-        let finish_ns = known.finish_ns(self.subtasks(dag));
-        let Some(missed) = known.missed else {
-            let may_be_lost = self.may_be_lost(deadline_ns);
-            let is_cut = known.aborted.is_some() || of_dag.is_stopped;
-            let late_ns = finish_ns.filter(|finish_ns| *finish_ns > deadline_ns)?;
-            return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
-                dag,
-                job,
-                finish_ns,
-                deadline_ns,
-                at_ns: late_ns,
-            });
-        };
-        let event = Event {
-            time_ns: missed.time_ns,
-            what: What::Missed,
-            core: missed.core,
-            dag,
-            job,
-            subtask: None,
-        };
-        if missed.time_ns <= deadline_ns {
-            return Some(Violation::MissedEarly { event, deadline_ns });
-        }
-        if let Some(finish_ns) = finish_ns.filter(|finish_ns| *finish_ns <= deadline_ns)
-            && !self.is_tolerable(finish_ns, missed.time_ns)
-        {
-            return Some(Violation::MissedInTime {
-                event,
-                finish_ns,
-                deadline_ns,
-            });
-        }
-        let is_late = self.is_exact() && missed.time_ns > deadline_ns + 1;
-        is_late.then_some(Violation::Late {
-            event,
-            since_ns: deadline_ns,
-        })
-    }
-
-    /// Reports whether what followed from a deadline may be among the events that are
-    /// lost: a miss, or an abort before.
-    fn may_be_lost(&self, deadline_ns: u64) -> bool {
-        !self.terms.is_whole && Some(deadline_ns) < self.first_ns
-    }
-
     /// R4 at the end, for a job that is not complete.
     pub(super) fn never_completed(&self, dag: DagId, job: u64) -> Option<Violation> {
         let of_dag = &self.dags[dag.index()];
@@ -366,32 +304,6 @@ impl Replay<'_> {
             job,
             over_ns,
             end_ns: self.end_ns,
-        })
-    }
-
-    /// R4 at the end, for the deadline of a job that is not complete.
-    pub(super) fn never_missed(&self, dag: DagId, job: u64) -> Option<Violation> {
-        let of_dag = &self.dags[dag.index()];
-        let known = of_dag.jobs.get(&job)?;
-        if known.completed.is_some() {
-            return None;
-        }
-        let judged = self.missed_wrongly(dag, job);
-        if judged.is_some() || known.missed.is_some() || known.aborted.is_some() {
-            return judged;
-        }
-        let relative_deadline_ns = self.task_set.dag(dag).relative_deadline_ns();
-        let deadline_ns = known.release_ns?.saturating_add(relative_deadline_ns);
-        let may_be_lost = self.may_be_lost(deadline_ns);
-        let is_finished = known.finish_ns(self.subtasks(dag)).is_some();
-        let has_passed = !self.is_tolerable(deadline_ns, self.end_ns);
-        let is_missing = has_passed && !is_finished && !of_dag.is_stopped && !may_be_lost;
-        is_missing.then_some(Violation::NotMissed {
-            dag,
-            job,
-            finish_ns: None,
-            deadline_ns,
-            at_ns: self.end_ns,
         })
     }
 }

@@ -15,6 +15,7 @@
 //! of what is not there of it, nothing can be concluded. All other jobs are judged as in
 //! a whole journal.
 
+mod deadlines;
 mod jobs;
 mod joins;
 mod lives;

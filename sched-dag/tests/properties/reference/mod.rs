@@ -63,6 +63,7 @@ pub(crate) fn simulate(set: &Set) -> Outcome {
                 .map(|dag| vec![JobOutcome::default(); per_job(dag)])
                 .collect(),
             statistics: vec![DagStatistics::default(); set.dags.len()],
+            sink_misses: set.dags.iter().map(no_misses).collect(),
         },
     };
     let mut running: Vec<Place> = Vec::new();
@@ -100,6 +101,11 @@ fn due_times(dag: &Dag) -> Vec<Option<u64>> {
     (0..dag.jobs).map(due_ns).collect()
 }
 
+fn no_misses(dag: &Dag) -> Vec<Option<u64>> {
+    let of = |subtask| dag.is_sink(subtask).then_some(0);
+    (0..dag.subtasks.len()).map(of).collect()
+}
+
 impl Reference<'_> {
     fn is_over(&self) -> bool {
         self.set.dags.iter().enumerate().all(|(dag, model)| {
@@ -113,25 +119,51 @@ impl Reference<'_> {
         })
     }
 
-    fn deadline_ns(&self, dag: usize, job: usize) -> u64 {
-        let due_ns = self.due_ns[dag][job];
-        due_ns.expect("it is in flight or waits") + self.set.dags[dag].deadline_ns
+    /// The deadline of the most urgent sink that a subtask reaches.
+    fn deadline_ns(&self, (dag, job, subtask): Place) -> u64 {
+        let model = &self.set.dags[dag];
+        if model.is_sink(subtask) {
+            let relative_ns = model.subtasks[subtask].deadline_ns;
+            let due_ns = self.due_ns[dag][job].expect("it is in flight or waits");
+            return due_ns + relative_ns.unwrap_or(model.deadline_ns);
+        }
+        let successors = model.edges.iter().filter(|edge| edge.0 == subtask);
+        let deadlines_ns = successors.map(|edge| self.deadline_ns((dag, job, edge.1)));
+        deadlines_ns.min().expect("it is no sink")
     }
 
-    /// A job that is not complete at its deadline has missed it.
+    /// A sink that has not finished at its deadline is late, and its job has missed a deadline.
     fn notice_misses(&mut self) {
         for dag in 0..self.states.len() {
             for job in 0..self.states[dag].len() {
                 let alive = matches!(self.states[dag][job], State::Waiting | State::InFlight)
                     && !self.is_cut(dag, job);
-                if alive && self.now_ns == self.deadline_ns(dag, job) + 1 {
-                    self.outcome.jobs[dag][job].missed_ns = Some(self.now_ns);
-                    let statistics = &mut self.outcome.statistics[dag];
-                    statistics.consecutive_misses += 1;
-                    statistics.most_consecutive_misses = statistics
-                        .most_consecutive_misses
-                        .max(statistics.consecutive_misses);
+                if alive {
+                    self.notice_misses_of(dag, job);
                 }
+            }
+        }
+    }
+
+    fn notice_misses_of(&mut self, dag: usize, job: usize) {
+        let model = &self.set.dags[dag];
+        for sink in (0..model.subtasks.len()).filter(|&subtask| model.is_sink(subtask)) {
+            let deadline_ns = self.deadline_ns((dag, job, sink));
+            let finish_ns = self.outcome.instances[dag][job][sink].finish_ns;
+            let is_late = finish_ns.is_none_or(|finish_ns| finish_ns > deadline_ns);
+            if self.now_ns != deadline_ns + 1 || !is_late {
+                continue;
+            }
+            let misses = self.outcome.sink_misses[dag][sink].as_mut();
+            *misses.expect("it is a sink") += 1;
+            let missed_ns = &mut self.outcome.jobs[dag][job].missed_ns;
+            if missed_ns.is_none() {
+                *missed_ns = Some(self.now_ns);
+                let statistics = &mut self.outcome.statistics[dag];
+                statistics.consecutive_misses += 1;
+                statistics.most_consecutive_misses = statistics
+                    .most_consecutive_misses
+                    .max(statistics.consecutive_misses);
             }
         }
     }
@@ -272,7 +304,7 @@ impl Reference<'_> {
         others.sort_by_key(|&(dag, job, subtask)| {
             let urgency = match self.set.options.policy {
                 Policy::StaticPriority => u64::from(self.set.dags[dag].subtasks[subtask].priority),
-                Policy::Edf => self.deadline_ns(dag, job),
+                Policy::Edf => self.deadline_ns((dag, job, subtask)),
             };
             (urgency, dag, job, subtask)
         });
@@ -316,6 +348,7 @@ impl Reference<'_> {
             instances,
             jobs,
             statistics,
+            ..
         } = &mut self.outcome;
         for (dag, statistics) in statistics.iter_mut().enumerate() {
             let due_ns = self.due_ns[dag].iter();

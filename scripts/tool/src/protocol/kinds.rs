@@ -133,6 +133,20 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "response_time_ns.max",
         ],
     ),
+    (
+        "dag_sink",
+        &[
+            "set",
+            "dag",
+            "sink",
+            "relative_deadline_ns",
+            "deadline_misses",
+            "response_time_ns.min",
+            "response_time_ns.median",
+            "response_time_ns.p99",
+            "response_time_ns.max",
+        ],
+    ),
     ("dag_set", &["set", "dags", "violations", "allocations"]),
     (
         "soak",
@@ -254,6 +268,17 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "name",
             "join_latency_ns",
             "execution_time_ns",
+        ],
+    ),
+    (
+        "times_sink",
+        &[
+            "dag",
+            "subtask",
+            "name",
+            "relative_deadline_ns",
+            "misses",
+            "response_time_ns",
         ],
     ),
     ("trace_begin", &["policy", "preemption", "cores", "run"]),

@@ -7,7 +7,7 @@
 //! commit verifies them. A count that memory is taken for is held against the most that
 //! there can be before.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 
 use sched_dag::journal::{Event, What};
@@ -133,7 +133,7 @@ fn add_dag(line: &Line<'_>, open: &mut Open) -> Result<(), Malformed> {
     }
     let subtasks = line.elements("subtasks")?.iter();
     let subtasks = subtasks.map(|it| subtask(line, it));
-    let subtasks: Vec<SubtaskSpec> = subtasks.collect::<Result<_, _>>()?;
+    let mut subtasks: Vec<SubtaskSpec> = subtasks.collect::<Result<_, _>>()?;
     let in_flight = line.within("in_flight", 1..=u64::from(u32::MAX))?;
     let count = subtasks.len() as u64;
     let edge = |edge: &Value| {
@@ -147,6 +147,8 @@ fn add_dag(line: &Line<'_>, open: &mut Open) -> Result<(), Malformed> {
         Ok((line.small(from)? as usize, line.small(to)? as usize))
     };
     let edges = line.elements("edges")?.iter().map(edge);
+    let edges: Vec<(usize, usize)> = edges.collect::<Result<_, _>>()?;
+    add_sinks(line, &mut subtasks, &edges)?;
     open.lines.push(line.0.number);
     open.dags.push(DagSpec {
         name: line.text("name")?.to_string(),
@@ -165,9 +167,38 @@ fn add_dag(line: &Line<'_>, open: &mut Open) -> Result<(), Malformed> {
             other => return Err(line.unknown("overrun", other, "queue, skip or abort")),
         },
         subtasks,
-        edges: edges.collect::<Result<_, _>>()?,
+        edges,
         ..DagSpec::default()
     });
+    Ok(())
+}
+
+/// Reads the deadlines of sinks, which are stated if there are several. One that a shared
+/// state puts before another counts as that one's predecessor only.
+fn add_sinks(
+    line: &Line<'_>,
+    subtasks: &mut [SubtaskSpec],
+    edges: &[(usize, usize)],
+) -> Result<(), Malformed> {
+    if line.0.value.get("sinks").is_none() {
+        return Ok(());
+    }
+    let followed: BTreeSet<usize> = edges.iter().map(|edge| edge.0).collect();
+    for sink in line.elements("sinks")? {
+        let pair: Option<Vec<u64>> = sink.elements().iter().map(Value::as_u64).collect();
+        let count = subtasks.len() as u64;
+        let Some(&[sink, deadline_ns]) = pair.as_deref().filter(|pair| pair.first() < Some(&count))
+        else {
+            return Err(line.malformed(format!(
+                "a sink is a pair of a number less than {count}, the number of subtasks, and its \
+                 relative deadline"
+            )));
+        };
+        let sink = line.small(sink)? as usize;
+        if !followed.contains(&sink) {
+            subtasks[sink].relative_deadline_ns = Some(deadline_ns);
+        }
+    }
     Ok(())
 }
 

@@ -49,12 +49,30 @@ pub(super) fn zero_deadline() -> Vec<Dag> {
     vec![dag]
 }
 
-pub(super) fn deadlines_differ() -> Vec<Dag> {
+pub(super) fn zero_sink_deadline() -> Vec<Dag> {
     let dag = named("lidar");
     source(&dag, "read", "points");
-    sink(&dag, "store", "points");
-    let show = SubtaskAttributes::named("show");
-    dag.register_sink_subtask(|(_,): (u32,)| (), vec!["points"], PERIOD * 2, show);
+    dag.relative_deadline(PERIOD);
+    let store = SubtaskAttributes::named("store");
+    dag.register_sink_subtask(|(_,): (u32,)| (), vec!["points"], Duration::ZERO, store);
+    vec![dag]
+}
+
+pub(super) fn sink_deadline_beyond_dag() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    dag.relative_deadline(PERIOD);
+    let store = SubtaskAttributes::named("store");
+    dag.register_sink_subtask(|(_,): (u32,)| (), vec!["points"], PERIOD * 2, store);
+    vec![dag]
+}
+
+pub(super) fn deadline_of_no_sink() -> Vec<Dag> {
+    let dag = named("lidar");
+    dag.period(PERIOD).relative_deadline(PERIOD);
+    let read = dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("read"));
+    let store = dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("store"));
+    dag.precede(&read, &store).sink_deadline(&read, PERIOD / 2);
     vec![dag]
 }
 

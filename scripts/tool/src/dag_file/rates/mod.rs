@@ -18,9 +18,11 @@
 //! Where times are missing: a source without timer gets the longest period of the
 //! graph, else its shortest end-to-end deadline, else the sum of all execution
 //! times. A DAG without deadline gets the smallest multiple of its period that is
-//! longer than its longest path, for no schedule can be faster than that.
+//! longer than its longest path, for no schedule can be faster than that. A sink has its own
+//! deadline, or the longest of its DAG's; that of a subtask with successors is one of its whole
+//! DAG.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check, is_name, no_name, quoted};
 use sched_dag::{DagSpec, Policy, SubtaskSpec};
@@ -226,10 +228,16 @@ fn dag(
 ) -> Result<FileDag, Malformed> {
     let position = |subtask: usize| part.binary_search(&subtask).ok();
     let subtasks = part.iter().map(|&subtask| &graph.subtasks[subtask]);
+    let deadline_ns = |subtask: &usize| graph.subtasks[*subtask].deadline_ns;
+    let followed: BTreeSet<usize> = edges.iter().map(|edge| edge.0).collect();
+    let (inner, sinks): (Vec<usize>, Vec<usize>) =
+        part.iter().partition(|subtask| followed.contains(subtask));
+    let longest_ns = sinks.iter().filter_map(deadline_ns).max();
+    let of_dag_ns = inner.iter().filter_map(deadline_ns).chain(longest_ns).min();
     let mut spec = DagSpec {
         name,
         period_ns: Some(period_ns),
-        relative_deadline_ns: subtasks.clone().filter_map(|one| one.deadline_ns).min(),
+        relative_deadline_ns: of_dag_ns,
         offset_ns,
         ..DagSpec::default()
     };
@@ -237,10 +245,12 @@ fn dag(
         line: graph.subtasks[part[0]].line,
         ..FileDag::default()
     };
-    for subtask in subtasks {
+    for (number, subtask) in part.iter().zip(subtasks) {
+        let is_shorter = |own_ns: &u64| !followed.contains(number) && Some(*own_ns) < of_dag_ns;
         spec.subtasks.push(SubtaskSpec {
             name: subtask.name.clone(),
             wcet_ns: Some(subtask.wcet_ns),
+            relative_deadline_ns: subtask.deadline_ns.filter(is_shorter),
             ..SubtaskSpec::default()
         });
         dag.subtasks.push(FileSubtask {

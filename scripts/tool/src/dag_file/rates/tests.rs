@@ -93,6 +93,26 @@ fn missing_times_have_their_defaults() {
 }
 
 #[test]
+fn each_sink_has_its_own_deadline() {
+    let mut fork = graph(
+        &[("a", Some(20)), ("b", None), ("c", None), ("d", None)],
+        &[(0, 1), (0, 2), (0, 3)],
+    );
+    fork.subtasks[1].deadline_ns = Some(5_000_000);
+    fork.subtasks[2].deadline_ns = Some(9_000_000);
+    let deadlines = |graph: &Graph| {
+        let spec = split(graph, "g").unwrap().remove(0).spec;
+        let of_sinks = spec.subtasks.iter().map(|one| one.relative_deadline_ns);
+        (spec.relative_deadline_ns, of_sinks.collect::<Vec<_>>())
+    };
+    let own = vec![None, Some(5_000_000), None, None];
+    assert_eq!(deadlines(&fork), (Some(9_000_000), own));
+    // That of a subtask with successors is one of all that follows.
+    fork.subtasks[0].deadline_ns = Some(4_000_000);
+    assert_eq!(deadlines(&fork), (Some(4_000_000), vec![None; 4]));
+}
+
+#[test]
 fn a_cycle_is_refused_even_through_a_timer() {
     let graph = graph(&[("a", Some(10)), ("b", None)], &[(0, 1), (1, 0)]);
     let faults = split(&graph, "g").unwrap_err();

@@ -1,0 +1,206 @@
+//! Holding jobs against the deadlines of their sinks (R4).
+//!
+//! To *judge* a job by a deadline is to find out whether the sinks that have it are
+//! late. By each relative deadline jobs are judged in the order of their numbers, each
+//! once: a job in flight when the deadline has passed, or when it ends; a waiting one, of
+//! which no sink can have finished, when it has passed. A job that is aborted, or in
+//! flight when its DAG is ended, is judged by that.
+//!
+//! Which sinks are late shows in their progress, as long as each is looked at before
+//! another instant begins. So a sink that ends after a deadline that nobody has noticed
+//! yet is judged at once, and counts as late: had the deadline passed before, it would
+//! have been noticed.
+
+use alloc::boxed::Box;
+
+use super::jobs::Jobs;
+use super::vertices::Vertices;
+use super::{Observer, Scheduler};
+use crate::ids::{DagId, SubtaskId};
+use crate::order::sorted_by_key;
+use crate::task_set::Dag;
+
+/// One relative deadline of a DAG, and how far its jobs are judged by it.
+#[derive(Debug)]
+pub(super) struct Deadline {
+    relative_ns: u64,
+    sinks: Box<[Sink]>,
+    /// The sequence number of the first job in flight that is not judged, if that is
+    /// not older than all in flight.
+    judged: u64,
+    /// The first waiting job that is not judged, if that is not older than all waiting.
+    judged_waiting: u64,
+}
+
+/// A sink, and how many jobs it was late in.
+#[derive(Debug)]
+struct Sink {
+    subtask: SubtaskId,
+    misses: u64,
+}
+
+/// A job that is to be judged next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unjudged {
+    number: u64,
+    /// Its sequence number; `None` if it waits.
+    sequence: Option<u64>,
+    /// By which deadline, and when that is.
+    deadline: usize,
+    deadline_ns: u64,
+}
+
+impl Deadline {
+    /// Returns the deadlines of a DAG, ascending, at least one.
+    pub(super) fn all(dag: &Dag) -> Box<[Self]> {
+        let sinks = dag.sinks();
+        let relative_ns = |sink: usize| dag.subtask(sinks[sink]).relative_deadline_ns();
+        let order = sorted_by_key(sinks.len(), relative_ns);
+        let same = order.chunk_by(|one, other| relative_ns(*one) == relative_ns(*other));
+        let deadline = |same: &[usize]| Self {
+            relative_ns: relative_ns(same[0]),
+            sinks: (same.iter())
+                .map(|&sink| Sink {
+                    subtask: sinks[sink],
+                    misses: 0,
+                })
+                .collect(),
+            judged: 0,
+            judged_waiting: 0,
+        };
+        same.map(deadline).collect()
+    }
+
+    /// Takes over what is known of a waiting job that is released, with a sequence number.
+    pub(super) fn release(&mut self, number: u64, sequence: u64) {
+        if number < self.judged_waiting {
+            // Judged in order: so all in flight are.
+            self.judged = sequence + 1;
+        }
+    }
+
+    /// Reports whether a waiting job is judged.
+    pub(super) const fn has_judged_waiting(&self, number: u64) -> bool {
+        number < self.judged_waiting
+    }
+}
+
+impl Jobs {
+    /// Returns the job that is to be judged first.
+    pub(super) fn first_unjudged(&self, dag: &Dag) -> Option<Unjudged> {
+        let of_deadlines = self.deadlines.iter().enumerate();
+        let unjudged = of_deadlines.filter_map(|(at, deadline)| self.unjudged(dag, at, deadline));
+        unjudged.min_by_key(|unjudged| unjudged.deadline_ns)
+    }
+
+    #[inline]
+    fn unjudged(&self, dag: &Dag, at: usize, deadline: &Deadline) -> Option<Unjudged> {
+        let sequence = deadline.judged.max(self.oldest).max(self.aborted);
+        if sequence < self.next && !self.is_ended() {
+            let job = self.job(sequence);
+            return Some(Unjudged {
+                number: job.number,
+                sequence: Some(sequence),
+                deadline: at,
+                deadline_ns: job.release_ns + deadline.relative_ns,
+            });
+        }
+        let number = self.first_waiting.max(deadline.judged_waiting);
+        (number < self.next_due).then(|| Unjudged {
+            number,
+            sequence: None,
+            deadline: at,
+            deadline_ns: self.waiting_release_ns(dag, number) + deadline.relative_ns,
+        })
+    }
+
+    /// Counts the sinks that are late, and reports whether any is.
+    fn count_late(&mut self, unjudged: &Unjudged, is_late: impl Fn(SubtaskId) -> bool) -> bool {
+        let deadline = &mut self.deadlines[unjudged.deadline];
+        match unjudged.sequence {
+            Some(sequence) => deadline.judged = sequence + 1,
+            None => deadline.judged_waiting = unjudged.number + 1,
+        }
+        let mut late = 0_u64;
+        for sink in &mut deadline.sinks {
+            let is_late = u64::from(is_late(sink.subtask));
+            sink.misses += is_late;
+            late += is_late;
+        }
+        late > 0
+    }
+
+    /// Notes that a job has missed a deadline, and reports whether it is its first one.
+    fn note_miss(&mut self, unjudged: &Unjudged) -> bool {
+        match unjudged.sequence {
+            Some(sequence) => !core::mem::replace(&mut self.job_mut(sequence).missed, true),
+            // Nothing of it has finished: it misses one deadline after the other.
+            None => unjudged.deadline == 0,
+        }
+    }
+
+    /// Returns how many jobs a sink was late in; `None` if the subtask is no sink.
+    fn misses_of(&self, subtask: SubtaskId) -> Option<u64> {
+        let mut sinks = self.deadlines.iter().flat_map(|deadline| &deadline.sinks);
+        let sink = sinks.find(|sink| sink.subtask == subtask)?;
+        Some(sink.misses)
+    }
+}
+
+impl Unjudged {
+    /// Returns when its deadline has passed: the deadline itself is still in time.
+    pub(super) const fn late_ns(&self) -> u64 {
+        self.deadline_ns + 1
+    }
+}
+
+impl Scheduler {
+    /// Returns how many jobs a sink has missed its deadline in, whether they were
+    /// released or still waited for their release.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG, or the subtask is no sink of it.
+    #[must_use]
+    pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
+        let misses = self.dags[dag.index()].jobs.misses_of(sink);
+        misses.expect("only sinks have deadlines; ask `Dag::sinks`")
+    }
+
+    /// Notices all deadlines of a DAG that have passed. The instance of the vertex
+    /// `ended` has ended at this instant, and no other one since the last look.
+    pub(super) fn judge(&mut self, dag: DagId, ended: Option<u32>, observer: &mut impl Observer) {
+        let model = self.task_set.dag(dag);
+        let first = self.task_set.first_vertex(dag);
+        let state = &mut self.dags[dag.index()];
+        while let Some(unjudged) = state.jobs.first_unjudged(model)
+            && unjudged.deadline_ns < self.now_ns
+        {
+            let vertices = &self.vertices;
+            let is_late = |sink: SubtaskId| match unjudged.sequence {
+                Some(sequence) => is_unfinished(vertices, first + sink.0, sequence, ended),
+                None => true,
+            };
+            if state.jobs.count_late(&unjudged, is_late) && state.jobs.note_miss(&unjudged) {
+                state.statistics.count_miss();
+                observer.deadline_missed(dag, unjudged.number, unjudged.deadline_ns);
+            }
+        }
+    }
+
+    /// Judges the DAG of a vertex whose instance has just ended, if that is one of several sinks.
+    pub(super) fn judge_ended(&mut self, vertex: u32, observer: &mut impl Observer) {
+        let ended = self.vertices.get(vertex);
+        let (dag, subtask) = (ended.dag, ended.subtask);
+        let sinks = self.task_set.dag(dag).sinks();
+        if sinks.len() > 1 && sinks.binary_search(&subtask).is_ok() {
+            self.judge(dag, Some(vertex), observer);
+        }
+    }
+}
+
+/// Reports whether a sink had not finished its part of a job in flight before this instant.
+fn is_unfinished(vertices: &Vertices, sink: u32, sequence: u64, ended: Option<u32>) -> bool {
+    let has_just_ended = u64::from(ended == Some(sink));
+    vertices.get(sink).progress - has_just_ended <= sequence
+}
