@@ -1,8 +1,9 @@
 //! Status lines: how a run does, now and then.
 //!
 //! The load of each core is computed from the journal, so that counting it costs
-//! nothing between two lines. Where the journal holds less than that time, the load
-//! is of what it holds; where events are not recorded there is none.
+//! nothing between two lines. Where the journal holds less than that time, or more than
+//! 2,048 events of it, the load is of the latest; where events are not recorded there is
+//! none.
 
 use sched_dag::DagId;
 
@@ -15,8 +16,8 @@ use crate::text::json;
 /// How many events are read where time is short.
 const FEW_EVENTS: u64 = 128;
 
-/// How many are read otherwise.
-const MOST_EVENTS: u64 = 1 << 16;
+/// How many are read otherwise: some tens of microseconds, in which core 0 takes no interrupt.
+const MOST_EVENTS: u64 = 2048;
 
 /// When and what to print.
 #[derive(Debug)]
