@@ -52,7 +52,7 @@ impl Replay<'_> {
                 .iter()
                 .filter(|due| due.finish_ns.is_some() && !due.is_met());
             let late = late.max_by_key(|due| due.finish_ns)?;
-            let may_be_lost = self.may_be_lost(late.deadline_ns);
+            let may_be_lost = self.may_be_lost(&dues);
             let is_cut = known.aborted.is_some() || of_dag.is_stopped;
             return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
                 dag,
@@ -62,6 +62,10 @@ impl Replay<'_> {
                 at_ns: late.finish_ns?,
             });
         };
+        // Which of several sinks is meant is not known if a finish may be lost.
+        if known.is_partial && dues.len() > 1 {
+            return None;
+        }
         let event = Event {
             time_ns: missed.time_ns,
             what: What::Missed,
@@ -99,10 +103,11 @@ impl Replay<'_> {
         })
     }
 
-    /// Reports whether what followed from a deadline may be among the events that are
-    /// lost: a miss, or an abort before.
-    fn may_be_lost(&self, deadline_ns: u64) -> bool {
-        !self.terms.is_whole && Some(deadline_ns) < self.first_ns
+    /// Reports whether what followed from one of the deadlines may be among the events
+    /// that are lost: the job's miss, or an abort before.
+    fn may_be_lost(&self, dues: &[Due]) -> bool {
+        let earliest_ns = dues.iter().map(|due| due.deadline_ns).min();
+        !self.terms.is_whole && earliest_ns < self.first_ns
     }
 
     /// R4 at the end, for the deadlines of a job that is not complete.
@@ -120,7 +125,7 @@ impl Replay<'_> {
         let unfinished = dues.iter().filter(|due| due.finish_ns.is_none());
         let deadline_ns = unfinished.map(|due| due.deadline_ns).min()?;
         let has_passed = !self.is_tolerable(deadline_ns, self.end_ns);
-        let is_missing = has_passed && !of_dag.is_stopped && !self.may_be_lost(deadline_ns);
+        let is_missing = has_passed && !of_dag.is_stopped && !self.may_be_lost(&dues);
         is_missing.then_some(Violation::NotMissed {
             dag,
             job,

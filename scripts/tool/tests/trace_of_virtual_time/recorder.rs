@@ -105,16 +105,21 @@ impl Recorder {
         let subtasks: Vec<String> = subtasks.collect();
         let edges = dag.edges.iter().map(|(from, to)| format!("[{from},{to}]"));
         let edges: Vec<String> = edges.collect();
+        let stated = dag.subtasks.iter().enumerate();
+        let sinks = stated
+            .filter_map(|(number, subtask)| Some(format!("[{number},{}]", subtask.deadline_ns?)));
+        let sinks: Vec<String> = sinks.collect();
         format!(
             "{{\"kind\":\"trace_dag\",\"dag\":{number},\"name\":\"d{number}\",\"period_ns\":{},\
              \"relative_deadline_ns\":{},\"offset_ns\":{},\"in_flight\":{},\
-             \"overrun\":\"{overrun}\",\"subtasks\":[{}],\"edges\":[{}]}}",
+             \"overrun\":\"{overrun}\",\"subtasks\":[{}],\"edges\":[{}],\"sinks\":[{}]}}",
             dag.period_ns,
             dag.deadline_ns,
             dag.offset_ns,
             dag.in_flight,
             subtasks.join(","),
-            edges.join(",")
+            edges.join(","),
+            sinks.join(",")
         )
     }
 }
