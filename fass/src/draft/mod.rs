@@ -73,8 +73,22 @@ impl Draft {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
+        let inputs = (inputs, Args::input_types());
+        let outputs = (outputs, Ret::output_types());
+        self.make_bodies.push(defer(f));
+        self.enter(inputs, outputs, attributes)
+    }
+
+    /// Notes what a subtask states. Apart, as each of an app's functions has a
+    /// [`register`](Self::register) of its own, and an image has little room.
+    #[inline(never)]
+    fn enter(
+        &mut self,
+        (inputs, input_types): (&[&str], Vec<MessageType>),
+        (outputs, output_types): (&[&str], Vec<MessageType>),
+        attributes: SubtaskAttributes,
+    ) -> SubtaskLabel {
         let subtask = self.next_label(&attributes);
-        let (input_types, output_types) = (Args::input_types(), Ret::output_types());
         if input_types.len() != inputs.len() {
             self.flaws.push(Flaw::InputArity {
                 subtask: subtask.clone(),
@@ -95,7 +109,6 @@ impl Draft {
             outputs: ports(outputs, &output_types),
             ..spec
         });
-        self.make_bodies.push(defer(f));
         subtask
     }
 
@@ -145,6 +158,7 @@ impl Draft {
         self.spec.offset_ns = self.convert(offset, None, "offset").unwrap_or(0);
     }
 
+    #[inline(never)]
     pub(crate) fn set_period(
         &mut self,
         activation: Activation,
@@ -172,6 +186,7 @@ impl Draft {
 
     /// States the relative deadline of a sink. The DAG's is that of the sink which has the
     /// longest, unless it states its own.
+    #[inline(never)]
     pub(crate) fn set_sink_deadline(&mut self, deadline: Duration, sink: &SubtaskLabel) {
         let Some(deadline_ns) = self.convert(deadline, Some(sink), "relative deadline") else {
             return;

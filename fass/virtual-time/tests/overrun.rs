@@ -76,7 +76,7 @@ impl Drop for Counted {
 }
 
 #[test]
-fn aborted_jobs_leave_no_values_in_the_topics() {
+fn aborted_jobs_leave_at_most_a_value_an_edge() {
     let alive = Arc::new(AtomicI64::new(0));
     let machine = VirtualTime::new().cores(2);
     let dag = create_dag();
@@ -103,5 +103,8 @@ fn aborted_jobs_leave_no_values_in_the_topics() {
     let report = machine.run();
     assert!(report.statistics[0].aborts > 5);
     assert_eq!(report.violations(), []);
-    assert_eq!(alive.load(Ordering::Relaxed), 0);
+    // A value that is given up stays until its place is written again. Each of the three
+    // edges has one place besides the near one, which is written first.
+    let left = alive.load(Ordering::Relaxed);
+    assert!((0..=3).contains(&left), "{left}");
 }

@@ -39,29 +39,28 @@ impl Object<'_, '_> {
     ///
     /// See [`Object`].
     pub fn number(&mut self, name: &str, value: impl Into<u64>) -> &mut Self {
-        let value = value.into();
-        self.field(name, |out| Display::fmt(&value, out))
+        self.shown(name, &value.into())
     }
 
     /// Writes a field with a truth value.
     ///
     /// See [`Object`].
     pub fn flag(&mut self, name: &str, value: bool) -> &mut Self {
-        self.field(name, |out| Display::fmt(&value, out))
+        self.shown(name, &value)
     }
 
     /// Writes a field with text.
     ///
     /// See [`Object`].
     pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
-        self.field(name, |out| quoted(value).fmt(out))
+        self.shown(name, &quoted(value))
     }
 
     /// Writes a field with an object.
     ///
     /// See [`Object`].
     pub fn object(&mut self, name: &str, fields: impl Fn(&mut Object<'_, '_>)) -> &mut Self {
-        self.field(name, |out| Fields(&fields).fmt(out))
+        self.shown(name, &Fields(&fields))
     }
 
     /// Writes a field with a list of values, each of which is JSON already.
@@ -78,18 +77,30 @@ impl Object<'_, '_> {
         })
     }
 
+    /// Writes a field whose value is JSON already. One function for all: lines are not
+    /// written in haste, and an image has little room.
+    #[inline(never)]
+    fn shown(&mut self, name: &str, value: &dyn Display) -> &mut Self {
+        self.field(name, |out| value.fmt(out))
+    }
+
     fn field(
         &mut self,
         name: &str,
         value: impl FnOnce(&mut Formatter<'_>) -> fmt::Result,
     ) -> &mut Self {
+        self.begin(name);
+        self.result = self.result.and_then(|()| value(self.out));
+        self
+    }
+
+    #[inline(never)]
+    fn begin(&mut self, name: &str) {
         let separator = if self.first { "" } else { "," };
         self.first = false;
         self.result = self
             .result
-            .and_then(|()| write!(self.out, "{separator}{}:", quoted(name)))
-            .and_then(|()| value(self.out));
-        self
+            .and_then(|()| write!(self.out, "{separator}{}:", quoted(name)));
     }
 }
 

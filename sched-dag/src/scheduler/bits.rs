@@ -22,6 +22,7 @@ pub(super) struct BitSet {
 
 impl BitSet {
     /// Makes an empty set for the numbers `0..limit`.
+    #[inline]
     pub(super) fn new(limit: usize) -> Self {
         let mut levels = Vec::new();
         let mut words = limit.div_ceil(64);

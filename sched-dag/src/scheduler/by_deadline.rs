@@ -32,6 +32,7 @@ struct Line {
 }
 
 impl ByDeadline {
+    #[inline]
     pub(super) fn new(task_set: &TaskSet) -> Self {
         let mut lines = Vec::new();
         for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
@@ -46,6 +47,7 @@ impl ByDeadline {
         }
     }
 
+    #[inline]
     pub(super) fn insert(&mut self, key: Key) {
         let (deadline_ns, slot) = key.deadline_and_slot();
         let line = &mut self.lines[slot as usize];
@@ -56,6 +58,7 @@ impl ByDeadline {
     }
 
     /// Returns the smallest key.
+    #[inline]
     pub(super) fn peek(&self) -> Option<Key> {
         let ((deadline_ns, slot), _) = self.jobs.peek()?;
         let line = &self.lines[slot as usize];
@@ -63,6 +66,7 @@ impl ByDeadline {
         Some(Key::of_parts(deadline_ns, slot, vertex))
     }
 
+    #[inline]
     pub(super) fn remove(&mut self, key: Key) {
         let (_, slot) = key.deadline_and_slot();
         let line = &mut self.lines[slot as usize];

@@ -36,6 +36,7 @@ const IDLE: Occupation = Occupation {
 };
 
 impl Cores {
+    #[inline]
     pub(super) fn new(cores: u32) -> Self {
         Self {
             occupations: vec![IDLE; cores as usize].into_boxed_slice(),
@@ -45,21 +46,25 @@ impl Cores {
     }
 
     /// Returns the number of cores.
+    #[inline]
     pub(super) const fn count(&self) -> usize {
         self.occupations.len()
     }
 
+    #[inline]
     pub(super) fn running(&self, core: CoreId) -> Option<Key> {
         let key = self.occupations[core.index()].key;
         (!key.is_none()).then_some(key)
     }
 
     /// Reports whether any core is idle.
+    #[inline]
     pub(super) const fn any_idle(&self) -> bool {
         !self.idle.is_empty()
     }
 
     /// Returns an idle core, which the caller gives an instance.
+    #[inline]
     pub(super) fn take_idle(&mut self) -> Option<CoreId> {
         self.idle.pop()
     }
@@ -69,6 +74,7 @@ impl Cores {
     /// # Panics
     ///
     /// If it is not idle.
+    #[inline]
     pub(super) fn take_this(&mut self, core: CoreId) {
         let place = self.idle.iter().rposition(|&idle| idle == core);
         let place = place.expect("the core that is to go on has to be idle");
@@ -85,12 +91,14 @@ impl Cores {
     }
 
     /// Makes a core idle.
+    #[inline]
     pub(super) fn free(&mut self, core: CoreId) {
         self.occupations[core.index()] = IDLE;
         self.idle.push(core);
     }
 
     /// Returns the largest key among the instances that may be preempted.
+    #[inline]
     pub(super) fn largest_preemptible(&self) -> Option<(CoreId, Key)> {
         let occupations = self.occupations.iter().enumerate();
         let preemptible = occupations.filter(|(_, occupation)| occupation.may_be_preempted);

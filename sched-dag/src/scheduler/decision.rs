@@ -36,6 +36,7 @@ pub enum Decision {
 impl Decision {
     /// Returns the core that the decision is for.
     #[must_use]
+    #[inline]
     pub const fn core(self) -> CoreId {
         match self {
             Self::Start { core, .. } | Self::Resume { core, .. } | Self::Preempt { core, .. } => {
@@ -46,6 +47,7 @@ impl Decision {
 
     /// Returns the instance that the decision is about.
     #[must_use]
+    #[inline]
     pub const fn instance(self) -> Instance {
         match self {
             Self::Start { instance, .. }

@@ -22,6 +22,7 @@ use crate::ids::CoreId;
 
 impl Scheduler {
     /// Fills `decisions`.
+    #[inline]
     pub(super) fn decide(&mut self) {
         self.decisions.clear();
         while self.cores.any_idle()
@@ -60,6 +61,7 @@ impl Scheduler {
     }
 
     /// Puts the instance that runs on a core back in line.
+    #[inline]
     fn preempt(&mut self, core: CoreId, running: Key) {
         let vertex = self.vertices.get_mut(running.vertex());
         vertex.phase = Phase::Preempted;

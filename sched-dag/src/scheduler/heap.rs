@@ -24,6 +24,7 @@ pub(crate) struct IndexedHeap<K> {
 
 impl<K: Ord + Copy> IndexedHeap<K> {
     /// Makes an empty heap for the items `0..capacity`.
+    #[inline]
     pub(crate) fn new(capacity: usize) -> Self {
         Self {
             entries: Vec::with_capacity(capacity),
@@ -32,6 +33,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     }
 
     /// Returns the smallest key and its item.
+    #[inline]
     pub(crate) fn peek(&self) -> Option<(K, usize)> {
         self.entries
             .first()
@@ -39,6 +41,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     }
 
     /// Returns an item's key, if it is in.
+    #[inline]
     pub(crate) fn key(&self, item: usize) -> Option<K> {
         self.entries
             .get(self.positions[item] as usize)
@@ -46,6 +49,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     }
 
     /// Puts an item into the heap, or gives it another key.
+    #[inline]
     pub(crate) fn set(&mut self, item: usize, key: K) {
         let position = self.positions[item];
         if position == ABSENT {
@@ -60,6 +64,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     }
 
     /// Takes the item with the smallest key out.
+    #[inline]
     pub(crate) fn pop(&mut self) -> Option<(K, usize)> {
         let (key, item) = self.peek()?;
         self.remove(item);
@@ -67,6 +72,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     }
 
     /// Takes an item out, if it is in.
+    #[inline]
     pub(crate) fn remove(&mut self, item: usize) {
         let position = self.positions[item];
         if position == ABSENT {
@@ -83,6 +89,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         }
     }
 
+    #[inline]
     fn rise(&mut self, mut position: usize) {
         while position > 0 {
             let above = (position - 1) / 2;
@@ -94,6 +101,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         }
     }
 
+    #[inline]
     fn sink(&mut self, mut position: usize) {
         loop {
             let left = 2 * position + 1;
@@ -112,6 +120,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         }
     }
 
+    #[inline]
     fn swap(&mut self, one: usize, other: usize) {
         self.entries.swap(one, other);
         self.positions[self.entries[one].1 as usize] = to_u32(one);

@@ -25,6 +25,7 @@ impl Scheduler {
     /// Takes a started instance from its core, or out of line if it has none,
     /// and returns its vertex. `event` says what the driver claims, if the
     /// instance has not started.
+    #[inline]
     pub(super) fn take_off(&mut self, instance: Instance, event: &str) -> u32 {
         let number = self.vertex(instance).0;
         let vertex = self.vertices.get(number);
@@ -202,6 +203,7 @@ impl Scheduler {
     }
 
     /// Notes when something happens next to a DAG without a completion.
+    #[inline]
     pub(super) fn set_timer(&mut self, dag: DagId) {
         let model = self.task_set.dag(dag);
         match self.dags[dag.index()]

@@ -76,6 +76,7 @@ pub(super) struct Job {
 
 impl Jobs {
     /// Makes the jobs of a DAG whose slots are counted from `first_slot`.
+    #[inline]
     pub(super) fn new(dag: &Dag, first_slot: u32) -> Self {
         let slots = (first_slot..).take(dag.slots()).map(|slot| Job {
             slot,
@@ -110,6 +111,7 @@ impl Jobs {
         &mut self.in_flight[self.slot(sequence)]
     }
 
+    #[inline]
     fn slot(&self, sequence: u64) -> usize {
         // A mask, as the number of slots is a power of two.
         let slot = sequence & (self.in_flight.len() as u64 - 1);
@@ -125,6 +127,7 @@ impl Jobs {
     /// Reports whether there is neither a job in flight, nor one waiting, nor
     /// one ahead: the DAG is ended, or has a limit of jobs and is there, or is
     /// sporadic without a limit and has no signal.
+    #[inline]
     pub(super) fn are_over(&self, dag: &Dag) -> bool {
         let none_ahead = match dag.jobs() {
             Some(jobs) => self.next_due >= jobs,
@@ -134,6 +137,7 @@ impl Jobs {
     }
 
     /// Returns the job that a signal is for, or that one is kept for.
+    #[inline]
     pub(super) fn signal_job(&self) -> u64 {
         self.next_due - self.waiting().min(1)
     }
@@ -141,6 +145,7 @@ impl Jobs {
     /// Lets the next job of a sporadic DAG be due at `now_ns`, or as soon after it
     /// as the minimum inter-arrival time allows, and returns that time. `None` if
     /// the signal is dropped: an earlier one is still kept, or no job is left.
+    #[inline]
     pub(super) fn signal(&mut self, dag: &Dag, now_ns: u64) -> Option<u64> {
         let limit_reached = dag.jobs().is_some_and(|jobs| self.next_due >= jobs);
         if self.ended || limit_reached || self.waiting() > 0 || self.next_due_ns.is_some() {
@@ -157,19 +162,23 @@ impl Jobs {
     }
 
     /// Reports whether a job was due before `now_ns` and nobody has dealt with it.
+    #[inline]
     pub(super) fn is_overdue(&self, now_ns: u64) -> bool {
         self.next_due_ns.is_some_and(|due_ns| due_ns < now_ns)
     }
 
+    #[inline]
     pub(super) fn waiting(&self) -> u64 {
         self.next_due - self.first_waiting
     }
 
+    #[inline]
     pub(super) fn is_waiting(&self, number: u64) -> bool {
         (self.first_waiting..self.next_due).contains(&number)
     }
 
     /// Returns the first waiting job, if there is one and it is not blocked.
+    #[inline]
     pub(super) fn releasable(&self) -> Option<u64> {
         let number = self.first_waiting;
         let blocked =
@@ -179,6 +188,7 @@ impl Jobs {
 
     /// Lets the next job that is due at `now_ns` wait, and returns it with its
     /// nominal release time.
+    #[inline]
     pub(super) fn take_due(&mut self, dag: &Dag, now_ns: u64) -> Option<(u64, u64)> {
         let release_ns = self
             .next_due_ns
@@ -191,6 +201,7 @@ impl Jobs {
     }
 
     /// Releases the first waiting job and returns its sequence number.
+    #[inline]
     pub(super) fn release_waiting(&mut self, dag: &Dag) -> u64 {
         let sequence = self.next;
         let number = self.first_waiting;
@@ -215,6 +226,7 @@ impl Jobs {
     }
 
     /// Drops the first waiting job and returns it with its nominal release time.
+    #[inline]
     pub(super) fn skip_waiting(&mut self, dag: &Dag) -> (u64, u64) {
         let number = self.first_waiting;
         let release_ns = self.waiting_release_ns(dag, number);
@@ -223,6 +235,7 @@ impl Jobs {
     }
 
     /// Returns the nominal release time of a waiting job.
+    #[inline]
     pub(super) fn waiting_release_ns(&self, dag: &Dag, number: u64) -> u64 {
         if dag.is_sporadic() {
             debug_assert_eq!(number + 1, self.next_due, "one sporadic job waits");
@@ -234,6 +247,7 @@ impl Jobs {
 
     /// Marks the oldest job in flight that is not aborted, and returns its
     /// sequence number.
+    #[inline]
     pub(super) fn abort_oldest(&mut self) -> Option<u64> {
         let sequence = self.aborted.max(self.oldest);
         if sequence == self.next {
@@ -243,16 +257,19 @@ impl Jobs {
         Some(sequence)
     }
 
+    #[inline]
     pub(super) fn is_aborted(&self, sequence: u64) -> bool {
         sequence < self.aborted
     }
 
     /// Reports whether a job starts no further instance: it is aborted, or the
     /// DAG is ended.
+    #[inline]
     pub(super) fn is_cut(&self, sequence: u64) -> bool {
         self.ended || self.is_aborted(sequence)
     }
 
+    #[inline]
     pub(super) fn is_ended(&self) -> bool {
         self.ended
     }
@@ -260,6 +277,7 @@ impl Jobs {
     /// Drops all that waits and all that is ahead, and lets those in flight
     /// start no further instance. Returns how many were in flight and not aborted,
     /// and how many waited.
+    #[inline]
     pub(super) fn end_all(&mut self) -> (u64, u64) {
         let cut_short = self.next - self.aborted.max(self.oldest);
         let dropped = self.waiting();
@@ -270,6 +288,7 @@ impl Jobs {
     }
 
     /// Takes the oldest job out of flight, all of whose instances have ended.
+    #[inline]
     pub(super) fn end_oldest(&mut self) {
         self.oldest += 1;
     }
@@ -277,6 +296,7 @@ impl Jobs {
     /// Returns when something happens to these jobs without a completion: a
     /// release becomes due, or a deadline has passed. A release that no longer
     /// is blocked is due at `now_ns`.
+    #[inline]
     pub(super) fn next_event_ns(&self, dag: &Dag, now_ns: u64) -> Option<u64> {
         if self.releasable().is_some() {
             return Some(now_ns);
@@ -291,6 +311,7 @@ impl Jobs {
 
 /// Returns a job's nominal release time; `None` beyond the DAG's limit of jobs,
 /// or if the instant after its deadline is not a time, or if only a signal says.
+#[inline]
 fn due_ns(dag: &Dag, number: u64) -> Option<u64> {
     if dag.is_sporadic() || dag.jobs().is_some_and(|jobs| number >= jobs) {
         return None;

@@ -52,6 +52,7 @@ pub(super) struct Unjudged {
 
 impl Deadline {
     /// Returns the deadlines of a DAG, ascending, at least one.
+    #[inline]
     pub(super) fn all(dag: &Dag) -> Box<[Self]> {
         let sinks = dag.sinks();
         let relative_ns = |sink: usize| dag.subtask(sinks[sink]).relative_deadline_ns();
@@ -72,6 +73,7 @@ impl Deadline {
     }
 
     /// Takes over what is known of a waiting job that is released, with a sequence number.
+    #[inline]
     pub(super) fn release(&mut self, number: u64, sequence: u64) {
         if number < self.judged_waiting {
             // Judged in order: so all in flight are.
@@ -80,6 +82,7 @@ impl Deadline {
     }
 
     /// Reports whether a waiting job is judged.
+    #[inline]
     pub(super) const fn has_judged_waiting(&self, number: u64) -> bool {
         number < self.judged_waiting
     }
@@ -87,6 +90,7 @@ impl Deadline {
 
 impl Jobs {
     /// Returns the job that is to be judged first.
+    #[inline]
     pub(super) fn first_unjudged(&self, dag: &Dag) -> Option<Unjudged> {
         let of_deadlines = self.deadlines.iter().enumerate();
         let unjudged = of_deadlines.filter_map(|(at, deadline)| self.unjudged(dag, at, deadline));
@@ -131,6 +135,7 @@ impl Jobs {
     }
 
     /// Notes that a job has missed a deadline, and reports whether it is its first one.
+    #[inline]
     fn note_miss(&mut self, unjudged: &Unjudged) -> bool {
         match unjudged.sequence {
             Some(sequence) => !core::mem::replace(&mut self.job_mut(sequence).missed, true),
@@ -140,6 +145,7 @@ impl Jobs {
     }
 
     /// Returns how many jobs a sink was late in; `None` if the subtask is no sink.
+    #[inline]
     fn misses_of(&self, subtask: SubtaskId) -> Option<u64> {
         let mut sinks = self.deadlines.iter().flat_map(|deadline| &deadline.sinks);
         let sink = sinks.find(|sink| sink.subtask == subtask)?;
@@ -149,6 +155,7 @@ impl Jobs {
 
 impl Unjudged {
     /// Returns when its deadline has passed: the deadline itself is still in time.
+    #[inline]
     pub(super) const fn late_ns(&self) -> u64 {
         self.deadline_ns + 1
     }
@@ -162,6 +169,7 @@ impl Scheduler {
     ///
     /// If there is no such DAG, or the subtask is no sink of it.
     #[must_use]
+    #[inline]
     pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
         let misses = self.dags[dag.index()].jobs.misses_of(sink);
         misses.expect("only sinks have deadlines; ask `Dag::sinks`")
@@ -200,6 +208,7 @@ impl Scheduler {
 }
 
 /// Reports whether a sink had not finished its part of a job in flight before this instant.
+#[inline]
 fn is_unfinished(vertices: &Vertices, sink: u32, sequence: u64, ended: Option<u32>) -> bool {
     let has_just_ended = u64::from(ended == Some(sink));
     vertices.get(sink).progress - has_just_ended <= sequence

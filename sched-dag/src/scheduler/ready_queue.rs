@@ -71,6 +71,7 @@ enum Rest {
 
 impl ReadyQueue {
     /// Makes the queue for a set and a policy; gives vertices their ranks.
+    #[inline]
     pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut Vertices) -> Self {
         let in_any_order = |count| Rest::Keyed(IndexedHeap::new(count));
         if policy == Policy::Edf {
@@ -95,6 +96,7 @@ impl ReadyQueue {
         Self::of(Order::Job, in_any_order(vertices.len()))
     }
 
+    #[inline]
     fn of(order: Order, rest: Rest) -> Self {
         Self {
             front: Key::NONE,
@@ -171,6 +173,7 @@ impl ReadyQueue {
     }
 
     /// Takes an instance out, which waits.
+    #[inline]
     pub(super) fn remove(&mut self, key: Key) {
         if self.front == key {
             self.front = Key::NONE;
@@ -182,6 +185,7 @@ impl ReadyQueue {
 }
 
 impl Rest {
+    #[inline]
     fn peek(&self) -> Option<Key> {
         match self {
             Self::Word { ranks, vertices } => {
@@ -213,6 +217,7 @@ impl Rest {
         }
     }
 
+    #[inline]
     fn remove(&mut self, key: Key) {
         match self {
             Self::Word { ranks, .. } => *ranks &= !(1 << key.rank()),
@@ -252,6 +257,7 @@ impl Rest {
 
 /// Reports whether the subtasks of a DAG, as far as they wait together, are in
 /// the same order whatever jobs they do.
+#[inline]
 fn has_ranks(dag: &Dag) -> bool {
     let priorities: Vec<_> = dag.subtasks().iter().map(|s| s.priority().0).collect();
     let priorities = sorted(&priorities);
@@ -261,6 +267,7 @@ fn has_ranks(dag: &Dag) -> bool {
 /// Replaces each vertex's priority by its place in the order of (priority, DAG,
 /// subtask), or of (priority, DAG) if the job comes next; returns the vertices in
 /// that order.
+#[inline]
 fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
     // Vertices count DAG by DAG, within a DAG by subtask, and the sort is stable.
     let urgency = |vertex| vertices.get(to_u32(vertex)).rank;
@@ -282,6 +289,7 @@ fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
 
 /// Replaces each vertex's priority by its place in the order of (DAG, relative deadline,
 /// the longest first), and returns the relative deadline of each place.
+#[inline]
 fn rank_by_deadline(task_set: &TaskSet, vertices: &mut Vertices) -> Vec<u64> {
     let mut of_ranks = Vec::new();
     for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
@@ -298,6 +306,7 @@ fn rank_by_deadline(task_set: &TaskSet, vertices: &mut Vertices) -> Vec<u64> {
 }
 
 /// Returns the relative deadlines of a DAG's subtasks, each once, the longest first.
+#[inline]
 fn deadlines_ns(dag: &Dag) -> Vec<u64> {
     let of_subtasks = dag.subtasks().iter().map(|of| of.relative_deadline_ns());
     let mut deadlines_ns = sorted(&of_subtasks.collect::<Vec<_>>());
@@ -307,6 +316,7 @@ fn deadlines_ns(dag: &Dag) -> Vec<u64> {
 }
 
 /// Makes the rest for vertices in the order of their ranks.
+#[inline]
 fn ranked(order: &[u32]) -> Rest {
     let keys = (0u32..).zip(order);
     match order.len() {

@@ -84,6 +84,7 @@ pub(super) struct Vertices {
 }
 
 impl Vertices {
+    #[inline]
     pub(super) fn new(task_set: &TaskSet, preemption: Preemption) -> Self {
         let mut all = Self {
             vertices: Box::default(),
@@ -127,19 +128,23 @@ impl Vertices {
     }
 
     /// Returns the number of vertices.
+    #[inline]
     pub(super) const fn len(&self) -> usize {
         self.vertices.len()
     }
 
+    #[inline]
     pub(super) fn get(&self, vertex: u32) -> &Vertex {
         &self.vertices[vertex as usize]
     }
 
+    #[inline]
     pub(super) fn get_mut(&mut self, vertex: u32) -> &mut Vertex {
         &mut self.vertices[vertex as usize]
     }
 
     /// Writes what the end of the present instance writes, with no change.
+    #[inline]
     pub(super) fn touch(&mut self, vertex: u32) {
         let vertex = &mut self.vertices[vertex as usize];
         vertex.phase = black_box(vertex.phase);
@@ -148,6 +153,7 @@ impl Vertices {
     }
 
     /// Takes note that no job of these vertices' DAG is cut any more.
+    #[inline]
     pub(super) fn allow_passing_on(&mut self, vertices: Range<usize>) {
         for vertex in &mut self.vertices[vertices] {
             let [from, to] = vertex.successors;
@@ -197,6 +203,7 @@ impl Vertices {
 
     /// Returns the vertex that is the successor at a place, if it waits for nothing
     /// else. All have one slot.
+    #[inline]
     pub(super) fn ready_successor(&mut self, place: usize) -> Option<(u32, &mut Vertex)> {
         let number = self.successors[place];
         let vertex = &mut self.vertices[number as usize];
@@ -228,6 +235,7 @@ impl Vertices {
 
     /// Returns a vertex if its next instance, of a job that is released, waits for
     /// no predecessor.
+    #[inline]
     pub(super) fn next_is_ready(&mut self, vertex: u32) -> Option<&mut Vertex> {
         let vertex = &mut self.vertices[vertex as usize];
         (*vertex.counter(&mut self.counters, vertex.progress) == 0).then_some(vertex)
