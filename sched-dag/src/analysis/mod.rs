@@ -80,7 +80,6 @@ mod ratio;
 mod refusal;
 mod relation;
 mod set;
-mod sinks;
 mod task;
 mod width;
 mod witness;

@@ -46,7 +46,6 @@ mod hand_off;
 pub(crate) mod heap;
 mod instances;
 mod jobs;
-mod judging;
 mod key;
 mod moment;
 mod observer;

@@ -35,6 +35,8 @@
 //! those with it that it may delay, directly or through others. What is left
 //! is analysed without it: whatever it does, it cannot delay these.
 
+mod sinks;
+
 use alloc::vec::Vec;
 
 use super::answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
@@ -48,7 +50,6 @@ use super::pipelined::Unsolved;
 use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
 use super::set::{Failure, Set, constrained};
-use super::sinks;
 use super::task::{Task, TaskError};
 use crate::ids::{DagId, SubtaskId};
 use crate::order::sorted_by_key;

@@ -19,12 +19,12 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::answer::{Answer, DagBound, NotProven, Reason};
-use super::judge::Case;
-use super::pipelined::STEP_LIMIT;
-use super::relation::Mixture;
-use super::set::constrained;
-use super::task::Task;
+use super::Case;
+use crate::analysis::answer::{Answer, DagBound, NotProven, Reason};
+use crate::analysis::pipelined::STEP_LIMIT;
+use crate::analysis::relation::Mixture;
+use crate::analysis::set::constrained;
+use crate::analysis::task::Task;
 use crate::ids::SubtaskId;
 use crate::policy::Policy;
 use crate::task_set::Dag;

@@ -13,16 +13,16 @@
 
 use alloc::boxed::Box;
 
-use super::jobs::Jobs;
-use super::vertices::Vertices;
-use super::{Observer, Scheduler};
+use super::Jobs;
 use crate::ids::{DagId, SubtaskId};
 use crate::order::sorted_by_key;
+use crate::scheduler::vertices::Vertices;
+use crate::scheduler::{Observer, Scheduler};
 use crate::task_set::Dag;
 
 /// One relative deadline of a DAG, and how far its jobs are judged by it.
 #[derive(Debug)]
-pub(super) struct Deadline {
+pub(in crate::scheduler) struct Deadline {
     relative_ns: u64,
     sinks: Box<[Sink]>,
     /// The sequence number of the first job in flight that is not judged, if that is
@@ -41,7 +41,7 @@ struct Sink {
 
 /// A job that is to be judged next.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Unjudged {
+pub(in crate::scheduler) struct Unjudged {
     number: u64,
     /// Its sequence number; `None` if it waits.
     sequence: Option<u64>,
@@ -53,7 +53,7 @@ pub(super) struct Unjudged {
 impl Deadline {
     /// Returns the deadlines of a DAG, ascending, at least one.
     #[inline]
-    pub(super) fn all(dag: &Dag) -> Box<[Self]> {
+    pub(in crate::scheduler) fn all(dag: &Dag) -> Box<[Self]> {
         let sinks = dag.sinks();
         let relative_ns = |sink: usize| dag.subtask(sinks[sink]).relative_deadline_ns();
         let order = sorted_by_key(sinks.len(), relative_ns);
@@ -74,7 +74,7 @@ impl Deadline {
 
     /// Takes over what is known of a waiting job that is released, with a sequence number.
     #[inline]
-    pub(super) fn release(&mut self, number: u64, sequence: u64) {
+    pub(in crate::scheduler) fn release(&mut self, number: u64, sequence: u64) {
         if number < self.judged_waiting {
             // Judged in order: so all in flight are.
             self.judged = sequence + 1;
@@ -83,7 +83,7 @@ impl Deadline {
 
     /// Reports whether a waiting job is judged.
     #[inline]
-    pub(super) const fn has_judged_waiting(&self, number: u64) -> bool {
+    pub(in crate::scheduler) const fn has_judged_waiting(&self, number: u64) -> bool {
         number < self.judged_waiting
     }
 }
@@ -91,7 +91,7 @@ impl Deadline {
 impl Jobs {
     /// Returns the job that is to be judged first.
     #[inline]
-    pub(super) fn first_unjudged(&self, dag: &Dag) -> Option<Unjudged> {
+    pub(in crate::scheduler) fn first_unjudged(&self, dag: &Dag) -> Option<Unjudged> {
         let of_deadlines = self.deadlines.iter().enumerate();
         let unjudged = of_deadlines.filter_map(|(at, deadline)| self.unjudged(dag, at, deadline));
         unjudged.min_by_key(|unjudged| unjudged.deadline_ns)
@@ -156,7 +156,7 @@ impl Jobs {
 impl Unjudged {
     /// Returns when its deadline has passed: the deadline itself is still in time.
     #[inline]
-    pub(super) const fn late_ns(&self) -> u64 {
+    pub(in crate::scheduler) const fn late_ns(&self) -> u64 {
         self.deadline_ns + 1
     }
 }
@@ -177,7 +177,12 @@ impl Scheduler {
 
     /// Notices all deadlines of a DAG that have passed. The instance of the vertex
     /// `ended` has ended at this instant, and no other one since the last look.
-    pub(super) fn judge(&mut self, dag: DagId, ended: Option<u32>, observer: &mut impl Observer) {
+    pub(in crate::scheduler) fn judge(
+        &mut self,
+        dag: DagId,
+        ended: Option<u32>,
+        observer: &mut impl Observer,
+    ) {
         let model = self.task_set.dag(dag);
         let first = self.task_set.first_vertex(dag);
         let state = &mut self.dags[dag.index()];
@@ -197,7 +202,7 @@ impl Scheduler {
     }
 
     /// Judges the DAG of a vertex whose instance has just ended, if that is one of several sinks.
-    pub(super) fn judge_ended(&mut self, vertex: u32, observer: &mut impl Observer) {
+    pub(in crate::scheduler) fn judge_ended(&mut self, vertex: u32, observer: &mut impl Observer) {
         let ended = self.vertices.get(vertex);
         let (dag, subtask) = (ended.dag, ended.subtask);
         let sinks = self.task_set.dag(dag).sinks();

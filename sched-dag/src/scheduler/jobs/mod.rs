@@ -19,11 +19,13 @@
 //!
 //! The module `judging` holds jobs against their deadlines.
 
+mod judging;
+
 use alloc::boxed::Box;
 
-use super::judging::Deadline;
 use crate::ids::to_u32;
 use crate::task_set::Dag;
+use judging::Deadline;
 
 /// The jobs of one DAG.
 #[derive(Debug)]
