@@ -280,3 +280,18 @@ fn as_many_ready_subtasks_as_there_are_bits_in_words_start_in_order() {
         }
     }
 }
+
+#[test]
+fn a_dag_without_limit_of_jobs_is_never_finished() {
+    let mut spec = dag(10, 10, 1, &[0], &[]);
+    spec.jobs = None;
+    let mut scheduler = scheduler(&[spec], PREEMPTIVE);
+    for job in 0..1000 {
+        let mut moment = scheduler.at(10 * job);
+        if job > 0 {
+            moment.complete(instance(0, job - 1, 0), &mut ());
+        }
+        assert_eq!(moment.release_due(&mut ()).dispatch().len(), 1);
+        assert!(!scheduler.is_finished());
+    }
+}

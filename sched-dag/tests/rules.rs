@@ -3,7 +3,7 @@
 mod support;
 
 use sched_dag::{DagStatistics, Policy, Preemption, SchedulerOptions};
-use support::{PREEMPTIVE, assert_events, dag, instance, run, scheduler};
+use support::{PREEMPTIVE, assert_events, dag, run, scheduler};
 
 const DIAMOND: &[(usize, usize)] = &[(0, 1), (0, 2), (1, 3), (2, 3)];
 
@@ -395,19 +395,4 @@ fn an_instance_may_execute_for_no_time() {
          10 finish 0.1.1
          10 ended 0.1 Met",
     );
-}
-
-#[test]
-fn a_dag_without_limit_of_jobs_is_never_finished() {
-    let mut spec = dag(10, 10, 1, &[0], &[]);
-    spec.jobs = None;
-    let mut scheduler = scheduler(&[spec], PREEMPTIVE);
-    for job in 0..1000 {
-        let mut moment = scheduler.at(10 * job);
-        if job > 0 {
-            moment.complete(instance(0, job - 1, 0), &mut ());
-        }
-        assert_eq!(moment.release_due(&mut ()).dispatch().len(), 1);
-        assert!(!scheduler.is_finished());
-    }
 }
