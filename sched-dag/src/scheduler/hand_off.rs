@@ -119,6 +119,7 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such core.
+    #[inline]
     pub fn anticipate(&mut self, core: CoreId) {
         if let Some(key) = self.cores.running(core) {
             self.vertices.touch(key.vertex());

@@ -122,6 +122,7 @@ impl Scheduler {
     ///
     /// If the options say 0 cores.
     #[must_use]
+    #[inline]
     pub fn new(task_set: Arc<TaskSet>, options: SchedulerOptions) -> Self {
         assert!(
             options.cores > 0,
@@ -173,6 +174,7 @@ impl Scheduler {
 
     /// Begins the instant `now_ns`. A time earlier than one before counts as
     /// that one.
+    #[inline]
     pub fn at(&mut self, now_ns: u64) -> Moment<'_> {
         self.now_ns = self.now_ns.max(now_ns);
         Moment::new(self)
@@ -182,6 +184,7 @@ impl Scheduler {
     /// completes before: at the next release, or when a deadline has passed. An
     /// ended DAG has neither. `None`: only completions are to come, or nothing.
     #[must_use]
+    #[inline]
     pub fn next_event_ns(&self) -> Option<u64> {
         self.timers.peek().map(|(event_ns, _)| event_ns)
     }
@@ -192,6 +195,7 @@ impl Scheduler {
     ///
     /// If there is no such core.
     #[must_use]
+    #[inline]
     pub fn running(&self, core: CoreId) -> Option<Instance> {
         let key = self.cores.running(core)?;
         Some(self.vertices.get(key.vertex()).present_instance())
@@ -199,6 +203,7 @@ impl Scheduler {
 
     /// Reports whether every DAG [is over](Self::is_over).
     #[must_use]
+    #[inline]
     pub fn is_finished(&self) -> bool {
         let dags = self.task_set.dags().iter().zip(&self.dags);
         dags.into_iter()
@@ -214,6 +219,7 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
+    #[inline]
     pub fn is_over(&self, dag: DagId) -> bool {
         let state = &self.dags[dag.index()];
         state.jobs.are_over(self.task_set.dag(dag))
@@ -226,6 +232,7 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
+    #[inline]
     pub fn is_ended(&self, dag: DagId) -> bool {
         self.dags[dag.index()].jobs.is_ended()
     }
@@ -236,6 +243,7 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
+    #[inline]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
         &self.dags[dag.index()].statistics
     }
@@ -247,24 +255,28 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
+    #[inline]
     pub fn waiting(&self, dag: DagId) -> u64 {
         self.dags[dag.index()].jobs.waiting()
     }
 
     /// Returns the model that is scheduled.
     #[must_use]
+    #[inline]
     pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
     }
 
     /// Returns the options.
     #[must_use]
+    #[inline]
     pub const fn options(&self) -> SchedulerOptions {
         self.options
     }
 
     /// Returns the latest instant begun, in nanoseconds.
     #[must_use]
+    #[inline]
     pub const fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -276,6 +288,7 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
+    #[inline]
     pub fn vertex(&self, instance: Instance) -> Vertex {
         self.task_set.vertex(instance)
     }
@@ -287,6 +300,7 @@ impl Scheduler {
     ///
     /// If there is no such vertex.
     #[must_use]
+    #[inline]
     pub fn instance_of(&self, vertex: Vertex) -> Instance {
         let vertex = self.vertices.get(vertex.0);
         vertex.instance(self.dags[vertex.dag.index()].jobs.job(vertex.progress))
@@ -294,6 +308,7 @@ impl Scheduler {
 }
 
 /// Returns the least time, `u64::MAX` if there is none.
+#[inline]
 fn earliest_ns(timers: &IndexedHeap<u64>) -> u64 {
     timers.peek().map_or(u64::MAX, |(event_ns, _)| event_ns)
 }

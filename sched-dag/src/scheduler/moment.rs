@@ -18,6 +18,7 @@ pub struct Released<'s> {
 }
 
 impl<'s> Moment<'s> {
+    #[inline]
     pub(super) fn new(scheduler: &'s mut Scheduler) -> Self {
         Self { scheduler }
     }
@@ -79,6 +80,7 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If there is no such DAG.
+    #[inline]
     pub fn resume(&mut self, dag: DagId) {
         self.scheduler.resume(dag);
     }
@@ -114,6 +116,7 @@ impl<'s> Released<'s> {
     /// returns the changes. They are in effect for the scheduler; the driver
     /// has to carry them out.
     #[must_use = "the decisions are for the driver to carry out"]
+    #[inline]
     pub fn dispatch(self) -> &'s [Decision] {
         self.scheduler.decide();
         &self.scheduler.decisions

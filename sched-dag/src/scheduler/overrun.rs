@@ -90,11 +90,13 @@ impl Scheduler {
         }
     }
 
+    #[inline]
     fn take_due(&mut self, dag: DagId) -> Option<(u64, u64)> {
         let jobs = &mut self.dags[dag.index()].jobs;
         jobs.take_due(self.task_set.dag(dag), self.now_ns)
     }
 
+    #[inline]
     fn is_waiting(&self, dag: DagId, job: u64) -> bool {
         self.dags[dag.index()].jobs.is_waiting(job)
     }

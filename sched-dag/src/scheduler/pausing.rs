@@ -30,6 +30,7 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
+    #[inline]
     pub fn is_paused(&self, dag: DagId) -> bool {
         self.dags[dag.index()].is_paused
     }
@@ -40,6 +41,7 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
+    #[inline]
     pub fn in_flight(&self, dag: DagId) -> u64 {
         let jobs = &self.dags[dag.index()].jobs;
         jobs.next - jobs.oldest
@@ -60,6 +62,7 @@ impl Scheduler {
     }
 
     /// Ends the pause of a DAG (P4).
+    #[inline]
     pub(super) fn resume(&mut self, dag: DagId) {
         let state = &mut self.dags[dag.index()];
         if core::mem::take(&mut state.is_paused) {

@@ -33,12 +33,14 @@ pub struct DagStatistics {
 }
 
 impl DagStatistics {
+    #[inline]
     pub(super) fn count_miss(&mut self) {
         self.misses += 1;
         self.consecutive_misses += 1;
         self.most_consecutive_misses = self.most_consecutive_misses.max(self.consecutive_misses);
     }
 
+    #[inline]
     pub(super) fn count_met(&mut self) {
         self.consecutive_misses = 0;
     }
