@@ -26,6 +26,7 @@ use crate::analysis::relation::Mixture;
 use crate::analysis::set::constrained;
 use crate::analysis::task::Task;
 use crate::ids::SubtaskId;
+use crate::order::sorted_by_key;
 use crate::policy::Policy;
 use crate::task_set::Dag;
 
@@ -163,18 +164,23 @@ fn reaches(task: &Task, model: &Dag, policy: Policy, preemption: Mixture) -> Vec
             least_urgent[next] = least_urgent[next].max(least_urgent[subtask]);
         }
     }
-    let counts = |subtask: usize, sink: usize| match preemption {
-        Mixture::All => urgency(subtask) <= least_urgent[sink],
-        Mixture::None | Mixture::Some => true,
-    };
+    // By urgency, with the sums of WCETs: a look at all subtasks for each sink takes as long
+    // as the square of a large DAG's size.
+    let order = sorted_by_key(subtasks.len(), urgency);
+    let mut sums_ns = vec![0];
+    for &subtask in &order {
+        sums_ns.push(sums_ns[sums_ns.len() - 1] + task.wcets_ns()[subtask]);
+    }
     let sinks = model.sinks().iter().zip(lengths_ns(task, model));
     let reach = sinks.map(|(sink, length_ns)| {
-        let counted = (0..subtasks.len()).filter(|&subtask| counts(subtask, sink.index()));
-        let wcets_ns = counted.map(|subtask| task.wcets_ns()[subtask]);
-        let volume_ns = wcets_ns.sum();
+        let least = least_urgent[sink.index()];
+        let counted = match preemption {
+            Mixture::All => order.partition_point(|&subtask| urgency(subtask) <= least),
+            Mixture::None | Mixture::Some => order.len(),
+        };
         Reach {
             length_ns,
-            volume_ns,
+            volume_ns: sums_ns[counted],
         }
     });
     reach.collect()
