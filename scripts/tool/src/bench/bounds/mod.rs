@@ -6,9 +6,9 @@
 //! utilisation tests, which both have). Nothing is measured in time, so the table is the
 //! same on every host.
 //!
-//! - [`draw`]: the random sets;
-//! - [`curves`]: what is proven of them;
-//! - [`stg`]: bounds of published task graphs alone, also with a fixed order.
+//! - `draw`: the random sets;
+//! - `curves`: what is proven of them;
+//! - `stg`: bounds of published task graphs alone, also with a fixed order.
 
 mod curves;
 mod draw;

@@ -28,7 +28,7 @@
 //!
 //! Bounds under fixed priorities are in the order of `dm_order`. A lone `-`
 //! says that a test does not accept or does not apply. The bounds of the first kind that
-//! the multi-path ones have replaced are in [`older`].
+//! the multi-path ones have replaced are in `older`.
 
 use sched_dag::analysis::{
     Clip, Federation, Task, bonifaci_edf, covers, federated, gedf_capacity, multi_path,
