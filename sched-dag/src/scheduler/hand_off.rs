@@ -159,15 +159,21 @@ impl Scheduler {
         }
         let concerns_others = self.fresh > 1 && self.cores.count() > 1;
         if concerns_others || self.now_ns >= self.quiet_until_ns {
-            if self.now_ns >= self.quiet_until_ns {
-                self.judge_ended(vertex.0, observer);
-            }
-            self.cores.free(core);
-            self.fresh |= OWED;
-            return (HandOff::Open, false);
+            return (self.leave_open(core, vertex, observer), false);
         }
         self.fresh = 0;
         (self.give_first(taker), false)
+    }
+
+    /// Leaves the instant to be begun again, and the core idle.
+    #[inline(never)]
+    fn leave_open(&mut self, core: CoreId, ended: Vertex, observer: &mut impl Observer) -> HandOff {
+        if self.now_ns >= self.quiet_until_ns {
+            self.judge_ended(ended.0, observer);
+        }
+        self.cores.free(core);
+        self.fresh |= OWED;
+        HandOff::Open
     }
 
     /// Gives a core the one instance that has just become ready, without putting it in

@@ -176,7 +176,10 @@ impl Scheduler {
     /// Ends the oldest job of a DAG, all of whose instances have ended, that of the vertex
     /// `last` at this instant (R4).
     fn end_job(&mut self, dag: DagId, sequence: u64, last: u32, observer: &mut impl Observer) {
-        self.judge(dag, Some(last), observer);
+        // Before then no deadline has passed.
+        if self.now_ns >= self.quiet_until_ns {
+            self.judge(dag, Some(last), observer);
+        }
         let state = &mut self.dags[dag.index()];
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);

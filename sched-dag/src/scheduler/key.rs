@@ -46,47 +46,22 @@ impl Key {
     /// Stands where there is no key; it is larger than any.
     pub(super) const NONE: Self = Self(u128::MAX);
 
-    /// Makes the key of a vertex's next instance, which is of `job`; for the order
-    /// `SinkDeadline` from the relative deadline of each rank.
-    #[inline]
-    pub(super) fn new<'j>(
-        order: Order,
-        deadlines_ns: &[u64],
-        number: u32,
-        vertex: &Vertex,
-        job: impl FnOnce() -> &'j Job,
-    ) -> Self {
-        // The usual one is told apart by one comparison, and the next one by another.
-        if order == Order::Rank {
-            return Self::of_rank(vertex.rank, number);
-        }
-        if order != Order::Deadline {
-            return match order {
-                Order::SinkDeadline => Self::by_sink(deadlines_ns, number, vertex, job()),
-                _ => Self::by_job(number, vertex),
-            };
-        }
-        let job = job();
-        Self::of_parts(job.deadline_ns, job.slot, number)
-    }
-
     /// Makes the key of a vertex under the order `Rank`.
     #[inline]
     pub(super) const fn of_rank(rank: u32, vertex: u32) -> Self {
         Self::of_parts((rank as u64) << 32, 0, vertex)
     }
 
-    /// Apart, as it is rare, and its shifts would be made for every key.
-    #[inline(never)]
-    fn by_job(number: u32, vertex: &Vertex) -> Self {
+    /// Makes the key of a vertex under the order `Job`.
+    pub(super) fn by_job(number: u32, vertex: &Vertex) -> Self {
         let [high, low] = halves(vertex.progress);
         Self::of_parts(u64::from(vertex.rank) << 32 | u64::from(high), low, number)
     }
 
-    /// Apart for the same reason.
-    #[inline(never)]
-    fn by_sink(deadlines_ns: &[u64], number: u32, vertex: &Vertex, job: &Job) -> Self {
-        let deadline_ns = job.release_ns + deadlines_ns[vertex.rank as usize];
+    /// Makes the key of a vertex's instance of a job under the order `SinkDeadline`, from
+    /// the relative deadline of its rank.
+    pub(super) fn by_sink(deadline_ns: u64, number: u32, vertex: &Vertex, job: &Job) -> Self {
+        let deadline_ns = job.release_ns + deadline_ns;
         Self::of_parts(deadline_ns, vertex.rank, number)
     }
 

@@ -41,7 +41,7 @@ struct Sink {
 
 /// A job that is to be judged next.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::scheduler) struct Unjudged {
+struct Unjudged {
     number: u64,
     /// Its sequence number; `None` if it waits.
     sequence: Option<u64>,
@@ -81,6 +81,11 @@ impl Deadline {
         }
     }
 
+    /// Takes all jobs in flight before the one with a sequence number for judged.
+    pub(super) fn judge_before(&mut self, sequence: u64) {
+        self.judged = self.judged.max(sequence);
+    }
+
     /// Reports whether a waiting job is judged.
     #[inline]
     pub(in crate::scheduler) const fn has_judged_waiting(&self, number: u64) -> bool {
@@ -89,18 +94,30 @@ impl Deadline {
 }
 
 impl Jobs {
-    /// Returns the job that is to be judged first.
+    /// Returns when the first deadline has passed by which a job is not judged: the
+    /// deadline itself is still in time.
     #[inline]
-    pub(in crate::scheduler) fn first_unjudged(&self, dag: &Dag) -> Option<Unjudged> {
+    pub(super) fn late_ns(&self, dag: &Dag) -> Option<u64> {
+        // Where there is one, no time is spent on looking for the first.
+        let deadline_ns = match &*self.deadlines {
+            [only] => self.unjudged(dag, 0, only)?.deadline_ns,
+            _ => self.first_unjudged(dag)?.deadline_ns,
+        };
+        Some(deadline_ns + 1)
+    }
+
+    /// Returns the job that is to be judged first.
+    #[inline(never)]
+    fn first_unjudged(&self, dag: &Dag) -> Option<Unjudged> {
         let of_deadlines = self.deadlines.iter().enumerate();
         let unjudged = of_deadlines.filter_map(|(at, deadline)| self.unjudged(dag, at, deadline));
         unjudged.min_by_key(|unjudged| unjudged.deadline_ns)
     }
 
-    #[inline]
+    #[inline(always)]
     fn unjudged(&self, dag: &Dag, at: usize, deadline: &Deadline) -> Option<Unjudged> {
-        let sequence = deadline.judged.max(self.oldest).max(self.aborted);
-        if sequence < self.next && !self.is_ended() {
+        let sequence = deadline.judged.max(self.oldest);
+        if sequence < self.next {
             let job = self.job(sequence);
             return Some(Unjudged {
                 number: job.number,
@@ -153,14 +170,6 @@ impl Jobs {
     }
 }
 
-impl Unjudged {
-    /// Returns when its deadline has passed: the deadline itself is still in time.
-    #[inline]
-    pub(in crate::scheduler) const fn late_ns(&self) -> u64 {
-        self.deadline_ns + 1
-    }
-}
-
 impl Scheduler {
     /// Returns how many jobs a sink has missed its deadline in, whether they were
     /// released or still waited for their release.
@@ -177,12 +186,21 @@ impl Scheduler {
 
     /// Notices all deadlines of a DAG that have passed. The instance of the vertex
     /// `ended` has ended at this instant, and no other one since the last look.
+    #[inline]
     pub(in crate::scheduler) fn judge(
         &mut self,
         dag: DagId,
         ended: Option<u32>,
         observer: &mut impl Observer,
     ) {
+        let late_ns = self.dags[dag.index()].jobs.late_ns(self.task_set.dag(dag));
+        if late_ns.is_some_and(|late_ns| late_ns <= self.now_ns) {
+            self.judge_late(dag, ended, observer);
+        }
+    }
+
+    #[inline(never)]
+    fn judge_late(&mut self, dag: DagId, ended: Option<u32>, observer: &mut impl Observer) {
         let model = self.task_set.dag(dag);
         let first = self.task_set.first_vertex(dag);
         let state = &mut self.dags[dag.index()];
@@ -202,6 +220,7 @@ impl Scheduler {
     }
 
     /// Judges the DAG of a vertex whose instance has just ended, if that is one of several sinks.
+    #[inline(never)]
     pub(in crate::scheduler) fn judge_ended(&mut self, vertex: u32, observer: &mut impl Observer) {
         let ended = self.vertices.get(vertex);
         let (dag, subtask) = (ended.dag, ended.subtask);

@@ -256,7 +256,15 @@ impl Jobs {
             return None;
         }
         self.aborted = sequence + 1;
+        self.judge_before(self.aborted);
         Some(sequence)
+    }
+
+    /// Takes all jobs in flight before the one with a sequence number for judged.
+    fn judge_before(&mut self, sequence: u64) {
+        for deadline in &mut self.deadlines {
+            deadline.judge_before(sequence);
+        }
     }
 
     #[inline]
@@ -284,6 +292,7 @@ impl Jobs {
         let cut_short = self.next - self.aborted.max(self.oldest);
         let dropped = self.waiting();
         self.ended = true;
+        self.judge_before(self.next);
         self.next_due_ns = None;
         self.first_waiting = self.next_due;
         (cut_short, dropped)
@@ -303,7 +312,7 @@ impl Jobs {
         if self.releasable().is_some() {
             return Some(now_ns);
         }
-        let late_ns = self.first_unjudged(dag).map(|unjudged| unjudged.late_ns());
+        let late_ns = self.late_ns(dag);
         match (self.next_due_ns, late_ns) {
             (Some(due_ns), Some(late_ns)) => Some(due_ns.min(late_ns)),
             (due_ns, late_ns) => due_ns.or(late_ns),
