@@ -341,3 +341,42 @@ fn a_driver_that_comes_late_finds_every_release_and_every_miss() {
         );
     }
 }
+
+#[test]
+fn a_job_is_announced_before_it_is_late_however_late_the_driver_comes() {
+    for (overrun, expected) in [
+        (
+            OverrunPolicy::Queue,
+            "0 released 0.0 of 0
+             0 missed 0.0 of 10
+             0 queued 0.1
+             0 missed 0.1 of 20
+             0 queued 0.2",
+        ),
+        (
+            OverrunPolicy::Skip,
+            "0 released 0.0 of 0
+             0 missed 0.0 of 10
+             0 skipped 0.1
+             0 skipped 0.2",
+        ),
+        (
+            OverrunPolicy::Abort,
+            "0 released 0.0 of 0
+             0 missed 0.0 of 10
+             0 aborted 0.0
+             0 ended 0.0 Aborted
+             0 released 0.1 of 10
+             0 missed 0.1 of 20
+             0 aborted 0.1
+             0 ended 0.1 Aborted
+             0 released 0.2 of 20",
+        ),
+    ] {
+        let mut scheduler = support::scheduler(&one_subtask(3, 1, overrun), PREEMPTIVE);
+        let mut log = support::Log::new(|_| 0);
+        let decisions = scheduler.at(25).release_due(&mut log).dispatch();
+        assert_eq!(decisions.len(), 1, "{overrun:?}");
+        assert_events(&log.lines, expected);
+    }
+}

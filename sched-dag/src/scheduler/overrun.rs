@@ -52,6 +52,7 @@ impl Scheduler {
         self.release_waiting(dag, observer);
         while let Some((job, release_ns)) = self.take_due(dag) {
             self.release_or_overrun(dag, job, release_ns, observer);
+            self.dags[dag.index()].jobs.announce();
             // Another one is due only if the driver came late. Then deadlines
             // have passed that were not known of before.
             self.judge(dag, None, observer);

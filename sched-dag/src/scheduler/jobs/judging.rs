@@ -127,7 +127,7 @@ impl Jobs {
             });
         }
         let number = self.first_waiting.max(deadline.judged_waiting);
-        (number < self.next_due).then(|| Unjudged {
+        (number < self.announced).then(|| Unjudged {
             number,
             sequence: None,
             deadline: at,

@@ -54,6 +54,9 @@ pub(super) struct Jobs {
     last_due_ns: u64,
     /// The first job that waits; all up to `next_due` do.
     pub(super) first_waiting: u64,
+    /// The first job that is not announced yet: neither released, nor skipped, nor
+    /// queued. A due one that makes room for itself waits before it is announced.
+    announced: u64,
     /// How far jobs are judged by each deadline, ascending.
     pub(super) deadlines: Box<[Deadline]>,
 }
@@ -98,6 +101,7 @@ impl Jobs {
             next_due_ns: due_ns(dag, 0),
             last_due_ns: 0,
             first_waiting: 0,
+            announced: 0,
             deadlines: Deadline::all(dag),
         }
     }
@@ -200,6 +204,12 @@ impl Jobs {
         self.next_due += 1;
         self.next_due_ns = due_ns(dag, self.next_due);
         Some((number, release_ns))
+    }
+
+    /// Takes all due jobs for announced.
+    #[inline]
+    pub(super) fn announce(&mut self) {
+        self.announced = self.next_due;
     }
 
     /// Releases the first waiting job and returns its sequence number.
