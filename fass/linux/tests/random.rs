@@ -43,8 +43,7 @@ fn random_sets_keep_the_rules() {
                 let period = ms(2 + random.below(9));
                 dag.name(&format!("dag {number}"))
                     .jobs(5 + random.below(20));
-                // No step is so late that it sees a release and its deadline at once.
-                dag.period(period).relative_deadline(ms(1_000));
+                dag.period(period).relative_deadline(period);
                 dag.in_flight(1 + u32::try_from(random.below(3)).unwrap_or(0));
                 let overruns = [
                     OverrunPolicy::Queue,
