@@ -28,9 +28,11 @@ fn a_short_function_beside_those_that_compute_is_served_at_once() {
             assert_eq!(number(none), 0, "{none} in {text}");
         }
         assert_eq!(number("allocations"), 0, "{text}");
-        // A turn, and a first short one of each that is released at the same time.
+        // The wait for the core; a first short turn of each that is released at the same
+        // time; and a turn of each if the function is not done in its own first one. Which
+        // of these it takes depends on the layout of the code.
         let longest_ns = number("longest_response_ns");
-        assert!(longest_ns <= 20_000 + 2_000 * cores, "{text}");
+        assert!(longest_ns <= 20_000 + (2_000 + 8_000) * cores, "{text}");
         let runs = read(&outcome.serial).expect("a trace");
         assert_eq!(runs[0].lost, 0);
         assert_eq!(
