@@ -183,8 +183,7 @@ mod tests {
 
     impl PhysicalMemory for Machine {
         fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
-            let start = usize::try_from(address).ok()?;
-            self.0.get(start..start.checked_add(length)?)
+            self.0.bytes(address, length)
         }
     }
 

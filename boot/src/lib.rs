@@ -1,9 +1,9 @@
 //! What the machine tells the kernel at its start.
 //!
-//! A loader that speaks PVH (`qemu -kernel` does) jumps to `pvh_entry` of the crate
-//! `boot-entry` in 32-bit mode, which enters 64-bit mode, has what the loader tells
-//! collected here in a [`BootInfo`] and hands over to the image's `kernel_main` for
-//! good.
+//! A loader that speaks PVH (`qemu -kernel` does) or Multiboot2 (GRUB does) jumps to
+//! `pvh_entry` of the crate `boot-entry` in 32-bit mode, which enters 64-bit mode, has what
+//! the loader tells collected here in a [`BootInfo`] and hands over to the image's
+//! `kernel_main` for good.
 //!
 //! Words: the *image* is the program as linked, the *boot processor* the one
 //! that the firmware started, an *application processor* any other.
@@ -12,19 +12,22 @@
 //! 4 GiB is identity-mapped and writable, and the stack is part of the image and
 //! has no guard page. The kernel replaces tables and stack as soon as it can.
 //!
-//! Everything that interprets bytes ([`acpi`], [`pvh`]) works on a borrowed view
+//! Everything that interprets bytes ([`acpi`], [`multiboot2`], [`pvh`]) works on a borrowed view
 //! of memory and is tested on the host; `unsafe` is in `physical` only.
 
 #![cfg_attr(not(test), no_std)]
 
 pub mod acpi;
 mod list;
+pub mod multiboot2;
 #[allow(
     unsafe_code,
     reason = "what the loader left is at addresses, not in references"
 )]
 pub mod physical;
 pub mod pvh;
+
+use physical::PhysicalMemory;
 
 pub use list::{Full, List};
 
@@ -44,9 +47,10 @@ pub struct BootInfo {
     pub command_line: List<u8, MOST_COMMAND_LINE_BYTES>,
     /// Whether the loader passed more than that.
     pub is_command_line_cut: bool,
-    /// The physical memory map.
+    /// The physical memory map; what no longer fits is left out.
     pub memory: List<MemoryRegion, 64>,
-    /// The files that the loader left in memory, in its order.
+    /// The files that the loader left in memory, in its order. Where they lie is the
+    /// loader's word, which the kernel compares with the memory map.
     pub modules: List<Module, MAX_MODULES>,
     /// The physical address of the ACPI root pointer, if the loader named it.
     pub rsdp: Option<u64>,
@@ -65,7 +69,7 @@ pub struct MemoryRegion {
     pub usable: bool,
 }
 
-/// A file that the loader left in memory: `qemu -initrd FILE`.
+/// A file that the loader left in memory: `qemu -initrd FILE`, GRUB's `module2 FILE`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Module {
     /// The physical address of its first byte.
@@ -74,7 +78,64 @@ pub struct Module {
     pub end: u64,
 }
 
+/// What a loader has told is collected piece by piece. Nothing here can fail: a loader that
+/// tells less leaves lists empty, and the kernel, which can print, says what it misses.
 impl BootInfo {
+    /// Creates what is known without a loader's help: when Rust code began to run, in ticks
+    /// of the time stamp counter.
+    #[must_use]
+    pub const fn new(entry_tsc: u64) -> Self {
+        Self {
+            command_line: List::new(0),
+            is_command_line_cut: false,
+            memory: List::new(MemoryRegion {
+                start: 0,
+                end: 0,
+                usable: false,
+            }),
+            modules: List::new(Module { start: 0, end: 0 }),
+            rsdp: None,
+            entry_tsc,
+        }
+    }
+
+    /// Takes the command line: the bytes from `start` on, up to the first 0. Of more than
+    /// 2048 bytes, which the kernel refuses, it keeps the first.
+    fn take_command_line(&mut self, memory: &impl PhysicalMemory, start: u64) {
+        let text = (start..)
+            .map_while(|at| memory.u8(at))
+            .take_while(|byte| *byte != 0);
+        for byte in text {
+            if self.command_line.push(byte).is_err() {
+                self.is_command_line_cut = true;
+                return;
+            }
+        }
+    }
+
+    /// Adds a range of the memory map, of the given kind by E820's numbers. Firmware splits
+    /// memory into many ranges, so one that continues the last of its kind becomes one with it.
+    fn add_memory(&mut self, start: u64, size: u64, kind: u32) -> Result<(), Full> {
+        /// The kind of ordinary memory.
+        const USABLE: u32 = 1;
+        let (end, usable) = (start.saturating_add(size), kind == USABLE);
+        if let Some(last) = self.memory.as_mut_slice().last_mut()
+            && (last.end, last.usable) == (start, usable)
+        {
+            last.end = end;
+            return Ok(());
+        }
+        self.memory.push(MemoryRegion { start, end, usable })
+    }
+
+    /// Adds a module, unless it has no bytes.
+    fn add_module(&mut self, start: u64, end: u64) -> Result<(), Full> {
+        match start < end {
+            true => self.modules.push(Module { start, end }),
+            false => Ok(()),
+        }
+    }
+
     /// Returns the command line as text.
     ///
     /// # Errors

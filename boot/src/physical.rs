@@ -52,3 +52,12 @@ impl PhysicalMemory for IdentityMap {
         Some(unsafe { core::slice::from_raw_parts(start, length) })
     }
 }
+
+/// A machine of so many bytes.
+#[cfg(test)]
+impl PhysicalMemory for Vec<u8> {
+    fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
+        let start = usize::try_from(address).ok()?;
+        self.get(start..start.checked_add(length)?)
+    }
+}

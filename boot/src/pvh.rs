@@ -1,16 +1,12 @@
 //! What a PVH loader tells: Xen's `hvm_start_info`, version 0 or 1.
 //!
 //! The layout is that of Xen's public header `arch-x86/hvm/start_info.h`.
-//! Nothing here can fail: a loader that tells less leaves lists empty, and the
-//! kernel, which can print, says what it misses.
 
+use crate::BootInfo;
 use crate::physical::PhysicalMemory;
-use crate::{BootInfo, List, MemoryRegion, Module};
 
 /// "xEn3" with the top bit of the first letter set.
 const MAGIC: u32 = 0x336e_c578;
-/// The type of memory map entries that describe ordinary memory (as in E820).
-const USABLE: u32 = 1;
 
 mod offset {
     pub(super) const VERSION: u64 = 4;
@@ -22,60 +18,27 @@ mod offset {
     pub(super) const MEMORY_MAP_LENGTH: u64 = 48;
 }
 
-/// Reads the start info at `address` into a [`BootInfo`].
-///
-/// `entry_tsc` is passed through. A memory map with more than 64 entries is cut
-/// off there, and a list of more than 4 modules likewise; so is a command line of more
-/// than 2048 bytes, which the kernel refuses. Where modules lie is the loader's word, which the kernel
-/// compares with the memory map.
-pub fn boot_info(memory: &impl PhysicalMemory, address: u64, entry_tsc: u64) -> BootInfo {
-    let mut info = BootInfo {
-        command_line: List::new(0),
-        is_command_line_cut: false,
-        memory: List::new(MemoryRegion {
-            start: 0,
-            end: 0,
-            usable: false,
-        }),
-        modules: List::new(Module { start: 0, end: 0 }),
-        rsdp: None,
-        entry_tsc,
-    };
+/// Adds what the start info at `address` tells to `info`, and reports whether there is one.
+pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) -> bool {
     if memory.u32(address) != Some(MAGIC) {
-        return info;
+        return false;
     }
-    info.rsdp = memory.u64(address + offset::RSDP).filter(|rsdp| *rsdp != 0);
-    read_command_line(memory, address, &mut info);
-    read_modules(memory, address, &mut info);
+    let pointer = |offset| memory.u64(address + offset).filter(|to| *to != 0);
+    info.rsdp = pointer(offset::RSDP);
+    if let Some(start) = pointer(offset::COMMAND_LINE) {
+        info.take_command_line(memory, start);
+    }
+    read_modules(memory, address, info);
     if memory
         .u32(address + offset::VERSION)
         .is_some_and(|version| version >= 1)
     {
-        read_memory_map(memory, address, &mut info);
+        read_memory_map(memory, address, info);
     }
-    info
+    true
 }
 
-fn read_command_line(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
-    let Some(start) = memory
-        .u64(address + offset::COMMAND_LINE)
-        .filter(|start| *start != 0)
-    else {
-        return;
-    };
-    let text = (start..)
-        .map_while(|at| memory.u8(at))
-        .take_while(|byte| *byte != 0);
-    for byte in text {
-        if info.command_line.push(byte).is_err() {
-            info.is_command_line_cut = true;
-            return;
-        }
-    }
-}
-
-/// Notes where modules lie. One without a byte, or beyond the last address, is
-/// left out; nothing is read of the modules themselves.
+/// Notes where modules lie; nothing is read of the modules themselves.
 fn read_modules(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
     const ENTRY_SIZE: u64 = 32;
     let (Some(count), Some(list)) = (
@@ -90,10 +53,9 @@ fn read_modules(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo)
         let (Some(start), Some(size)) = (read(0), read(8)) else {
             return;
         };
-        let Some(end) = start.checked_add(size).filter(|end| *end > start) else {
-            continue;
-        };
-        if info.modules.push(Module { start, end }).is_err() {
+        // One beyond the last address is none.
+        let end = start.checked_add(size).unwrap_or(0);
+        if info.add_module(start, end).is_err() {
             return;
         }
     }
@@ -116,12 +78,7 @@ fn read_memory_map(memory: &impl PhysicalMemory, address: u64, info: &mut BootIn
         ) else {
             return;
         };
-        let region = MemoryRegion {
-            start,
-            end: start.saturating_add(size),
-            usable: kind == USABLE,
-        };
-        if info.memory.push(region).is_err() {
+        if info.add_memory(start, size, kind).is_err() {
             return;
         }
     }
@@ -130,17 +87,15 @@ fn read_memory_map(memory: &impl PhysicalMemory, address: u64, info: &mut BootIn
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::MemoryRegion;
 
-    struct Bytes(Vec<u8>);
-
-    impl PhysicalMemory for Bytes {
-        fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
-            let start = usize::try_from(address).ok()?;
-            self.0.get(start..start.checked_add(length)?)
-        }
+    fn boot_info(memory: &Vec<u8>, entry_tsc: u64) -> BootInfo {
+        let mut info = BootInfo::new(entry_tsc);
+        read(memory, 0, &mut info);
+        info
     }
 
-    fn start_info(magic: u32) -> Bytes {
+    fn start_info(magic: u32) -> Vec<u8> {
         let mut bytes = vec![0; 256];
         bytes[0..4].copy_from_slice(&magic.to_le_bytes());
         bytes[4] = 1;
@@ -152,12 +107,12 @@ mod tests {
         bytes[97] = 0x10; // start 0x1000
         bytes[105] = 0x20; // size 0x2000
         bytes[112] = 1;
-        Bytes(bytes)
+        bytes
     }
 
     #[test]
     fn reads_command_line_memory_and_root_pointer() {
-        let info = boot_info(&start_info(MAGIC), 0, 5);
+        let info = boot_info(&start_info(MAGIC), 5);
         assert_eq!(info.command_line(), Ok("jobs=200"));
         assert_eq!(info.rsdp, Some(0x99));
         assert_eq!(info.entry_tsc, 5);
@@ -173,11 +128,11 @@ mod tests {
     fn tells_that_a_command_line_was_cut() {
         for (bytes, is_cut) in [(crate::MOST_COMMAND_LINE_BYTES, false), (2049, true)] {
             let mut memory = start_info(MAGIC);
-            memory.0.truncate(160);
-            memory.0[24] = 160;
-            memory.0.extend(std::iter::repeat_n(b'x', bytes));
-            memory.0.push(0);
-            let info = boot_info(&memory, 0, 0);
+            memory.truncate(160);
+            memory[24] = 160;
+            memory.extend(std::iter::repeat_n(b'x', bytes));
+            memory.push(0);
+            let info = boot_info(&memory, 0);
             assert_eq!(info.command_line().map(str::len), Ok(2048));
             assert_eq!(info.is_command_line_cut, is_cut, "{bytes} bytes");
         }
@@ -185,21 +140,21 @@ mod tests {
 
     /// A start info that names `count` modules in a list at 160, where `entries`
     /// (start and size of each) stand.
-    fn with_modules(count: u8, entries: &[(u64, u64)]) -> Bytes {
+    fn with_modules(count: u8, entries: &[(u64, u64)]) -> Vec<u8> {
         let mut bytes = start_info(MAGIC);
-        bytes.0[12] = count;
-        bytes.0[16] = 160;
-        bytes.0.truncate(160);
+        bytes[12] = count;
+        bytes[16] = 160;
+        bytes.truncate(160);
         for (start, size) in entries {
-            bytes.0.extend(start.to_le_bytes());
-            bytes.0.extend(size.to_le_bytes());
-            bytes.0.extend([0; 16]); // no command line of its own
+            bytes.extend(start.to_le_bytes());
+            bytes.extend(size.to_le_bytes());
+            bytes.extend([0; 16]); // no command line of its own
         }
         bytes
     }
 
-    fn modules(bytes: &Bytes) -> Vec<(u64, u64)> {
-        let info = boot_info(bytes, 0, 0);
+    fn modules(bytes: &Vec<u8>) -> Vec<(u64, u64)> {
+        let info = boot_info(bytes, 0);
         let modules = info.modules.as_slice().iter();
         modules.map(|module| (module.start, module.end)).collect()
     }
@@ -220,20 +175,21 @@ mod tests {
     #[test]
     fn keeps_what_a_truncated_or_endless_list_of_modules_tells() {
         let mut bytes = with_modules(2, &[(0x7000, 1), (0x8000, 1)]);
-        bytes.0.truncate(160 + 32 + 15);
+        bytes.truncate(160 + 32 + 15);
         assert_eq!(modules(&bytes), [(0x7000, 0x7001)]);
         let bytes = with_modules(255, &[(0x7000, 1)]);
         assert_eq!(modules(&bytes), [(0x7000, 0x7001)]);
         let bytes = with_modules(5, &[(1, 1); 5]);
         assert_eq!(modules(&bytes).len(), crate::MAX_MODULES);
         let mut bytes = with_modules(1, &[(0x7000, 1)]);
-        bytes.0[16..24].fill(0xff); // the list lies beyond all memory
+        bytes[16..24].fill(0xff); // the list lies beyond all memory
         assert_eq!(modules(&bytes), []);
     }
 
     #[test]
     fn believes_nothing_without_the_magic_number() {
-        let info = boot_info(&start_info(1), 0, 0);
+        let mut info = BootInfo::new(0);
+        assert!(!read(&start_info(1), 0, &mut info));
         assert_eq!(info.command_line(), Ok(""));
         assert_eq!(info.rsdp, None);
         assert!(info.memory.as_slice().is_empty());
@@ -242,8 +198,8 @@ mod tests {
     #[test]
     fn keeps_what_a_truncated_table_still_tells() {
         let mut bytes = start_info(MAGIC);
-        bytes.0.truncate(100);
-        let info = boot_info(&bytes, 0, 0);
+        bytes.truncate(100);
+        let info = boot_info(&bytes, 0);
         assert_eq!(info.command_line(), Ok("jobs=200"));
         assert!(info.memory.as_slice().is_empty());
     }

@@ -1,7 +1,8 @@
 # The boot processor from the loader's 32-bit jump to 64-bit Rust.
 #
-# The loader (PVH, Xen's "x86/HVM direct boot ABI") enters with paging off, flat
-# segments, interrupts off, and the physical address of its start_info in ebx.
+# There are two kinds of loader: PVH (Xen's "x86/HVM direct boot ABI") and Multiboot2 (its
+# specification 2.0, 3.3). Both enter with paging off, flat segments, interrupts off, and
+# in ebx the physical address of what they tell, by which Rust tells them apart.
 
 .section .note.pvh, "a", @note
     .balign 4
@@ -11,13 +12,28 @@
     .asciz "Xen"
     .quad pvh_entry
 
+# A loader of Multiboot2 takes the address of the entry from the ELF header. Under UEFI,
+# too, it leaves the firmware and enters in 32-bit mode, as nothing else is asked for.
+.section .multiboot2, "a"
+    .balign 8
+multiboot2_header:
+    .long 0xe85250d6                # magic number
+    .long 0                         # architecture: 32-bit protected mode
+    .long multiboot2_header_end - multiboot2_header
+    .long -(0xe85250d6 + multiboot2_header_end - multiboot2_header)
+    .word 6, 0                      # modules begin on pages
+    .long 8
+    .word 0, 0                      # the end
+    .long 8
+multiboot2_header_end:
+
 .section .text.pvh_entry, "ax"
 .code32
 .global pvh_entry
 pvh_entry:
     cli
     cld
-    mov ebp, ebx                    # start_info; nothing below touches ebp
+    mov ebp, ebx                    # nothing below touches ebp
 
     # Identity-map the first 4 GiB with 2 MiB pages: 4 directories in a row.
     mov edi, offset boot_page_directories

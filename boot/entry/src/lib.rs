@@ -21,7 +21,7 @@ pub mod processors;
 use core::arch::{asm, global_asm};
 
 use boot::physical::IdentityMap;
-use boot::{BootInfo, pvh};
+use boot::{BootInfo, multiboot2, pvh};
 
 global_asm!(
     include_str!("entry.s"),
@@ -37,13 +37,19 @@ unsafe extern "Rust" {
 }
 
 /// Collects what the loader told and hands over to the kernel.
-extern "C" fn rust_entry(start_info: u32) -> ! {
+///
+/// The loader told at address `told`. PVH's start info begins with a magic number, and
+/// Multiboot2's list with its own length, which is never so large.
+extern "C" fn rust_entry(told: u32) -> ! {
     let entry_tsc = time_stamp();
     // SAFETY: 1. `entry.s` mapped the first 4 GiB one to one, and the view is
     // dropped before the kernel changes the map. 2. Only this processor runs,
     // and it writes to its stack alone, which the loader's data does not overlap.
     let memory = unsafe { IdentityMap::new() };
-    let info = pvh::boot_info(&memory, u64::from(start_info), entry_tsc);
+    let mut info = BootInfo::new(entry_tsc);
+    if !pvh::read(&memory, u64::from(told), &mut info) {
+        multiboot2::read(&memory, u64::from(told), &mut info);
+    }
     // SAFETY: this frame is never left (`kernel_main` does not return), and the
     // boot stack is part of the image: `info` lives as long as the machine runs.
     let info: &'static BootInfo = unsafe { &*core::ptr::from_ref(&info) };

@@ -1,0 +1,241 @@
+//! What a Multiboot2 loader tells: a list of tags, as GRUB gives it under BIOS and UEFI.
+//!
+//! The layout is that of the Multiboot2 specification 2.0, 3.6. The loader's list lies in
+//! memory that counts as free, so all that is wanted is copied here; of the ACPI root
+//! pointer, of which a tag holds a copy, only its place is kept. What is not known is
+//! passed over, and a list that is cut short tells what it tells.
+
+use crate::BootInfo;
+use crate::physical::PhysicalMemory;
+
+mod tag {
+    pub(super) const END: u32 = 0;
+    pub(super) const COMMAND_LINE: u32 = 1;
+    pub(super) const MODULE: u32 = 3;
+    pub(super) const MEMORY_MAP: u32 = 6;
+    pub(super) const OLD_RSDP: u32 = 14;
+    pub(super) const NEW_RSDP: u32 = 15;
+}
+
+/// Adds what the list of tags at `address` tells to `info`.
+pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
+    /// Of a tag: its kind and its size. The list begins with as many.
+    const HEADER: u64 = 8;
+    let end = address + u64::from(memory.u32(address).unwrap_or(0));
+    let mut at = address + HEADER;
+    while at + HEADER <= end {
+        let (Some(kind), Some(size)) = (memory.u32(at), memory.u32(at + 4)) else {
+            return;
+        };
+        let size = u64::from(size);
+        if kind == tag::END || size < HEADER || at + size > end {
+            return;
+        }
+        read_tag(memory, kind, at + HEADER, at + size, info);
+        at += size.next_multiple_of(8);
+    }
+}
+
+/// Reads one tag, whose content lies in `start..end`.
+fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info: &mut BootInfo) {
+    /// Where a root pointer has its revision (ACPI 5.2.5.3).
+    const REVISION: u64 = 15;
+    match kind {
+        tag::COMMAND_LINE => info.take_command_line(memory, start),
+        tag::MODULE => {
+            let place = (memory.u32(start), memory.u32(start + 4));
+            if let (Some(start), Some(end)) = place {
+                // More than there is room for is more than the kernel uses.
+                let _ = info.add_module(u64::from(start), u64::from(end));
+            }
+        }
+        tag::MEMORY_MAP => read_memory_map(memory, start, end, info),
+        // This copy ends before what a later revision would have.
+        tag::OLD_RSDP if memory.u8(start + REVISION) == Some(0) => {
+            info.rsdp.get_or_insert(start);
+        }
+        tag::NEW_RSDP => info.rsdp = Some(start),
+        _ => {}
+    }
+}
+
+fn read_memory_map(memory: &impl PhysicalMemory, start: u64, end: u64, info: &mut BootInfo) {
+    /// What is read of an entry; later versions may have more.
+    const KNOWN: u64 = 20;
+    let entry_size = memory.u32(start).map_or(0, u64::from);
+    if entry_size < KNOWN {
+        return;
+    }
+    let mut entry = start + 8;
+    while entry + KNOWN <= end {
+        let (Some(start), Some(size), Some(kind)) = (
+            memory.u64(entry),
+            memory.u64(entry + 8),
+            memory.u32(entry + 16),
+        ) else {
+            return;
+        };
+        if info.add_memory(start, size, kind).is_err() {
+            return;
+        }
+        entry += entry_size;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{MOST_COMMAND_LINE_BYTES, MemoryRegion, Module};
+
+    /// Where the list lies.
+    const LIST: u64 = 16;
+
+    /// A machine with a list of these tags.
+    fn list(tags: &[(u32, Vec<u8>)]) -> Vec<u8> {
+        let mut bytes = vec![0; 24];
+        for (kind, content) in tags {
+            let size = u32::try_from(8 + content.len()).unwrap();
+            bytes.extend([*kind, size].map(u32::to_le_bytes).concat());
+            bytes.extend(content);
+            bytes.resize(bytes.len().next_multiple_of(8), 0);
+        }
+        bytes.extend([0, 8].map(u32::to_le_bytes).concat());
+        let size = u32::try_from(bytes.len() - 16).unwrap();
+        bytes[16..20].copy_from_slice(&size.to_le_bytes());
+        bytes
+    }
+
+    fn info(memory: &Vec<u8>) -> BootInfo {
+        let mut info = BootInfo::new(7);
+        read(memory, LIST, &mut info);
+        info
+    }
+
+    fn map(entry_size: u32, entries: &[(u64, u64, u32)]) -> (u32, Vec<u8>) {
+        let mut bytes = [entry_size, 0].map(u32::to_le_bytes).concat();
+        for (start, size, kind) in entries {
+            let from = bytes.len();
+            bytes.extend([*start, *size].map(u64::to_le_bytes).concat());
+            bytes.extend(kind.to_le_bytes());
+            bytes.resize(from + entry_size as usize, 0);
+        }
+        (tag::MEMORY_MAP, bytes)
+    }
+
+    fn module(start: u32, end: u32, name: &str) -> (u32, Vec<u8>) {
+        let place = [start, end].map(u32::to_le_bytes).concat();
+        (tag::MODULE, [&place, name.as_bytes(), b"\0"].concat())
+    }
+
+    fn rsdp(kind: u32, revision: u8) -> (u32, Vec<u8>) {
+        let mut copy = vec![0; if kind == tag::NEW_RSDP { 36 } else { 20 }];
+        copy[15] = revision;
+        (kind, copy)
+    }
+
+    #[test]
+    fn reads_words_modules_and_memory_among_unknown_tags() {
+        let memory = list(&[
+            (2, b"GRUB 2.06\0".to_vec()),
+            (tag::COMMAND_LINE, b"jobs=20 seed=3\0".to_vec()),
+            module(0x14000, 0x2c6a0, "dags"),
+            map(
+                24,
+                &[
+                    (0, 0x9_fc00, 1),
+                    (0x9_fc00, 0x400, 2),
+                    (1 << 20, 1 << 20, 1),
+                ],
+            ),
+            module(0x30000, 0x30000, "empty"),
+        ]);
+        let info = info(&memory);
+        assert_eq!(info.command_line(), Ok("jobs=20 seed=3"));
+        assert_eq!(info.entry_tsc, 7);
+        let only = Module {
+            start: 0x14000,
+            end: 0x2c6a0,
+        };
+        assert_eq!(info.modules.as_slice(), &[only]);
+        let region = |start, end, usable| MemoryRegion { start, end, usable };
+        let regions = [
+            region(0, 0x9_fc00, true),
+            region(0x9_fc00, 0xa_0000, false),
+            region(1 << 20, 2 << 20, true),
+        ];
+        assert_eq!(info.memory.as_slice(), &regions);
+    }
+
+    #[test]
+    fn ranges_that_continue_one_another_become_one() {
+        let pages = (0..100).map(|page| (page << 12, 4096, if page < 60 { 1 } else { 2 }));
+        let info = info(&list(&[map(24, &pages.collect::<Vec<_>>())]));
+        let ends: Vec<u64> = info
+            .memory
+            .as_slice()
+            .iter()
+            .map(|it| it.end >> 12)
+            .collect();
+        assert_eq!(ends, [60, 100]);
+        let split = (0..200).map(|page| (page << 13, 4096, 1));
+        let info = self::info(&list(&[map(24, &split.collect::<Vec<_>>())]));
+        assert_eq!(info.memory.as_slice().len(), 64, "what fits");
+    }
+
+    #[test]
+    fn the_newer_copy_of_the_root_pointer_wins() {
+        let at = |tags: &[(u32, Vec<u8>)]| info(&list(tags)).rsdp;
+        let (old, new) = (rsdp(tag::OLD_RSDP, 0), rsdp(tag::NEW_RSDP, 2));
+        assert_eq!(at(core::slice::from_ref(&old)), Some(32));
+        assert_eq!(at(&[new.clone(), old.clone()]), Some(32));
+        assert_eq!(at(&[old, new]), Some(64));
+        assert_eq!(at(&[rsdp(tag::OLD_RSDP, 2)]), None, "cut off");
+    }
+
+    #[test]
+    fn entries_of_another_size_are_read_or_left() {
+        let entries = [(0, 4096, 1), (8192, 4096, 1)];
+        for (entry_size, regions) in [(24, 2), (20, 2), (40, 2), (16, 0), (0, 0)] {
+            let (kind, mut bytes) = map(24.max(entry_size), &entries);
+            if entry_size == 20 {
+                bytes = map(20, &entries).1;
+            }
+            bytes[..4].copy_from_slice(&entry_size.to_le_bytes());
+            let info = info(&list(&[(kind, bytes)]));
+            assert_eq!(info.memory.as_slice().len(), regions, "{entry_size}");
+        }
+    }
+
+    #[test]
+    fn a_list_that_is_cut_or_spoilt_tells_what_it_tells() {
+        let line = (tag::COMMAND_LINE, b"jobs=2\0".to_vec());
+        let whole = list(&[line.clone(), module(1, 2, "m"), map(24, &[(0, 4096, 1)])]);
+        for length in 0..whole.len() {
+            info(&whole[..length].to_vec());
+        }
+        for byte in 0..whole.len() {
+            for value in [0, 1, 7, 0x7f, 0xff] {
+                let mut spoilt = whole.clone();
+                spoilt[byte] = value;
+                info(&spoilt);
+            }
+        }
+        let cut = info(&whole[..48].to_vec());
+        assert_eq!(cut.command_line(), Ok("jobs=2"));
+        assert!(cut.modules.as_slice().is_empty());
+        let mut zero = whole;
+        zero[28..32].fill(0); // the first tag's size
+        assert_eq!(info(&zero).command_line(), Ok(""));
+    }
+
+    #[test]
+    fn tells_that_a_command_line_was_cut() {
+        for (bytes, is_cut) in [(MOST_COMMAND_LINE_BYTES, false), (2049, true)] {
+            let mut words = vec![b'x'; bytes];
+            words.push(0);
+            let info = info(&list(&[(tag::COMMAND_LINE, words)]));
+            assert_eq!(info.command_line().map(str::len), Ok(2048));
+            assert_eq!(info.is_command_line_cut, is_cut, "{bytes} bytes");
+        }
+    }
+}
