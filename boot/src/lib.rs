@@ -144,4 +144,12 @@ impl BootInfo {
     pub fn command_line(&self) -> Result<&str, core::str::Utf8Error> {
         core::str::from_utf8(self.command_line.as_slice()).map(str::trim)
     }
+
+    /// Reports whether a word stands in the command line. It takes no memory, so it can be
+    /// asked before there is any.
+    #[must_use]
+    pub fn has_word(&self, word: &str) -> bool {
+        let line = self.command_line().unwrap_or_default();
+        line.split_whitespace().any(|each| each == word)
+    }
 }

@@ -37,7 +37,8 @@ const HANDLER_STACK: u64 = 16 * 1024;
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
     serial::initialize();
     legacy::silence_interrupt_controllers();
-    interrupt::install(if probe::is_asked_for(info) {
+    let probes = info.has_word("probe=on");
+    interrupt::install(if probes {
         probe::HANDLERS
     } else {
         interrupt::Handlers {
@@ -66,6 +67,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         app,
         platform,
         layout,
+        probes,
     };
     // SAFETY: the stack is that of the context which this core runs first.
     unsafe { cpu::continue_on_stack(stack, &start, start_cores) }
@@ -100,6 +102,8 @@ struct Start {
     app: App,
     platform: Platform,
     layout: memory::Layout,
+    /// Whether it is the probe that runs, and no app.
+    probes: bool,
 }
 
 /// Measures time, starts the other cores and runs the app.
@@ -110,8 +114,11 @@ extern "C" fn start_cores(start: &Start) -> ! {
         app,
         platform,
         layout,
+        probes,
     } = start;
-    let clock = clock::calibrate(info.entry_tsc, platform.pm_timer).unwrap_or_else(|_| {
+    let is_counted = info.has_word("mode=deterministic");
+    let clock = clock::calibrate(info.entry_tsc, platform.pm_timer, is_counted);
+    let clock = clock.unwrap_or_else(|_| {
         panic!("no clock of known rate: the machine has neither an ACPI timer nor QEMU's APIC")
     });
     let cores = this_core::all().len();
@@ -119,8 +126,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
         start_others(info, layout, cores);
     }
     interrupt_flag::enable();
-    let probes = probe::is_asked_for(info);
-    if !probes {
+    if !*probes {
         heartbeat::set_heartbeats(0);
     }
     // A second installation would come from a second boot, which there is not.
@@ -135,7 +141,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
             .number("ready_ns", clock::now_ns())
             .text("command_line", command_line);
     });
-    end(if probes {
+    end(if *probes {
         probe::run()
     } else {
         run_app(info, *app)

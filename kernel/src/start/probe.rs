@@ -14,8 +14,6 @@
 use alloc::format;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use boot::BootInfo;
-
 use crate::app::ending::Ending;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::{Handlers, Interrupted};
@@ -44,13 +42,6 @@ const LIMIT_NS: u64 = 2_000_000_000;
 static STEPS: AtomicU32 = AtomicU32::new(0);
 /// The sum of the numbers of these steps, as the bits of an `f64`.
 static SUM: AtomicU64 = AtomicU64::new(0);
-
-/// Reports whether the command line asks for the probe. It is looked at before there
-/// is memory to take it apart in.
-pub(crate) fn is_asked_for(info: &BootInfo) -> bool {
-    let line = info.command_line().unwrap_or_default();
-    line.split_whitespace().any(|word| word == "probe=on")
-}
 
 /// Sends the token round from core 0, which executes this, and says how far it came.
 pub(crate) fn run() -> Result<(), Ending> {
