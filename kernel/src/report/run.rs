@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 use core::cell::OnceCell;
 
 use sched_dag::law::{self, Record, Tally, Terms, Violation};
-use sched_dag::{DagId, DagStatistics, Journal, SubtaskId, TaskSet};
+use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::run::execution::{Execution, Snapshot};
 
@@ -162,6 +162,11 @@ impl Run {
         self.execution.scheduler().sink_misses(dag, sink)
     }
 
+    /// Returns how the scheduler was told to work.
+    pub(crate) const fn options(&self) -> SchedulerOptions {
+        self.execution.scheduler().options()
+    }
+
     /// Returns the response time that the commit has proven for a sink, if it has.
     pub(crate) fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
         self.execution.sink_bound_ns(dag, sink)
@@ -206,10 +211,9 @@ impl Run {
     #[must_use]
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
         let journal = self.journal();
-        let options = self.execution.scheduler().options();
         (journal.lost() == 0).then(|| {
             let (terms, events) = (self.terms(bound_ns), journal.events());
-            law::dispatch_violations(self.task_set(), &options, terms, events)
+            law::dispatch_violations(self.task_set(), &self.options(), terms, events)
         })
     }
 

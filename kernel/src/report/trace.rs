@@ -7,9 +7,7 @@ use sched_dag::{Dag, SubtaskId};
 
 use super::run::Run;
 use crate::run::execution;
-use crate::run::platform::KERNEL;
 use crate::text::{graph, json};
-use fass::{Platform, Policy, Preemption};
 
 /// The most events on one line.
 const EVENTS_A_LINE: usize = 32;
@@ -17,18 +15,8 @@ const EVENTS_A_LINE: usize = 32;
 /// Prints the model and the events of a run, the `number`th since boot.
 pub(crate) fn dump(run: &Run, number: u64) {
     json::emit("trace_begin", |line| {
-        let policy = match KERNEL.policy() {
-            Policy::StaticPriority => "static",
-            Policy::Edf => "edf",
-        };
-        let preemption = match KERNEL.preemption() {
-            Preemption::Enabled => "on",
-            Preemption::Disabled => "off",
-        };
-        line.text("policy", policy)
-            .text("preemption", preemption)
-            .number("cores", KERNEL.cores())
-            .number("run", number);
+        graph::scheduling(line, &run.options());
+        line.number("run", number);
     });
     for (number, dag) in (0u32..).zip(run.task_set().dags()) {
         dump_dag(number, dag);

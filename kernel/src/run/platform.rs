@@ -134,7 +134,8 @@ impl Platform for Kernel {
             preemption: self.preemption(),
             cores: self.cores(),
         };
-        graph::dump(&plan, options);
+        let overhead_ns = self.overheads().of_an_instance_ns(options.preemption);
+        graph::dump(&plan, options, overhead_ns);
         let terms = Terms {
             coincidence_ns: self.coincidence_ns.load(Ordering::Relaxed),
             budget_factor: self.budget_factor.load(Ordering::Relaxed),

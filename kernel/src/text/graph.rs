@@ -7,7 +7,7 @@
 use core::fmt;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use fass::{OverrunPolicy, Plan, Policy};
+use fass::{OverrunPolicy, Plan, Policy, Preemption};
 use sched_dag::{Dag, DagId, SchedulerOptions, SubtaskId};
 
 use super::json::{self, Object};
@@ -23,21 +23,19 @@ pub(crate) fn enable() {
     DUMPS.store(true, Ordering::Relaxed);
 }
 
-/// Prints the DAGs of a commit, if commits do.
-pub(crate) fn dump(plan: &Plan, options: SchedulerOptions) {
+/// Prints the DAGs of a commit, if commits do. Each instance was charged `overhead_ns`.
+pub(crate) fn dump(plan: &Plan, options: SchedulerOptions, overhead_ns: Option<u64>) {
     if !DUMPS.load(Ordering::Relaxed) {
         return;
     }
     let commit = COMMITS.fetch_add(1, Ordering::Relaxed);
-    let policy = match options.policy {
-        Policy::StaticPriority => "static",
-        Policy::Edf => "edf",
-    };
-    for (number, dag) in (0u32..).zip(plan.task_set.dags()) {
+    let dags = plan.task_set.dags().iter().zip(&plan.bounds_ns);
+    for (number, (dag, bound_ns)) in (0u32..).zip(dags) {
         json::emit("graph", |line| {
-            line.number("commit", commit)
-                .text("policy", policy)
-                .number("cores", options.cores);
+            line.number("commit", commit);
+            scheduling(line, &options);
+            line.list("overhead_ns", overhead_ns.iter())
+                .list("bound_ns", bound_ns.iter());
             describe(line, number, dag);
             line.flag("sporadic", dag.is_sporadic())
                 .list("jobs", dag.jobs().iter())
@@ -46,6 +44,21 @@ pub(crate) fn dump(plan: &Plan, options: SchedulerOptions) {
                 .list("samples", samples(plan, DagId(number)));
         });
     }
+}
+
+/// Says how DAGs are scheduled, by the members that the kinds `graph` and `trace_begin` share.
+pub(crate) fn scheduling(line: &mut Object<'_, '_>, options: &SchedulerOptions) {
+    let policy = match options.policy {
+        Policy::StaticPriority => "static",
+        Policy::Edf => "edf",
+    };
+    let preemption = match options.preemption {
+        Preemption::Enabled => "on",
+        Preemption::Disabled => "off",
+    };
+    line.text("policy", policy)
+        .text("preemption", preemption)
+        .number("cores", options.cores);
 }
 
 /// Describes a DAG by the members that the kinds `graph` and `trace_dag` share.

@@ -17,7 +17,7 @@
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`markdown`], [`fault_page`], [`promises`]: pages that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
-//! - [`dot`]: committed DAGs as a picture;
+//! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
 //! - [`mod@bench`]: what is measured, and compared with a baseline;
 //! - [`oracle`]: reference schedules, bounds and synchronizers;
 //! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
@@ -52,6 +52,7 @@ pub mod places;
 pub mod probe;
 pub mod progress;
 pub mod promises;
+pub mod proof;
 pub mod protocol;
 pub mod qemu;
 pub mod run;

@@ -57,7 +57,10 @@ pub const KINDS: &[(&str, &[&str])] = &[
         &[
             "commit",
             "policy",
+            "preemption",
             "cores",
+            "overhead_ns",
+            "bound_ns",
             "dag",
             "name",
             "period_ns",

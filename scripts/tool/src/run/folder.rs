@@ -18,6 +18,7 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
         "trace",
         "serial",
         "dot",
+        "witness",
         "console",
         "gdb",
     ] {

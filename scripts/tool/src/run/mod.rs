@@ -87,7 +87,7 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
     let inputs = options.named(&["dag", "image", "qemu"]);
-    let outputs = options.named(&["serial", "trace", "dot"]);
+    let outputs = options.named(&["serial", "trace", "dot", "witness"]);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     log::check(options).map_err(Refusal::Usage)
 }
@@ -155,10 +155,15 @@ fn boot_app(
              `./scripts/trace {file} -o {file}.json` draws it"
         ));
     }
-    let drawn = seeing::write_dot(options, &outcome);
-    if outcome.judge().is_ok() {
-        // Otherwise there are worse news.
-        if let Some(line) = drawn.map_err(Refusal::Failure)? {
+    for written in [
+        seeing::write_dot(options, &outcome),
+        seeing::write_witness(options, &outcome),
+    ] {
+        if outcome.judge().is_err() {
+            // There are worse news.
+            break;
+        }
+        if let Some(line) = written.map_err(Refusal::Failure)? {
             screen.say(&line);
         }
     }

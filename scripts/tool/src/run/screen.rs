@@ -42,7 +42,7 @@ impl Screen {
             quiet: options.is_given("quiet"),
             // Who wants these in a file does not want megabytes of them here.
             traces: !options.is_given("trace"),
-            graphs: !options.is_given("dot"),
+            graphs: !options.is_given("dot") && !options.is_given("witness"),
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,
             status: StatusLine::default(),

@@ -16,6 +16,7 @@ use crate::dot;
 use crate::files;
 use crate::options::Parsed;
 use crate::outcome::Outcome;
+use crate::proof::{commits, witness};
 use crate::system;
 
 /// Returns the guest's words for what the options ask for.
@@ -26,7 +27,8 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     } else if is_watched(options) {
         words.push("status=1".into());
     }
-    words.extend(options.is_given("dot").then(|| "graph=dump".into()));
+    let wants_graphs = ["dot", "witness"].iter().any(|name| options.is_given(name));
+    words.extend(wants_graphs.then(|| "graph=dump".into()));
     words
 }
 
@@ -54,6 +56,19 @@ pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<Option<St
     Ok(Some(format!(
         "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
     )))
+}
+
+/// Writes the witnesses of a run's bounds, if the options ask for it, and returns what to
+/// say of them.
+///
+/// # Errors
+///
+/// In words: there are none, or a file cannot be written.
+pub(super) fn write_witness(options: &Parsed, outcome: &Outcome) -> Result<Option<String>, String> {
+    let Some(path) = options.path("witness") else {
+        return Ok(None);
+    };
+    witness::write(path, &commits::read(&outcome.transcript)?).map(Some)
 }
 
 /// Hands standard input on to the guest's serial port, until either ends. At its end the

@@ -154,6 +154,12 @@ pub static RUN: Command = Command {
             "Write the committed DAGs to this file, for Graphviz: `dot -Tsvg FILE`.",
         ),
         Opt::new(
+            "witness",
+            Takes::File("FILE"),
+            "Write what proves the commit's bounds to this file, which ./scripts/check-witness \
+             checks; of a second commit to FILE.1, and so on.",
+        ),
+        Opt::new(
             "console",
             Takes::Nothing,
             "Talk to the kernel while it runs: type `help`. Real time unless --mode says \

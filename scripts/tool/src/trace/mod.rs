@@ -17,7 +17,9 @@
 
 pub mod bound;
 pub mod command;
+pub mod dag;
 pub mod figures;
+pub mod line;
 pub mod model;
 mod read;
 pub mod report;

@@ -7,20 +7,16 @@
 //! commit verifies them. A count that memory is taken for is held against the most that
 //! there can be before.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::ops::RangeInclusive;
+use std::collections::BTreeMap;
 
 use sched_dag::journal::{Event, What};
-use sched_dag::{
-    Activation, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, OverrunPolicy, Policy,
-    Preemption, Priority, SchedulerOptions, SubtaskId, SubtaskSpec, TaskSet, verify,
-};
+use sched_dag::{CoreId, DagId, DagSpec, SubtaskId, TaskSet};
 
-use super::bound;
+use super::line::Line;
 use super::model::Run;
+use super::{bound, dag};
 use crate::json::Value;
-use crate::protocol::{MachineLine, read_line};
-use crate::qemu::MOST_CORES;
+use crate::protocol::read_line;
 use replay::lines::Malformed;
 use replay::shown::quoted;
 
@@ -98,23 +94,10 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
 }
 
 fn begin(line: &Line<'_>, is_counted: bool) -> Result<Run, Malformed> {
-    let cores = line.within("cores", 1..=MOST_CORES)?;
     Ok(Run {
         number: line.number("run")?,
         line: line.0.number,
-        options: SchedulerOptions {
-            policy: match line.text("policy")? {
-                "static" => Policy::StaticPriority,
-                "edf" => Policy::Edf,
-                other => return Err(line.unknown("policy", other, "static or edf")),
-            },
-            preemption: match line.text("preemption")? {
-                "on" => Preemption::Enabled,
-                "off" => Preemption::Disabled,
-                other => return Err(line.unknown("preemption", other, "on or off")),
-            },
-            cores: line.small(cores)?,
-        },
+        options: dag::options(line)?,
         is_counted,
         task_set: TaskSet::default(),
         events: Vec::new(),
@@ -131,123 +114,9 @@ fn add_dag(line: &Line<'_>, open: &mut Open) -> Result<(), Malformed> {
     if !open.run.events.is_empty() {
         return Err(line.malformed("a DAG is described after the first event"));
     }
-    let subtasks = line.elements("subtasks")?.iter();
-    let subtasks = subtasks.map(|it| subtask(line, it));
-    let mut subtasks: Vec<SubtaskSpec> = subtasks.collect::<Result<_, _>>()?;
-    let in_flight = line.within("in_flight", 1..=u64::from(u32::MAX))?;
-    let count = subtasks.len() as u64;
-    let edge = |edge: &Value| {
-        let ends: Option<Vec<u64>> = edge.elements().iter().map(Value::as_u64).collect();
-        let ends = ends.filter(|ends| ends.iter().all(|&end| end < count));
-        let Some(&[from, to]) = ends.as_deref() else {
-            return Err(line.malformed(format!(
-                "an edge is a pair of numbers less than {count}, the number of subtasks"
-            )));
-        };
-        Ok((line.small(from)? as usize, line.small(to)? as usize))
-    };
-    let edges = line.elements("edges")?.iter().map(edge);
-    let edges: Vec<(usize, usize)> = edges.collect::<Result<_, _>>()?;
-    add_sinks(line, &mut subtasks, &edges)?;
+    open.dags.push(dag::spec(line)?);
     open.lines.push(line.0.number);
-    open.dags.push(DagSpec {
-        name: line.text("name")?.to_string(),
-        activation: match line.flag("sporadic")? {
-            true => Activation::Sporadic,
-            false => Activation::Periodic,
-        },
-        period_ns: Some(line.within("period_ns", 1..=u64::MAX)?),
-        relative_deadline_ns: Some(line.within("relative_deadline_ns", 1..=u64::MAX)?),
-        offset_ns: line.number("offset_ns")?,
-        in_flight: Some(line.small(in_flight)?),
-        overrun: match line.text("overrun")? {
-            "queue" => OverrunPolicy::Queue,
-            "skip" => OverrunPolicy::Skip,
-            "abort" => OverrunPolicy::Abort,
-            other => return Err(line.unknown("overrun", other, "queue, skip or abort")),
-        },
-        subtasks,
-        edges,
-        ..DagSpec::default()
-    });
     Ok(())
-}
-
-/// Reads the deadlines of sinks, which are stated if there are several. One that a shared
-/// state puts before another counts as that one's predecessor only.
-fn add_sinks(
-    line: &Line<'_>,
-    subtasks: &mut [SubtaskSpec],
-    edges: &[(usize, usize)],
-) -> Result<(), Malformed> {
-    if line.0.value.get("sinks").is_none() {
-        return Ok(());
-    }
-    let followed: BTreeSet<usize> = edges.iter().map(|edge| edge.0).collect();
-    for sink in line.elements("sinks")? {
-        let pair: Option<Vec<u64>> = sink.elements().iter().map(Value::as_u64).collect();
-        let count = subtasks.len() as u64;
-        let Some(&[sink, deadline_ns]) = pair.as_deref().filter(|pair| pair.first() < Some(&count))
-        else {
-            return Err(line.malformed(format!(
-                "a sink is a pair of a number less than {count}, the number of subtasks, and its \
-                 relative deadline"
-            )));
-        };
-        let sink = line.small(sink)? as usize;
-        if !followed.contains(&sink) {
-            subtasks[sink].relative_deadline_ns = Some(deadline_ns);
-        }
-    }
-    Ok(())
-}
-
-/// Makes the model, as a commit does.
-fn model(open: &Open) -> Result<TaskSet, Malformed> {
-    let SchedulerOptions { policy, cores, .. } = open.run.options;
-    let options = CommitOptions::new(policy, cores)
-        .with_construction(ConstructionPolicy::any_graph())
-        .with_instance_limit(u32::MAX);
-    if open.dags.is_empty() {
-        return Ok(TaskSet::default());
-    }
-    verify(&open.dags, &options)
-        .map(|verified| verified.task_set)
-        .map_err(|rejected| {
-            let is_right = |line: &usize| {
-                let before = open.lines.partition_point(|other| other <= line);
-                verify(&open.dags[..before], &options).is_ok()
-            };
-            let wrong = open.lines.partition_point(is_right);
-            let faults: Vec<String> = rejected.faults().iter().map(ToString::to_string).collect();
-            Malformed {
-                line: open.lines.get(wrong).copied().unwrap_or(open.run.line),
-                reason: format!("`trace_dag`: {}", faults.join("; ")),
-            }
-        })
-}
-
-fn subtask(line: &Line<'_>, value: &Value) -> Result<SubtaskSpec, Malformed> {
-    let read = || {
-        let [name, priority, non_preemptive, wcet_ns] = value.elements() else {
-            return None;
-        };
-        let is_wcet = *wcet_ns == Value::Null || wcet_ns.as_u64().is_some();
-        let non_preemptive = non_preemptive
-            .as_u64()
-            .filter(|&flag| flag < 2 && is_wcet)?;
-        let priority = u32::try_from(priority.as_u64()?).ok()?;
-        Some(SubtaskSpec {
-            name: name.as_text()?.to_string(),
-            wcet_ns: wcet_ns.as_u64(),
-            priority: Some(Priority(priority)),
-            non_preemptive: non_preemptive == 1,
-            ..SubtaskSpec::default()
-        })
-    };
-    read().ok_or_else(|| {
-        line.malformed("a subtask is [name, priority, non-preemptive 0 or 1, WCET or null]")
-    })
 }
 
 fn add_events(line: &Line<'_>, open: &mut Open) -> Result<(), Malformed> {
@@ -292,7 +161,7 @@ fn event(open: &Open, value: &Value) -> Result<Event, String> {
 }
 
 fn end(line: &Line<'_>, open: Open) -> Result<Run, Malformed> {
-    let task_set = model(&open)?;
+    let task_set = dag::task_set("trace_dag", open.run.options, &open.dags, &open.lines)?;
     let mut run = open.run;
     run.task_set = task_set;
     let (stated, found) = (line.number("events")?, run.events.len());
@@ -326,67 +195,4 @@ fn in_order(run: &Run) -> Result<(), CoreId> {
         *latest_ns = event.time_ns;
     }
     Ok(())
-}
-
-/// A machine line whose members are asked for.
-struct Line<'a>(&'a MachineLine);
-
-impl Line<'_> {
-    fn malformed(&self, reason: impl Into<String>) -> Malformed {
-        Malformed {
-            line: self.0.number,
-            reason: format!("`{}`: {}", self.0.kind, reason.into()),
-        }
-    }
-
-    fn unknown(&self, name: &str, found: &str, allowed: &str) -> Malformed {
-        let found = quoted(found);
-        self.malformed(format!("`{name}` is {found} and must be {allowed}"))
-    }
-
-    /// Returns a member that is true or false, and false if it is left out.
-    fn flag(&self, name: &str) -> Result<bool, Malformed> {
-        match self.0.value.get(name) {
-            None => Ok(false),
-            Some(Value::Bool(flag)) => Ok(*flag),
-            Some(_) => Err(self.malformed(format!("`{name}` is neither true nor false"))),
-        }
-    }
-
-    fn within(&self, name: &str, range: RangeInclusive<u64>) -> Result<u64, Malformed> {
-        let number = self.number(name)?;
-        match range.contains(&number) {
-            true => Ok(number),
-            false if *range.end() == u64::MAX => {
-                let least = range.start();
-                Err(self.malformed(format!("`{name}` is {number} and must be at least {least}")))
-            }
-            false => {
-                let (least, most) = range.into_inner();
-                let reason = format!("`{name}` is {number} and must be from {least} to {most}");
-                Err(self.malformed(reason))
-            }
-        }
-    }
-
-    fn number(&self, name: &str) -> Result<u64, Malformed> {
-        let reason = || self.malformed(format!("`{name}` is not a number from 0"));
-        self.0.number_at(name).ok_or_else(reason)
-    }
-
-    fn text(&self, name: &str) -> Result<&str, Malformed> {
-        let reason = || self.malformed(format!("`{name}` is not text"));
-        self.0.text_at(name).ok_or_else(reason)
-    }
-
-    fn elements(&self, name: &str) -> Result<&[Value], Malformed> {
-        match self.0.value.get(name) {
-            Some(Value::Array(elements)) => Ok(elements),
-            _ => Err(self.malformed(format!("`{name}` is not a list"))),
-        }
-    }
-
-    fn small(&self, number: u64) -> Result<u32, Malformed> {
-        u32::try_from(number).map_err(|error| self.malformed(error.to_string()))
-    }
 }

@@ -1,0 +1,167 @@
+//! The commits of a guest, as its lines of kind `graph` tell them.
+
+use sched_dag::analysis::{self, Overheads, Settings};
+use sched_dag::{DagSpec, SchedulerOptions, TaskSet};
+
+use crate::json::Value;
+use crate::protocol::{MachineLine, Transcript};
+use crate::trace::dag;
+use crate::trace::line::Line;
+use replay::lines::Malformed;
+
+/// One commit: what was committed, and what it has proven.
+#[derive(Clone, Debug)]
+pub struct Commit {
+    /// Its number within the boot, from 0.
+    pub number: u64,
+    /// The DAGs, by number.
+    pub task_set: TaskSet,
+    /// What the analysis takes for granted besides them.
+    pub settings: Settings,
+    /// What the guest has proven of each DAG, in nanoseconds.
+    pub bounds_ns: Vec<Option<u64>>,
+}
+
+/// The lines of one commit, as far as they are read.
+struct Open {
+    number: u64,
+    options: SchedulerOptions,
+    overhead_ns: u64,
+    dags: Vec<DagSpec>,
+    lines: Vec<usize>,
+    bounds_ns: Vec<Option<u64>>,
+}
+
+/// Reads all commits of a guest, in their order.
+///
+/// # Errors
+///
+/// In words, with the line: one that is not as `docs/serial-protocol.md` says, or a commit
+/// whose bounds are not those that the analysis gives here.
+pub fn read(transcript: &Transcript) -> Result<Vec<Commit>, String> {
+    let say = |malformed: Malformed| {
+        let Malformed { line, reason } = malformed;
+        format!("serial line {line}: {reason}")
+    };
+    let mut open: Vec<Open> = Vec::new();
+    for line in transcript.of_kind("graph") {
+        add(line, &mut open).map_err(say)?;
+    }
+    let commits = open
+        .into_iter()
+        .map(|open| close(open).map_err(say)?.agreed());
+    commits.collect()
+}
+
+fn add(line: &MachineLine, all: &mut Vec<Open>) -> Result<(), Malformed> {
+    let line = Line(line);
+    let number = line.number("commit")?;
+    if all.last().is_none_or(|open| open.number != number) {
+        all.push(Open {
+            number,
+            options: dag::options(&line)?,
+            overhead_ns: one(&line, "overhead_ns")?.unwrap_or(u64::MAX),
+            dags: Vec::new(),
+            lines: Vec::new(),
+            bounds_ns: Vec::new(),
+        });
+    }
+    let bound_ns = one(&line, "bound_ns")?;
+    let spec = dag::spec(&line)?;
+    if let Some(open) = all.last_mut() {
+        open.dags.push(spec);
+        open.lines.push(line.0.number);
+        open.bounds_ns.push(bound_ns);
+    }
+    Ok(())
+}
+
+/// Returns the one number of a list, or `None` of an empty one.
+fn one(line: &Line<'_>, name: &str) -> Result<Option<u64>, Malformed> {
+    match line.elements(name)? {
+        [] => Ok(None),
+        [Value::Integer(number)] if *number >= 0 => Ok(u64::try_from(*number).ok()),
+        _ => Err(line.malformed(format!("`{name}` is a list of one number or none"))),
+    }
+}
+
+fn close(open: Open) -> Result<Commit, Malformed> {
+    let SchedulerOptions {
+        policy,
+        preemption,
+        cores,
+    } = open.options;
+    Ok(Commit {
+        number: open.number,
+        task_set: dag::task_set("graph", open.options, &open.dags, &open.lines)?,
+        settings: Settings {
+            policy,
+            preemption,
+            cores,
+            // One number is all that the analysis makes of them.
+            overheads: Overheads {
+                dispatch_ns: open.overhead_ns,
+                ..Overheads::default()
+            },
+        },
+        bounds_ns: open.bounds_ns,
+    })
+}
+
+impl Commit {
+    /// Makes sure that the analysis gives the same bounds here.
+    fn agreed(self) -> Result<Commit, String> {
+        let answer = analysis::answer(&self.task_set, &self.settings);
+        for ((dag, guest), host) in
+            (self.task_set.dags().iter().zip(&self.bounds_ns)).zip(&answer.bounds)
+        {
+            let host = host.map(|bound| bound.bound_ns);
+            if *guest != host {
+                let (name, number) = (dag.name(), self.number);
+                return Err(format!(
+                    "the bound of dag `{name}` in commit {number} is {guest:?} ns by the guest and \
+                     {host:?} ns by the same analysis here; report this"
+                ));
+            }
+        }
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::read;
+    use crate::protocol::Transcript;
+
+    /// A chain of 2 and 3 ms, each charged 1 us.
+    fn log(bound: &str) -> String {
+        format!(
+            "{{\"kind\":\"graph\",\"commit\":0,\"policy\":\"static\",\"preemption\":\"on\",\
+             \"cores\":2,\"overhead_ns\":[1000],\"bound_ns\":[{bound}],\"dag\":0,\
+             \"name\":\"demo\",\"period_ns\":10000000,\"relative_deadline_ns\":10000000,\
+             \"offset_ns\":0,\"in_flight\":1,\"overrun\":\"queue\",\
+             \"subtasks\":[[\"a\",0,0,2000000],[\"b\",1,0,3000000]],\"edges\":[[0,1]],\
+             \"sporadic\":false,\"jobs\":[],\"topics\":[],\"states\":[],\"samples\":[]}}\n"
+        )
+    }
+
+    #[test]
+    fn the_model_is_made_again_and_bounded_alike() {
+        let commits = read(&Transcript::read(&log("5002000"))).unwrap();
+        assert_eq!(commits[0].bounds_ns, [Some(5_002_000)]);
+        assert_eq!(commits[0].task_set.dags()[0].name(), "demo");
+    }
+
+    #[test]
+    fn another_bound_and_a_damaged_line_are_refused() {
+        let said = |text: &str| read(&Transcript::read(text)).unwrap_err();
+        let wrong = said(&log("5001000"));
+        assert!(
+            wrong.contains("dag `demo` in commit 0 is Some(5001000) ns"),
+            "{wrong}"
+        );
+        let damaged = said(&log("5002000").replace("\"on\"", "\"maybe\""));
+        let expected = "serial line 1: `graph`: `preemption` is `maybe` and must be on or off";
+        assert_eq!(damaged, expected);
+    }
+}

@@ -1,0 +1,57 @@
+//! The witnesses of a guest's bounds, in files for `./scripts/check-witness`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sched_dag::analysis;
+
+use super::commits::Commit;
+use crate::files;
+
+/// Writes the witness of each commit, and returns what to say of them. Those of later
+/// commits go to files of their own, with the commit's number as their last extension.
+///
+/// # Errors
+///
+/// In words: nothing was committed, or a file cannot be written.
+pub fn write(path: &Path, commits: &[Commit]) -> Result<String, String> {
+    let mut names = Vec::new();
+    for commit in commits {
+        let path = file(path, commit.number);
+        let text = analysis::witness(&commit.task_set, &commit.settings);
+        let name = files::place(&path);
+        fs::write(&path, text)
+            .map_err(|error| format!("`--witness {name}`: cannot be written: {error}"))?;
+        names.push(name);
+    }
+    match names.join(" ") {
+        none if none.is_empty() => Err("the guest has committed no DAG".into()),
+        names => Ok(format!(
+            "{names}: what proves the bounds; `./scripts/check-witness {names}` checks it"
+        )),
+    }
+}
+
+fn file(path: &Path, commit: u64) -> PathBuf {
+    match commit {
+        0 => path.into(),
+        later => {
+            let mut name = path.as_os_str().to_owned();
+            name.push(format!(".{later}"));
+            name.into()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::file;
+    use std::path::Path;
+
+    #[test]
+    fn each_commit_has_a_file() {
+        let path = Path::new("a/demo.witness");
+        assert_eq!(file(path, 0), path);
+        assert_eq!(file(path, 2), Path::new("a/demo.witness.2"));
+    }
+}
