@@ -75,7 +75,7 @@ fn a_cycle_is_refused() {
 }
 
 #[test]
-#[should_panic(expected = "Untyped(1) is a subtask of another dag")]
+#[should_panic(expected = "Untyped(1) is a subtask of another DAG")]
 fn edges_stay_inside_a_dag() {
     let (dag, subtasks, _) = graph(&[1; 2], &[], 1);
     let (_, others, _) = graph(&[1; 2], &[], 1);

@@ -172,7 +172,7 @@ fn a_core_that_takes_no_interrupts_is_noticed_by_another() {
         assert!(
             outcome
                 .serial
-                .contains("that is subtask `deaf` of DAG `deaf`")
+                .contains("that is subtask `deaf` of dag `deaf`")
         );
         assert_eq!(line.number_at("job"), Some(0), "{}", line.text);
         line.number_at("cpu")

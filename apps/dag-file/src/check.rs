@@ -148,7 +148,7 @@ mod tests {
         let words = [
             "line 2: subtask `a` of dag `x` has a relative deadline and is no sink, for subtask `b`",
             "line 3: subtask `b` of dag `x` has a relative deadline of 0; give it at least 1 ns",
-            "line 4: subtask `c` of dag `x` has a relative deadline of 10ms, longer than its dag's",
+            "line 4: subtask `c` of dag `x` has a relative deadline of 10ms, longer than its DAG's",
         ];
         for words in words {
             assert!(found.contains(words), "{found}");

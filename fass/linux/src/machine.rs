@@ -210,7 +210,7 @@ impl Linux {
     pub fn raise_on_input(&self, signal: &Signal, file: &impl AsFd) -> io::Result<()> {
         let target = signal.target();
         let Some((_, dag)) = target else {
-            panic!("a signal is connected before its dag is committed; commit the dag first");
+            panic!("a signal is connected before its DAG is committed; commit that first");
         };
         let control = self.control();
         let control = control.expect("what is committed can be controlled");

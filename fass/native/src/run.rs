@@ -129,7 +129,7 @@ fn run_watched<B: Execute, W: Watch>(
     assert!(
         dags.iter()
             .all(|dag| dag.jobs().is_some() || dag.is_sporadic()),
-        "a dag without a limit of jobs would run forever; give each one a limit"
+        "a DAG without a limit of jobs would run forever; give each one a limit"
     );
     let subtasks = dags.iter().map(|dag| dag.subtasks().len());
     assert!(

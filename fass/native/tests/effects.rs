@@ -82,7 +82,7 @@ fn signals_and_latest_values_take_effect_at_the_same_completion() {
                 named("ask"),
             );
         asks.register_sink_subtask(|_: (u64,)| (), vec!["count"], PERIOD, named("end"));
-        finish_create_dags(&[one, other, asks]).expect("the dags are right");
+        finish_create_dags(&[one, other, asks]).expect("the DAGs are right");
         Box::new(move |report| {
             for of_dag in &report.statistics {
                 assert_eq!((of_dag.completed, of_dag.misses), (JOBS, 0));
@@ -113,7 +113,7 @@ fn a_signal_too_soon_is_dropped_and_an_instance_that_raises_none_has_none() {
             PERIOD,
             named("ask"),
         );
-        finish_create_dags(&[answers, asks]).expect("the dags are right");
+        finish_create_dags(&[answers, asks]).expect("the DAGs are right");
         Box::new(|report| {
             let answers = &report.statistics[0];
             // Of four in a row, one finds another that is still kept.
@@ -143,7 +143,7 @@ fn a_chain_of_signals_reaches_its_end() {
                 let _ = dag.register_untyped_subtask(|_job| (), named("stage"));
             }
         }
-        finish_create_dags(&dags).expect("the dags are right");
+        finish_create_dags(&dags).expect("the DAGs are right");
         Box::new(|report| {
             assert!(report.statistics.iter().all(|of| of.completed == JOBS));
         })
@@ -168,7 +168,7 @@ fn without_a_limit() -> Native {
         named("ask"),
     );
     asks.register_sink_subtask(|_: (u64,)| (), vec!["tick"], PERIOD, named("end"));
-    finish_create_dags(&[answers, asks]).expect("the dags are right");
+    finish_create_dags(&[answers, asks]).expect("the DAGs are right");
     machine
 }
 
@@ -217,7 +217,7 @@ fn nobody_finds_a_state_taken_though_jobs_are_aborted() {
             period,
             named("sink"),
         );
-        finish_create_dags(&[dag]).expect("the dag is right");
+        finish_create_dags(&[dag]).expect("the DAG is right");
         let recorded = machine.run_recorded();
         assert_eq!(recorded.violations, [], "{workers} workers");
         assert!(recorded.report.statistics[0].aborts > 0);

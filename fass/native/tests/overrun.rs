@@ -94,7 +94,7 @@ fn run(policy: OverrunPolicy, in_flight: u32, workers: u32, by: Policy) -> (Reco
     let dag = overloaded(policy, in_flight, move |_| {
         count.fetch_add(1, Relaxed);
     });
-    finish_create_dags(&[dag]).expect("the dag is right");
+    finish_create_dags(&[dag]).expect("the DAG is right");
     let recorded = machine.run_recorded();
     assert_eq!(recorded.violations, [], "{policy:?}, {workers} workers");
     (recorded, runs.load(Relaxed))
@@ -153,7 +153,7 @@ fn where_the_clock_stands_still_nothing_is_aborted_or_late() {
         for workers in 1..=3 {
             let machine = Native::new().workers(workers);
             let dag = overloaded(policy, 1, |_| ());
-            finish_create_dags(&[dag]).expect("the dag is right");
+            finish_create_dags(&[dag]).expect("the DAG is right");
             let statistics = machine.run().statistics[0];
             assert_eq!((statistics.completed, statistics.misses), (JOBS, 0));
             assert_eq!((statistics.aborts, statistics.skips), (0, 0));
@@ -166,7 +166,7 @@ fn panics_amid_aborts(workers: u32) {
     let dag = overloaded(OverrunPolicy::Abort, 2, |number| {
         assert!(number < 20, "the sink gives up");
     });
-    finish_create_dags(&[dag]).expect("the dag is right");
+    finish_create_dags(&[dag]).expect("the DAG is right");
     machine.run_recorded();
 }
 

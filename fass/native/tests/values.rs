@@ -30,7 +30,7 @@ fn commit(sums: &Arc<AtomicU64>) {
         sums.fetch_add(a + b + c, Relaxed);
     };
     dag.register_sink_subtask(sink, vec!["a", "b", "c"], period, named("sink"));
-    finish_create_dags(&[dag]).expect("the dag is right");
+    finish_create_dags(&[dag]).expect("the DAG is right");
 }
 
 #[test]

@@ -130,7 +130,7 @@ impl Signal {
     #[track_caller]
     pub fn raise(&self) {
         let Some((plan, dag)) = self.target() else {
-            panic!("a signal is raised before its dag is committed; commit the dag first");
+            panic!("a signal is raised before its DAG is committed; commit that first");
         };
         platform::expect_installed().raise(plan, dag);
     }

@@ -108,7 +108,7 @@ impl Dag {
         for end in [earlier, later] {
             assert!(
                 Rc::ptr_eq(&end.draft, &self.draft),
-                "{end:?} is a subtask of another dag; an edge joins two subtasks of one"
+                "{end:?} is a subtask of another DAG; an edge joins two subtasks of one"
             );
         }
         let edge = (earlier.subtask, later.subtask);
@@ -138,7 +138,7 @@ impl Dag {
     pub fn sink_deadline(&self, sink: &Untyped, relative_deadline: Duration) -> &Self {
         assert!(
             Rc::ptr_eq(&sink.draft, &self.draft),
-            "{sink:?} is a subtask of another dag; call its own dag's `sink_deadline`"
+            "{sink:?} is a subtask of another DAG; call its own DAG's `sink_deadline`"
         );
         let mut draft = self.open();
         let label = draft.label(sink.subtask);

@@ -39,7 +39,7 @@ impl Dag {
     pub fn using<U: Uses>(&self, uses: U) -> Using<'_, U> {
         assert!(
             uses.is_of(self),
-            "a state of another dag is used; share it between dags as a latest value"
+            "a state of another DAG is used; share it between DAGs as a latest value"
         );
         Using { dag: self, uses }
     }

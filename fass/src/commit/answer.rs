@@ -149,7 +149,7 @@ pub enum Verdict {
 /// assert_eq!(
 ///     unproven.to_string(),
 ///     "no WCET above 0 is given for subtask `source`, subtask `sink`; give every subtask one \
-///      to have the dag analysed"
+///      to have the DAG analysed"
 /// );
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -365,7 +365,7 @@ impl fmt::Display for Unproven {
                 if !more.is_empty() {
                     write!(f, " and {} more", more.len())?;
                 }
-                f.write_str("; give every subtask one to have the dag analysed")
+                f.write_str("; give every subtask one to have the DAG analysed")
             }
             (Reason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
                 f,

@@ -227,7 +227,7 @@ impl VirtualTime {
     /// If the signal's DAG is not committed.
     pub fn raise_at(&self, signal: &Signal, time: Duration) {
         let Some(target) = signal.target() else {
-            panic!("a signal is raised before its dag is committed; commit the dag first");
+            panic!("a signal is raised before its DAG is committed; commit that first");
         };
         let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
         self.machine.raise_at(ns, target);

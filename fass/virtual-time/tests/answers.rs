@@ -179,7 +179,7 @@ fn dags_without_all_wcets_say_so() {
         texts(commit.answers()),
         [
             "dag `unknown` is not proven to meet its deadlines: no WCET above 0 is given for \
-             subtask `sink`; give every subtask one to have the dag analysed",
+             subtask `sink`; give every subtask one to have the DAG analysed",
             "dag `urgent` takes at most 2ms, by multiple paths",
             "dag `lax` is not proven to meet its deadlines: dag `unknown`, which may delay it, is \
              not proven itself; see to that one first",
@@ -257,7 +257,7 @@ fn a_wcet_of_zero_proves_nothing() {
             texts(commit.answers()),
             [
                 "dag `star` is not proven to meet its deadlines: no WCET above 0 is given for \
-                 subtask `sink`; give every subtask one to have the dag analysed"
+                 subtask `sink`; give every subtask one to have the DAG analysed"
             ]
         );
         assert_eq!(commit.warnings()[0].code(), "zero_wcet");

@@ -123,7 +123,7 @@ fn several_uses_are_a_tuple() {
 }
 
 #[test]
-#[should_panic(expected = "a state of another dag is used")]
+#[should_panic(expected = "a state of another DAG is used")]
 fn a_state_stays_in_its_dag() {
     let state = create_dag().state("state", 0);
     let _ = create_dag().using(state.update());

@@ -296,7 +296,7 @@ impl Machine {
         let target = signal.target();
         assert!(
             target.is_some(),
-            "a signal is connected before its dag is committed; commit the dag first"
+            "a signal is connected before its DAG is committed; commit that first"
         );
         self.input.set(target);
     }

@@ -156,7 +156,7 @@ fn report(instance: Instance, fault: &Fault<'_>) {
     let dag = Excerpt::<NAME_BYTES>::of(dag.map_or("", |dag| dag.name()));
     let subtask = Excerpt::<NAME_BYTES>::of(subtask.map_or("", |subtask| subtask.name()));
     crate::println!(
-        "fault: {cause} in subtask `{subtask}` of DAG `{dag}`, job {}, on core {core}: {message}; \
+        "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \
          at {place}; the DAG is ended",
         instance.job
     );

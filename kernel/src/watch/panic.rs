@@ -79,7 +79,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         write_in_emergency(format_args!("  in {instance}\n"));
         execution::try_names(instance, |dag, subtask| {
             write_in_emergency(format_args!(
-                "  that is subtask `{subtask}` of DAG `{dag}`\n"
+                "  that is subtask `{subtask}` of dag `{dag}`\n"
             ));
         });
     }

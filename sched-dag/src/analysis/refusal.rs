@@ -41,12 +41,12 @@ impl fmt::Display for Refusal {
             Self::DoesNotApply => f.write_str("the test does not apply to these DAGs"),
             Self::Fails { position } => write!(
                 f,
-                "DAG {position} has no bound within its relative deadline; \
+                "dag {position} has no bound within its relative deadline; \
                  give it more time, more cores or less interference"
             ),
             Self::Limit { position } => write!(
                 f,
-                "the analysis of DAG {position} reached a limit; \
+                "the analysis of dag {position} reached a limit; \
                  shorten its deadline in periods or use a coarser unit of time"
             ),
         }

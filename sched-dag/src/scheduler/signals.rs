@@ -33,7 +33,7 @@ impl Scheduler {
     pub(super) fn signal(&mut self, dag: DagId, observer: &mut impl Observer) {
         assert!(
             self.task_set.dag(dag).is_sporadic(),
-            "a signal to dag {}, which is periodic; signal sporadic dags only",
+            "a signal to dag {}, which is periodic; signal sporadic DAGs only",
             dag.0
         );
         // A driver that comes late: what was due before this signal is not kept any more.

@@ -25,12 +25,12 @@ impl Display for Fault {
             Self::TooManyDags { count } => {
                 write!(
                     f,
-                    "the commit has {count} dags, more than {}; merge some",
+                    "the commit has {count} DAGs, more than {}; merge some",
                     u32::MAX
                 )
             }
             Self::NoSubtasks { dag } => {
-                write!(f, "{dag} has no subtask; register one or drop the dag")
+                write!(f, "{dag} has no subtask; register one or drop the DAG")
             }
             Self::TooManySubtasks { dag, count } => {
                 write!(
@@ -115,8 +115,8 @@ impl Display for Fault {
                 of_dag_ns,
             } => write!(
                 f,
-                "{sink} of {dag} has a relative deadline of {:?}, longer than its dag's of {:?}; shorten \
-                 it, or extend the dag's",
+                "{sink} of {dag} has a relative deadline of {:?}, longer than its DAG's of {:?}; shorten \
+                 it, or extend the DAG's",
                 Duration::from_nanos(*relative_deadline_ns),
                 Duration::from_nanos(*of_dag_ns)
             ),
@@ -280,7 +280,7 @@ impl Fault {
             Self::TopicInSeveralDags { topic, dags } => {
                 write!(
                     f,
-                    "topic `{topic}` is used by {} dags: {}",
+                    "topic `{topic}` is used by {} DAGs: {}",
                     dags.len(),
                     list(dags)
                 )?;

@@ -102,7 +102,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
             budget_ns: subtask.budget_ns,
             priority: match ranks.get(index) {
                 Some(rank) => Priority(priority_base + rank),
-                None => subtask.priority.expect("given to all subtasks of the dag"),
+                None => subtask.priority.expect("given to all subtasks of the DAG"),
             },
             non_preemptive: subtask.non_preemptive,
             relative_deadline_ns: deadlines_ns[index],

@@ -83,7 +83,7 @@ impl fmt::Display for Warning {
             ),
             Self::DuplicateDagName { first, second } => write!(
                 f,
-                "two dags are named `{}` (number {} and {}); rename one",
+                "two DAGs are named `{}` (number {} and {}); rename one",
                 first.name, first.id.0, second.id.0
             ),
             Self::CertainMiss { dag, reason } => {

@@ -35,7 +35,7 @@ fn no_dags_no_cores_no_subtasks() {
     );
     let no_subtasks = [(
         "no_subtasks",
-        "dag 0 has no subtask; register one or drop the dag",
+        "dag 0 has no subtask; register one or drop the DAG",
     )];
     assert_faults(&[dag("", vec![])], &no_subtasks);
     // Neither what subtasks would have stated is missed.

@@ -168,7 +168,7 @@ fn a_topic_stays_inside_one_dag() {
         &[drive(), other],
         &[(
             "topic_in_several_dags",
-            "topic `image` is used by 2 dags: dag `drive`, dag `park`; a topic stays inside one dag, so \
+            "topic `image` is used by 2 DAGs: dag `drive`, dag `park`; a topic stays inside one dag, so \
              rename it in the others",
         )],
     );
@@ -200,7 +200,7 @@ fn duplicates() {
     let verified = verify(&[drive(), twin], &options()).expect("only a warning");
     assert_eq!(
         verified.warnings[0].to_string(),
-        "two dags are named `drive` (number 0 and 1); rename one"
+        "two DAGs are named `drive` (number 0 and 1); rename one"
     );
 }
 

@@ -67,7 +67,7 @@ fn walk(set: &Set) -> Result<(), String> {
             short.complete_shortly(now_ns, core, instance, &mut random);
             long.complete(now_ns, instance);
         } else {
-            let dag = DagId(u32::try_from(random.below(set.dags.len())).expect("few dags"));
+            let dag = DagId(u32::try_from(random.below(set.dags.len())).expect("few DAGs"));
             let failing = running.iter().map(|&(_, instance)| instance).next();
             let is_sporadic = set.dags[dag.index()].signals_ns.is_some();
             for side in [&mut short, &mut long] {

@@ -144,7 +144,7 @@ fn malformed_files_are_refused_with_their_line() {
         ("edge 0 1", "edge 0 1\nsink 1", 6, "takes 2 words"),
         ("edge 0 1", "edge 0 1\nsink 1 3\nsink 1 3", 7, "twice"),
         ("edge 0 1", "edge 0 1\nsink 1 0", 2, "deadline of 0"),
-        ("edge 0 1", "edge 0 1\nsink 1 5", 2, "longer than its dag's"),
+        ("edge 0 1", "edge 0 1\nsink 1 5", 2, "longer than its DAG's"),
         ("edge 0 1", "edge 0 1\nsink 0 3", 2, "is no sink"),
         ("x 0 0 1 1 5 0\n", "", 11, "without 1 `x` records"),
         ("x 0 0 1 1 5 0", "x 0 0 0 1 5 0", 7, "twice"),

@@ -42,7 +42,7 @@ pub fn parse(text: &str) -> Result<DagFile, Malformed> {
             let (expected, remedy) = if reader.file.sets.is_empty() {
                 (
                     "a `dag` record",
-                    "it is empty: describe a dag, or name another file",
+                    "it is empty: describe a DAG, or name another file",
                 )
             } else {
                 ("`end`", "a part of it is missing, or that last line is")
@@ -187,7 +187,7 @@ impl<'a> Reader<'a> {
         let position = |name: &str| {
             self.subtasks.get(name).copied().ok_or_else(|| {
                 line.malformed(format!(
-                    "no subtask {} stands before this line in the dag; add one, or correct the name",
+                    "no subtask {} stands before this line in the DAG; add one, or correct the name",
                     quoted(name)
                 ))
             })
@@ -220,7 +220,7 @@ impl<'a> Reader<'a> {
         };
         match set.dags.last() {
             None => Err(next.malformed(format!(
-                "set {} ends here without a dag; add one, or remove the set",
+                "set {} ends here without a DAG; add one, or remove the set",
                 quoted(&set.name)
             ))),
             Some(dag) if dag.subtasks.is_empty() => Err(next.malformed(format!(

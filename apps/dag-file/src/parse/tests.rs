@@ -56,7 +56,7 @@ fn every_part_of_a_file_that_is_cut_off_is_refused() {
 #[test]
 fn an_empty_file_is_refused() {
     let empty = "line 1: the file ends where a `dag` record should be; it is empty: describe a \
-                 dag, or name another file";
+                 DAG, or name another file";
     assert_eq!(refusal(""), empty);
     assert_eq!(
         refusal("end"),
@@ -151,7 +151,7 @@ fn a_refusal_names_line_offender_and_remedy() {
             "line 1: `x\\u{202e}y` is no name",
         ),
         ("\u{1b}[2J", "found `\\u{1b}[2J`"),
-        ("set a\nset b", "line 2: set `a` ends here without a dag"),
+        ("set a\nset b", "line 2: set `a` ends here without a DAG"),
         (
             "{dag}subtask a wcet 1ms\nend\n\nx",
             "line 5: `x` stands after `end`",

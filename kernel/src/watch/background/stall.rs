@@ -146,7 +146,7 @@ fn report(core: u32, instance: Instance, still_ns: u64) {
     let dag = task_set.dag(instance.dag);
     let subtask = dag.subtask(instance.subtask).name();
     crate::println!(
-        "stalled: subtask `{subtask}` of DAG `{}`, job {}, has kept core {core} for {} ms, \
+        "stalled: subtask `{subtask}` of dag `{}`, job {}, has kept core {core} for {} ms, \
          and goes on",
         dag.name(),
         instance.job,

@@ -296,7 +296,7 @@ fn parse_dag<'a, 'f>(
         line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
     }
     if seen.is_empty() {
-        let reason = format!("the dag before this has no `{}` record", by_cores[0]);
+        let reason = format!("the DAG before this has no `{}` record", by_cores[0]);
         return Err(line.malformed(reason));
     }
     dags.push(ExpectedDag { task, quantities });

@@ -73,7 +73,7 @@ fn malformed_files_are_refused_with_their_line() {
     let single = "single 7 graham 41 long_paths 41\n";
     assert_eq!(
         refused(single, ""),
-        (17, "the dag before this has no `single` record".to_owned())
+        (17, "the DAG before this has no `single` record".to_owned())
     );
     assert_eq!(
         refused(single, &single.repeat(2)),
