@@ -22,6 +22,21 @@ pub use boot::BootInfo;
 #[macro_export]
 macro_rules! entry {
     ($app:path) => {
+        #[cfg(not(linked_as_image))]
+        compile_error!(
+            "the image is linked as a program of the host: let `build.rs` call \
+             `boot_link::link_image()`, with `boot-link` in `[build-dependencies]`"
+        );
+        #[cfg(test)]
+        compile_error!(
+            "an image is compiled as a test: write `test = false` below `[[bin]]` in `Cargo.toml`"
+        );
+        #[cfg(not(any(test, panic = "abort")))]
+        compile_error!(
+            "an image cannot unwind: write `panic = \"abort\"` below `[profile.dev]` and below \
+             `[profile.release]` in the `Cargo.toml` of the workspace"
+        );
+
         #[global_allocator]
         static HEAP: $crate::KernelHeap = $crate::KernelHeap;
 

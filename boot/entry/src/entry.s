@@ -31,6 +31,13 @@ multiboot2_header_end:
 .code32
 .global pvh_entry
 pvh_entry:
+    # A processor in 64-bit mode has no loader of ours behind it: it is in a program of Linux.
+    # There the byte of `dec eax` is a prefix of `nop` and leaves the zero flag as it is.
+    xor eax, eax
+    dec eax
+    nop
+    jz host_entry
+
     cli
     cld
     mov ebp, ebx                    # nothing below touches ebp
@@ -130,6 +137,27 @@ processor_long_mode:
     xor ebp, ebp
     call {processor_rust_entry}
     ud2
+
+# Somebody has started the image as a program of Linux, and is told so (system calls 1,
+# write, and 60, exit).
+.section .text.host_entry, "ax"
+host_entry:
+    mov eax, 1
+    mov edi, 2
+    lea rsi, [rip + host_message]
+    lea rdx, [rip + host_message_end]
+    sub rdx, rsi
+    syscall
+    mov eax, 60
+    mov edi, 1
+    syscall
+    ud2
+
+.section .rodata.host_message, "a"
+host_message:
+    .ascii "this is an image for the bare machine, and no program of this system; "
+    .ascii "boot it by `./scripts/boot FILE`, or by `fass-tool boot FILE`\n"
+host_message_end:
 
 .section .rodata.boot_gdt, "a"
     .balign 16

@@ -27,7 +27,9 @@ const SCRIPT: &str = include_str!("../../entry/src/image.ld");
 
 /// Tells cargo to link the binaries of the package being built as images.
 ///
-/// To be called from `build.rs`.
+/// To be called from `build.rs`. `kernel::entry!` makes sure that it was, and that `Cargo.toml` is
+/// right for an image; what `src/main.rs` lacks at its top is found here, where the compiler would
+/// give a reason that says nothing.
 ///
 /// # Panics
 ///
@@ -39,7 +41,28 @@ pub fn link_image() {
     for argument in arguments(&script.display().to_string()) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
+    println!("cargo::rustc-check-cfg=cfg(linked_as_image)");
+    println!("cargo::rustc-cfg=linked_as_image");
     println!("cargo::rerun-if-changed=build.rs");
+    if let Ok(main) = std::fs::read_to_string("src/main.rs") {
+        println!("cargo::rerun-if-changed=src/main.rs");
+        for attribute in missing_attributes(&main) {
+            println!(
+                "cargo::error=src/main.rs is an image's and lacks `#![{attribute}]`; write it \
+                 above all items"
+            );
+        }
+    }
+}
+
+/// Returns the attributes that an image's file must have and this one has not.
+fn missing_attributes(main: &str) -> impl Iterator<Item = &'static str> {
+    let has = |attribute: &str| {
+        let mut lines = main.lines().map(str::trim_start);
+        lines.any(|line| line.starts_with("#![") && line.contains(attribute))
+    };
+    let needed = ["no_std", "no_main"];
+    needed.into_iter().filter(move |attribute| !has(attribute))
 }
 
 /// Returns all arguments, with the linker script at this place. It is an argument by
@@ -55,5 +78,16 @@ mod tests {
     fn the_script_is_an_argument_by_itself() {
         let all: Vec<&str> = super::arguments("/a,b/image.ld").collect();
         assert!(all.ends_with(&["-Xlinker", "-T", "-Xlinker", "/a,b/image.ld"]));
+    }
+
+    #[test]
+    fn an_attribute_counts_where_it_is_one() {
+        let missing = |main| super::missing_attributes(main).collect::<Vec<_>>();
+        assert_eq!(
+            missing("#![no_std]\n#![cfg_attr(not(test), no_main)]\n").len(),
+            0
+        );
+        assert_eq!(missing("//! `#![no_std]`\n#![no_main]\n"), ["no_std"]);
+        assert_eq!(missing("fn main() {}\n"), ["no_std", "no_main"]);
     }
 }

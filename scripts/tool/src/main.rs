@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use tool::options::{Choice, Menu};
 
 static TOOL: Menu = Menu {
-    invocation: "tool",
+    invocation: "fass-tool",
     word: "SUBCOMMAND",
     about: "Does what the scripts in scripts/ are there for.",
     choices: &[
@@ -22,8 +22,13 @@ static TOOL: Menu = Menu {
             work: tool::run::run,
         },
         Choice {
+            name: "boot",
+            about: "boot an image, and run any other program as it is: for cargo",
+            work: tool::run::boot,
+        },
+        Choice {
             name: "new-app",
-            about: "make an app of your own under apps/",
+            about: "make an app of your own, in a repository of its own or under apps/",
             work: tool::new_app::new_app,
         },
         Choice {

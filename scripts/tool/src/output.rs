@@ -76,7 +76,7 @@ pub fn conclude(code: ExitCode) -> ExitCode {
     let Some(error) = LOST.get() else {
         return code;
     };
-    eprintln!("tool: standard output could not be written: {error}");
+    eprintln!("fass-tool: standard output could not be written: {error}");
     if code == ExitCode::SUCCESS {
         return ExitCode::FAILURE;
     }

@@ -14,6 +14,7 @@
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -143,12 +144,16 @@ fn sentence(address: u64, frames: &[Frame]) -> String {
     format!("{address:#x} is {function}{line}")
 }
 
-/// Returns a file and line from the workspace on, if it is the app's.
+/// Returns a file and line if it is the app's: from the workspace on, or from this folder on,
+/// which is the root of the app's own repository where cargo starts the tool.
 fn line_of_app(frame: &Frame) -> Option<&str> {
-    let path = frame.line.strip_prefix(system::workspace().to_str()?)?;
-    let path = path.strip_prefix('/')?;
-    let is_known = !path.ends_with(":?") && !path.ends_with(":0");
-    (is_known && !OF_OTHERS.iter().any(|of| path.starts_with(of))).then_some(path)
+    let below = |folder: &Path| frame.line.strip_prefix(folder.to_str()?)?.strip_prefix('/');
+    let path = match below(system::workspace()) {
+        Some(path) if OF_OTHERS.iter().any(|of| path.starts_with(of)) => return None,
+        Some(path) => path,
+        None => below(&env::current_dir().ok()?)?,
+    };
+    (!path.ends_with(":?") && !path.ends_with(":0")).then_some(path)
 }
 
 #[cfg(test)]

@@ -58,7 +58,7 @@ impl Drop for Stub {
 }
 
 fn tool(words: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command
         .args(words.split(' '))
         .current_dir(system::workspace())

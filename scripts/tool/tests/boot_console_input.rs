@@ -9,7 +9,7 @@ use tool::image;
 /// the exit code and the output.
 fn run(input: &str, jobs: u64) -> (Option<i32>, String) {
     let image = image::build("fork-join").expect("it builds").path;
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command.args(["run", "--console", "--json", "--mode=deterministic"]);
     command
         .args(["--timeout=60", "--jobs"])
@@ -63,7 +63,7 @@ fn of_many_lines_at_once_whole_answers_are_left_out() {
 
 #[test]
 fn a_run_whose_output_goes_to_a_program_is_not_asked_for_its_status() {
-    let mut run = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut run = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     let words = [
         "run",
         "--mode",

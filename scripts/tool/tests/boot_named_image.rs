@@ -11,7 +11,7 @@ fn built(app: &str) -> PathBuf {
 }
 
 fn run(image: &Path, words: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command.args(["run", "--mode=deterministic", "--image"]);
     command.arg(image).args(words.split_whitespace());
     command.output().expect("the tool can be started")

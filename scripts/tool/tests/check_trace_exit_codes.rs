@@ -27,7 +27,7 @@ fn check_trace(words: &[&str]) -> Output {
 }
 
 fn call(subcommand: &str, words: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command.arg(subcommand).args(words);
     command.output().expect("the tool can be started")
 }
@@ -145,7 +145,7 @@ fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
 fn that_no_one_reads_the_output_is_no_failure() {
     let log = file("unread.log", GOOD);
     for subcommand in ["trace", "check-trace"] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
         command.arg(subcommand).arg(&log).stdout(Stdio::piped());
         let mut child = command.spawn().expect("the tool can be started");
         drop(child.stdout.take());

@@ -9,8 +9,9 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "run",
+    "boot",
     "test",
     "new-app",
     "check-trace",
@@ -30,7 +31,7 @@ const COMMANDS: [&str; 17] = [
 ];
 
 fn tool(words: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command.args(words.split(' ')).stdin(Stdio::null());
     command
 }
@@ -87,7 +88,7 @@ fn the_nearest_option_or_word_is_suggested() {
         ),
         (
             "tset",
-            "tool: unknown SUBCOMMAND `tset`; did you mean `test`?\n",
+            "fass-tool: unknown SUBCOMMAND `tset`; did you mean `test`?\n",
         ),
     ] {
         let output = output(words);
@@ -102,7 +103,7 @@ fn what_is_no_image_is_2_before_anything_boots() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let text = folder.join("image.txt");
     fs::write(&text, "no image").expect("the test's folder takes a file");
-    let tool = PathBuf::from(env!("CARGO_BIN_EXE_tool"));
+    let tool = PathBuf::from(env!("CARGO_BIN_EXE_fass-tool"));
     for (path, why) in [
         (
             &text,
@@ -177,7 +178,7 @@ fn what_cannot_be_written_is_1_and_said() {
         let output = tool(&words).stdout(full).output().expect("it starts");
         let said = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(1), "{words}: {said}");
-        let words = "tool: standard output could not be written: No space left on device";
+        let words = "fass-tool: standard output could not be written: No space left on device";
         assert!(said.starts_with(words), "{said}");
     }
 }
@@ -230,7 +231,7 @@ fn that_no_one_reads_is_no_failure() {
 #[test]
 fn a_name_that_no_app_can_have_is_2() {
     let run = |words: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
         let output = command.arg("new-app").args(words).output();
         output.expect("the tool can be started")
     };
@@ -260,10 +261,28 @@ fn a_name_that_no_app_can_have_is_2() {
             &["one", "two"],
             "new-app: `two`: only one NAME is allowed, and `one` is one\n",
         ),
+        (
+            &["one", "--git", "https://example.org"],
+            "new-app: `--git` is for a repository; add its folder, `--out DIR`\n",
+        ),
     ] {
         let output = run(words);
         assert_eq!(output.status.code(), Some(2), "{words:?}");
         assert_eq!(String::from_utf8_lossy(&output.stderr), line);
     }
     assert!(!workspace().join("apps/one").exists());
+}
+
+#[test]
+fn boot_runs_what_is_no_image_as_it_is() {
+    let program = output("boot /bin/echo --help me");
+    assert_eq!(program.status.code(), Some(0));
+    assert_eq!(program.stdout, b"--help me\n");
+    let nothing = output("boot ./no-such-program");
+    let said = String::from_utf8_lossy(&nothing.stderr).into_owned();
+    assert_eq!(nothing.status.code(), Some(1), "{said}");
+    assert!(
+        said.starts_with("boot: cannot start ./no-such-program: "),
+        "{said}"
+    );
 }

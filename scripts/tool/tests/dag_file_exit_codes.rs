@@ -15,7 +15,7 @@ fn file(name: &str, text: &str) -> PathBuf {
 }
 
 fn run(words: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command.arg("run").args(words);
     command.output().expect("the tool can be started")
 }

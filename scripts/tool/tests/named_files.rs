@@ -18,7 +18,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 fn tool(words: &[&OsStr], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tool"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command.args(words).current_dir(folder).stdin(Stdio::null());
     command.output().expect("the tool can be started")
 }

@@ -1,9 +1,10 @@
-//! The subcommand `new-app`: an app of one's own under `apps/`.
+//! The subcommand `new-app`: an app of one's own, under `apps/` or in a repository of its own.
 //!
 //! The *template* is an app that is complete: a library with the functions and
 //! their DAG, a program that boots it, and a test that runs it on the host in
-//! virtual time. A new app is a copy in which the template's name is replaced;
-//! cargo finds it by the workspace's `apps/*`, so nothing else changes.
+//! virtual time. A new app is a copy in which the template's name is replaced.
+//! Under `apps/` cargo finds it by the workspace's `apps/*`, so nothing else changes. In a
+//! repository it has what the workspace gives otherwise: `repository` adds that.
 //!
 //! A name that cannot be a package's, or is taken, is refused before anything is
 //! written. If writing fails in the middle, what was written is removed.
@@ -12,6 +13,7 @@
 //! command line.
 
 mod name;
+mod repository;
 mod table;
 
 use std::ffi::OsString;
@@ -23,14 +25,20 @@ use std::process::ExitCode;
 use crate::system;
 
 pub use name::check;
+pub use repository::{Source, create_repository};
 pub use table::NEW_APP;
 
 /// The template's name, as a package and as a crate.
 const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
 
-/// The template's files: where each goes in the app's folder, and its text.
-const FILES: &[(&str, &str)] = &[
-    ("Cargo.toml", include_str!("../../template/manifest.toml")),
+/// A file of an app: where it goes in the app's folder, and its text.
+type AppFile = (&'static str, &'static str);
+
+/// What says how an app under `apps/` is built.
+const MANIFEST: AppFile = ("Cargo.toml", include_str!("../../template/manifest.toml"));
+
+/// The template's other files, which any app has.
+const FILES: &[AppFile] = &[
     ("build.rs", include_str!("../../template/build.rs")),
     ("src/lib.rs", include_str!("../../template/src/lib.rs")),
     ("src/main.rs", include_str!("../../template/src/main.rs")),
@@ -59,9 +67,22 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
     let Some(name) = options.positional() else {
         return NEW_APP.refuse("which name? give one, such as `./scripts/new-app brake-assist`");
     };
-    match create(system::workspace(), name) {
-        Ok(_) => {
-            print!("{}", next_steps(name));
+    let made = match (options.path("out"), options.text("git")) {
+        (None, Some(_)) => {
+            return NEW_APP.refuse("`--git` is for a repository; add its folder, `--out DIR`");
+        }
+        (None, None) => create(system::workspace(), name).map(|_| next_steps(name)),
+        (Some(out), git) => {
+            let source = match git {
+                Some(url) => Source::Git(url),
+                None => Source::Folder(system::workspace()),
+            };
+            create_repository(out, name, source).map(|()| repository::next_steps(out, source))
+        }
+    };
+    match made {
+        Ok(lines) => {
+            print!("{lines}");
             ExitCode::SUCCESS
         }
         Err(NewAppError::Name(line)) => NEW_APP.refuse(&line),
@@ -76,29 +97,54 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
 /// The name is refused, or a file cannot be written; nothing is left then.
 pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, NewAppError> {
     check(workspace, name).map_err(NewAppError::Name)?;
-    let apps = workspace.join("apps");
-    let folder = apps.join(name);
-    let failed = |error| format!("cannot write `{}`: {error}", folder.display());
-    fs::create_dir_all(&apps).map_err(|error| NewAppError::Files(failed(error)))?;
-    fs::create_dir(&folder).map_err(|error| match error.kind() {
-        // Another command has been as quick.
-        ErrorKind::AlreadyExists => NewAppError::Name(name::taken(name)),
-        _ => NewAppError::Files(failed(error)),
-    })?;
-    write_all(&folder, name).map_err(|line| {
-        // What cannot be written can perhaps not be removed either; the line
-        // names the place.
-        let _ = fs::remove_dir_all(&folder);
-        NewAppError::Files(line)
-    })?;
+    let folder = workspace.join("apps").join(name);
+    let files = [MANIFEST].into_iter().chain(FILES.iter().copied());
+    // Another command has been as quick.
+    write_folder(
+        &folder,
+        name,
+        files,
+        |text| text.into(),
+        || name::taken(name),
+    )?;
     Ok(folder)
 }
 
-fn write_all(folder: &Path, name: &str) -> Result<(), String> {
+/// Makes an app's folder, which must not be there, and writes its files, each changed as it
+/// has to be. `taken` says that the folder is there.
+fn write_folder(
+    folder: &Path,
+    name: &str,
+    files: impl Iterator<Item = AppFile>,
+    change: impl Fn(&str) -> String,
+    taken: impl Fn() -> String,
+) -> Result<(), NewAppError> {
+    let failed = |error| format!("cannot write `{}`: {error}", folder.display());
+    if let Some(parent) = folder.parent() {
+        fs::create_dir_all(parent).map_err(|error| NewAppError::Files(failed(error)))?;
+    }
+    fs::create_dir(folder).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => NewAppError::Name(taken()),
+        _ => NewAppError::Files(failed(error)),
+    })?;
+    write_all(folder, name, files, change).map_err(|line| {
+        // What cannot be written can perhaps not be removed either; the line
+        // names the place.
+        let _ = fs::remove_dir_all(folder);
+        NewAppError::Files(line)
+    })
+}
+
+fn write_all(
+    folder: &Path,
+    name: &str,
+    files: impl Iterator<Item = AppFile>,
+    change: impl Fn(&str) -> String,
+) -> Result<(), String> {
     let crate_name = name.replace('-', "_");
-    for (place, text) in FILES {
+    for (place, text) in files {
         let path = folder.join(place);
-        let text = text
+        let text = change(text)
             .replace(PLACEHOLDER.0, name)
             .replace(PLACEHOLDER.1, &crate_name);
         let parent = path.parent().unwrap_or(folder);
@@ -129,7 +175,7 @@ apps/{name} is there:
 
 #[cfg(test)]
 mod tests {
-    use super::{FILES, NewAppError, PLACEHOLDER, create};
+    use super::{FILES, MANIFEST, NewAppError, PLACEHOLDER, create};
     use std::fs;
 
     #[test]
@@ -137,7 +183,7 @@ mod tests {
         let workspace = std::env::temp_dir().join(format!("new-app-{}", std::process::id()));
         let folder = create(&workspace, "brake-assist").unwrap();
         let mut named = 0;
-        for (place, template) in FILES {
+        for (place, template) in FILES.iter().chain([&MANIFEST]) {
             let text = fs::read_to_string(folder.join(place)).unwrap();
             assert!(!text.contains(PLACEHOLDER.0), "{place}");
             assert!(!text.contains(PLACEHOLDER.1), "{place}");

@@ -83,7 +83,31 @@ const RESERVED: &[&str] = &[
 ///
 /// One line: the name, what is wrong with it, and what is possible.
 pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
-    let refuse = |why: &str| Err(format!("{} cannot be an app's name: {why}", quoted(name)));
+    check_word(name)?;
+    let folder = Path::new("apps").join(name);
+    if workspace.join(&folder).exists() {
+        return Err(taken(name));
+    }
+    match package_folder(workspace, name) {
+        Some(taken) => refuse(
+            name,
+            &format!("the package in {} has it; choose another", taken.display()),
+        ),
+        None => Ok(()),
+    }
+}
+
+fn refuse(name: &str, why: &str) -> Result<(), String> {
+    Err(format!("{} cannot be an app's name: {why}", quoted(name)))
+}
+
+/// Checks that a name can be an app's wherever that is: a package's and a crate's.
+///
+/// # Errors
+///
+/// As of [`check`].
+pub(super) fn check_word(name: &str) -> Result<(), String> {
+    let refuse = |why: &str| refuse(name, why);
     if name.is_empty() {
         return Err("the name is empty; give one, such as `brake-assist`".into());
     }
@@ -108,17 +132,7 @@ pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
     if RESERVED.contains(&name) {
         return refuse("Rust or cargo use the word themselves; add another, such as `my-`");
     }
-    let folder = Path::new("apps").join(name);
-    if workspace.join(&folder).exists() {
-        return Err(taken(name));
-    }
-    match package_folder(workspace, name) {
-        Some(taken) => refuse(&format!(
-            "the package in {} has it; choose another",
-            taken.display()
-        )),
-        None => Ok(()),
-    }
+    Ok(())
 }
 
 /// Says that there is an app of the name.

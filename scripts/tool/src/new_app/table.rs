@@ -1,21 +1,36 @@
 //! What `new-app` accepts: the one table behind its parser and its help text.
 
-use crate::options::{Command, Takes};
+use crate::options::{Command, Opt, Takes};
 
 /// The table of `new-app`.
 pub static NEW_APP: Command = Command {
     invocation: "./scripts/new-app",
     about: "\
-Makes an app of your own under apps/: a library with functions and their DAG, a
-program that boots it, and a test that runs it on the host in virtual time.",
+Makes an app of your own, in a repository of its own or under apps/: a library with
+functions and their DAG, a program that boots it, and a test that runs it on the host in
+virtual time.",
     positional: Some((
         Takes::Text("NAME"),
         "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
     )),
-    options: &[],
+    options: &[
+        Opt::new(
+            "out",
+            Takes::File("DIR"),
+            "Make the app in this new folder, which is the root of a repository.",
+        ),
+        Opt::new(
+            "git",
+            Takes::Text("URL"),
+            "--out: take the crates from this git repository, not from the folder of these \
+             commands. Its runner is `fass-tool boot`, which `cargo install --git URL tool` \
+             installs.",
+        ),
+    ],
     notes: "\
-./scripts/run --app NAME boots it, cargo test -p NAME tests it, and docs/guide.md
-shows what to do next.
+With --out, cargo run boots the app and cargo test tests it; without, it is in apps/,
+./scripts/run --app NAME boots it and cargo test -p NAME tests it. docs/guide.md shows
+what to do next.
 
 exit codes: 0 the app is there; 1 its files cannot be written; 2 a refused
 command line

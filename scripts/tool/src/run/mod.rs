@@ -8,6 +8,7 @@
 //! Exit codes: 0 all is well, 1 a failure, 2 a refused command line (ours or
 //! the guest's).
 
+mod boot;
 mod folder;
 mod log;
 mod screen;
@@ -33,6 +34,7 @@ use crate::system;
 use log::Log;
 use screen::Screen;
 
+pub use boot::boot;
 pub use table::RUN;
 
 /// Why a run ended before the guest did.

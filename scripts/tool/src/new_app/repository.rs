@@ -1,0 +1,239 @@
+//! An app in a repository of its own, outside the workspace.
+//!
+//! It has all that an app under `apps/` gets from the workspace: profiles, the toolchain's
+//! version, where the crates are. Cargo's *runner* there boots what is an image, so that
+//! `cargo run` and `cargo test` do what they do for any program.
+
+use std::path::Path;
+
+use replay::shown::quoted;
+
+use super::{AppFile, FILES, NewAppError, name, write_folder};
+
+/// Where a repository's app has the crates from, and cargo its runner.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// The root of a workspace in this file system.
+    Folder(&'a Path),
+    /// A git repository, by its URL; the runner is installed.
+    Git(&'a str),
+}
+
+/// The workspace's root, as the template's files name it.
+const WORKSPACE: &str = "/workspace";
+
+/// The packages that the template depends on, by their folders.
+const PACKAGES: [&str; 5] = [
+    "fass",
+    "kernel",
+    "sched-dag",
+    "fass/virtual-time",
+    "boot/link",
+];
+
+/// The files that an app under `apps/` does without, or has others for.
+const OWN_FILES: [AppFile; 6] = [
+    (
+        "Cargo.toml",
+        include_str!("../../template/repository/manifest.toml"),
+    ),
+    (
+        ".cargo/config.toml",
+        include_str!("../../template/repository/config.toml"),
+    ),
+    (
+        ".github/workflows/ci.yml",
+        include_str!("../../template/repository/ci.yml"),
+    ),
+    (".gitignore", "/target\n"),
+    (
+        "README.md",
+        include_str!("../../template/repository/README.md"),
+    ),
+    (
+        "rust-toolchain.toml",
+        include_str!("../../../../rust-toolchain.toml"),
+    ),
+];
+
+/// Makes a new folder, the root of an app's repository.
+///
+/// # Errors
+///
+/// The name or the folder is refused, or a file cannot be written; nothing is left then.
+pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(), NewAppError> {
+    name::check_word(name).map_err(NewAppError::Name)?;
+    if PACKAGES
+        .iter()
+        .any(|package| package.replace("fass/", "").replace('/', "-") == name)
+    {
+        return Err(NewAppError::Name(format!(
+            "{} cannot be an app's name: it is that of a package that the app needs; choose another",
+            quoted(name)
+        )));
+    }
+    let shown = quoted(&out.to_string_lossy()).to_string();
+    let change = match source {
+        Source::Git(url) if url.contains(['"', '\\', '\n']) => {
+            let line = format!("`--git {}`: no URL has such a character", quoted(url));
+            return Err(NewAppError::Name(line));
+        }
+        Source::Folder(root) => match root.to_str().filter(|root| !root.contains(['"', '\\'])) {
+            Some(root) => from_folder(root),
+            None => {
+                let line = format!("{shown}: cargo cannot name the folder of these commands");
+                return Err(NewAppError::Files(line));
+            }
+        },
+        Source::Git(url) => from_git(url),
+    };
+    let files = OWN_FILES.into_iter().chain(FILES.iter().copied());
+    write_folder(out, name, files, change, || {
+        format!("`--out` {shown}: it is there already; name a folder to be made")
+    })
+}
+
+/// Returns how texts change for crates of this workspace. Nothing is installed for them.
+fn from_folder(root: &str) -> Box<dyn Fn(&str) -> String> {
+    let root = root.to_string();
+    Box::new(move |text| {
+        let lines = text.split_inclusive('\n');
+        let kept = lines.filter(|line| !line.contains("cargo install"));
+        kept.collect::<String>()
+            .replace("ubuntu-latest", "self-hosted # where the crates are")
+            .replace(WORKSPACE, &root)
+    })
+}
+
+/// Returns how texts change for crates of this git repository.
+fn from_git(url: &str) -> Box<dyn Fn(&str) -> String> {
+    let url = url.to_string();
+    Box::new(move |text| {
+        let mut text = text.replace("\"/workspace/scripts/boot\"", "\"fass-tool\", \"boot\"");
+        for package in PACKAGES {
+            let by_path = format!("path = \"{WORKSPACE}/{package}\"");
+            text = text.replace(&by_path, &format!("git = \"{url}\""));
+        }
+        text.replace(WORKSPACE, &url)
+    })
+}
+
+/// Says what to do in the repository.
+pub(super) fn next_steps(out: &Path, source: Source<'_>) -> String {
+    let install = match source {
+        Source::Folder(_) => String::new(),
+        Source::Git(url) => {
+            format!("cargo install --locked --git {url} tool   # once: the runner, fass-tool\n")
+        }
+    };
+    format!(
+        "\
+{} is there:
+  src/lib.rs             the functions and their DAG: begin here
+  src/main.rs            boots it and reports
+  tests/virtual_time.rs  runs it on the host, in virtual time
+
+{install}cd {}
+cargo run               # boots it in QEMU
+cargo test              # tests it on the host
+git init                # docs/guide.md goes on from here
+",
+        out.display(),
+        out.display()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Source, create_repository};
+    use crate::new_app::NewAppError;
+    use crate::system::workspace;
+    use std::fs;
+    use std::path::{Path, PathBuf};
+
+    fn made(name: &str, source: Source<'_>) -> PathBuf {
+        let out = std::env::temp_dir().join(format!("{name}-{}", std::process::id()));
+        create_repository(&out, "brake-assist", source).unwrap();
+        out
+    }
+
+    fn text(out: &Path, place: &str) -> String {
+        fs::read_to_string(out.join(place)).unwrap()
+    }
+
+    #[test]
+    fn from_a_folder_every_path_is_there_and_nothing_is_installed() {
+        let out = made("from-folder", Source::Folder(workspace()));
+        let places = [text(&out, "Cargo.toml"), text(&out, ".cargo/config.toml")].concat();
+        let paths = places.split('"').filter(|word| word.starts_with('/'));
+        assert_eq!(paths.clone().count(), 6);
+        for path in paths {
+            assert!(Path::new(path).exists(), "{path}");
+        }
+        let steps = text(&out, ".github/workflows/ci.yml");
+        assert!(!steps.contains("install"), "{steps}");
+        fs::remove_dir_all(out).unwrap();
+    }
+
+    #[test]
+    fn from_git_the_url_is_all_that_is_named() {
+        let url = "https://example.org/kernel.git";
+        let out = made("from-git", Source::Git(url));
+        let manifest = text(&out, "Cargo.toml");
+        assert_eq!(
+            manifest.matches(&format!("{{ git = \"{url}\" }}")).count(),
+            5
+        );
+        let runner = text(&out, ".cargo/config.toml");
+        assert!(
+            runner.ends_with("runner = [\"fass-tool\", \"boot\"]\n"),
+            "{runner}"
+        );
+        let steps = text(&out, ".github/workflows/ci.yml");
+        let install = format!("- run: cargo install --locked --git {url} tool\n");
+        assert!(steps.contains(&install), "{steps}");
+        for file in [manifest, runner, steps] {
+            assert!(!file.contains("/workspace"), "{file}");
+        }
+        fs::remove_dir_all(out).unwrap();
+    }
+
+    #[test]
+    fn it_is_built_for_figures_as_in_the_workspace() {
+        let profile = |manifest: &str| {
+            let from = manifest.find("[profile.release]").unwrap();
+            let lines = manifest[from..].lines().filter(|line| !line.is_empty());
+            lines.map(String::from).collect::<Vec<_>>()
+        };
+        let own = profile(include_str!("../../template/repository/manifest.toml"));
+        let workspace = profile(include_str!("../../../../Cargo.toml"));
+        assert!(own.len() > 8, "{own:?}");
+        assert!(own.iter().all(|line| workspace.contains(line)), "{own:?}");
+    }
+
+    #[test]
+    fn a_folder_that_is_there_and_a_name_that_it_needs_are_refused() {
+        let out = made("there", Source::Folder(workspace()));
+        for (out, name, part) in [
+            (
+                out.clone(),
+                "brake-assist",
+                ": it is there already; name a folder to be made",
+            ),
+            (
+                out.join("new"),
+                "boot-link",
+                "of a package that the app needs; choose another",
+            ),
+            (out.join("new"), "Brake", "'B' is in it; "),
+        ] {
+            let refused = create_repository(&out, name, Source::Git("https://example.org"));
+            let Err(NewAppError::Name(line)) = refused else {
+                panic!("{name} is made: {refused:?}");
+            };
+            assert!(line.contains(part), "{line}");
+        }
+        assert!(!out.join("new").exists());
+        fs::remove_dir_all(out).unwrap();
+    }
+}

@@ -1,0 +1,56 @@
+//! The subcommand `boot`: what cargo starts a program by.
+//!
+//! Cargo hands each program that it would start to a *runner*, images and tests alike. Here an
+//! image is booted, as by `run --image`; any other program takes this process over, so that it
+//! has its words, its streams and its exit code.
+
+use std::ffi::OsString;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{self, ExitCode};
+
+use super::run;
+use crate::files;
+use crate::image;
+use crate::options::{Command, Takes};
+
+/// The table of `boot`, for its help.
+static BOOT: Command = Command {
+    invocation: "./scripts/boot",
+    about: "\
+Boots an image, with the options of ./scripts/run after it, and runs any other program
+as it is: a runner for cargo.",
+    positional: Some((
+        Takes::File("FILE"),
+        "The image or program; all words after it are for that.",
+    )),
+    options: &[],
+    notes: "\
+In the .cargo/config.toml of an app that ./scripts/new-app made:
+  [target.x86_64-unknown-linux-gnu]
+  runner = [\"/path/to/scripts/boot\"]
+
+exit codes: those of ./scripts/run, or of the program
+",
+};
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn boot(words: &[OsString]) -> ExitCode {
+    let named = words.split_first();
+    let Some((file, rest)) = named.filter(|(file, _)| !file.as_bytes().starts_with(b"-")) else {
+        return match BOOT.read(words) {
+            Ok(_) => BOOT.refuse("which file? name an image, such as `target/release/fork-join`"),
+            Err(code) => code,
+        };
+    };
+    if image::check_file(Path::new(file)).is_ok() {
+        return run(&[&["--image".into(), file.clone()], rest].concat());
+    }
+    let error = process::Command::new(file).args(rest).exec();
+    BOOT.fail(&format!(
+        "cannot start {}: {error}",
+        files::place(Path::new(file))
+    ))
+}
