@@ -31,17 +31,19 @@ pub(super) type Chain = Vec<(usize, bool)>;
 /// Exact unless the graph is large.
 #[must_use]
 pub fn covers(task: &Task, most: usize) -> Vec<u64> {
+    exact(task, most).unwrap_or_else(|| sums(&parts(task, most)))
+}
+
+/// Returns the covers, and the work of each of the chains that [`peel`] finds.
+pub(super) fn covers_and_parts(task: &Task, most: usize) -> (Vec<u64>, Vec<u64>) {
+    let parts = parts(task, most);
+    (exact(task, most).unwrap_or_else(|| sums(&parts)), parts)
+}
+
+fn exact(task: &Task, most: usize) -> Option<Vec<u64>> {
     let chains = most.min(task.subtask_count());
     if !is_small(task, chains) {
-        let mut sum = 0;
-        let peeled = peel(task, chains);
-        return peeled
-            .iter()
-            .map(|chain| {
-                sum += weight(task, chain);
-                sum
-            })
-            .collect();
+        return None;
     }
     let mut flow = Flow::none(task);
     let mut covers: Vec<u64> = Vec::new();
@@ -50,7 +52,20 @@ pub fn covers(task: &Task, most: usize) -> Vec<u64> {
         sum += flow.augment();
         covers.push(sum);
     }
-    covers
+    Some(covers)
+}
+
+fn parts(task: &Task, most: usize) -> Vec<u64> {
+    let chains = peel(task, most);
+    chains.iter().map(|chain| weight(task, chain)).collect()
+}
+
+fn sums(parts: &[u64]) -> Vec<u64> {
+    let sums = parts.iter().scan(0, |sum, part| {
+        *sum += part;
+        Some(*sum)
+    });
+    sums.collect()
 }
 
 /// Returns the chains behind the `count`-th of the covers of at most `most` chains.

@@ -67,22 +67,15 @@ impl Task {
     pub fn longest_path(&self, weights: &[u64]) -> Vec<usize> {
         let count = self.subtask_count();
         let mut levels = vec![0_u64; count];
-        let mut next = vec![None; count];
         for &subtask in self.topological_order().iter().rev() {
-            let mut rest = 0;
-            for &successor in self.successors(subtask) {
-                if next[subtask].is_none() || levels[successor] > rest {
-                    rest = levels[successor];
-                    next[subtask] = Some(successor);
-                }
-            }
-            levels[subtask] = weights[subtask] + rest;
+            let rest = self.successors(subtask).iter().map(|&next| levels[next]);
+            levels[subtask] = weights[subtask] + rest.max().unwrap_or(0);
         }
-        let mut at = (0..count).max_by_key(|&v| (levels[v], core::cmp::Reverse(v)));
+        let mut at = first_largest(0..count, &levels);
         let mut path = Vec::new();
         while let Some(subtask) = at {
             path.push(subtask);
-            at = next[subtask];
+            at = first_largest(self.successors(subtask).iter().copied(), &levels);
         }
         path
     }
@@ -114,6 +107,17 @@ impl Task {
     pub fn largest_wcet_ns(&self) -> u64 {
         self.wcets_ns().iter().copied().max().unwrap_or(0)
     }
+}
+
+/// Returns the first of the subtasks with the largest level.
+fn first_largest(subtasks: impl Iterator<Item = usize>, levels: &[u64]) -> Option<usize> {
+    subtasks.reduce(|first, next| {
+        if levels[next] > levels[first] {
+            next
+        } else {
+            first
+        }
+    })
 }
 
 #[cfg(test)]

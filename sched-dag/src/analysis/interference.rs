@@ -8,7 +8,7 @@
 
 use alloc::vec::Vec;
 
-use super::cover::{covers, peel, weight};
+use super::cover::covers_and_parts;
 use super::task::Task;
 use super::width::parallelism;
 use super::workload::{Piece, Workload};
@@ -39,11 +39,11 @@ impl Shape {
     pub(super) fn of(task: &Task, cores: u32) -> Self {
         let parallelism = parallelism(task, cores);
         let most = usize::try_from(parallelism).unwrap_or(usize::MAX);
-        let chains = peel(task, most);
+        let (covers, chains) = covers_and_parts(task, most);
         Self {
             parallelism,
-            covers: covers(task, most),
-            chains: chains.iter().map(|chain| weight(task, chain)).collect(),
+            covers,
+            chains,
         }
     }
 }
@@ -138,18 +138,15 @@ impl Other {
         count: usize,
         of_chains: Option<Piece>,
     ) -> [Piece; 2] {
-        let clipped = |workload: &Workload| {
-            let whole = workload.at(window_ns);
-            whole.least(workload.over(waiting_ns))
-        };
         let whole = &self.whole[count - 1];
-        let waiting = of_chains.map(|of_chains| {
-            let rest = self.rest.get(count - 1).map_or(Piece::NONE, clipped);
-            clipped(whole).least(of_chains.and(rest))
+        let plain = whole.at(window_ns);
+        let clipped = plain.least(whole.over(waiting_ns));
+        let by_chains = of_chains.map(|of_chains| {
+            let rest = self.rest.get(count - 1).map_or(Piece::NONE, |rest| {
+                rest.at(window_ns).least(rest.over(waiting_ns))
+            });
+            clipped.least(of_chains.and(rest))
         });
-        [
-            whole.at(window_ns),
-            waiting.unwrap_or_else(|| clipped(whole)),
-        ]
+        [plain, by_chains.unwrap_or(clipped)]
     }
 }
