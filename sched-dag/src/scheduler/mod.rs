@@ -122,7 +122,7 @@ impl Scheduler {
     ///
     /// If the options say 0 cores.
     #[must_use]
-    #[inline]
+    #[inline(never)]
     pub fn new(task_set: Arc<TaskSet>, options: SchedulerOptions) -> Self {
         assert!(
             options.cores > 0,
