@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
 
-use sched_dag::law::{self, Record, Terms, Violation};
+use sched_dag::law::{Record, Violation};
 use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, TaskSet};
 
 use crate::release::Budgets;
@@ -97,10 +97,8 @@ pub(crate) fn run(launched: Launched) -> Run {
         }
     }
     join(release);
-    let is_whole = journal.lost() == 0;
-    let record = Record::of_events(&task_set, is_whole, journal.events());
     Run {
-        record: record.expect("the times of a journal's events fit into memory"),
+        record: journal.record(&task_set),
         task_set,
         options,
         statistics,
@@ -184,24 +182,14 @@ impl Run {
     /// Returns every breach of rules R1 to R4, and whether each instance had one life and
     /// each core one instance at a time. However long something takes is right.
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
-        let terms = self.terms(u64::MAX);
-        law::violations(&self.task_set, terms, self.journal.events()).into_iter()
-    }
-
-    fn terms(&self, tolerance_ns: u64) -> Terms {
-        Terms {
-            is_whole: self.journal.lost() == 0,
-            ..Terms::whole(tolerance_ns)
-        }
+        self.journal.violations(&self.task_set).into_iter()
     }
 
     /// Returns every breach of R5 that lasts for longer than `bound_ns`: a decision takes
     /// effect when Linux has switched threads. `None` if events are lost.
     #[must_use]
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
-        (self.journal.lost() == 0).then(|| {
-            let (terms, events) = (self.terms(bound_ns), self.journal.events());
-            law::dispatch_violations(&self.task_set, &self.options, terms, events)
-        })
+        self.journal
+            .dispatch_violations(&self.task_set, &self.options, bound_ns)
     }
 }

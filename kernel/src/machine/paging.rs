@@ -79,6 +79,7 @@ impl PageTable {
 
     /// Maps the whole pages `virtual_range` to physical addresses from
     /// `physical` on, with the largest pages that fit.
+    #[inline(never)]
     pub(crate) fn map(
         &mut self,
         virtual_range: Range<u64>,

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::cell::OnceCell;
 
-use sched_dag::law::{self, Record, Tally, Terms, Violation};
+use sched_dag::law::{Record, Tally, Violation};
 use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::run::execution::{Execution, Snapshot};
@@ -85,12 +85,8 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     pub fn record(&self) -> &Record {
-        self.record.get_or_init(|| {
-            let journal = self.journal();
-            let is_whole = journal.lost() == 0;
-            Record::of_events(self.task_set(), is_whole, journal.events())
-                .expect("the times of a journal's events fit into memory")
-        })
+        self.record
+            .get_or_init(|| self.journal().record(self.task_set()))
     }
 
     /// Returns the statistics of all jobs and instances, those included whose events
@@ -188,15 +184,7 @@ impl Run {
     ///
     /// See [`Run`].
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
-        let terms = self.terms(u64::MAX);
-        law::violations(self.task_set(), terms, self.journal().events()).into_iter()
-    }
-
-    fn terms(&self, tolerance_ns: u64) -> Terms {
-        Terms {
-            is_whole: self.journal().lost() == 0,
-            ..Terms::whole(tolerance_ns)
-        }
+        self.journal().violations(self.task_set()).into_iter()
     }
 
     /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
@@ -210,11 +198,8 @@ impl Run {
     /// ```
     #[must_use]
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
-        let journal = self.journal();
-        (journal.lost() == 0).then(|| {
-            let (terms, events) = (self.terms(bound_ns), journal.events());
-            law::dispatch_violations(self.task_set(), &self.options(), terms, events)
-        })
+        self.journal()
+            .dispatch_violations(self.task_set(), &self.options(), bound_ns)
     }
 
     /// Returns how often anything, kernel or app, allocated memory between the

@@ -44,14 +44,10 @@ pub(super) struct Blocking {
 
 impl Blocking {
     /// Returns what subtasks of these WCETs can block of `task`.
-    pub(super) fn by(mut wcets_ns: Vec<u64>, cores: u32, task: &Task) -> Self {
+    pub(super) fn by(wcets_ns: &[u64], cores: u32, task: &Task) -> Self {
         let cores = usize::try_from(cores).unwrap_or(usize::MAX);
-        if cores < wcets_ns.len() {
-            wcets_ns.select_nth_unstable_by_key(cores, |&wcet| core::cmp::Reverse(wcet));
-            wcets_ns.truncate(cores);
-        }
-        let ascending = sorted(&wcets_ns);
-        let largest = ascending.iter().rev().scan(0, |sum, &wcet| {
+        let ascending = sorted(wcets_ns);
+        let largest = ascending.iter().rev().take(cores).scan(0, |sum, &wcet| {
             *sum += u128::from(wcet);
             Some(*sum)
         });

@@ -17,6 +17,8 @@
 //!
 //! Times are nanoseconds since the run's epoch.
 
+mod judged;
+
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -51,6 +53,7 @@ pub struct Journal {
 impl Journal {
     /// Takes the memory for a run, of `free_bytes`, and for at most `most_events` events.
     #[must_use]
+    #[inline(never)]
     pub fn new(task_set: &Arc<TaskSet>, free_bytes: usize, most_events: u64) -> Self {
         let needed = events_of(task_set);
         let wished = usize::try_from(most_events).unwrap_or(usize::MAX);
@@ -184,18 +187,6 @@ impl Journal {
             number -= u64::from(place.is_some());
         }
         number
-    }
-
-    /// Computes the statistics of the run, which has ended; `None` if events were
-    /// neither kept nor counted.
-    #[must_use]
-    pub fn statistics(&self, task_set: &Arc<TaskSet>) -> Option<Tally> {
-        let mut tally = match &self.tally {
-            Some(tally) => tally.clone(),
-            None => Tally::new(task_set, FINEST),
-        };
-        self.events().for_each(|event| tally.take(&event));
-        self.is_complete.then_some(tally)
     }
 }
 

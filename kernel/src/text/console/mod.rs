@@ -54,6 +54,7 @@ pub(crate) fn write_line(is_kernels: bool, line: &dyn fmt::Display) {
     write_as(kind, format_args!("{line}"));
 }
 
+#[inline(never)]
 fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
     let mut fits = true;
     let mut pieces = Pieces::new(kind, |piece, begins| {
@@ -94,6 +95,7 @@ pub(crate) fn has_pending() -> bool {
 
 /// Sends one byte that waits, if any, and reports whether there was one. It waits for
 /// the port, with interrupts and locks as they are.
+#[inline(never)]
 pub(crate) fn send_pending_byte() -> bool {
     if !has_pending() {
         return false;

@@ -103,6 +103,7 @@ pub(super) fn end() {
 }
 
 /// Takes a look if one is due. In core 0's heartbeat.
+#[inline(never)]
 pub(super) fn beat(now_ns: u64) {
     let Some(mut watch) = WATCH.try_lock() else {
         return;
@@ -139,6 +140,8 @@ fn wcet_ns(instance: Instance) -> u64 {
 }
 
 /// Says which instance keeps a core.
+#[cold]
+#[inline(never)]
 fn report(core: u32, instance: Instance, still_ns: u64) {
     let Some(task_set) = execution::task_set() else {
         return;

@@ -281,8 +281,11 @@ impl<'a> Case<'a> {
                 let others = (0..self.tasks.len()).filter(|&other| other != dag);
                 let blocking = others.filter(|&other| !counts_in_full(other, dag));
                 let wcets = blocking.flat_map(|other| self.tasks[other].wcets_ns().iter().copied());
-                figures.blocking =
-                    Blocking::by(wcets.collect(), self.settings.cores, self.tasks[dag]);
+                figures.blocking = Blocking::by(
+                    &wcets.collect::<Vec<u64>>(),
+                    self.settings.cores,
+                    self.tasks[dag],
+                );
             }
         }
     }
