@@ -14,7 +14,7 @@ use crate::ids::{DagId, to_u32};
 use crate::task_set::TaskSet;
 
 /// Instances by the absolute deadline, then by the slot of the job, then by vertex.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 pub(super) struct ByDeadline {
     /// The deadlines of the jobs that have ready instances, by slot.
     jobs: IndexedHeap<(u64, u32)>,
@@ -23,7 +23,7 @@ pub(super) struct ByDeadline {
 }
 
 /// The ready instances of one job in flight.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 struct Line {
     /// The first vertex of its DAG.
     first: u32,

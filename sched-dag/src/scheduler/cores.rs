@@ -17,13 +17,13 @@ use super::key::Key;
 use crate::ids::{CoreId, to_u32};
 
 /// The cores and their instances.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 pub(super) struct Cores {
     occupations: Box<[Occupation]>,
     idle: Vec<CoreId>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Hash)]
 struct Occupation {
     /// The key of what runs, if anything does.
     key: Key,

@@ -15,7 +15,7 @@ use crate::ids::to_u32;
 const ABSENT: u32 = u32::MAX;
 
 /// A heap with the smallest key on top.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 pub(crate) struct IndexedHeap<K> {
     entries: Vec<(K, u32)>,
     /// Where in `entries` each item is.

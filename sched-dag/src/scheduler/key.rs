@@ -26,7 +26,7 @@ use super::jobs::Job;
 use super::vertices::Vertex;
 
 /// What keys are made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Order {
     /// Each subtask has a rank of its own.
     Rank,
@@ -39,7 +39,7 @@ pub(super) enum Order {
 }
 
 /// An instance's place in the order of dispatch; the smaller key goes first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct Key(u128);
 
 impl Key {

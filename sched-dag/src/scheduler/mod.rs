@@ -59,6 +59,7 @@ mod vertices;
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::hash::{Hash, Hasher};
 
 pub use decision::Decision;
 pub use hand_off::HandOff;
@@ -77,7 +78,11 @@ use crate::policy::SchedulerOptions;
 use crate::task_set::TaskSet;
 
 /// The state of all jobs in flight.
-#[derive(Debug)]
+///
+/// A copy goes on by itself, as if it had been told all that the original was. Copies of
+/// one scheduler that [hash](Hash) alike are taken for the same state: what the task set
+/// and the options say is not in the hash.
+#[derive(Clone, Debug)]
 pub struct Scheduler {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
@@ -105,7 +110,7 @@ pub struct Scheduler {
 const OWED: u32 = 1 << 31;
 
 /// The state of one DAG.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 struct DagState {
     jobs: Jobs,
     statistics: DagStatistics,
@@ -304,6 +309,14 @@ impl Scheduler {
     pub fn instance_of(&self, vertex: Vertex) -> Instance {
         let vertex = self.vertices.get(vertex.0);
         vertex.instance(self.dags[vertex.dag.index()].jobs.job(vertex.progress))
+    }
+}
+
+impl Hash for Scheduler {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // The least time is that of the timers, and between instants nothing is ending.
+        (self.now_ns, &self.dags, &self.vertices, &self.ready).hash(state);
+        (self.fresh, &self.cores, &self.timers).hash(state);
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the scheduler counts, one fixed set of numbers a DAG.
 
 /// Counts over the jobs of one DAG since the scheduler was made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DagStatistics {
     /// Jobs released.
     pub released: u64,

@@ -31,7 +31,7 @@ use crate::policy::Preemption;
 use crate::task_set::TaskSet;
 
 /// What the next instance of a subtask does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Phase {
     /// It is not ready.
     Absent,
@@ -44,7 +44,7 @@ pub(super) enum Phase {
 }
 
 /// One subtask, in one cache line.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Hash)]
 #[repr(align(64))]
 pub(super) struct Vertex {
     pub(super) phase: Phase,
@@ -74,7 +74,7 @@ pub(super) struct Vertex {
 }
 
 /// All subtasks.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 pub(super) struct Vertices {
     vertices: Box<[Vertex]>,
     /// The successors of all vertices, those of one together.

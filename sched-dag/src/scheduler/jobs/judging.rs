@@ -21,7 +21,7 @@ use crate::scheduler::{Observer, Scheduler};
 use crate::task_set::Dag;
 
 /// One relative deadline of a DAG, and how far its jobs are judged by it.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 pub(in crate::scheduler) struct Deadline {
     relative_ns: u64,
     sinks: Box<[Sink]>,
@@ -33,7 +33,7 @@ pub(in crate::scheduler) struct Deadline {
 }
 
 /// A sink, and how many jobs it was late in.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 struct Sink {
     subtask: SubtaskId,
     misses: u64,

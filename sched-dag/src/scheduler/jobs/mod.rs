@@ -28,7 +28,7 @@ use crate::task_set::Dag;
 use judging::Deadline;
 
 /// The jobs of one DAG.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 pub(super) struct Jobs {
     /// The jobs in flight, by slot of their sequence number.
     in_flight: Box<[Job]>,
@@ -62,7 +62,7 @@ pub(super) struct Jobs {
 }
 
 /// A job in flight.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Hash)]
 pub(super) struct Job {
     /// The job's number on the nominal grid.
     pub(super) number: u64,

@@ -33,7 +33,7 @@ use crate::task_set::TaskSet;
 use ranks::{deadlines_ns, has_ranks, rank, rank_by_deadline};
 
 /// The instances in line. At most one of a vertex waits at a time.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 pub(super) struct ReadyQueue {
     /// The smallest key, or none.
     front: Key,
@@ -46,7 +46,7 @@ pub(super) struct ReadyQueue {
 }
 
 /// Its numbers are its own, so that telling the first one apart takes one comparison.
-#[derive(Debug)]
+#[derive(Clone, Debug, Hash)]
 #[repr(u8)]
 enum Rest {
     /// For keys that are ranks up to 63.

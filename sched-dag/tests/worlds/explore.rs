@@ -1,0 +1,337 @@
+//! The exploration: each state's steps, each state once.
+
+use std::collections::{BTreeSet, HashSet};
+use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Moment, Observer,
+    Scheduler, SubtaskId, verify,
+};
+
+use crate::rules::{Facts, Place, Said};
+use crate::world::World;
+
+/// By so much a late driver comes later: a release and its deadline may both have passed.
+const LATE_NS: u64 = 3;
+
+/// What was explored.
+#[derive(Default)]
+pub(crate) struct Counts {
+    worlds: usize,
+    states: usize,
+    steps: usize,
+    pub(crate) kinds: std::collections::BTreeMap<&'static str, usize>,
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            worlds,
+            states,
+            steps,
+            kinds,
+        } = self;
+        write!(
+            f,
+            "{states} states by {steps} steps ({kinds:?}) in {worlds} worlds"
+        )
+    }
+}
+
+/// What happens at an instant before its releases.
+#[derive(Clone, Copy, Debug)]
+enum What {
+    Nothing,
+    Complete(Place),
+    Both(Place, Place),
+    Fail(Place),
+    Stop(usize),
+    Pause(usize),
+    Resume(usize),
+    Signal(usize),
+}
+
+impl What {
+    const fn kind(self) -> &'static str {
+        match self {
+            Self::Nothing => "time",
+            Self::Complete(_) | Self::Both(..) => "complete",
+            Self::Fail(_) => "fail",
+            Self::Stop(_) => "stop",
+            Self::Pause(_) => "pause",
+            Self::Resume(_) => "resume",
+            Self::Signal(_) => "signal",
+        }
+    }
+
+    const fn is_disturbance(self) -> bool {
+        !matches!(self, Self::Nothing | Self::Complete(_) | Self::Both(..))
+    }
+}
+
+struct Node<'w> {
+    scheduler: Scheduler,
+    facts: Facts<'w>,
+    disturbances: u8,
+    /// The number of its last step.
+    step: Option<usize>,
+}
+
+/// The steps that led to new states: when, what, and the number of the step before.
+type Ways = Vec<(u64, What, Option<usize>)>;
+
+/// Explores a world; the error is the way to the first difference.
+pub(crate) fn explore(world: &World, counts: &mut Counts) -> Result<(), String> {
+    let options = CommitOptions::new(world.options.policy, world.options.cores)
+        .with_construction(ConstructionPolicy::any_graph());
+    let verified = verify(&world.specs(), &options).expect("the world is right");
+    let mut known = HashSet::new();
+    let mut open = vec![Node {
+        scheduler: Scheduler::new(Arc::new(verified.task_set), world.options),
+        facts: Facts::new(world),
+        disturbances: 0,
+        step: None,
+    }];
+    let mut ways = Ways::new();
+    counts.worlds += 1;
+    while let Some(node) = open.pop() {
+        for (time_ns, what) in steps(world, &node) {
+            let mut next = Node {
+                scheduler: node.scheduler.clone(),
+                facts: node.facts.clone(),
+                disturbances: node.disturbances + u8::from(what.is_disturbance()),
+                step: Some(ways.len()),
+            };
+            let taken = take(&mut next, time_ns, what);
+            *counts.kinds.entry(what.kind()).or_default() += 1;
+            counts.steps += 1;
+            let is_new = known.insert(hash(&next));
+            if is_new {
+                ways.push((time_ns, what, node.step));
+            }
+            let compared = taken.and_then(|()| compare(&next));
+            compared.map_err(|found| {
+                let way = way(&ways, node.step);
+                format!("{found}\nafter {way:?} and, at {time_ns}, {what:?}")
+            })?;
+            if is_new {
+                open.push(next);
+            }
+        }
+    }
+    counts.states += known.len();
+    Ok(())
+}
+
+/// Returns the steps up to one, the first one first.
+fn way(ways: &Ways, mut step: Option<usize>) -> Vec<(u64, What)> {
+    let mut way = Vec::new();
+    while let Some(number) = step {
+        let (time_ns, what, before) = ways[number];
+        way.push((time_ns, what));
+        step = before;
+    }
+    way.reverse();
+    way
+}
+
+/// Returns every step of a driver: at this instant, at the next, or one later still.
+fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, What)> {
+    let started = node.facts.started();
+    let mut whats = vec![What::Nothing];
+    for &one in &started {
+        whats.push(What::Complete(one));
+        let others = started.iter().filter(|&&other| other != one);
+        whats.extend(others.map(|&other| What::Both(one, other)));
+    }
+    if node.disturbances < world.disturbances() {
+        whats.extend(started.iter().map(|&place| What::Fail(place)));
+        for (dag, model) in world.dags.iter().enumerate() {
+            whats.push(What::Stop(dag));
+            whats.push(match node.facts.dags[dag].is_paused {
+                true => What::Resume(dag),
+                false => What::Pause(dag),
+            });
+            whats.extend(model.is_sporadic.then_some(What::Signal(dag)));
+        }
+    }
+    let now_ns = node.facts.now_ns;
+    let last_ns = now_ns.max(world.horizon_ns());
+    let times_ns = [0, 1, LATE_NS].map(|later_ns| now_ns + later_ns);
+    let times_ns = times_ns.into_iter().filter(|&time_ns| time_ns <= last_ns);
+    let steps = times_ns.flat_map(|time_ns| whats.iter().map(move |&what| (time_ns, what)));
+    // The first instant is one without anything.
+    let is_first = node.step.is_none();
+    let is_step = |&(time_ns, what): &(u64, What)| {
+        let is_nothing = matches!(what, What::Nothing);
+        if is_first {
+            is_nothing
+        } else {
+            !is_nothing || time_ns > now_ns
+        }
+    };
+    steps.filter(is_step).collect()
+}
+
+/// Tells both what happens, and compares what both say of jobs.
+fn take(node: &mut Node<'_>, time_ns: u64, what: What) -> Result<(), String> {
+    let Node {
+        scheduler, facts, ..
+    } = node;
+    let mut moment: Moment<'_> = scheduler.at(time_ns);
+    facts.now_ns = time_ns;
+    facts.said.iter_mut().for_each(Vec::clear);
+    let mut heard = Heard(facts.said.clone());
+    match what {
+        What::Nothing => {}
+        What::Complete(place) => {
+            moment.complete(instance(place), &mut heard);
+            facts.complete(place);
+        }
+        What::Both(one, other) => {
+            for place in [one, other] {
+                moment.complete(instance(place), &mut heard);
+                facts.complete(place);
+            }
+        }
+        What::Fail(place) => {
+            moment.fail(instance(place), &mut heard);
+            facts.fail(place);
+        }
+        What::Stop(dag) => {
+            moment.stop(id(dag), &mut heard);
+            facts.stop(dag);
+        }
+        What::Pause(dag) => {
+            moment.pause(id(dag), &mut heard);
+            facts.pause(dag);
+        }
+        What::Resume(dag) => {
+            moment.resume(id(dag));
+            facts.resume(dag);
+        }
+        What::Signal(dag) => {
+            moment.signal(id(dag), &mut heard);
+            facts.signal(dag);
+        }
+    }
+    let _decisions = moment.release_due(&mut heard).dispatch();
+    facts.end_instant();
+    same("reports", &facts.said, &heard.0)
+}
+
+/// Returns what the scheduler has that the rules have not.
+fn compare(node: &Node<'_>) -> Result<(), String> {
+    let Node {
+        scheduler, facts, ..
+    } = node;
+    let cores = (0..scheduler.options().cores).map(CoreId);
+    let running: BTreeSet<Instance> = cores.filter_map(|core| scheduler.running(core)).collect();
+    let expected: BTreeSet<Instance> = facts.running.iter().copied().map(instance).collect();
+    same("running", &expected, &running)?;
+    same(
+        "next event",
+        &facts.next_event_ns(),
+        &scheduler.next_event_ns(),
+    )?;
+    for (dag, of_dag) in facts.dags.iter().enumerate() {
+        same(
+            "counters",
+            &of_dag.statistics,
+            scheduler.statistics(id(dag)),
+        )?;
+        same("ended", &of_dag.is_ended, &scheduler.is_ended(id(dag)))?;
+        let waiting = facts.waiting(dag) as u64;
+        same("waiting", &waiting, &scheduler.waiting(id(dag)))?;
+    }
+    Ok(())
+}
+
+/// What the scheduler reports of each DAG's jobs.
+struct Heard(Vec<Vec<Said>>);
+
+impl Heard {
+    fn hear(&mut self, dag: DagId, said: impl Fn(usize) -> Said, job: u64) {
+        self.0[dag.index()].push(said(usize::try_from(job).expect("few jobs")));
+    }
+}
+
+impl Observer for Heard {
+    fn released(&mut self, dag: DagId, job: u64, _release_ns: u64) {
+        self.hear(dag, Said::Released, job);
+    }
+
+    fn queued(&mut self, dag: DagId, job: u64, _release_ns: u64) {
+        self.hear(dag, Said::Queued, job);
+    }
+
+    fn skipped(&mut self, dag: DagId, job: u64, _release_ns: u64) {
+        self.hear(dag, Said::Skipped, job);
+    }
+
+    fn aborted(&mut self, dag: DagId, job: u64) {
+        self.hear(dag, Said::Aborted, job);
+    }
+
+    fn deadline_missed(&mut self, dag: DagId, job: u64, _deadline_ns: u64) {
+        self.hear(dag, Said::Missed, job);
+    }
+
+    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
+        self.hear(dag, |job| Said::Completed(job, outcome), job);
+    }
+
+    fn ended(&mut self, dag: DagId) {
+        self.0[dag.index()].push(Said::Ended);
+    }
+}
+
+fn same<T: PartialEq + fmt::Debug>(what: &str, expected: &T, happened: &T) -> Result<(), String> {
+    match expected == happened {
+        true => Ok(()),
+        false => Err(format!(
+            "{what}: expected {expected:?}, happened {happened:?}"
+        )),
+    }
+}
+
+fn hash(node: &Node<'_>) -> u128 {
+    let mut mixed = Mixed(1);
+    (node.disturbances, &node.facts.dags, &node.facts.running).hash(&mut mixed);
+    node.scheduler.hash(&mut mixed);
+    mixed.0
+}
+
+/// A hash of 128 bits, quick and good enough for some millions of states.
+struct Mixed(u128);
+
+impl Hasher for Mixed {
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            let mixed = self.0 ^ u128::from(u64::from_le_bytes(word));
+            // An odd factor without pattern (of the PCG generators), and its upper half back.
+            let mixed = mixed.wrapping_mul(0x2360_ed05_1fc6_5da4_4385_df64_9fcc_f645);
+            self.0 = mixed ^ (mixed >> 67);
+        }
+    }
+
+    fn finish(&self) -> u64 {
+        unreachable!("all 128 bits are taken")
+    }
+}
+
+fn id(dag: usize) -> DagId {
+    DagId(u32::try_from(dag).expect("few DAGs"))
+}
+
+fn instance((dag, job, subtask): Place) -> Instance {
+    Instance {
+        dag: id(dag),
+        job: job as u64,
+        subtask: SubtaskId(u32::try_from(subtask).expect("few subtasks")),
+    }
+}
