@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "run",
     "boot",
     "test",
@@ -23,6 +23,7 @@ const COMMANDS: [&str; 18] = [
     "bench join-latency",
     "bench makespan",
     "bench native",
+    "bench sizes",
     "oracle",
     "oracle bounds",
     "oracle schedules",

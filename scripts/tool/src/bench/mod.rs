@@ -11,15 +11,18 @@
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
 //! - [`makespan`]: task graphs on the machine, next to their published optima;
-//! - [`native`]: the scheduler on this host's own processors.
+//! - [`native`]: the scheduler on this host's own processors;
+//! - [`sizes`]: what each part of an image takes of its room.
 
 pub mod bounds;
+mod code;
 pub mod hand_off;
 pub mod join_latency;
 pub mod makespan;
 pub mod native;
 mod plots;
 pub mod scheduler;
+pub mod sizes;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -62,6 +65,11 @@ static BENCH: Menu = Menu {
             name: "native",
             about: "the scheduler on this host's own processors, in nanoseconds",
             work: native::run,
+        },
+        Choice {
+            name: "sizes",
+            about: "what each part of an image takes of its room",
+            work: sizes::run,
         },
     ],
     notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",

@@ -10,11 +10,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 
 use super::plan::Boot;
-use crate::places::{self, Frame};
+use crate::bench::code::{self, Frames};
+use crate::places::Frame;
 use crate::qemu::{Ending, Mode};
 use crate::{protocol::Status, system};
 
@@ -53,23 +53,17 @@ const STEPS: [(&str, &[&str]); 11] = [
     ("the app's function", &["apps/"]),
 ];
 
-/// Everything in the image that contains an address, the innermost first.
-type Frames = BTreeMap<u64, Vec<Frame>>;
-
 /// Boots, prints how many instructions each step takes, and writes all of them to a file.
 ///
 /// # Errors
 ///
 /// In words: a program is missing, the guest failed, or the file cannot be written.
 pub(super) fn list(boot: &Boot, image: &Path, file: &Path) -> Result<(), String> {
-    let [objdump, addr2line] = ["objdump", "addr2line"].map(program);
-    let (objdump, addr2line) = (objdump?, addr2line?);
+    let instructions = code::instructions(image)?;
     let executed = executed(boot, image)?;
-    let instructions = instructions(&objdump, image)?;
     let frames = |addresses: BTreeSet<u64>| {
         let addresses: Vec<u64> = addresses.into_iter().collect();
-        places::frames(&addr2line, image, &addresses)
-            .ok_or_else(|| format!("`{}` failed", addr2line.display()))
+        code::frames(image, &addresses)
     };
     let is_call = |address: &u64| {
         let text = instructions.get(address);
@@ -81,11 +75,6 @@ pub(super) fn list(boot: &Boot, image: &Path, file: &Path) -> Result<(), String>
     print!("{}", table(hop, &frames));
     let listing = listing(hop, &frames, &instructions);
     fs::write(file, listing).map_err(|error| format!("`{}`: {error}", file.display()))
-}
-
-fn program(name: &str) -> Result<PathBuf, String> {
-    let missing = || format!("`{name}` is not installed; install the package binutils");
-    system::find_program(name).ok_or_else(missing)
 }
 
 /// Boots the image and returns the addresses of all instructions that it executes.
@@ -127,22 +116,6 @@ fn addresses(mut log: impl BufRead) -> Vec<u64> {
         line.clear();
     }
     addresses
-}
-
-/// Returns the instructions of the image by their addresses.
-fn instructions(objdump: &Path, image: &Path) -> Result<BTreeMap<u64, String>, String> {
-    let output = Command::new(objdump)
-        .args(["-d", "-C", "--no-show-raw-insn"])
-        .arg(image)
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|error| format!("`{}`: {error}", objdump.display()))?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    let instruction = |line: &str| {
-        let (address, text) = line.trim().split_once(":\t")?;
-        Some((u64::from_str_radix(address, 16).ok()?, text.to_string()))
-    };
-    Ok(text.lines().filter_map(instruction).collect())
 }
 
 /// Returns where subtasks' futures are polled: the one indirect call of `plan.rs` that was

@@ -1,0 +1,57 @@
+//! The code of an image: its instructions, and the functions that each is of.
+//!
+//! `objdump` and `addr2line` of binutils know both.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::places::{self, Frame};
+use crate::system;
+
+/// Addresses with everything that contains them, the innermost first.
+pub(super) type Frames = BTreeMap<u64, Vec<Frame>>;
+
+/// The most addresses that fit a command line with room to spare.
+const AT_ONCE: usize = 20_000;
+
+/// Returns the instructions of an image by their addresses.
+///
+/// # Errors
+///
+/// In words: `objdump` is missing or cannot be started.
+pub(super) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String> {
+    let objdump = program("objdump")?;
+    let output = Command::new(&objdump)
+        .args(["-d", "-C", "--no-show-raw-insn"])
+        .arg(image)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| format!("`{}`: {error}", objdump.display()))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let instruction = |line: &str| {
+        let (address, text) = line.trim().split_once(":\t")?;
+        Some((u64::from_str_radix(address, 16).ok()?, text.to_string()))
+    };
+    Ok(text.lines().filter_map(instruction).collect())
+}
+
+/// Returns what contains each of some addresses.
+///
+/// # Errors
+///
+/// In words: `addr2line` is missing or has failed.
+pub(super) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames, String> {
+    let addr2line = program("addr2line")?;
+    let mut all = Frames::new();
+    for some in addresses.chunks(AT_ONCE) {
+        let found = places::frames(&addr2line, image, some);
+        all.append(&mut found.ok_or_else(|| format!("`{}` failed", addr2line.display()))?);
+    }
+    Ok(all)
+}
+
+fn program(name: &str) -> Result<PathBuf, String> {
+    let missing = || format!("`{name}` is not installed; install the package binutils");
+    system::find_program(name).ok_or_else(missing)
+}

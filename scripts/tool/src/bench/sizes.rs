@@ -1,0 +1,144 @@
+//! What each part of an image takes of its room.
+//!
+//! An instruction is its part's: of the functions that it was inlined from, the innermost
+//! that is in a file of ours decides, so what the library does for a part counts as the
+//! part's. A part is a crate's room, or the file there, that the file is in. What comes
+//! from no file of ours, like the code that drops a value, is told apart, and so is what is
+//! no code: constants, variables that do not begin as zeros, headers.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use super::code::{self, Frames};
+use crate::image;
+use crate::options::{Command, Opt, Takes};
+use crate::places::Frame;
+use crate::system;
+
+static TABLE: Command = Command {
+    invocation: "./scripts/bench sizes",
+    about: "Says how many bytes of an image each part of the code takes.",
+    positional: None,
+    options: &[Opt::new("app", Takes::Text("APP"), "The app.").or("fork-join")],
+    notes: "\
+Builds the image. Prints a table, the largest part first, and a JSON object for each part.
+Counted are the bytes that `strip` leaves.
+
+Exit code: 0 the image is within its limit; 1 it is not, or could not be read; 2 the
+command line is refused.
+",
+};
+
+/// Of no file of ours.
+const LIBRARY: &str = "the library, and what drops values";
+
+/// Weighs, and prints.
+pub(super) fn run(words: &[OsString]) -> ExitCode {
+    let options = match TABLE.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    let app = options.text("app").unwrap_or_default();
+    if let Err(error) = image::check_app(app) {
+        return TABLE.refuse(&error.to_string());
+    }
+    match weigh(app) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(line) => TABLE.fail(&line),
+    }
+}
+
+/// Prints what the parts of an app's image take, and returns whether all are within its limit.
+fn weigh(app: &str) -> Result<bool, String> {
+    let image = image::build(app).map_err(|error| error.to_string())?;
+    let stripped = image.stripped_bytes()?;
+    let addresses: Vec<u64> = code::instructions(&image.path)?.into_keys().collect();
+    let mut parts = parts(&addresses, &code::frames(&image.path, &addresses)?);
+    let code: u64 = parts.values().sum();
+    let rest = stripped.saturating_sub(code);
+    parts.insert("constants, variables, headers".into(), rest);
+    let mut parts: Vec<_> = parts.into_iter().collect();
+    parts.sort_by_key(|&(_, bytes)| std::cmp::Reverse(bytes));
+    for (part, bytes) in &parts {
+        println!("{bytes:>9} {:>5.1} %  {part}", share(*bytes, stripped));
+    }
+    let most = image::most_stripped_bytes(app);
+    println!("{stripped:>9} bytes of `{app}` in all, of {most} at most");
+    for (part, bytes) in &parts {
+        println!(
+            "{{\"kind\":\"bench\",\"name\":\"size\",\"app\":\"{app}\",\"part\":\"{part}\",\
+             \"bytes\":{bytes}}}"
+        );
+    }
+    Ok(stripped <= most)
+}
+
+fn share(bytes: u64, of: u64) -> f64 {
+    100.0 * bytes as f64 / of.max(1) as f64
+}
+
+/// Returns the bytes of each part. An instruction is as long as it is to the next one; the
+/// last one, and what ends before a gap, counts as one byte.
+fn parts(addresses: &[u64], frames: &Frames) -> BTreeMap<String, u64> {
+    /// No instruction is longer (Intel SDM, volume 2, 2.3.11).
+    const LONGEST: u64 = 15;
+    let root = format!("{}/", system::workspace().display());
+    let next = addresses.iter().skip(1).chain(addresses.last());
+    let mut parts = BTreeMap::new();
+    for (address, next) in addresses.iter().zip(next) {
+        let bytes = match next - address {
+            bytes @ 1..=LONGEST => bytes,
+            _ => 1,
+        };
+        let frames = frames.get(address).map_or(&[][..], |frames| frames);
+        let ours = frames.iter().find_map(|frame| part(frame, &root));
+        *parts.entry(ours.unwrap_or(LIBRARY.into())).or_default() += bytes;
+    }
+    parts
+}
+
+/// Returns the part that a frame's file is in, such as `kernel: run`; `None` if the file is
+/// not ours.
+fn part(frame: &Frame, root: &str) -> Option<String> {
+    let path = frame.line.strip_prefix(root)?;
+    let (owner, below) = path.split_once("/src/")?;
+    let room = below.split(['/', ':']).next()?;
+    Some(format!("{owner}: {}", room.trim_end_matches(".rs")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LIBRARY, parts};
+    use crate::bench::code::Frames;
+    use crate::places::Frame;
+    use crate::system;
+
+    #[test]
+    fn an_instruction_is_its_innermost_file_of_ours_and_gaps_are_nobodys() {
+        let root = system::workspace().display().to_string();
+        let frame = |line: &str| Frame {
+            function: "f".into(),
+            line: line.replace("ROOT", &root),
+        };
+        let library = frame("/rustc/x/library/core/src/ptr/mod.rs:1");
+        let inlined = vec![
+            library.clone(),
+            frame("ROOT/sched-dag/src/order.rs:7"),
+            frame("ROOT/kernel/src/run/worker.rs:4"),
+        ];
+        let of_room = vec![frame("ROOT/kernel/src/run/execution/step.rs:4")];
+        let frames = Frames::from([(10, inlined), (13, vec![library]), (20, of_room)]);
+        let found = parts(&[10, 13, 20, 100, 104], &frames);
+        let expected = [
+            ("kernel: run", 1),
+            (LIBRARY, 7 + 4 + 1),
+            ("sched-dag: order", 3),
+        ];
+        assert_eq!(
+            found,
+            expected.map(|(part, bytes)| (part.into(), bytes)).into()
+        );
+    }
+}
