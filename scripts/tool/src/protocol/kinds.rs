@@ -93,6 +93,18 @@ pub const KINDS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "drone",
+        &[
+            "waypoints",
+            "landed",
+            "deadline_misses",
+            "attitude_misses",
+            "skips",
+            "violations",
+            "allocations",
+        ],
+    ),
+    (
         "fork_join",
         &[
             "subtasks",

@@ -1,0 +1,96 @@
+//! Boots into a flight and says how it went.
+
+#![no_std]
+#![no_main]
+
+extern crate alloc;
+
+use alloc::format;
+use core::time::Duration;
+
+use drone::{Flight, Workload};
+use fass::finish_create_dags;
+use kernel::report::Ns;
+use kernel::{Ending, Machine, Run, json, println};
+use sched_dag::{DagId, Vertex};
+
+kernel::entry!(main);
+
+fn main(machine: &Machine) -> Result<(), Ending> {
+    let options = machine.options();
+    let seconds = options.number("seconds", 1..=100_000, 8)?;
+    let seed = options.number("seed", 0..=u64::MAX, 1)?;
+    let delay_us = options.number("delay_us", 0..=1_000_000, 0)?;
+    options.finish(&["seconds", "seed", "delay_us"])?;
+    let workload = Workload {
+        seconds,
+        seed,
+        takes_wcet: false,
+        delay: Duration::from_micros(delay_us),
+    };
+    if delay_us > 0 {
+        machine.accept_exceeded_bounds();
+    }
+
+    let system = workload.build();
+    let commit = finish_create_dags(&system.dags)?;
+    for answer in commit.answers() {
+        println!("{answer}");
+    }
+    for staleness in commit.staleness() {
+        println!("{staleness}");
+    }
+    let run = machine.run()?;
+    report(&run, &system.flight)
+}
+
+fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
+    println!();
+    println!("{flight}");
+    let (mut misses, mut skips) = (0, 0);
+    let mut vertices = (0..).map(Vertex);
+    for (id, dag) in (0..).map(DagId).zip(run.task_set().dags()) {
+        let counts = run.statistics(id);
+        misses += counts.misses;
+        skips += counts.skips;
+        println!(
+            "  {:<10}{:>7} jobs, {} deadlines missed, {} skipped",
+            dag.name(),
+            counts.completed,
+            counts.misses,
+            counts.skips
+        );
+        for (subtask, vertex) in dag.subtasks().iter().zip(&mut vertices) {
+            let observed = run
+                .times()
+                .map(|times| times.subtask(vertex).execution_time.max());
+            println!(
+                "    {:<12} WCET {:>10}, observed {:>12}",
+                subtask.name(),
+                Ns(subtask.wcet_ns().unwrap_or(0)),
+                Ns(observed.unwrap_or(0))
+            );
+        }
+    }
+    let violations = run
+        .violations()
+        .inspect(|found| println!("violation: {found}"))
+        .count() as u64;
+    println!(
+        "{violations} violations, {} allocations while it flew",
+        run.allocations()
+    );
+    json::emit("drone", |line| {
+        line.number("waypoints", flight.waypoints())
+            .number("landed", u64::from(flight.has_landed()))
+            .number("deadline_misses", misses)
+            .number("attitude_misses", run.statistics(DagId(0)).misses)
+            .number("skips", skips)
+            .number("violations", violations)
+            .number("allocations", run.allocations());
+    });
+    match violations {
+        0 => Ok(()),
+        count => Err(Ending::Failure(format!("{count} violations"))),
+    }
+}

@@ -1,0 +1,54 @@
+//! The mathematical functions that `core` lacks, for apps: square root and trigonometry.
+//!
+//! A result depends on its argument alone: it has the same bits on the host and on the machine,
+//! and none depends on a library of the host. Errors are given in *ulp*, units in the last place
+//! of the true value; `tests/references.rs` measures them against true values in 90 digits.
+//!
+//! | function | error, at most | arguments |
+//! |---|---|---|
+//! | [`sqrt`] | 0.5 ulp, as IEEE 754 demands | all |
+//! | [`sin`], [`cos`] | 1 ulp | up to [`LARGEST_ANGLE`] |
+//! | [`tan`] | 2 ulp | up to [`LARGEST_ANGLE`] |
+//! | [`atan`], [`atan2`] | 2 ulp | all |
+//! | [`asin`], [`acos`] | 3 ulp | from -1 to 1 |
+//!
+//! Outside, and of NaN, the result is NaN. [`single`] has the same functions of `f32`, which are
+//! calculated in `f64`, so that the error is next to 0.5 ulp.
+//!
+//! Other functions (`exp`, `ln`, `pow`) are in crates such as `libm`: any `no_std` crate works in
+//! an app.
+//!
+//! ```
+//! let tilt = maths::atan2(1.0, 2.0);
+//! assert!((maths::tan(tilt) - 0.5).abs() < 1e-15);
+//! assert_eq!(maths::sqrt(2.25), 1.5);
+//! assert_eq!(maths::single::sin(0.5), 0.5_f32.sin());
+//! ```
+
+#![no_std]
+
+mod arcs;
+#[allow(unsafe_code, reason = "the processor's square root")]
+mod root;
+pub mod single;
+mod turns;
+
+pub use arcs::{acos, asin, atan, atan2};
+pub use root::sqrt;
+pub use turns::{LARGEST_ANGLE, cos, sin, sin_cos, tan};
+
+/// What is added to a number below 2^51 so that its last bit counts 1: the sum is rounded, and
+/// its low bits are an integer.
+const ROUNDS: f64 = 6_755_399_441_055_744.0;
+
+/// Returns the nearest integer, as a number and by its low bits, of a number below 2^51.
+fn nearest_integer(x: f64) -> (f64, u64) {
+    let shifted = x + ROUNDS;
+    (shifted - ROUNDS, shifted.to_bits())
+}
+
+/// Returns a polynomial's value, from its coefficients, the constant first.
+fn polynomial(x: f64, coefficients: &[f64]) -> f64 {
+    let highest_first = coefficients.iter().rev();
+    highest_first.fold(0.0, |sum, coefficient| sum * x + coefficient)
+}

@@ -1,0 +1,29 @@
+//! The drone on one core and on several.
+
+use harness::Guest;
+
+#[test]
+fn it_flies_without_a_miss_on_one_two_and_four_cores() {
+    for cores in [1, 2, 4] {
+        let guest = Guest::new("drone").cores(cores).word("seconds=3");
+        let outcome = guest.succeed();
+        let line = outcome.transcript.of_kind("drone").next();
+        let line = line.expect("the app's line");
+        let number = |name: &str| line.number_at(name).expect(name);
+        assert!(number("waypoints") >= 2, "{cores} cores: {}", line.text);
+        for none in ["deadline_misses", "skips", "violations", "allocations"] {
+            assert_eq!(number(none), 0, "{cores} cores: {}", line.text);
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_is_too_slow_skips_frames_and_the_control_loop_keeps_its_deadlines() {
+    let guest = Guest::new("drone").cores(2);
+    let outcome = guest.word("seconds=2").word("delay_us=40000").succeed();
+    let line = outcome.transcript.of_kind("drone").next();
+    let line = line.expect("the app's line");
+    let number = |name: &str| line.number_at(name).expect(name);
+    assert!(number("skips") >= 20, "{}", line.text);
+    assert_eq!(number("attitude_misses"), 0, "{}", line.text);
+}
