@@ -1,6 +1,6 @@
 //! The end of the run: telling QEMU, or another host.
 
-use super::{cpu, port};
+use super::{cpu, non_maskable, port, this_core};
 
 /// How a run ended, as the value that QEMU's debug exit device takes. QEMU's
 /// own exit status is twice that plus 1.
@@ -14,10 +14,14 @@ pub(crate) enum Status {
     Usage = 0x12,
 }
 
-/// Ends the run. Without the debug exit device the machine stays halted.
+/// Ends the run. Without the debug exit device the machine stays halted: all its cores are,
+/// or one would look into why this one is silent.
 pub(crate) fn exit(status: Status) -> ! {
     const DEBUG_EXIT: u16 = 0xf4;
     // SAFETY: the port belongs to QEMU's isa-debug-exit device or to nobody.
     unsafe { port::write_u32(DEBUG_EXIT, status as u32) };
+    if this_core::is_ready() {
+        non_maskable::stop_others();
+    }
     cpu::halt_forever()
 }
