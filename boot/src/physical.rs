@@ -22,33 +22,36 @@ pub trait PhysicalMemory {
     }
 }
 
-/// The machine's own memory through the boot identity map: 1 KiB to 4 GiB. (The
-/// first KiB holds the interrupt vectors of real mode; loaders do use the next.)
+/// The machine's own memory below 4 GiB, as the boot page table shows it a second time. There
+/// no address is null, and a loader may leave what it tells at address 0.
 #[derive(Clone, Copy, Debug)]
-pub struct IdentityMap(());
+pub struct LowMemory(());
 
-impl IdentityMap {
-    /// Grants reading through the identity map.
+/// Where it is shown: `entry.s` makes the second entry of the root table the first's twin.
+const WINDOW: usize = 1 << 39;
+
+impl LowMemory {
+    /// Grants reading.
     ///
     /// # Safety
     ///
-    /// 1. The first 4 GiB are identity-mapped for as long as the value, a copy
-    ///    of it, or a slice that it gave is in use.
+    /// 1. The boot page table is in use for as long as the value, a copy of it, or a slice
+    ///    that it gave is.
     /// 2. Nothing writes to what is read through it meanwhile.
     pub const unsafe fn new() -> Self {
         Self(())
     }
 }
 
-impl PhysicalMemory for IdentityMap {
+impl PhysicalMemory for LowMemory {
     fn bytes(&self, address: u64, length: usize) -> Option<&[u8]> {
         let end = address.checked_add(u64::try_from(length).ok()?)?;
-        if address < 1024 || end > 1 << 32 {
+        if end > 1 << 32 {
             return None;
         }
-        let start = usize::try_from(address).ok()? as *const u8;
-        // SAFETY: the range lies between 1 KiB and 4 GiB, which conditions 1 and
-        // 2 of `new` make readable and constant.
+        let start = (WINDOW + usize::try_from(address).ok()?) as *const u8;
+        // SAFETY: the range lies below 4 GiB, which conditions 1 and 2 of `new` make
+        // readable and constant.
         Some(unsafe { core::slice::from_raw_parts(start, length) })
     }
 }

@@ -67,6 +67,7 @@ pvh_entry:
     mov eax, offset boot_directory_pointers
     or eax, 3
     mov [edi], eax
+    mov [edi + 8], eax              # from 512 GiB on once more, see boot::physical
     mov cr3, edi
 
     lgdt [boot_gdt_pointer]

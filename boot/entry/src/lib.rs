@@ -20,7 +20,7 @@ pub mod processors;
 
 use core::arch::{asm, global_asm};
 
-use boot::physical::IdentityMap;
+use boot::physical::LowMemory;
 use boot::{BootInfo, multiboot2, pvh};
 
 global_asm!(
@@ -42,10 +42,10 @@ unsafe extern "Rust" {
 /// Multiboot2's list with its own length, which is never so large.
 extern "C" fn rust_entry(told: u32) -> ! {
     let entry_tsc = time_stamp();
-    // SAFETY: 1. `entry.s` mapped the first 4 GiB one to one, and the view is
-    // dropped before the kernel changes the map. 2. Only this processor runs,
-    // and it writes to its stack alone, which the loader's data does not overlap.
-    let memory = unsafe { IdentityMap::new() };
+    // SAFETY: 1. `entry.s` has loaded the boot page table, and the view is dropped
+    // before the kernel loads its own. 2. Only this processor runs, and it writes to its
+    // stack alone, which the loader's data does not overlap.
+    let memory = unsafe { LowMemory::new() };
     let mut info = BootInfo::new(entry_tsc);
     if !pvh::read(&memory, u64::from(told), &mut info) {
         multiboot2::read(&memory, u64::from(told), &mut info);

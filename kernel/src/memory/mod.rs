@@ -1,8 +1,8 @@
 //! Memory: frames, the address space, stacks and the heap.
 //!
-//! Virtual and physical addresses are the same, except for stacks: they live in
+//! Virtual and physical addresses are the same, with two exceptions. Stacks live in
 //! a window of their own, so that each can have an absent guard page below it
-//! that catches an overflow at once.
+//! that catches an overflow at once; so does the loader's module, which may lie in page 0.
 
 pub(crate) mod frames;
 pub(crate) mod heap;
@@ -18,6 +18,9 @@ use frames::{FRAME, Frames, less};
 
 /// Where stacks live: 512 GiB, beyond any physical address of ordinary PCs.
 const STACK_WINDOW: u64 = 1 << 39;
+
+/// Where the module is: its physical address beyond this one.
+pub(crate) const MODULE_WINDOW: u64 = 1 << 40;
 
 /// There is not enough memory for what was asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,8 +113,7 @@ pub(crate) fn trampoline_page(map: &[MemoryRegion], modules: &[Module]) -> Optio
     u8::try_from(page.start / PAGE).ok()
 }
 
-/// Reports whether a module lies in one range of usable memory, apart from page 0 and
-/// the image.
+/// Reports whether a module lies in one range of usable memory, apart from the image.
 pub(crate) fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range<u64>) -> bool {
     let fits = |region: &MemoryRegion| {
         region.usable && region.start <= module.start && module.end <= region.end
@@ -121,12 +123,11 @@ pub(crate) fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range
         return false;
     };
     module.start < module.end
-        && module.start >= PAGE
         && (end <= image.start || module.start / PAGE * PAGE >= image.end)
         && map.iter().any(fits)
 }
 
-/// Maps the image with its rights, the module as constant, all other usable
+/// Maps the image with its rights, the module as constant in its window, all other usable
 /// memory as data, and one page of a device's registers.
 fn map_all(
     table: &mut PageTable,
@@ -144,7 +145,8 @@ fn map_all(
     for (range, access) in sections {
         table.map(range.clone(), range.start, access, new_frame)?;
     }
-    table.map(module.clone(), module.start, Access::Constant, new_frame)?;
+    let shown = MODULE_WINDOW + module.start..MODULE_WINDOW + module.end;
+    table.map(shown, module.start, Access::Constant, new_frame)?;
     for region in map.iter().filter(|region| region.usable) {
         // Page 0 stays absent, so that a null pointer faults.
         let start = region.start.max(PAGE).next_multiple_of(PAGE);
@@ -230,8 +232,7 @@ mod tests {
             lies(64 << 10, 65 << 10),
             "below the first MiB, as GRUB does"
         );
-        assert!(lies(4096, 8192));
-        assert!(!lies(4095, 8192), "into page 0");
+        assert!(lies(0, 8192), "in page 0, as GRUB does under UEFI");
         assert!(!lies(639 << 10, 641 << 10), "into the firmware's");
         assert!(!lies(MIB, 2 * MIB + 1), "into the image");
         assert!(!lies(3 * MIB - 1, 4 * MIB), "out of the image");

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::cell::Cell;
 
 use boot::acpi::{self, Platform};
-use boot::physical::IdentityMap;
+use boot::physical::LowMemory;
 use boot::{BootInfo, Module};
 
 use super::{probe, settings};
@@ -88,11 +88,12 @@ fn module(info: &BootInfo) -> Option<Module> {
 
 /// Returns the bytes of the loader's module, once it is mapped.
 fn module_bytes(info: &'static BootInfo) -> Option<&'static [u8]> {
-    let Module { start, end } = module(info)?;
-    let length = usize::try_from(end - start).ok()?;
-    // SAFETY: `memory::initialize` mapped the module as constant at its physical
-    // address, for good, and kept its pages from the frames: nobody writes there.
-    Some(unsafe { core::slice::from_raw_parts(start as *const u8, length) })
+    let module = module(info)?;
+    let length = usize::try_from(module.end - module.start).ok()?;
+    let start = (memory::MODULE_WINDOW + module.start) as *const u8;
+    // SAFETY: `memory::initialize` mapped the module as constant in its window, for good,
+    // and kept its pages from the frames: nobody writes there.
+    Some(unsafe { core::slice::from_raw_parts(start, length) })
 }
 
 /// What the boot processor takes along to its own stack.
@@ -166,10 +167,9 @@ fn start_others(info: &BootInfo, layout: &memory::Layout, cores: usize) {
 }
 
 fn read_platform(info: &BootInfo) -> Platform {
-    // SAFETY: 1. Until `memory::initialize` the boot table is in use, which
-    // identity-maps the first 4 GiB, and the view ends with this function.
-    // 2. Nothing writes to the firmware's tables.
-    let memory = unsafe { IdentityMap::new() };
+    // SAFETY: 1. Until `memory::initialize` the boot table is in use, and the view ends
+    // with this function. 2. Nothing writes to the firmware's tables.
+    let memory = unsafe { LowMemory::new() };
     acpi::read(&memory, info.rsdp).unwrap_or_else(|error| panic!("{error}"))
 }
 
