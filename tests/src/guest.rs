@@ -27,7 +27,7 @@ use tool::image::{self, Image};
 use tool::install;
 use tool::outcome::{Outcome, boot_with_input};
 use tool::protocol::Status;
-use tool::qemu::{Machine, Mode, Qemu};
+use tool::qemu::{Loader, Machine, Mode, Qemu};
 use tool::system;
 
 /// How long a guest may take in wall time if the test does not say: many times what
@@ -98,6 +98,15 @@ impl Guest {
         self
     }
 
+    /// Boots as a PC does: from a stick, by this loader and GRUB, with its words and its
+    /// module on the stick. It is in real time, as firmware takes long otherwise, on a q35.
+    #[must_use]
+    pub fn from_stick(self, loader: Loader) -> Guest {
+        let mut guest = self.in_real_time().machine(Machine::Q35);
+        guest.qemu.loader = loader;
+        guest.memory_mib(loader.least_memory_mib().max(32))
+    }
+
     /// Adds words to the guest's command line, such as `jobs=20`.
     #[must_use]
     pub fn word(mut self, word: &str) -> Guest {
@@ -163,6 +172,7 @@ impl Guest {
                 Some(file) => install::ensure_qemu().map(|()| file.clone())?,
                 None => built(&self.package)?.path,
             };
+            install::ensure_loader(self.qemu.loader)?;
             let log = system::new_log(&self.package)?;
             let mut qemu = self.qemu.clone();
             let mode = format!("mode={}", qemu.mode);
@@ -242,7 +252,7 @@ impl<'g> Talk<'g> {
 }
 
 /// Builds each image once in the life of a test binary.
-fn built(package: &str) -> Result<Image, String> {
+pub(crate) fn built(package: &str) -> Result<Image, String> {
     static BUILT: Mutex<BTreeMap<String, Image>> = Mutex::new(BTreeMap::new());
     // The map is whole at every moment, so a panic elsewhere does not harm it.
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,8 +1,9 @@
 //! What the boot tests share, above the host tool's library: a [`Guest`] that a test
-//! describes and boots, and the tutorials, whose examples are this crate's doctests.
+//! describes and boots, [`bochs`], where it is not QEMU that boots it, and the tutorials, whose examples are this crate's doctests.
 
 #![forbid(unsafe_code)]
 
+pub mod bochs;
 pub mod guest;
 pub mod guide;
 

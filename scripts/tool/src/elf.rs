@@ -26,6 +26,36 @@ const NAME_BYTES: u64 = 24;
 /// In words: it is none, or a table points outside it.
 pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
     check(file)?;
+    let end = loaded_bytes(file)?;
+    let mut kept = 2; // the null section and the section names
+    for section in table(file, 40, 60, SECTION_HEADER_BYTES)? {
+        let flags = number(file, section + 8, 8)?;
+        kept += u64::from(flags & SHF_ALLOC != 0);
+    }
+    Ok(end + kept * (SECTION_HEADER_BYTES + NAME_BYTES))
+}
+
+/// Cuts a file down to what is loaded of it: symbols and debugging data go, and with them the
+/// table of sections, which GRUB would load otherwise.
+///
+/// # Errors
+///
+/// As [`stripped_bytes`].
+pub fn loaded(mut file: Vec<u8>) -> Result<Vec<u8>, String> {
+    check(&file)?;
+    let end = usize::try_from(loaded_bytes(&file)?).unwrap_or(usize::MAX);
+    if file.len() < end {
+        return Err("a segment lies outside the file".into());
+    }
+    file.truncate(end);
+    // Where the table of sections begins; its entries' size, their number, that of the names.
+    file[40..48].fill(0);
+    file[58..64].fill(0);
+    Ok(file)
+}
+
+/// Returns how far headers and segments reach into the file.
+fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
     let segments = table(file, 32, 56, PROGRAM_HEADER_BYTES)?;
     let mut end = 64 + PROGRAM_HEADER_BYTES * count(segments.len());
     for segment in segments {
@@ -33,12 +63,7 @@ pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
         let length = number(file, segment + 32, 8)?;
         end = end.max(offset.saturating_add(length));
     }
-    let mut kept = 2; // the null section and the section names
-    for section in table(file, 40, 60, SECTION_HEADER_BYTES)? {
-        let flags = number(file, section + 8, 8)?;
-        kept += u64::from(flags & SHF_ALLOC != 0);
-    }
-    Ok(end + kept * (SECTION_HEADER_BYTES + NAME_BYTES))
+    Ok(end)
 }
 
 /// Makes sure that QEMU's `-kernel` can enter a file: a 64-bit ELF file with Xen's note
@@ -147,7 +172,7 @@ fn count(length: usize) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{check_bootable, stripped_bytes};
+    use super::{check_bootable, loaded, stripped_bytes};
     use crate::tiny::{TinyEnd, tiny_image};
 
     #[test]
@@ -158,6 +183,21 @@ mod tests {
         assert!((loaded..loaded + 256).contains(&alone), "{alone}");
         image.extend([0; 100_000]);
         assert_eq!(stripped_bytes(&image), Ok(alone));
+    }
+
+    #[test]
+    fn what_is_loaded_is_what_is_left_without_symbols() {
+        let image = tiny_image("hello", TinyEnd::Never);
+        let mut with_symbols = image.clone();
+        with_symbols.extend([7; 5000]);
+        with_symbols[40] = 200; // the table of sections lies among them
+        with_symbols[60] = 3;
+        let alone = loaded(image.clone()).unwrap();
+        assert_eq!(alone.len(), image.len());
+        assert_eq!(loaded(with_symbols), Ok(alone));
+        let error = loaded(image[..image.len() - 1].to_vec()).unwrap_err();
+        assert_eq!(error, "a segment lies outside the file");
+        assert!(loaded(b"#!/bin/sh".to_vec()).is_err());
     }
 
     #[test]

@@ -1,26 +1,89 @@
-//! Getting QEMU onto the machine, by the system's own package manager.
+//! Getting what a command needs onto the machine, by the system's own package manager.
 //!
-//! Which manager there is decides what is run; nothing is downloaded by
-//! ourselves. Without one that we know, the person is told what to install.
+//! A command that needs QEMU installs it if it is missing; one that needs GRUB, a firmware
+//! or Bochs does likewise. Which manager there is decides what is run; nothing is
+//! downloaded by ourselves. Without one that we know, the person is told what to install.
 
 use std::io;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::qemu::PROGRAM;
+use crate::qemu::{Loader, OVMF_FILE, PROGRAM};
 use crate::system::find_program;
 
-/// A package manager: its program, the package that brings QEMU with its
-/// firmware, and the commands that install it.
+/// Something of the host's that a command needs.
+#[derive(Debug)]
+pub struct Need {
+    /// What it is called, and what it is.
+    name: &'static str,
+    what: &'static str,
+    /// What it is there by: programs on the `PATH`, and files or folders.
+    parts: &'static [&'static str],
+    /// For each package manager that is known to have it, the packages.
+    packages: &'static [(&'static str, &'static [&'static str])],
+}
+
+/// The emulator that everything boots in, with the firmware that it brings.
+pub static QEMU: Need = Need {
+    name: "QEMU",
+    what: "QEMU's system emulator for x86_64",
+    parts: &[PROGRAM],
+    packages: &[
+        ("apt-get", &["qemu-system-x86"]),
+        ("dnf", &["qemu-system-x86-core"]),
+        ("pacman", &["qemu-system-x86"]),
+        ("zypper", &["qemu-x86"]),
+        ("apk", &["qemu-system-x86_64"]),
+    ],
+};
+
+/// What an ISO is made with, for BIOS and for UEFI.
+pub static GRUB: Need = Need {
+    name: "GRUB",
+    what: "GRUB for BIOS and for UEFI, xorriso and mtools",
+    parts: &[
+        "grub-mkrescue",
+        "xorriso",
+        "mformat",
+        "/usr/lib/grub/i386-pc",
+        "/usr/lib/grub/x86_64-efi",
+    ],
+    packages: &[(
+        "apt-get",
+        &["grub-pc-bin", "grub-efi-amd64-bin", "xorriso", "mtools"],
+    )],
+};
+
+/// UEFI for QEMU.
+pub static OVMF: Need = Need {
+    name: "OVMF",
+    what: "the firmware that gives QEMU's machines UEFI",
+    parts: &[OVMF_FILE],
+    packages: &[("apt-get", &["ovmf"])],
+};
+
+/// The emulator that imitates a PC the most strictly.
+pub static BOCHS: Need = Need {
+    name: "Bochs",
+    what: "the emulator Bochs with its firmware and SDL's display",
+    parts: &[
+        "bochs",
+        "/usr/share/bochs/BIOS-bochs-latest",
+        "/usr/lib/x86_64-linux-gnu/bochs/plugins/libbx_sdl2_gui.so",
+    ],
+    packages: &[("apt-get", &["bochs", "bochs-sdl", "bochsbios", "vgabios"])],
+};
+
+/// A package manager: its program, and the commands that install packages, whose names
+/// follow the last one.
 struct Manager {
     program: &'static str,
-    package: &'static str,
     commands: &'static [&'static [&'static str]],
 }
 
 const MANAGERS: &[Manager] = &[
     Manager {
         program: "apt-get",
-        package: "qemu-system-x86",
         commands: &[
             &["apt-get", "update"],
             &["apt-get", "install", "--yes", "--no-install-recommends"],
@@ -28,80 +91,111 @@ const MANAGERS: &[Manager] = &[
     },
     Manager {
         program: "dnf",
-        package: "qemu-system-x86-core",
         commands: &[&["dnf", "install", "--assumeyes"]],
     },
     Manager {
         program: "pacman",
-        package: "qemu-system-x86",
         commands: &[&["pacman", "--sync", "--refresh", "--noconfirm", "--needed"]],
     },
     Manager {
         program: "zypper",
-        package: "qemu-x86",
         commands: &[&["zypper", "--non-interactive", "install"]],
     },
     Manager {
         program: "apk",
-        package: "qemu-system-x86_64",
         commands: &[&["apk", "add"]],
     },
 ];
 
-/// Makes sure that QEMU is there, installing it if it is not. What the
-/// package manager says goes to standard error.
+/// Makes sure that QEMU is there, as [`ensure`] does.
+///
+/// # Errors
+///
+/// As [`ensure`].
+pub fn ensure_qemu() -> Result<(), String> {
+    ensure(&QEMU)
+}
+
+/// Makes sure that what a loader takes besides QEMU is there, as [`ensure`] does.
+///
+/// # Errors
+///
+/// As [`ensure`].
+pub fn ensure_loader(loader: Loader) -> Result<(), String> {
+    match loader {
+        Loader::Pvh => Ok(()),
+        Loader::Bios => ensure(&GRUB),
+        Loader::Uefi => ensure(&GRUB).and_then(|()| ensure(&OVMF)),
+    }
+}
+
+/// Makes sure that something is there, installing it if it is not. What the package manager
+/// says goes to standard error.
 ///
 /// # Errors
 ///
 /// In words: the system is not known, or the installation failed, and what to
 /// do by hand.
-pub fn ensure_qemu() -> Result<(), String> {
-    if find_program(PROGRAM).is_some() {
+pub fn ensure(need: &Need) -> Result<(), String> {
+    let Some(part) = missing(need) else {
         return Ok(());
-    }
-    let mut plan = plan(|name| find_program(name).is_some(), is_root())?;
+    };
+    let mut plan = plan(need, part, |name| find_program(name).is_some(), is_root())?;
+    let name = need.name;
     let install = plan.pop();
     for words in plan {
         // One source of packages that cannot be reached fails the whole update,
-        // and need not be the one with QEMU: the installation will tell.
-        if let Err(why) = run(&words) {
+        // and need not be the one with what is needed: the installation will tell.
+        if let Err(why) = run(name, &words) {
             eprintln!("{why}");
         }
     }
     if let Some(words) = install {
-        run(&words).map_err(|why| {
-            format!("QEMU could not be installed: {why}; install it by hand and start again")
+        run(name, &words).map_err(|why| {
+            format!("{name} could not be installed: {why}; install it by hand and start again")
         })?;
     }
-    match find_program(PROGRAM) {
-        Some(_) => Ok(()),
-        None => Err(format!(
-            "the installation ended well, but there is still no `{PROGRAM}` on the PATH; \
-             install QEMU for x86_64 by hand"
+    match missing(need) {
+        None => Ok(()),
+        Some(part) => Err(format!(
+            "the installation ended well, but there is still no `{part}`; install {} by hand",
+            need.what
         )),
     }
 }
 
-/// Decides on the commands to run, the installation last, given which programs exist and whether we
-/// are root.
-fn plan(exists: impl Fn(&str) -> bool, root: bool) -> Result<Vec<Vec<String>>, String> {
-    let manager = MANAGERS.iter().find(|manager| exists(manager.program));
-    let manager = manager.ok_or_else(|| {
+/// Returns the first part that is not there.
+fn missing(need: &Need) -> Option<&'static str> {
+    let is_there = |part: &&str| match part.starts_with('/') {
+        true => Path::new(part).exists(),
+        false => find_program(part).is_some(),
+    };
+    need.parts.iter().copied().find(|part| !is_there(part))
+}
+
+/// Decides on the commands to run, the installation last, given what is missing, which
+/// programs exist and whether we are root.
+fn plan(
+    need: &Need,
+    part: &str,
+    exists: impl Fn(&str) -> bool,
+    root: bool,
+) -> Result<Vec<Vec<String>>, String> {
+    let Need { name, what, .. } = need;
+    let mut known = need.packages.iter();
+    let (manager, packages) = known.find(|(manager, _)| exists(manager)).ok_or_else(|| {
+        let known: Vec<&str> = need.packages.iter().map(|(manager, _)| *manager).collect();
         format!(
-            "QEMU is missing, and none of the package managers {} is here; install the package \
-             that brings `{PROGRAM}` (QEMU's system emulator for x86_64) and start again",
-            MANAGERS
-                .iter()
-                .map(|m| m.program)
-                .collect::<Vec<_>>()
-                .join(", ")
+            "{name} is missing, and none of the package managers that are known to have it \
+                 is here ({}); install the package that brings `{part}` ({what}) and start again",
+            known.join(", ")
         )
     })?;
     if !root && !exists("sudo") {
         return Err(format!(
-            "QEMU is missing, and installing it takes root or `sudo`; as root, install the \
-             package `{}` and start again",
-            manager.package
+            "{name} is missing, and installing it takes root or `sudo`; as root, install \
+             `{}` and start again",
+            packages.join(" ")
         ));
     }
     let with_privilege = |command: &&[&str]| {
@@ -109,16 +203,18 @@ fn plan(exists: impl Fn(&str) -> bool, root: bool) -> Result<Vec<Vec<String>>, S
         let words = sudo.into_iter().chain(command.iter().copied());
         words.map(String::from).collect::<Vec<_>>()
     };
-    let mut commands: Vec<_> = manager.commands.iter().map(with_privilege).collect();
+    let all = MANAGERS.iter().filter(|known| known.program == *manager);
+    let commands = all.flat_map(|manager| manager.commands);
+    let mut commands: Vec<_> = commands.map(with_privilege).collect();
     if let Some(last) = commands.last_mut() {
-        last.push(manager.package.into());
+        last.extend(packages.iter().map(|package| package.to_string()));
     }
     Ok(commands)
 }
 
-fn run(words: &[String]) -> Result<(), String> {
+fn run(name: &str, words: &[String]) -> Result<(), String> {
     let line = words.join(" ");
-    eprintln!("QEMU is missing; running: {line}");
+    eprintln!("{name} is missing; running: {line}");
     let mut command = Command::new(&words[0]);
     command.args(&words[1..]);
     command.env("DEBIAN_FRONTEND", "noninteractive");
@@ -139,10 +235,14 @@ fn is_root() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::plan;
+    use super::{BOCHS, GRUB, MANAGERS, Need, OVMF, QEMU, plan};
 
     fn lines(programs: &[&str], root: bool) -> Result<Vec<String>, String> {
-        let plan = plan(|name| programs.contains(&name), root)?;
+        lines_of(&QEMU, programs, root)
+    }
+
+    fn lines_of(need: &Need, programs: &[&str], root: bool) -> Result<Vec<String>, String> {
+        let plan = plan(need, need.parts[0], |name| programs.contains(&name), root)?;
         Ok(plan.iter().map(|words| words.join(" ")).collect())
     }
 
@@ -176,6 +276,29 @@ mod tests {
             "{refusal}"
         );
         assert!(refusal.contains("`qemu-system-x86_64`"), "{refusal}");
+    }
+
+    #[test]
+    fn what_is_needed_is_installed_in_one_go() {
+        let lines = lines_of(&GRUB, &["apt-get", "sudo"], false).unwrap();
+        assert_eq!(
+            lines[1],
+            "sudo apt-get install --yes --no-install-recommends grub-pc-bin grub-efi-amd64-bin \
+             xorriso mtools"
+        );
+        let refusal = lines_of(&GRUB, &["dnf"], true).unwrap_err();
+        assert!(refusal.contains("brings `grub-mkrescue`"), "{refusal}");
+    }
+
+    #[test]
+    fn packages_are_of_managers_that_we_can_run() {
+        for (manager, packages) in [&QEMU, &GRUB, &OVMF, &BOCHS]
+            .into_iter()
+            .flat_map(|n| n.packages)
+        {
+            assert!(MANAGERS.iter().any(|known| known.program == *manager));
+            assert!(!packages.is_empty(), "{manager}");
+        }
     }
 
     #[test]

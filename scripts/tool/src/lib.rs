@@ -9,7 +9,7 @@
 //! the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
-//! - [`elf`], [`image`], [`places`], [`tiny`]: what is booted;
+//! - [`elf`], [`image`], [`iso`], [`places`], [`tiny`]: what is booted;
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
@@ -20,7 +20,7 @@
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
 //! - [`mod@bench`]: what is measured, and compared with a baseline;
 //! - [`oracle`]: reference schedules, bounds and synchronizers;
-//! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
+//! - [`run`](mod@run), [`stick`], [`test`](mod@test), [`soak`](mod@soak),
 //!   [`new_app`](mod@new_app): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
@@ -42,6 +42,7 @@ pub mod fault_page;
 pub mod files;
 pub mod image;
 pub mod install;
+pub mod iso;
 pub mod json;
 pub mod markdown;
 pub mod new_app;
@@ -57,6 +58,7 @@ pub mod protocol;
 pub mod qemu;
 pub mod run;
 pub mod soak;
+pub mod stick;
 pub mod system;
 pub mod tail;
 pub mod test;

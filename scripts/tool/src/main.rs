@@ -27,6 +27,11 @@ static TOOL: Menu = Menu {
             work: tool::run::boot,
         },
         Choice {
+            name: "image",
+            about: "make a file that boots an app on a PC",
+            work: tool::stick::image,
+        },
+        Choice {
             name: "new-app",
             about: "make an app of your own, in a repository of its own or under apps/",
             work: tool::new_app::new_app,

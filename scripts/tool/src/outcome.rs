@@ -13,8 +13,9 @@ use std::process::ChildStdin;
 use std::time::Duration;
 
 use crate::files;
+use crate::iso::Temporary;
 use crate::places::Places;
-use crate::protocol::{Status, Transcript};
+use crate::protocol::{MachineLine, Status, Transcript};
 use crate::qemu::{Ending, Qemu};
 use crate::tail::Tail;
 
@@ -80,7 +81,14 @@ pub fn boot_with_input(
     talk: impl FnOnce(Option<ChildStdin>),
     mut show: impl FnMut(&str),
 ) -> Result<Outcome, String> {
-    let mut running = qemu.start(image, log)?;
+    let needs_stick = qemu.loader.needs_stick();
+    let iso = needs_stick.then(|| {
+        qemu.check_words()?;
+        Temporary::new(image, &qemu.guest_words, qemu.module.as_deref())
+    });
+    let iso = iso.transpose()?;
+    let loaded = iso.as_ref().map_or(image, Temporary::path);
+    let mut running = qemu.start(loaded, log)?;
     talk(running.input());
     let mut tail = Tail::new(log);
     let ending = running.wait(limit, || tail.follow(&mut show));
@@ -102,6 +110,37 @@ pub fn boot_with_input(
         files::check_room(log).map_err(|why| format!("the serial log {why}"))?;
     }
     Ok(outcome)
+}
+
+/// Judges what a guest has printed: no machine line is damaged, the verdict is success, and
+/// no line reports a violation.
+///
+/// # Errors
+///
+/// The first reason why it is not good.
+pub fn judge_lines(transcript: &Transcript) -> Result<(), Fault> {
+    let failure = |reason: String| Fault {
+        status: Status::Failure,
+        reason,
+    };
+    let verdict = transcript.verdict().map_err(failure)?;
+    if let Some(fault) = transcript.faults.first() {
+        return Err(failure(fault.to_string()));
+    }
+    if verdict.status != Status::Success {
+        return Err(Fault {
+            status: verdict.status,
+            reason: verdict.reason,
+        });
+    }
+    let violated = |line: &&MachineLine| line.number_at("violations").is_some_and(|n| n > 0);
+    match transcript.machine.iter().find(violated) {
+        Some(line) => Err(failure(format!(
+            "serial line {} reports violations in spite of the verdict",
+            line.number
+        ))),
+        None => Ok(()),
+    }
 }
 
 impl Outcome {
@@ -150,24 +189,7 @@ impl Outcome {
                 verdict.status
             )));
         }
-        if let Some(fault) = self.transcript.faults.first() {
-            return Err(failure(fault.to_string()));
-        }
-        if by_exit != Status::Success {
-            return Err(Fault {
-                status: by_exit,
-                reason: verdict.reason,
-            });
-        }
-        let violated = |line: &&_| crate::protocol::MachineLine::number_at(line, "violations");
-        let mut lines = self.transcript.machine.iter();
-        match lines.find(|line| violated(line).is_some_and(|count| count > 0)) {
-            Some(line) => Err(failure(format!(
-                "serial line {} reports violations in spite of the verdict",
-                line.number
-            ))),
-            None => Ok(()),
-        }
+        judge_lines(&self.transcript)
     }
 
     /// Returns the last serial lines, indented, and where all of them are. To

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::outcome::boot;
-use crate::qemu::{Ending, Mode, Qemu};
+use crate::qemu::{Ending, Loader, Mode, Qemu};
 use crate::system;
 
 /// How long the probe may take; where all is well it takes a tenth of this.
@@ -64,7 +64,7 @@ pub fn kvm(machine: &Qemu, image: &Path) -> Result<(), String> {
     )
 }
 
-/// Boots the probe on `machine`, for at most `limit`.
+/// Boots the probe on `machine`, for at most `limit`, without a firmware, which takes longer.
 ///
 /// # Errors
 ///
@@ -73,6 +73,7 @@ pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> 
     let qemu = Qemu {
         guest_words: "probe=on".into(),
         module: None,
+        loader: Loader::Pvh,
         has_input: false,
         wait_for_debugger: false,
         ..machine.clone()

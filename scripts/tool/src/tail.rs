@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use crate::protocol::written;
+
 /// A file that is being followed.
 #[derive(Debug)]
 pub struct Tail {
@@ -39,7 +41,7 @@ impl Tail {
         self.rest.extend(fresh);
         while let Some(end) = self.rest.iter().position(|byte| *byte == b'\n') {
             let line: Vec<u8> = self.rest.drain(..=end).collect();
-            show(String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']));
+            show(written(&String::from_utf8_lossy(&line)));
         }
     }
 

@@ -151,6 +151,14 @@ impl Transcript {
     }
 }
 
+/// Returns what the guest has written of a line. A terminal's line end is no part of it, nor
+/// is what a firmware has left there, which ends in a carriage return.
+#[must_use]
+pub fn written(line: &str) -> &str {
+    let line = line.trim_end_matches(['\r', '\n']);
+    line.rsplit_once('\r').map_or(line, |(_, own)| own)
+}
+
 /// Reads one line of a log; `None` if it is a line for people.
 ///
 /// # Errors
@@ -158,8 +166,7 @@ impl Transcript {
 /// The line begins with `{` and is no valid machine line.
 #[must_use]
 pub fn read_line(number: usize, line: &str) -> Option<Result<MachineLine, ProtocolError>> {
-    // A terminal's line end is `\r\n`; `lines` strips it, a tail may not.
-    let line = line.trim_end_matches(['\r', '\n']);
+    let line = written(line);
     line.starts_with('{').then(|| {
         let fault = |message| ProtocolError { number, message };
         let value = json::parse(line).map_err(|error| fault(error.to_string()))?;
@@ -194,7 +201,7 @@ mod tests {
 
     const GOOD: &str = "\
 hello {\r
-{\"kind\":\"progress\",\"done\":1,\"total\":2}\r
+error: no video\r{\"kind\":\"progress\",\"done\":1,\"total\":2}\r
  {\"kind\":\"indented, so not for machines\"}
 {\"kind\":\"own\",\"x\":{\"y\":7}}
 {\"kind\":\"verdict\",\"status\":\"success\",\"reason\":\"all is well\"}

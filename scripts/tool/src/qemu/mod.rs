@@ -11,6 +11,8 @@
 //! `isa-debug-exit` device, see [`Ending`]. Input to the serial port, for the
 //! console, comes from us through a pipe.
 
+mod loader;
+mod machine;
 mod process;
 
 use std::ffi::OsString;
@@ -21,6 +23,8 @@ use std::process::Command;
 
 use boot::MOST_COMMAND_LINE_BYTES;
 
+pub use loader::{Loader, OVMF_FILE};
+pub use machine::Machine;
 pub use process::{Ending, Running};
 
 /// The name under which QEMU is looked for.
@@ -108,42 +112,6 @@ impl fmt::Display for Mode {
     }
 }
 
-/// The board that QEMU imitates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Machine {
-    /// The smallest one, which boots in a tenth of a second.
-    Microvm,
-    /// A PC with PCI Express, HPET and all.
-    Q35,
-}
-
-impl Machine {
-    /// The words for [`Machine`] on command lines.
-    pub const NAMES: &[&str] = &["microvm", "q35"];
-
-    /// Returns the machine of that name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Machine> {
-        let all = [Machine::Microvm, Machine::Q35];
-        all.into_iter().find(|machine| machine.name() == name)
-    }
-
-    /// Returns the machine's name, which is also QEMU's.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Machine::Microvm => "microvm",
-            Machine::Q35 => "q35",
-        }
-    }
-}
-
-impl fmt::Display for Machine {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 /// A guest to be started.
 #[derive(Clone, Debug)]
 pub struct Qemu {
@@ -153,6 +121,8 @@ pub struct Qemu {
     pub mode: Mode,
     /// The board.
     pub machine: Machine,
+    /// What brings the image into memory.
+    pub loader: Loader,
     /// The number of processors.
     pub cores: u64,
     /// The memory in MiB.
@@ -170,12 +140,13 @@ pub struct Qemu {
 }
 
 impl Default for Qemu {
-    /// Describes one core with 32 MiB on a microvm, deterministic.
+    /// Describes one core with 32 MiB on a microvm, deterministic, without a firmware.
     fn default() -> Self {
         Qemu {
             program: PROGRAM.into(),
             mode: Mode::Deterministic,
             machine: Machine::Microvm,
+            loader: Loader::Pvh,
             cores: 1,
             memory_mib: 32,
             guest_words: String::new(),
@@ -189,18 +160,14 @@ impl Default for Qemu {
 
 impl Qemu {
     /// Returns QEMU's arguments for booting `image` with its serial output
-    /// going to `serial`.
+    /// going to `serial`. For a [`Loader`] with a firmware `image` is a whole stick.
     #[must_use]
     pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<OsString> {
         let mut arguments: Vec<OsString> = vec!["-machine".into(), self.machine.name().into()];
         arguments.extend(self.mode.arguments().iter().map(OsString::from));
         arguments.extend(["-smp".into(), self.cores.to_string().into()]);
         arguments.extend(["-m".into(), format!("{}M", self.memory_mib).into()]);
-        arguments.extend(["-kernel".into(), image.into()]);
-        arguments.extend(["-append".into(), OsString::from(&self.guest_words)]);
-        if let Some(module) = &self.module {
-            arguments.extend(["-initrd".into(), module.into()]);
-        }
+        arguments.extend(self.loading(image));
         // A comma would end the file's name in QEMU's syntax unless doubled.
         let serial = with_doubled_commas(serial);
         if self.has_input {
@@ -220,6 +187,27 @@ impl Qemu {
         arguments.extend(["-display", "none", "-no-reboot"].map(OsString::from));
         if self.wait_for_debugger {
             arguments.extend(["-S", "-gdb", "tcp::1234"].map(OsString::from));
+        }
+        arguments
+    }
+
+    /// Returns the arguments by which the image comes into memory, with words and module.
+    fn loading(&self, image: &Path) -> Vec<OsString> {
+        if self.loader.needs_stick() {
+            let mut drive = OsString::from("if=none,id=stick,format=raw,readonly=on,file=");
+            drive.push(with_doubled_commas(image));
+            let mut arguments: Vec<OsString> = vec!["-drive".into(), drive];
+            let devices = ["-device", "qemu-xhci", "-device", "usb-storage,drive=stick"];
+            arguments.extend(devices.map(OsString::from));
+            if self.loader == Loader::Uefi {
+                arguments.extend(["-bios", OVMF_FILE].map(OsString::from));
+            }
+            return arguments;
+        }
+        let mut arguments: Vec<OsString> = vec!["-kernel".into(), image.into()];
+        arguments.extend(["-append".into(), OsString::from(&self.guest_words)]);
+        if let Some(module) = &self.module {
+            arguments.extend(["-initrd".into(), module.into()]);
         }
         arguments
     }
@@ -291,7 +279,7 @@ fn with_doubled_commas(path: &Path) -> OsString {
 
 #[cfg(test)]
 mod tests {
-    use super::{Machine, Mode, Qemu};
+    use super::{Loader, Machine, Mode, Qemu};
     use std::ffi::OsStr;
     use std::path::Path;
 
@@ -308,6 +296,9 @@ mod tests {
         }
         for name in Machine::NAMES {
             assert_eq!(Machine::from_name(name).map(Machine::name), Some(*name));
+        }
+        for name in Loader::NAMES {
+            assert_eq!(Loader::from_name(name).map(Loader::name), Some(*name));
         }
         assert_eq!(Mode::from_name("fast"), None);
     }
@@ -339,6 +330,27 @@ mod tests {
         let port = "-chardev stdio,id=console,signal=off,logfile=a,,b.log -serial chardev:console";
         assert!(line.contains(port), "{line}");
         assert!(!line.contains("file:a"));
+    }
+
+    #[test]
+    fn a_firmware_gets_a_stick_that_has_the_words() {
+        let with = |loader| {
+            line(&Qemu {
+                loader,
+                guest_words: "jobs=3".into(),
+                ..Qemu::default()
+            })
+        };
+        assert!(with(Loader::Pvh).contains("-kernel image -append jobs=3"));
+        let (bios, uefi) = (with(Loader::Bios), with(Loader::Uefi));
+        for line in [&bios, &uefi] {
+            assert!(line.contains("readonly=on,file=image "), "{line}");
+            assert!(
+                !line.contains("-kernel") && !line.contains("jobs"),
+                "{line}"
+            );
+        }
+        assert!(uefi.contains("-bios /usr/share/ovmf/OVMF.fd") && !bios.contains("-bios"));
     }
 
     #[test]

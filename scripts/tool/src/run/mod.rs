@@ -10,6 +10,7 @@
 
 mod boot;
 mod folder;
+mod loading;
 mod log;
 mod screen;
 mod seeing;
@@ -25,11 +26,12 @@ use crate::dag_file::{self, Prepared};
 use crate::files;
 use crate::image;
 use crate::install;
+use crate::iso;
 use crate::options::Parsed;
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::{Status, Transcript};
-use crate::qemu::{Ending, LEAST_MEMORY_MIB, Machine, Mode, PROGRAM, Qemu};
+use crate::qemu::{Ending, Mode, PROGRAM, Qemu};
 use crate::system;
 use log::Log;
 use screen::Screen;
@@ -109,9 +111,11 @@ fn boot_app(
 ) -> Result<Booted, Refusal> {
     let app = choose_app(options, dags.is_some())?;
     let memory_mib = choose_memory(options, dags.as_deref())?;
-    let program = choose_program(options)?;
-
     let named = options.text("mode").and_then(Mode::from_name);
+    loading::check(options, named).map_err(Refusal::Usage)?;
+    let program = choose_program(options)?;
+    install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
+
     if let Some(dags) = dags.as_deref_mut() {
         dags.write_module().map_err(Refusal::Failure)?;
     }
@@ -120,6 +124,9 @@ fn boot_app(
     // No mode has a longer name than this one.
     let longest = describe(named.unwrap_or(Mode::Deterministic));
     longest.check_words().map_err(Refusal::Usage)?;
+    if longest.loader.needs_stick() {
+        iso::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
+    }
     let log = Log::choose(options, &app).map_err(Refusal::Failure)?;
     let image = match options.path("image") {
         Some(path) => path.into(),
@@ -130,8 +137,8 @@ fn boot_app(
                 .path
         }
     };
-    // A person needs time to type.
-    let otherwise = match options.is_given("console") {
+    // A person needs time to type, and a firmware takes long where instructions are counted.
+    let otherwise = match options.is_given("console") || longest.loader.needs_stick() {
         true => Mode::Threads,
         false => Mode::Deterministic,
     };
@@ -142,7 +149,8 @@ fn boot_app(
     let mut screen = Screen::new(options, &image);
     introduce(&screen, &app, &qemu, why);
     let show = |line: &str| {
-        if shows {
+        // Where a firmware paints on the serial port, it is not for this screen.
+        if shows && !(qemu.loader.needs_stick() && line.contains('\x1b')) {
             let translated = dags.and_then(|dags| dags.translate(line));
             screen.show(translated.as_deref().unwrap_or(line));
         }
@@ -210,7 +218,8 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
 /// cases enough for the stacks and tables of that many processors.
 fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
     let cores = options.number("cores").unwrap_or(1);
-    let mut least = LEAST_MEMORY_MIB.max((cores * 5).div_ceil(8));
+    let loader = loading::chosen(options);
+    let mut least = loader.least_memory_mib().max((cores * 5).div_ceil(8));
     if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
         least = least.max(dags.memory_mib);
     }
@@ -220,8 +229,8 @@ fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refus
     }
     if options.is_given("memory") {
         return Err(Refusal::Usage(format!(
-            "`--memory {memory_mib}`: {cores} cores take at least {least} MiB; \
-             give more, or fewer cores"
+            "`--memory {memory_mib}`: {cores} cores, booted by {loader}, take at least {least} \
+             MiB; give more, or fewer cores"
         )));
     }
     Ok(least)
@@ -246,7 +255,6 @@ fn describe(
     memory_mib: u64,
     dags: Option<&Prepared>,
 ) -> Qemu {
-    let machine = options.text("machine").and_then(Machine::from_name);
     let mut words = vec![format!("mode={mode}")];
     for name in table::GUEST_WORDS {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
@@ -258,7 +266,8 @@ fn describe(
     Qemu {
         program: program.into(),
         mode,
-        machine: machine.unwrap_or(Machine::Microvm),
+        machine: loading::machine(options),
+        loader: loading::chosen(options),
         cores: options.number("cores").unwrap_or(1),
         memory_mib,
         guest_words: words.join(" "),
@@ -287,8 +296,8 @@ fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
 fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say(&format!("app {app}, guest words: {}", qemu.guest_words));
     screen.say(&format!(
-        "mode {}, machine {}, {} cores, {} MiB of memory",
-        qemu.mode, qemu.machine, qemu.cores, qemu.memory_mib
+        "mode {}, machine {}, booted by {}, {} cores, {} MiB of memory",
+        qemu.mode, qemu.machine, qemu.loader, qemu.cores, qemu.memory_mib
     ));
     screen.say(&format!("time: {}", qemu.mode.meaning()));
     if let Some(why) = why {

@@ -1,7 +1,7 @@
 //! What `run` accepts: the one table behind its parser and its help text.
 
 use crate::options::{Command, Opt, Takes};
-use crate::qemu::{LEAST_MEMORY_MIB, MOST_CORES, Machine, Mode};
+use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
 
 /// The options that become words `name=value` on the guest's command line, if
 /// they are given: kernel and apps have defaults of their own, and not every app
@@ -124,14 +124,22 @@ pub static RUN: Command = Command {
         Opt::new(
             "mode",
             Takes::OneOf(Mode::NAMES),
-            "What time means, see below; kvm where it works, else deterministic.",
+            "What time means, see below; kvm where it works, else deterministic, or threads with \
+             --boot bios or uefi.",
         ),
         Opt::new(
             "machine",
             Takes::OneOf(Machine::NAMES),
-            "The board that QEMU imitates.",
+            "The board that QEMU imitates; with --boot bios or uefi it is q35.",
         )
         .or("microvm"),
+        Opt::new(
+            "boot",
+            Takes::OneOf(Loader::NAMES),
+            "What brings the image into memory: QEMU (pvh), or GRUB on a stick, started by a \
+             BIOS or by UEFI, as on a PC.",
+        )
+        .or("pvh"),
         Opt::new(
             "timeout",
             Takes::number(1..=86_400),

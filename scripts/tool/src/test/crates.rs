@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::Stdio;
 
+use crate::install::{self, Need};
 use crate::json::{self, Value};
 use crate::system;
 
@@ -31,7 +32,25 @@ impl TestBinary {
     pub(super) fn boots_guests(&self) -> bool {
         self.target.starts_with("boot_") || self.target.ends_with("_qemu")
     }
+
+    /// Installs what its tests need besides QEMU, if it is missing; they say so by the
+    /// target's name.
+    ///
+    /// # Errors
+    ///
+    /// Why they cannot run, in words.
+    pub(super) fn ensure_needs(&self) -> Result<(), String> {
+        let needs = NEEDS.iter().find(|(target, _)| *target == self.target);
+        let needs = needs.map_or(&[][..], |(_, needs)| needs);
+        needs.iter().copied().try_for_each(install::ensure)
+    }
 }
+
+/// What test programs need besides QEMU.
+const NEEDS: [(&str, &[&Need]); 2] = [
+    ("boot_by_grub", &[&install::GRUB, &install::OVMF]),
+    ("boot_in_bochs", &[&install::GRUB, &install::BOCHS]),
+];
 
 /// Compiles the tests of all packages. Cargo's errors go to standard error.
 pub(super) fn compile() -> (Vec<TestBinary>, Result<(), String>) {

@@ -53,12 +53,13 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
         let name = binary.name();
         let skipped = match &plan.boots {
             _ if !binary.boots_guests() => None,
-            _ if plan.quick => Some("left out by --quick"),
-            Err(why) => Some(why.as_str()),
+            _ if plan.quick => Some("left out by --quick".into()),
+            Err(why) => Some(why.clone()),
+            Ok(()) if has_matches(plan, &binary) => binary.ensure_needs().err(),
             Ok(()) => None,
         };
         match skipped {
-            Some(why) if has_matches(plan, &binary) => tally.skip(&name, why),
+            Some(why) if has_matches(plan, &binary) => tally.skip(&name, &why),
             Some(_) => {}
             None => run_binary(plan, &binary, tally),
         }

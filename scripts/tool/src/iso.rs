@@ -1,0 +1,165 @@
+//! An ISO from which PCs boot an image: to be written to a stick as it is, or to a disc.
+//!
+//! On it are GRUB for BIOS and for UEFI, the image as far as it is loaded, a file to be left
+//! in memory if there is one, and GRUB's commands to boot the one with the words and the
+//! other. `grub-mkrescue` makes it, with the few of GRUB's modules that this takes.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::elf;
+use crate::files;
+use crate::install;
+use crate::system;
+
+/// What GRUB has to be able to do besides what it brings itself to its own files.
+/// The kinds of partitions are those that it asks for at its start.
+const MODULES: &str = "--install-modules=normal multiboot2 iso9660 all_video part_acorn \
+                       part_amiga part_apple part_bsd part_dfly part_dvh part_gpt part_msdos \
+                       part_plan part_sun part_sunpc";
+
+/// Makes sure that words reach the image through GRUB as they are.
+///
+/// # Errors
+///
+/// In words, with the offender: it has a character that GRUB would change.
+pub fn check_words(words: &str) -> Result<(), String> {
+    let changes = |c: char| matches!(c, '\'' | '"' | '\\') || !(c.is_ascii_graphic());
+    for word in words.split_whitespace() {
+        if let Some(c) = word.chars().find(|c| changes(*c)) {
+            return Err(format!(
+                "`{word}`: GRUB would not hand on `{c}` as it is; give words of ASCII without \
+                 quotes and backslashes"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Makes the ISO `iso` that boots `image` with `words` and leaves `module` in memory.
+/// What it is made with is installed if it is missing.
+///
+/// # Errors
+///
+/// In words: the words are refused, something is missing, a file cannot be read or written,
+/// or `grub-mkrescue` failed.
+pub fn write(iso: &Path, image: &Path, words: &str, module: Option<&Path>) -> Result<(), String> {
+    check_words(words)?;
+    install::ensure(&install::GRUB)?;
+    let folder = system::new_log("iso")?.with_extension("folder");
+    let made = fill(&folder, image, words, module).and_then(|()| rescue(&folder, iso));
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_dir_all(&folder);
+    made
+}
+
+/// Lays out what the ISO is to have in `folder`.
+fn fill(folder: &Path, image: &Path, words: &str, module: Option<&Path>) -> Result<(), String> {
+    let read =
+        |path: &Path| files::read(path).map_err(|why| format!("`{}`: {why}", files::place(path)));
+    let loaded = elf::loaded(read(image)?);
+    let loaded = loaded.map_err(|why| format!("`{}`: {why}", files::place(image)))?;
+    let boot = folder.join("boot");
+    let write = |name: &str, bytes: &[u8]| {
+        let path = boot.join(name);
+        fs::write(&path, bytes).map_err(|why| format!("cannot write `{}`: {why}", path.display()))
+    };
+    fs::create_dir_all(boot.join("grub"))
+        .map_err(|why| format!("cannot make the folder `{}`: {why}", folder.display()))?;
+    write("image", &loaded)?;
+    if let Some(module) = module {
+        write("module", &read(module)?)?;
+    }
+    write(
+        "grub/grub.cfg",
+        commands(words, module.is_some()).as_bytes(),
+    )
+}
+
+/// Returns GRUB's commands. A file is left as it is, compressed or not.
+fn commands(words: &str, has_module: bool) -> String {
+    let quoted = words.split_whitespace().map(|word| format!(" '{word}'"));
+    let quoted: String = quoted.collect();
+    let module = match has_module {
+        true => "module2 --nounzip /boot/module\n",
+        false => "",
+    };
+    format!("multiboot2 /boot/image{quoted}\n{module}boot\n")
+}
+
+fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
+    let mut output = OsString::from("--output=");
+    output.push(iso);
+    let mut command = Command::new("grub-mkrescue");
+    command.args(["--locales=", "--themes=", "--fonts=", MODULES]);
+    let made = command.arg(output).arg(folder).output();
+    let made = made.map_err(|why| format!("`grub-mkrescue` did not start: {why}"))?;
+    if made.status.success() && iso.is_file() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&made.stderr);
+    let last: Vec<&str> = said.lines().rev().take(3).collect();
+    Err(format!(
+        "`grub-mkrescue` could not make `{}`: {}",
+        files::place(iso),
+        last.into_iter().rev().collect::<Vec<_>>().join("; ")
+    ))
+}
+
+/// An ISO for one boot, which is removed with this value.
+#[derive(Debug)]
+pub struct Temporary {
+    path: PathBuf,
+}
+
+impl Temporary {
+    /// Makes an ISO as [`write()`] does.
+    ///
+    /// # Errors
+    ///
+    /// As [`write()`].
+    pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<Temporary, String> {
+        let path = system::new_log("stick")?.with_extension("iso");
+        let iso = Temporary { path };
+        write(&iso.path, image, words, module)?;
+        Ok(iso)
+    }
+
+    /// Returns where it lies.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // It is ours, and in the way of no one if it cannot be removed.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{check_words, commands};
+
+    #[test]
+    fn grub_gets_each_word_as_it_is() {
+        assert_eq!(
+            commands("jobs=3  a=$x;{}#", true),
+            "multiboot2 /boot/image 'jobs=3' 'a=$x;{}#'\nmodule2 --nounzip /boot/module\nboot\n"
+        );
+        assert_eq!(commands("", false), "multiboot2 /boot/image\nboot\n");
+    }
+
+    #[test]
+    fn words_that_grub_would_change_are_refused_by_name() {
+        assert_eq!(check_words("jobs=3 a=$x;{}# "), Ok(()));
+        for word in ["it's", "say=\"x\"", "a\\b", "k=\u{e4}", "bell\u{7}"] {
+            let why = check_words(&format!("jobs=3 {word}")).unwrap_err();
+            assert!(why.starts_with(&format!("`{word}`: GRUB")), "{why}");
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The subcommand `image`: an app as a file that boots on a PC.
+//!
+//! The file is an [`iso`], with the app's image, the words that it is to be given and a file
+//! that it is to find in memory. What can be refused is, before anything is built; the
+//! file is there whole or as it was.
+//!
+//! Exit codes: 0 the file is there, 1 it could not be made, 2 a refused command line.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+
+use crate::files;
+use crate::image;
+use crate::iso::{self, Temporary};
+use crate::options::{Command, Opt, Parsed, Takes};
+use crate::qemu::Qemu;
+
+/// The table of `image`.
+pub static IMAGE: Command = Command {
+    invocation: "./scripts/image",
+    about: "Makes a file that boots an app on a PC: to be written to a stick, or to a disc.",
+    positional: Some((
+        Takes::Text("WORD..."),
+        "Words for the app and the kernel, such as `jobs=20`.",
+    )),
+    options: &[
+        Opt::new(
+            "app",
+            Takes::Text("NAME"),
+            "The app: a package under apps/.",
+        )
+        .or("fork-join"),
+        Opt::new("iso", Takes::File("FILE"), "The ISO to be made."),
+        Opt::new(
+            "module",
+            Takes::File("MODULE"),
+            "A file that the app finds in memory, as dag-file does its DAGs.",
+        ),
+        Opt::new(
+            "image",
+            Takes::File("IMAGE"),
+            "Take this image; build nothing.",
+        ),
+    ],
+    notes: "\
+The ISO boots by GRUB, under BIOS and UEFI. `cp FILE /dev/DEVICE` writes it to a stick,
+and what was there is lost; docs/stick.md says how, and what is known of real PCs.
+
+DAGs of a file: `./scripts/run --dag FILE --print-dag > MODULE` makes the module for
+`--app dag-file`, whose words are those that `./scripts/run --dag FILE` shows.
+
+exit codes: 0 the file is there; 1 it could not be made; 2 a refused command line
+",
+};
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn image(words: &[OsString]) -> ExitCode {
+    let options = match IMAGE.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    let guest_words = match check(&options) {
+        Ok(words) => words,
+        Err(line) => return IMAGE.refuse(&line),
+    };
+    match make(&options, &guest_words) {
+        Ok(line) => {
+            println!("{line}");
+            ExitCode::SUCCESS
+        }
+        Err(line) => IMAGE.fail(&line),
+    }
+}
+
+/// Makes sure of everything that can be refused, and returns the words for the guest.
+fn check(options: &Parsed) -> Result<String, String> {
+    if !options.is_given("iso") {
+        return Err("which file? give --iso FILE".into());
+    }
+    let inputs = options.named(&["module", "image"]);
+    files::check(&inputs, &options.named(&["iso"]))?;
+    for input in &inputs {
+        let (option, place) = (input.option, files::place(input.path));
+        let read = match option {
+            "image" => image::check_file(input.path).map(|_| ()),
+            _ => files::read(input.path).map(|_| ()),
+        };
+        read.map_err(|why| format!("`--{option} {place}`: {why}"))?;
+    }
+    if !options.is_given("image") {
+        let app = options.text("app").unwrap_or_default();
+        image::check_app(app).map_err(|error| error.to_string())?;
+    }
+    let words = options.files().map(Path::to_string_lossy);
+    let guest_words = words.collect::<Vec<_>>().join(" ");
+    iso::check_words(&guest_words)?;
+    let guest = Qemu {
+        guest_words,
+        ..Qemu::default()
+    };
+    guest.check_words()?;
+    Ok(guest.guest_words)
+}
+
+/// Makes the ISO, and returns what to say of it.
+fn make(options: &Parsed, words: &str) -> Result<String, String> {
+    let image = match options.path("image") {
+        Some(path) => path.into(),
+        None => {
+            let built = image::build(options.text("app").unwrap_or_default());
+            built.map_err(|error| error.to_string())?.path
+        }
+    };
+    let made = Temporary::new(&image, words, options.path("module"))?;
+    let path = options.path("iso").unwrap_or(Path::new("")); // checked before
+    let place = files::place(path);
+    let bytes = fs::copy(made.path(), path)
+        .map_err(|why| format!("`--iso {place}`: cannot be written: {why}"))?;
+    Ok(format!(
+        "{place}: {} KiB that boot under BIOS and UEFI; `cp {place} /dev/DEVICE` writes it to a \
+         stick, and what was there is lost",
+        bytes >> 10
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{IMAGE, check};
+    use crate::system;
+
+    #[test]
+    fn what_cannot_be_made_is_refused_before_the_work() {
+        let iso = system::new_log("refused").unwrap();
+        let refused = |line: &str| check(&IMAGE.right(line).with("iso", &iso)).unwrap_err();
+        assert!(refused("--app fork-jion").contains("did you mean `fork-join`?"));
+        assert!(refused("it's").starts_with("`it's`: GRUB"));
+        assert!(refused("--module /dev/zero").starts_with("`--module /dev/zero`: cannot"));
+        assert!(refused("--image /etc/passwd").starts_with("`--image /etc/passwd`: is no image"));
+        assert!(refused(&"x".repeat(2049)).contains("2049 bytes"));
+        let why = check(&IMAGE.right("jobs=3")).unwrap_err();
+        assert_eq!(why, "which file? give --iso FILE");
+        let right = IMAGE.right("jobs=3 seed=7").with("iso", &iso);
+        assert_eq!(check(&right).as_deref(), Ok("jobs=3 seed=7"));
+        assert!(!iso.exists());
+    }
+}

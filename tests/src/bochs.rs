@@ -1,0 +1,103 @@
+//! Booting in Bochs, the emulator that imitates a PC more strictly than QEMU does.
+//!
+//! What it judges that QEMU does not: a local APIC that is not enabled keeps its timer
+//! masked, processors come out of INIT with their caches off, and x2APIC, the counter's
+//! deadline timer and five-level paging are there, as on PCs of today. It is slow, and its
+//! clock is its own: a test may judge by counts and order alone.
+//!
+//! A kernel cannot end Bochs, so a run ends when its verdict is in the serial log.
+
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+
+use tool::child::{Child, bound_to_us};
+use tool::install;
+use tool::iso::Temporary;
+use tool::outcome::judge_lines;
+use tool::protocol::Transcript;
+use tool::system::{find_program, host_load, new_log};
+
+use crate::guest::built;
+
+/// How long a boot may take in wall time: many times what any takes.
+const LIMIT: Duration = Duration::from_secs(600);
+
+/// Boots the image of a package from an ISO, in a PC with so many processors of Bochs' model
+/// `model`, and returns what it has printed, which must be success.
+///
+/// # Panics
+///
+/// Panics with what is missing, or with the serial log if it does not succeed.
+#[must_use]
+pub fn succeed(package: &str, words: &str, model: &str, cores: u64) -> Transcript {
+    let run = || -> Result<String, String> {
+        install::ensure(&install::BOCHS)?;
+        let iso = Temporary::new(&built(package)?.path, words, None)?;
+        let log = new_log("bochs")?;
+        let (settings, said) = (log.with_extension("bochs"), log.with_extension("said"));
+        let text = settings_text(model, cores, iso.path(), &log, &said);
+        let written = fs::write(&settings, text);
+        written.map_err(|why| format!("cannot write `{}`: {why}", settings.display()))?;
+        let serial = boot(&settings, &log);
+        for file in [&settings, &said, &log] {
+            // They are ours, and in the way of no one if they cannot be removed.
+            let _ = fs::remove_file(file);
+        }
+        serial
+    };
+    let serial = run().unwrap_or_else(|why| panic!("`{package}` did not boot in Bochs: {why}"));
+    let transcript = Transcript::read(&serial);
+    if let Err(fault) = judge_lines(&transcript) {
+        panic!("{}; {}\n{serial}", fault.reason, host_load());
+    }
+    transcript
+}
+
+/// Runs Bochs until there is a verdict, at most for the limit, and returns the serial log.
+fn boot(settings: &Path, log: &Path) -> Result<String, String> {
+    let program = find_program("bochs").ok_or("there is no program `bochs`")?;
+    let mut command = bound_to_us(&program);
+    // Debian's Bochs has a debugger, which has to be told to begin; its commands are a file.
+    let commands = settings.with_extension("commands");
+    fs::write(&commands, "c\n").map_err(|why| format!("`{}`: {why}", commands.display()))?;
+    command.arg("-q").arg("-f").arg(settings);
+    command.arg("-rc").arg(&commands);
+    command.env("SDL_VIDEODRIVER", "dummy");
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    let started = Child::start(&mut command);
+    let mut child = started.map_err(|why| format!("cannot start Bochs: {why}"))?;
+    let read = || String::from_utf8_lossy(&fs::read(log).unwrap_or_default()).into_owned();
+    let has_verdict = |log: &str| {
+        let verdict = log.split_once("\n{\"kind\":\"verdict\"");
+        verdict.is_some_and(|(_, rest)| rest.contains('\n'))
+    };
+    child.wait(LIMIT, || !has_verdict(&read()));
+    let _ = fs::remove_file(&commands);
+    Ok(read())
+}
+
+/// Returns the settings of the PC.
+fn settings_text(model: &str, cores: u64, iso: &Path, log: &Path, said: &Path) -> String {
+    let (iso, log, said) = (iso.display(), log.display(), said.display());
+    format!(
+        "\
+config_interface: textconfig
+display_library: sdl2
+cpu: model={model}, count={cores}, ips=50000000, reset_on_triple_fault=0
+memory: guest=256, host=256
+romimage: file=/usr/share/bochs/BIOS-bochs-latest
+vgaromimage: file=/usr/share/bochs/VGABIOS-lgpl-latest
+ata0: enabled=1, ioaddr1=0x1f0, ioaddr2=0x3f0, irq=14
+ata0-master: type=cdrom, path={iso}, status=inserted
+boot: cdrom
+com1: enabled=1, mode=file, dev={log}
+clock: sync=none
+log: {said}
+"
+    )
+}
