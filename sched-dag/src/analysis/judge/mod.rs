@@ -35,9 +35,12 @@
 //! those with it that it may delay, directly or through others. What is left
 //! is analysed without it: whatever it does, it cannot delay these.
 
+mod analysable;
 mod sinks;
 
 use alloc::vec::Vec;
+
+use analysable::{analysable, first_unknown};
 
 use super::answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
 use super::bonifaci::{bonifaci_dm, bonifaci_edf};
@@ -50,7 +53,7 @@ use super::pipelined::Unsolved;
 use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
 use super::set::{Failure, Set, constrained};
-use super::task::{Task, TaskError};
+use super::task::Task;
 use crate::ids::{DagId, SubtaskId};
 use crate::order::sorted_by_key;
 use crate::policy::Policy;
@@ -96,55 +99,6 @@ pub(super) fn with_case<T>(
         .collect();
     let case = Case::new(dags, &members, &tasks, relation.among(&members), settings);
     work(&case, reasons)
-}
-
-/// Returns the DAGs as the analysis sees them, and for each that cannot be
-/// analysed the reason: its own, or that it may have to wait for such a one.
-fn analysable(
-    dags: &[Dag],
-    relation: &Relation,
-    settings: &Settings,
-) -> (Vec<Option<Task>>, Vec<Option<Reason>>) {
-    let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
-    let mut tasks = Vec::with_capacity(dags.len());
-    let mut reasons = Vec::with_capacity(dags.len());
-    for dag in dags {
-        let task = overhead
-            .ok_or(TaskError::VolumeOverflow)
-            .and_then(|overhead_ns| Task::from_dag(dag, overhead_ns));
-        reasons.push(match &task {
-            _ if settings.cores == 0 => Some(Reason::NoCores),
-            Ok(_) => None,
-            Err(error) => Some(Reason::Unknown(*error)),
-        });
-        tasks.push(task.ok());
-    }
-    let (mut known, mut unknown): (Vec<usize>, Vec<usize>) =
-        (0..dags.len()).partition(|&dag| reasons[dag].is_none());
-    let mut seen = 0;
-    while let Some(&other) = unknown.get(seen) {
-        seen += 1;
-        known.retain(|&dag| {
-            let is_delayed = relation.may_delay(other, dag);
-            if is_delayed {
-                reasons[dag] = Some(Reason::DelayedBy { dag: dag_id(other) });
-                unknown.push(dag);
-            }
-            !is_delayed
-        });
-    }
-    (tasks, reasons)
-}
-
-/// Returns the first DAG that cannot be analysed for a reason of its own.
-fn first_unknown(reasons: &[Option<Reason>]) -> Option<NotProven> {
-    let own = |reason: &Reason| !matches!(reason, Reason::DelayedBy { .. });
-    let mut unknown = reasons.iter().enumerate().filter_map(|(dag, reason)| {
-        let reason = reason.filter(own)?;
-        let dag = dag_id(dag);
-        Some(NotProven { dag, reason })
-    });
-    unknown.next()
 }
 
 /// The DAGs that can be analysed, and what follows from their attributes.
