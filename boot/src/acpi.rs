@@ -1,11 +1,15 @@
-//! The few ACPI tables that name the processors and a known clock.
+//! The few ACPI tables that name the processors, a known clock, and the machine's end.
 //!
-//! Root pointer (RSDP) -> RSDT or XSDT -> MADT (processors) and FADT (power
-//! management timer). Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every
+//! Root pointer (RSDP) -> RSDT or XSDT -> MADT (processors, I/O APICs) and
+//! FADT (power management timer, [`power`]). Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every
 //! table's checksum is verified; what is malformed is as good as absent.
 
 use crate::physical::PhysicalMemory;
+use crate::power::{self, Power};
 use crate::{List, MAX_PROCESSORS};
+
+/// The most I/O APICs that are noted.
+pub const MAX_IO_APICS: usize = 8;
 
 /// What the tables tell.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +20,10 @@ pub struct Platform {
     pub local_apic: u64,
     /// The power management timer, if the machine has one.
     pub pm_timer: Option<PmTimer>,
+    /// The physical addresses of the I/O APICs' registers.
+    pub io_apics: List<u64, MAX_IO_APICS>,
+    /// How it is powered off and reset.
+    pub power: Power,
 }
 
 /// The 3.579545 MHz counter of ACPI 4.8.2.1.
@@ -70,12 +78,13 @@ pub fn read(memory: &impl PhysicalMemory, rsdp: Option<u64>) -> Result<Platform,
     let madt = tables
         .find(memory, *b"APIC")
         .ok_or(AcpiError::NoProcessorTable)?;
+    let fadt = tables.find(memory, *b"FACP");
     let mut platform = Platform {
         apic_ids: List::new(0),
         local_apic: 0,
-        pm_timer: tables
-            .find(memory, *b"FACP")
-            .and_then(|fadt| pm_timer(memory, fadt)),
+        pm_timer: fadt.and_then(|fadt| pm_timer(memory, fadt)),
+        io_apics: List::new(0),
+        power: fadt.map_or(Power::default(), |fadt| power::read(memory, fadt)),
     };
     read_madt(memory, madt, &mut platform).ok_or(AcpiError::NoProcessorTable)?;
     Ok(platform)
@@ -140,6 +149,7 @@ impl RootTable {
 /// Reads the processors and the local APIC's address (ACPI 5.2.12).
 fn read_madt(memory: &impl PhysicalMemory, madt: u64, platform: &mut Platform) -> Option<()> {
     const LOCAL_APIC: u8 = 0;
+    const IO_APIC: u8 = 1;
     const LOCAL_APIC_ADDRESS_OVERRIDE: u8 = 5;
     const ENABLED: u32 = 1;
     let length = u64::from(memory.u32(madt + 4)?);
@@ -151,6 +161,10 @@ fn read_madt(memory: &impl PhysicalMemory, madt: u64, platform: &mut Platform) -
         match memory.u8(entry)? {
             LOCAL_APIC if memory.u32(entry + 4)? & ENABLED != 0 => {
                 platform.apic_ids.push(memory.u8(entry + 3)?).ok()?;
+            }
+            IO_APIC => {
+                // One more than there is room for stays as the firmware left it.
+                let _ = platform.io_apics.push(u64::from(memory.u32(entry + 4)?));
             }
             LOCAL_APIC_ADDRESS_OVERRIDE => platform.local_apic = memory.u64(entry + 4)?,
             _ => {}
@@ -200,6 +214,8 @@ mod tests {
                 entry(0, 1),
                 entry(2, 1),
                 entry(3, 0),
+                [1, 12, 0, 0, 0, 0, 0xc0, 0xfe],
+                [0, 0, 0, 0, 9, 4, 0, 0],
             ]
             .concat();
             machine.put_table(0x5000, *b"APIC", &madt);
@@ -245,6 +261,7 @@ mod tests {
             let platform = read(&Machine::new(revision), Some(RSDP)).unwrap();
             assert_eq!(platform.apic_ids.as_slice(), &[0, 2], "revision {revision}");
             assert_eq!(platform.local_apic, 0xfee0_0000);
+            assert_eq!(platform.io_apics.as_slice(), &[0xfec0_0000]);
             assert_eq!(
                 platform.pm_timer,
                 Some(PmTimer {

@@ -25,6 +25,7 @@ pub mod multiboot2;
     reason = "what the loader left is at addresses, not in references"
 )]
 pub mod physical;
+pub mod power;
 pub mod pvh;
 
 use physical::PhysicalMemory;

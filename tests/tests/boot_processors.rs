@@ -86,6 +86,36 @@ fn a_machine_that_cannot_be_ended_stays_silent_after_its_verdict() {
     assert_eq!(status, Ok(Status::Success), "{}", outcome.tail());
 }
 
+#[test]
+fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
+    let endless = qemu_with("iobase=0xf4", "iobase=0xf8");
+    for machine in [Machine::Microvm, Machine::Q35] {
+        // A reset ends QEMU, too: it was told not to boot again.
+        for word in ["end=off", "end=reset"] {
+            let guest = Guest::new("fork-join").cores(2).machine(machine);
+            let guest = guest.program(&endless).word("jobs=2").word("subtasks=2");
+            let outcome = guest.word(word).limit(Duration::from_secs(60)).boot();
+            let what = format!("{machine}, {word}: {}\n", outcome.ending) + &outcome.tail();
+            assert_eq!(outcome.ending, Ending::Status(0), "{what}");
+            let verdict = outcome.transcript.verdict();
+            let status = verdict.map(|verdict| verdict.status);
+            assert_eq!(status, Ok(Status::Success), "{what}");
+        }
+    }
+    fs::remove_file(&endless).expect("it is ours");
+}
+
+/// What would be printed goes nowhere, at once.
+#[test]
+fn a_machine_without_a_serial_port_runs() {
+    let mute = qemu_with("#microvm", "microvm,isa-serial=off");
+    let guest = Guest::new("fork-join").cores(2).program(&mute);
+    let outcome = guest.word("jobs=2").word("subtasks=2").boot();
+    fs::remove_file(&mute).expect("it is ours");
+    assert_eq!(outcome.ending, Ending::Guest(Status::Success));
+    assert_eq!(outcome.serial, "");
+}
+
 /// The board has no ACPI timer, and the processor does not say that it is QEMU's.
 #[test]
 fn a_machine_without_a_clock_of_known_rate_is_refused() {

@@ -1,6 +1,6 @@
 //! The end of the run: telling QEMU, or another host.
 
-use super::{cpu, non_maskable, port, this_core};
+use super::{cpu, non_maskable, port, power, serial, this_core};
 
 /// How a run ended, as the value that QEMU's debug exit device takes. QEMU's
 /// own exit status is twice that plus 1.
@@ -14,8 +14,9 @@ pub(crate) enum Status {
     Usage = 0x12,
 }
 
-/// Ends the run. Without the debug exit device the machine stays halted: all its cores are,
-/// or one would look into why this one is silent.
+/// Ends the run. Without the debug exit device the machine ends as was settled
+/// ([`power::set_end`]), or stays halted: all its cores are, or one would look into why
+/// this one is silent.
 pub(crate) fn exit(status: Status) -> ! {
     const DEBUG_EXIT: u16 = 0xf4;
     // SAFETY: the port belongs to QEMU's isa-debug-exit device or to nobody.
@@ -23,5 +24,7 @@ pub(crate) fn exit(status: Status) -> ! {
     if this_core::is_ready() {
         non_maskable::stop_others();
     }
+    serial::drain();
+    power::end();
     cpu::halt_forever()
 }

@@ -13,6 +13,16 @@ pub(crate) unsafe fn write_u8(port: u16, value: u8) {
     unsafe { asm!("out dx, al", in("dx") port, in("al") value, options(nomem, nostack)) };
 }
 
+/// Writes a 16-bit value to a port.
+///
+/// # Safety
+///
+/// As for [`write_u8`].
+pub(crate) unsafe fn write_u16(port: u16, value: u16) {
+    // SAFETY: the caller vouches for the device.
+    unsafe { asm!("out dx, ax", in("dx") port, in("ax") value, options(nomem, nostack)) };
+}
+
 /// Writes a 32-bit value to a port.
 ///
 /// # Safety
@@ -32,6 +42,18 @@ pub(crate) unsafe fn read_u8(port: u16) -> u8 {
     let value;
     // SAFETY: the caller vouches for the device.
     unsafe { asm!("in al, dx", in("dx") port, out("al") value, options(nomem, nostack)) };
+    value
+}
+
+/// Reads a 16-bit value from a port.
+///
+/// # Safety
+///
+/// As for [`read_u8`].
+pub(crate) unsafe fn read_u16(port: u16) -> u16 {
+    let value;
+    // SAFETY: the caller vouches for the device.
+    unsafe { asm!("in ax, dx", in("dx") port, out("ax") value, options(nomem, nostack)) };
     value
 }
 

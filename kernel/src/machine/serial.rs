@@ -6,11 +6,19 @@
 //! while the port's FIFO of 16 bytes is full, or bytes are lost.
 //! Registers: National Semiconductor PC16550D data sheet, 8.0.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use super::port;
 
 const BASE: u16 = 0x3f8;
 
-/// Sets the port to 115200 baud, 8 data bits, no parity, one stop bit.
+/// Several times the 1.4 ms that a full FIFO of 16 bytes takes.
+const MOST_POLLS: u32 = 100_000;
+
+/// Whether the port is there, which is found at [`initialize`].
+static IS_THERE: AtomicBool = AtomicBool::new(false);
+
+/// Looks whether there is a port, and sets it to 115200 baud, 8 data bits, no parity, one stop bit.
 pub(crate) fn initialize() {
     const SETUP: [(u16, u8); 7] = [
         (1, 0x00), // no interrupts
@@ -21,6 +29,15 @@ pub(crate) fn initialize() {
         (2, 0xc7), // FIFOs on and cleared
         (4, 0x03), // ready to send
     ];
+    // A byte that means nothing to the port, and that only a port keeps.
+    const SCRATCH: u16 = BASE + 7;
+    let keeps = |value: u8| {
+        // SAFETY: the ports from 0x3f8 are the serial port's, which is this module's.
+        unsafe { port::write_u8(SCRATCH, value) };
+        // SAFETY: likewise.
+        unsafe { port::read_u8(SCRATCH) == value }
+    };
+    IS_THERE.store(keeps(0x5a) && keeps(0xa5), Ordering::Release);
     for (register, value) in SETUP {
         // SAFETY: the ports from 0x3f8 are the serial port's, which is this module's.
         unsafe { port::write_u8(BASE + register, value) };
@@ -35,11 +52,9 @@ pub(crate) fn send(byte: u8) {
 
 /// Waits until a byte can be sent, and reports whether it can.
 ///
-/// The wait is bounded: a port that never gets ready (because there is none)
-/// costs its bytes, not the kernel.
+/// The wait is bounded: a port that never gets ready costs its bytes, not the kernel. If
+/// there is none nothing is waited for, and bytes go nowhere.
 pub(crate) fn wait_until_ready() -> bool {
-    /// Several times the 1.4 ms that a full FIFO of 16 bytes takes.
-    const MOST_POLLS: u32 = 100_000;
     for _ in 0..MOST_POLLS {
         if is_ready() {
             return true;
@@ -47,6 +62,14 @@ pub(crate) fn wait_until_ready() -> bool {
         super::cpu::relax();
     }
     false
+}
+
+/// Waits until the last byte has left the port, at most as long as for one to be sent.
+pub(crate) fn drain() {
+    const ALL_SENT: u8 = 1 << 6;
+    // SAFETY: reading the line status of this module's device.
+    let is_idle = |_: &u32| unsafe { port::read_u8(BASE + 5) } & ALL_SENT != 0;
+    let _ = (0..MOST_POLLS).find(is_idle);
 }
 
 /// Sends one byte; it is lost if there is no room for it.
@@ -60,7 +83,7 @@ pub(crate) fn is_ready() -> bool {
     const TRANSMITTER_EMPTY: u8 = 1 << 5;
     // SAFETY: reading the line status of this module's device.
     let status = unsafe { port::read_u8(BASE + 5) };
-    status & TRANSMITTER_EMPTY != 0
+    status & TRANSMITTER_EMPTY != 0 || !IS_THERE.load(Ordering::Relaxed)
 }
 
 /// Takes a byte that has been received, if there is one.

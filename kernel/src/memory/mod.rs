@@ -58,10 +58,11 @@ pub(crate) struct Layout {
 /// 1. The boot page table is in use, and `map` is the machine's memory map.
 /// 2. It is called once, by the boot processor, before anything is allocated.
 /// 3. `module`, if any, [lies in memory](lies_in_memory) by that map.
+/// 4. At `devices` there are registers.
 pub(crate) unsafe fn initialize(
     map: &[MemoryRegion],
     module: Option<Module>,
-    device: u64,
+    devices: &[u64],
 ) -> Result<Layout, OutOfMemory> {
     let mut frames = Frames::new(map, &[boot_entry::image::whole(), pages_of(module)]);
     let total_bytes = frames.total_bytes();
@@ -70,7 +71,8 @@ pub(crate) unsafe fn initialize(
     // SAFETY: frames are unused and zeroed (`take_zeroed`), in memory that the
     // boot table maps (condition 1) and `map_all` maps too.
     let mut table = unsafe { PageTable::new(&mut new_frame) }?;
-    map_all(&mut table, map, pages_of(module), device, &mut new_frame)?;
+    map_all(&mut table, map, pages_of(module), &mut new_frame)?;
+    map_devices(&mut table, map, devices, &mut new_frame)?;
     let root_table = table.root();
     // SAFETY: image, data (so the boot stack) and all usable memory are mapped
     // to where they were.
@@ -128,12 +130,11 @@ pub(crate) fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range
 }
 
 /// Maps the image with its rights, the module as constant in its window, all other usable
-/// memory as data, and one page of a device's registers.
+/// memory as data.
 fn map_all(
     table: &mut PageTable,
     map: &[MemoryRegion],
     module: Range<u64>,
-    device: u64,
     new_frame: &mut dyn FnMut() -> Option<u64>,
 ) -> Result<(), OutOfMemory> {
     let image = boot_entry::image::whole();
@@ -155,7 +156,27 @@ fn map_all(
             table.map(part.clone(), part.start, Access::Data, new_frame)?;
         }
     }
-    table.map(device..device + PAGE, device, Access::Device, new_frame)?;
+    Ok(())
+}
+
+/// Maps the pages in which devices have registers at these addresses, each once.
+fn map_devices(
+    table: &mut PageTable,
+    map: &[MemoryRegion],
+    devices: &[u64],
+    new_frame: &mut dyn FnMut() -> Option<u64>,
+) -> Result<(), OutOfMemory> {
+    let page = |address: &u64| address / PAGE * PAGE;
+    for (index, start) in devices.iter().map(page).enumerate() {
+        let is_memory = |region: &MemoryRegion| {
+            region.usable && region.start < start + PAGE && start < region.end
+        };
+        let is_mapped = devices[..index].iter().any(|before| page(before) == start);
+        // A firmware that puts a device into memory is mistaken in one of the two.
+        if !is_mapped && !map.iter().any(is_memory) {
+            table.map(start..start + PAGE, start, Access::Device, new_frame)?;
+        }
+    }
     Ok(())
 }
 

@@ -4,9 +4,9 @@ use alloc::format;
 use alloc::vec::Vec;
 use core::cell::Cell;
 
-use boot::acpi::{self, Platform};
+use boot::acpi::{self, MAX_IO_APICS, Platform};
 use boot::physical::LowMemory;
-use boot::{BootInfo, Module};
+use boot::{BootInfo, List, Module};
 
 use super::{probe, settings};
 use crate::app::bound_verdict::BoundVerdict;
@@ -14,9 +14,10 @@ use crate::app::ending::Ending;
 use crate::app::fault_verdict::FaultVerdict;
 use crate::app::machine_handle::Machine;
 use crate::interrupts;
+use crate::machine::power::{self, End};
 use crate::machine::this_core::{self, Stacks};
 use crate::machine::{
-    clock, cpu, exit, interrupt, interrupt_flag, legacy, local_apic, processors, serial,
+    clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic, processors, serial,
 };
 use crate::memory::{self, OutOfMemory};
 use crate::println;
@@ -36,6 +37,11 @@ const HANDLER_STACK: u64 = 16 * 1024;
 /// boot stack has no guard page.
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
     serial::initialize();
+    for (word, end) in [("end=off", End::Off), ("end=reset", End::Reset)] {
+        if info.has_word(word) {
+            power::set_end(end);
+        }
+    }
     legacy::silence_interrupt_controllers();
     let probes = info.has_word("probe=on");
     interrupt::install(if probes {
@@ -54,10 +60,22 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     // SAFETY: 1. `boot` handed over with its table in use and the machine's
     // map. 2. This is the boot processor's only way, and nothing was allocated.
     // 3. `module` made sure of it.
-    let layout = unsafe { memory::initialize(info.memory.as_slice(), module, platform.local_apic) };
+    let layout = unsafe {
+        memory::initialize(
+            info.memory.as_slice(),
+            module,
+            devices(&platform).as_slice(),
+        )
+    };
     let layout = layout.expect("the machine has too little memory: give it 16 MiB or more");
     // SAFETY: `memory::initialize` mapped one page of registers there.
     unsafe { local_apic::set_base(platform.local_apic) };
+    // SAFETY: the tables name these registers, and `devices` had them mapped.
+    unsafe { power::set_registers(platform.power) };
+    for base in platform.io_apics.as_slice() {
+        // SAFETY: likewise, and nothing else in this kernel uses them.
+        unsafe { io_apic::mask_all(*base) };
+    }
     this_core::create(boot_processor_first(&platform));
     let core = processors::become_core(local_apic::id());
     let stack = core.context().stack_top();
@@ -71,6 +89,19 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     };
     // SAFETY: the stack is that of the context which this core runs first.
     unsafe { cpu::continue_on_stack(stack, &start, start_cores) }
+}
+
+/// Returns the addresses of all registers in memory, for their pages to be mapped.
+fn devices(platform: &Platform) -> List<u64, { MAX_IO_APICS + 3 }> {
+    let mut devices = List::new(0);
+    let apics = platform.io_apics.as_slice().iter().copied();
+    let own = core::iter::once(platform.local_apic);
+    for address in own.chain(apics).chain(platform.power.addresses()) {
+        devices
+            .push(address)
+            .expect("there is room for all of them");
+    }
+    devices
 }
 
 /// Returns the first module that the loader left in memory.

@@ -16,6 +16,7 @@
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
 //! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
 //! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
+//! | `end=halt\|off\|reset` | what the machine does after the verdict, if no host ends it; it holds from the start on | `halt` |
 
 use alloc::format;
 
@@ -69,6 +70,8 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
         counted_time::enable();
         turns::enable();
     }
+    // What is right was taken at the start, so that a panic ends likewise.
+    options.choice("end", &[("halt", ()), ("off", ()), ("reset", ())])?;
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;
     let events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;

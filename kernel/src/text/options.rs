@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 14] = [
+const KERNELS: [&str; 15] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -28,6 +28,7 @@ const KERNELS: [&str; 14] = [
     "status",
     "mode",
     "probe",
+    "end",
 ];
 
 /// The command line, with a note of which words have been taken.
@@ -273,7 +274,7 @@ mod tests {
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
              budget_factor, overheads_ns, trace, trace_events, times, graph, measure, \
-             idle, console, status, mode, probe"
+             idle, console, status, mode, probe, end"
         );
     }
 
