@@ -134,6 +134,14 @@ fn a_dag_given_twice_is_a_fault() {
 }
 
 #[test]
+fn a_signal_of_a_fault_that_releases_nothing_is_a_fault() {
+    let dag = faultless("steering");
+    dag.on_fault(&create_dag().sporadic(PERIOD));
+    let error = refuse(&[dag]);
+    assert_eq!(codes(&error), ["signal_not_committed"]);
+}
+
+#[test]
 fn a_dag_committed_before_is_a_fault_and_cannot_be_changed() {
     let dag = faultless("done");
     drop(support::commit(slice::from_ref(&dag)));

@@ -27,3 +27,15 @@ fn a_camera_that_is_too_slow_skips_frames_and_the_control_loop_keeps_its_deadlin
     assert!(number("skips") >= 20, "{}", line.text);
     assert_eq!(number("attitude_misses"), 0, "{}", line.text);
 }
+
+#[test]
+fn when_the_camera_fails_the_drone_is_sent_down_and_stays_under_control() {
+    let guest = Guest::new("drone").cores(2);
+    let outcome = guest.word("seconds=2").word("fault_at=30").succeed();
+    assert_eq!(outcome.transcript.of_kind("fault").count(), 1);
+    let line = outcome.transcript.of_kind("drone").next();
+    let line = line.expect("the app's line");
+    let number = |name: &str| line.number_at(name).expect(name);
+    assert_eq!(number("landed"), 1, "{}", line.text);
+    assert_eq!(number("attitude_misses"), 0, "{}", line.text);
+}

@@ -16,7 +16,7 @@ use crate::{FRAME, Flight, PERIOD, SECONDS, Workload};
 /// The WCETs in microseconds: three times and more what was observed on four cores in mode
 /// `deterministic`, where all of them share one clock (`./scripts/run --app drone --cores 4`).
 /// The images' have room for a build without optimization.
-pub const WCETS: [(&str, u64); 10] = [
+pub const WCETS: [(&str, u64); 11] = [
     ("measure", 60),
     ("estimate", 60),
     ("control", 60),
@@ -27,6 +27,7 @@ pub const WCETS: [(&str, u64); 10] = [
     ("drain", 60),
     ("watch", 60),
     ("decide", 60),
+    ("alarm", 60),
 ];
 
 /// Where to fly, above the beacon's surroundings.
@@ -53,7 +54,7 @@ const LITTLE: f64 = 0.35;
 #[derive(Debug)]
 pub struct System {
     /// In the order of the table above.
-    pub dags: [Dag; 5],
+    pub dags: [Dag; 6],
     /// The figures.
     pub flight: Flight,
 }
@@ -63,17 +64,18 @@ impl Workload {
     #[must_use]
     pub fn build(self) -> System {
         let flight = Flight::default();
-        let [attitude, camera, battery, mission, command] = [
+        let [attitude, camera, battery, mission, command, safety] = [
             ("attitude", PERIOD),
             ("camera", FRAME),
             ("battery", Duration::from_millis(100)),
             ("mission", Duration::from_millis(50)),
             ("command", Duration::from_millis(200)),
+            ("safety", PERIOD),
         ]
         .map(|(name, period)| {
             let dag = create_dag();
             dag.name(name).relative_deadline(period).demand_proof();
-            if name != "command" {
+            if !["command", "safety"].contains(&name) {
                 let jobs = Duration::from_secs(self.seconds).as_nanos() / period.as_nanos();
                 dag.jobs(u64::try_from(jobs).unwrap_or(u64::MAX).max(1));
             }
@@ -88,14 +90,19 @@ impl Workload {
             fix: camera.latest("fix"),
             charge: battery.latest("charge"),
             goal: command.latest("goal"),
+            is_alarmed: safety.latest("is_alarmed"),
         };
         self.register_attitude(&attitude, &views, &flight);
         self.register_camera(&camera, &views, &flight);
         let changed = self.register_command(&command, &views, &flight);
         self.register_battery(&battery, &views, &changed);
         self.register_mission(&mission, &views, &changed);
+        let alarm = self.register_safety(&safety, &flight);
+        for dag in [&camera, &battery, &mission, &command] {
+            dag.on_fault(&alarm);
+        }
         System {
-            dags: [attitude, camera, battery, mission, command],
+            dags: [attitude, camera, battery, mission, command, safety],
             flight,
         }
     }
@@ -131,21 +138,34 @@ impl Workload {
             taking("estimate"),
         );
 
-        let control = move |(fix, goal): (Seen<'_, Fix>, Seen<'_, Vector>),
-                            (estimate,): (Estimate,)| {
+        type Ahead<'a> = (Seen<'a, Fix>, Seen<'a, Vector>, Seen<'a, bool>);
+        let control = move |(fix, goal, alarm): Ahead<'_>, (estimate,): (Estimate,)| {
             self.spend("control");
+            if alarm.is_some() {
+                return (control(&estimate, None, GROUND),);
+            }
             let fix = fix.map(|fix| (*fix.value, seconds(fix.age_ns())));
             let goal = goal.map_or(START, |goal| *goal.value);
             (control(&estimate, fix, goal),)
         };
-        dag.using((views.fix.sample(), views.goal.sample()))
-            .register_subtask(control, vec!["estimate"], vec!["force"], taking("control"));
+        let uses = (
+            views.fix.sample(),
+            views.goal.sample(),
+            views.is_alarmed.sample(),
+        );
+        dag.using(uses).register_subtask(
+            control,
+            vec!["estimate"],
+            vec!["force"],
+            taking("control"),
+        );
 
         let flight = flight.clone();
         let proceed = move |airframe: &mut Airframe, (force,): (Force,)| {
             self.spend("move");
             airframe.step(force, SECONDS);
-            flight.tilted(acos(rotation(airframe.pose.angles)[2][2].min(1.0)));
+            let upright = rotation(airframe.pose.angles)[2][2].min(1.0);
+            flight.moved(acos(upright), airframe.pose.position[2]);
             (airframe.pose,)
         };
         dag.using(airframe.update()).register_subtask(
@@ -168,8 +188,14 @@ impl Workload {
 
         // Beyond its WCET, frames are skipped; beyond its budget the camera is at fault.
         let slow = taking("detect").budget(Duration::from_millis(100));
+        let mut frame = 0;
         let find = move |(image,): (Image,)| {
             self.spend("detect");
+            assert!(
+                self.fault_at != Some(frame),
+                "the camera fails, as was asked for"
+            );
+            frame += 1;
             if !self.delay.is_zero() {
                 execute_for(self.delay, Occupation::Hold);
             }
@@ -218,6 +244,16 @@ impl Workload {
             Duration::from_millis(200),
             taking("decide"),
         )
+    }
+
+    fn register_safety(self, dag: &Dag, flight: &Flight) -> Signal {
+        let flight = flight.clone();
+        let alarm = move || {
+            self.spend("alarm");
+            flight.decided(true);
+            (true,)
+        };
+        dag.register_sporadic_subtask(alarm, vec!["is_alarmed"], PERIOD, taking("alarm"))
     }
 
     fn register_battery(self, dag: &Dag, views: &Views, changed: &Signal) {
@@ -276,6 +312,7 @@ struct Views {
     fix: Latest<Fix>,
     charge: Latest<f64>,
     goal: Latest<Vector>,
+    is_alarmed: Latest<bool>,
 }
 
 /// What an image was taken from, and what was believed then.

@@ -21,6 +21,7 @@ struct Figures {
     /// The bits of numbers that are not negative, which have the numbers' order.
     most_tilt: AtomicU64,
     most_error: AtomicU64,
+    height: AtomicU64,
 }
 
 impl Flight {
@@ -55,6 +56,12 @@ impl Flight {
         f64::from_bits(self.0.most_error.load(Relaxed))
     }
 
+    /// Returns the height of the end, in metres.
+    #[must_use]
+    pub fn height_metres(&self) -> f64 {
+        f64::from_bits(self.0.height.load(Relaxed))
+    }
+
     pub(crate) fn decided(&self, lands: bool) {
         match lands {
             true => self.0.has_landed.store(1, Relaxed),
@@ -62,8 +69,9 @@ impl Flight {
         }
     }
 
-    pub(crate) fn tilted(&self, radians: f64) {
-        self.0.most_tilt.fetch_max(radians.to_bits(), Relaxed);
+    pub(crate) fn moved(&self, tilt: f64, height: f64) {
+        self.0.most_tilt.fetch_max(tilt.to_bits(), Relaxed);
+        self.0.height.store(height.to_bits(), Relaxed);
     }
 
     pub(crate) fn located(&self, found: Option<[f64; 2]>, truth: &Pose) {

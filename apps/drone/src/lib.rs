@@ -1,4 +1,4 @@
-//! A drone that flies between waypoints: four DAGs that compute, and close a loop.
+//! A drone that flies between waypoints: DAGs that compute, and close a loop.
 //!
 //! | DAG | released | subtasks |
 //! |---|---|---|
@@ -7,12 +7,14 @@
 //! | `battery` | every 100 ms | `drain` |
 //! | `mission` | every 50 ms | `watch` |
 //! | `command` | by a signal, at most every 200 ms | `decide` |
+//! | `safety` | by a fault of another than `attitude` | `alarm` |
 //!
 //! The airframe and what its sensors see are simulated, within `measure`, `move` and `capture`;
 //! all else is what would fly. The airframe is a *state* of `attitude`. Between the DAGs travel
 //! *latest values*: `camera` reads what `attitude` believes, `attitude` where `camera` has seen
 //! the beacon and what `command` has decided. `mission` signals a waypoint that is reached,
-//! `battery` that little is left; then the drone comes down. A frame that is not done when the
+//! `battery` that little is left; then the drone comes down. It does so, without the camera, when
+//! a fault has ended a DAG (`Dag::on_fault`). A frame that is not done when the
 //! next is due makes that one be skipped.
 //!
 //! The code here knows no kernel: the tests fly it in virtual time.
@@ -57,4 +59,6 @@ pub struct Workload {
     pub takes_wcet: bool,
     /// What `detect` takes longer than that, as it must not; zero in a sound flight.
     pub delay: Duration,
+    /// The frame in which `detect` panics; `None` in a sound flight.
+    pub fault_at: Option<u64>,
 }

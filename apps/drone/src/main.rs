@@ -21,13 +21,18 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let seconds = options.number("seconds", 1..=100_000, 8)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
     let delay_us = options.number("delay_us", 0..=1_000_000, 0)?;
-    options.finish(&["seconds", "seed", "delay_us"])?;
+    let fault_at = options.number("fault_at", 0..=1_000_000, 0)?;
+    options.finish(&["seconds", "seed", "delay_us", "fault_at"])?;
     let workload = Workload {
         seconds,
         seed,
         takes_wcet: false,
         delay: Duration::from_micros(delay_us),
+        fault_at: (fault_at > 0).then_some(fault_at),
     };
+    if fault_at > 0 {
+        machine.accept_faults();
+    }
     if delay_us > 0 {
         machine.accept_exceeded_bounds();
     }

@@ -11,10 +11,12 @@ const WORKLOAD: Workload = Workload {
     seed: 1,
     takes_wcet: true,
     delay: Duration::ZERO,
+    fault_at: None,
 };
 
 fn fly(workload: Workload, cores: u32, policy: Policy) -> (drone::Flight, Report) {
     let machine = VirtualTime::new().cores(cores).policy(policy);
+    let machine = machine.contain_panics();
     let system = workload.build();
     let commit = finish_create_dags(&system.dags).expect("every DAG is proven");
     assert!(
@@ -62,4 +64,25 @@ fn a_camera_that_is_too_slow_skips_frames_and_delays_nothing_else() {
     assert_eq!((attitude.completed, attitude.misses), (8_000, 0));
     assert!(camera.skips > 100, "{camera:?}");
     assert!(flight.most_tilt_degrees() < 30.0, "{flight}");
+}
+
+#[test]
+fn when_the_camera_fails_the_drone_comes_down_by_its_other_sensors() {
+    let workload = Workload {
+        seconds: 5,
+        fault_at: Some(60),
+        ..WORKLOAD
+    };
+    let (flight, report) = fly(workload, 2, Policy::StaticPriority);
+    assert_eq!(report.panics.len(), 1);
+    let [attitude, camera, .., safety] = &report.statistics[..] else {
+        panic!("six DAGs");
+    };
+    assert_eq!((attitude.completed, attitude.misses), (5_000, 0));
+    assert_eq!((camera.completed, safety.completed), (60, 1));
+    assert!(
+        flight.has_landed() && flight.most_tilt_degrees() < 25.0,
+        "{flight}"
+    );
+    assert!(flight.height_metres() < 0.8, "{} m", flight.height_metres());
 }

@@ -138,6 +138,7 @@ impl Platform for Host {
         let state = State::new(
             scheduler,
             plan.bodies,
+            plan.after_fault,
             journal,
             terms.processors,
             terms.levels,

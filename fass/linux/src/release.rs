@@ -19,7 +19,7 @@ use sched_dag::journal::What;
 use sched_dag::{CoreId, Vertex};
 
 use crate::level::Role;
-use crate::state::{Fault, State};
+use crate::state::State;
 use crate::sys;
 use crate::team::Team;
 
@@ -159,9 +159,6 @@ impl Team {
         state.replace(core, &self.workers);
         let instance = state.scheduler.instance_of(vertex);
         let cause = "its budget was exceeded".to_owned();
-        state.faults.push(Fault { instance, cause });
-        state.step(&self.workers, |moment, mut observer| {
-            moment.fail(instance, &mut observer);
-        });
+        state.fail(&self.workers, instance, cause);
     }
 }

@@ -56,6 +56,8 @@ pub(crate) struct State {
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
     pub(crate) signals: Vec<DagId>,
+    /// By DAG, the one that gets a signal when a fault ends it.
+    after_fault: Vec<Option<DagId>>,
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
     called: Vec<CoreId>,
@@ -82,6 +84,7 @@ impl State {
     pub(crate) fn new(
         scheduler: Scheduler,
         bodies: Vec<Vec<Body>>,
+        after_fault: Vec<Option<DagId>>,
         journal: Journal,
         processors: Box<[u32]>,
         levels: Option<Levels>,
@@ -110,6 +113,7 @@ impl State {
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
             signals: Vec::with_capacity(dags),
+            after_fault,
             faults: Vec::with_capacity(dags),
             called: Vec::with_capacity(2 * cores),
             decisions: Vec::with_capacity(2 * cores),
@@ -171,6 +175,18 @@ impl State {
         self.decisions.clear();
         self.decisions.extend_from_slice(decisions);
         self.carry_out(workers);
+    }
+
+    /// Ends an instance's DAG because of a fault.
+    pub(crate) fn fail(&mut self, workers: &[Worker], instance: Instance, cause: String) {
+        self.faults.push(Fault { instance, cause });
+        let handler = self.after_fault[instance.dag.index()];
+        self.step(workers, |moment, mut observer| {
+            moment.fail(instance, &mut observer);
+            if let Some(handler) = handler {
+                moment.signal(handler, &mut observer);
+            }
+        });
     }
 
     /// Hands a completion over to the scheduler in the shortest way.

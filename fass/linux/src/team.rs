@@ -13,7 +13,7 @@ use sched_dag::journal::What;
 
 use crate::level::{Levels, Role};
 use crate::requests::{Request, Requests};
-use crate::state::{Fault, Number, Runner, State};
+use crate::state::{Number, Runner, State};
 use crate::sys;
 use crate::worker::Worker;
 
@@ -207,12 +207,7 @@ impl Team {
             Ok(()) => state_now.step(workers, |moment, mut observer| {
                 moment.complete(instance, &mut observer);
             }),
-            Err(cause) => {
-                state_now.faults.push(Fault { instance, cause });
-                state_now.step(workers, |moment, mut observer| {
-                    moment.fail(instance, &mut observer);
-                });
-            }
+            Err(cause) => state_now.fail(workers, instance, cause),
         }
         Ok(self.go_on(me, state))
     }

@@ -27,9 +27,14 @@ fn a_panic_ends_its_dag_alone() {
         let function = |job| assert!(job < 5, "out of numbers");
         faulty.register_untyped_subtask(function, SubtaskAttributes::named("counts"));
         let healthy = ticking("healthy", 20, ms(2), 1, 100);
-        finish_create_dags(&[faulty, healthy]).unwrap();
+        let safe = create_dag();
+        safe.name("safe").relative_deadline(ms(2));
+        safe.register_untyped_subtask(|_| (), SubtaskAttributes::named("holds"));
+        faulty.on_fault(&safe.sporadic(ms(2)));
+        finish_create_dags(&[faulty, healthy, safe]).unwrap();
         let run = alone.machine.run().unwrap();
         assert_eq!(run.violations().count(), 0);
+        assert_eq!(run.statistics(DagId(2)).completed, 1);
         let [fault] = run.faults() else {
             panic!("one fault is meant, not {:?}", run.faults());
         };

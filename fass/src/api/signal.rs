@@ -198,6 +198,41 @@ impl Dag {
         self.signal()
     }
 
+    /// Has a signal raised when a fault ends the DAG: a panic, an exception, an exceeded
+    /// budget. What the signal releases brings the system into a safe state; as a DAG it has its
+    /// place in the schedule, and a bound. It is released in the step that ends the DAG, and
+    /// should sample nothing that the ended DAG would have to renew.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new().contain_panics();
+    /// let ms = Duration::from_millis;
+    /// let brakes = create_dag();
+    /// brakes.name("brakes").relative_deadline(ms(5));
+    /// let hold = SubtaskAttributes::named("hold");
+    /// let stop = brakes.register_sporadic_subtask(|| (), vec![], ms(50), hold);
+    ///
+    /// let steering = create_dag();
+    /// steering.name("steering").jobs(10).relative_deadline(ms(10)).on_fault(&stop);
+    /// let mut angles = vec![1, 2, 3].into_iter();
+    /// let steer = move || _ = angles.next().unwrap(); // panics in job 3
+    /// steering.register_periodic_subtask(steer, vec![], ms(10), SubtaskAttributes::named("steer"));
+    ///
+    /// finish_create_dags(&[brakes, steering]).unwrap();
+    /// let report = machine.run();
+    /// assert_eq!(report.panics.len(), 1);
+    /// assert_eq!(report.jobs.last().unwrap().release_ns, 30_000_000); // at the fault
+    /// assert_eq!(report.statistics[0].completed, 1);
+    /// ```
+    #[track_caller]
+    pub fn on_fault(&self, signal: &Signal) -> &Self {
+        self.open().on_fault = Some(Arc::clone(&signal.target));
+        self
+    }
+
     #[track_caller]
     fn signal(&self) -> Signal {
         let mut draft = self.open();

@@ -301,11 +301,17 @@ fn missing_others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
         let own = other.signal.as_ref();
         own.is_some_and(|target| Arc::ptr_eq(signal, target))
     };
-    let raises = draft.raises.iter();
+    // The fault of any subtask raises the DAG's; the first stands for them.
+    let of_faults = draft.on_fault.iter().take(draft.spec.subtasks.len());
+    let raises = draft
+        .raises
+        .iter()
+        .map(|(subtask, signal)| (*subtask, signal));
+    let raises = raises.chain(of_faults.map(|signal| (0, signal)));
     let unknown = raises.filter(|(_, signal)| !dags.iter().any(|other| is_target(signal, other)));
     let signals = unknown.map(|(subtask, _)| Fault::SignalNotCommitted {
         dag: label.clone(),
-        subtask: staleness::label_of(dag, *subtask),
+        subtask: staleness::label_of(dag, subtask),
     });
     latest.chain(signals).collect()
 }

@@ -65,12 +65,14 @@ pub(crate) fn tie(
             bodies
         })
         .collect();
+    let handler = |dag: &Dag| Some(dag.draft.borrow().on_fault.as_ref()?.get()?.1);
     Plan {
         task_set,
         number,
         bodies,
         bounds_ns: answers.bounds_ns(),
         sink_bounds_ns: answers.sink_bounds_ns(),
+        after_fault: dags.iter().map(handler).collect(),
         staleness,
     }
 }

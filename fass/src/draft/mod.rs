@@ -53,6 +53,8 @@ pub(crate) struct Draft {
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// What releases this DAG, if it is sporadic.
     pub(crate) signal: Option<Arc<Target>>,
+    /// The signal that is raised when a fault ends the DAG.
+    pub(crate) on_fault: Option<Arc<Target>>,
 }
 
 /// The type of a topic's end that no function states.

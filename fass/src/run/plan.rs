@@ -41,6 +41,10 @@ pub struct Plan {
     pub bounds_ns: Vec<Option<u64>>,
     /// The same of each sink, in the order of [`Dag::sinks`](sched_dag::Dag::sinks).
     pub sink_bounds_ns: Vec<Vec<Option<u64>>>,
+    /// By DAG, the one that gets a signal when a fault ends it
+    /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
+    /// scheduler.
+    pub after_fault: Vec<Option<DagId>>,
     /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
     /// passes between DAGs, for platforms that show it.
     pub staleness: Vec<Staleness>,

@@ -29,6 +29,8 @@ pub(crate) struct Session {
     task_set: Arc<TaskSet>,
     driver: Driver,
     bodies: Vec<Vec<Body>>,
+    /// By DAG, the one that gets a signal when a fault ends it.
+    after_fault: Vec<Option<DagId>>,
     recording: Recording,
 }
 
@@ -44,6 +46,7 @@ impl Session {
                 run_until_ns: 0,
             },
             bodies: plan.bodies,
+            after_fault: plan.after_fault,
             task_set,
         }
     }
@@ -67,6 +70,7 @@ impl Session {
         let mut runner = Runner {
             machine,
             bodies: &mut self.bodies,
+            after_fault: &self.after_fault,
             recording: &mut self.recording,
             panic: None,
         };
@@ -167,6 +171,7 @@ struct Recording {
 struct Runner<'s> {
     machine: &'s Surroundings,
     bodies: &'s mut [Vec<Body>],
+    after_fault: &'s [Option<DagId>],
     recording: &'s mut Recording,
     /// The panic that fails the run and stops it. In what is left of its instant
     /// nothing runs, and nothing is recorded.
@@ -255,8 +260,11 @@ impl Workload for Runner<'_> {
         self.recording.journal.on_core(What::Finish, instance, core);
     }
 
-    fn failed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
+    fn failed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
         self.recording.journal.on_core(What::Ended, instance, core);
+        if let Some(handler) = self.after_fault[instance.dag.index()] {
+            self.machine.signal_at(now_ns, handler);
+        }
     }
 }
 

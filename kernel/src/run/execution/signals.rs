@@ -21,6 +21,8 @@ pub(super) struct Signals {
     has_begun: bool,
     /// The DAGs, each once; there is room for all.
     raised: Vec<DagId>,
+    /// By DAG, the one that gets a signal when a fault ends it.
+    after_fault: Vec<Option<DagId>>,
 }
 
 impl Signals {
@@ -29,7 +31,13 @@ impl Signals {
             plan: plan.number,
             has_begun: false,
             raised: Vec::with_capacity(plan.bodies.len()),
+            after_fault: plan.after_fault.clone(),
         }
+    }
+
+    /// Returns the DAG that gets a signal when a fault ends another.
+    pub(super) fn after_fault(&self, ended: DagId) -> Option<DagId> {
+        self.after_fault.get(ended.index()).copied().flatten()
     }
 
     /// Publishes what the body has prepared, and takes its signals. Apart, as most

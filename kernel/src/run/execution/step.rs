@@ -102,7 +102,12 @@ impl Execution {
                 moment.complete(instance, watcher);
                 signals.send(&mut moment, watcher);
             }
-            Event::Failed(instance) => moment.fail(instance, watcher),
+            Event::Failed(instance) => {
+                moment.fail(instance, watcher);
+                if let Some(dag) = signals.after_fault(instance.dag) {
+                    moment.signal(dag, watcher);
+                }
+            }
             Event::Signalled(dag) => moment.signal(dag, watcher),
             Event::Control(control) => control.apply(&mut moment, watcher),
         }
