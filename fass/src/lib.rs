@@ -122,4 +122,5 @@ pub use run::staleness::Staleness;
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use sched_dag::analysis::{Overheads, Reason, Test};
+pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{ConstructionPolicy, Count, Order, OverrunPolicy, Policy, Preemption, Warning};

@@ -5,6 +5,7 @@
 //! commits its DAGs. The commit asks it for the policy and the cores to verify
 //! against, and leaves the [`Plan`] with it.
 
+use alloc::borrow::Cow;
 use alloc::string::String;
 use core::fmt;
 use core::time::Duration;
@@ -85,6 +86,13 @@ pub trait Platform: Sync {
     /// ```
     fn overheads(&self) -> Overheads {
         Overheads::default()
+    }
+
+    /// Returns a file of WCETs that were observed, if the platform was given one; the
+    /// commit takes what it has for its DAGs in place of what they state.
+    /// `sched_dag::wcets` has the format.
+    fn wcets(&self) -> Option<Cow<'static, str>> {
+        None
     }
 
     /// Returns the time since the platform's start, in nanoseconds.

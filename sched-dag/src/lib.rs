@@ -94,6 +94,7 @@
 extern crate alloc;
 
 pub mod analysis;
+mod fnv;
 mod ids;
 pub mod journal;
 mod kept;
@@ -110,6 +111,7 @@ mod task_set;
 mod topic;
 mod verify;
 pub mod virtual_time;
+pub mod wcets;
 
 pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use kept::Journal;

@@ -82,6 +82,9 @@ pub struct SubtaskSpec {
     pub name: String,
     /// The worst-case execution time, if known.
     pub wcet_ns: Option<u64>,
+    /// The margin that it has over the longest call observed, in hundredths of that;
+    /// `None`: it is stated.
+    pub wcet_margin_percent: Option<u32>,
     /// The execution time beyond which an instance is ended as faulty; `None`:
     /// the driver's choice. Enforced by the driver, not by the scheduler.
     pub budget_ns: Option<u64>,

@@ -9,6 +9,7 @@ use alloc::string::String;
 use crate::ids::{DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::{Activation, OverrunPolicy, Priority};
 use crate::topic::Topic;
+use crate::wcets::WcetSource;
 
 /// All DAG tasks of one commit; by default none.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +25,7 @@ pub struct TaskSet {
 #[derive(Clone, Debug)]
 pub struct Dag {
     pub(crate) name: String,
+    pub(crate) graph_hash: u64,
     pub(crate) activation: Activation,
     pub(crate) period_ns: u64,
     pub(crate) relative_deadline_ns: u64,
@@ -57,6 +59,7 @@ pub struct StatePrecedence {
 pub struct Subtask {
     pub(crate) name: String,
     pub(crate) wcet_ns: Option<u64>,
+    pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
@@ -131,6 +134,12 @@ impl Dag {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Returns the hash of the names and edges that were registered.
+    #[must_use]
+    pub const fn graph_hash(&self) -> u64 {
+        self.graph_hash
     }
 
     /// Returns what releases the jobs.
@@ -284,6 +293,12 @@ impl Subtask {
     #[must_use]
     pub const fn budget_ns(&self) -> Option<u64> {
         self.budget_ns
+    }
+
+    /// Returns where the WCET is from.
+    #[must_use]
+    pub const fn wcet_source(&self) -> WcetSource {
+        self.wcet_source
     }
 
     /// Returns how long an instance may execute for, `u64::MAX` if there is no limit: its

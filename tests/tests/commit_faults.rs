@@ -41,6 +41,17 @@ fn not_launched() -> fass::CommitError {
     error
 }
 
+fn wcets_refused() -> fass::CommitError {
+    let observed = "margin 20\ndag 1 lidar\nwcet 1200000 0 start\nend\n";
+    let machine = virtual_time::VirtualTime::new().wcets(observed);
+    let dag = fass::create_dag();
+    dag.name("lidar").period(PERIOD).relative_deadline(PERIOD);
+    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
+    let error = finish_create_dags(&[dag]).expect_err("another graph has that hash");
+    drop(machine);
+    error
+}
+
 fn no_cores() -> Vec<Fault> {
     let options = CommitOptions::new(Policy::Edf, 0);
     faults(&[lidar()], &options)
@@ -119,8 +130,9 @@ fn every_fault_is_found_and_said_as_documented() {
         let fault = fault.unwrap_or_else(|| panic!("{code} is not found, but {faults:?}"));
         said.insert(code.to_string(), fault.to_string());
     }
-    let refused = not_launched();
-    said.insert(refused.faults()[0].code().into(), refused.to_string());
+    for refused in [not_launched(), wcets_refused()] {
+        said.insert(refused.faults()[0].code().into(), refused.to_string());
+    }
 
     let machine = virtual_time::VirtualTime::new();
     let _machine = machine.policy(fass::Policy::StaticPriority);

@@ -4,6 +4,8 @@ use core::time::Duration;
 
 use common::random::{Random, nth};
 
+use crate::WCET;
+
 /// The execution times of one parallel subtask, job by job.
 ///
 /// Each parallel subtask has its own generator, so what one draws does not depend on when
@@ -11,21 +13,29 @@ use common::random::{Random, nth};
 #[derive(Clone, Debug)]
 pub struct ExecutionTimes {
     random: Random,
+    longest_ns: u64,
 }
 
 impl ExecutionTimes {
     /// Starts the sequence of parallel subtask `branch` for `seed`.
     #[must_use]
     pub fn new(seed: u64, branch: usize) -> Self {
+        Self::up_to(WCET, seed, branch)
+    }
+
+    /// Starts one whose longest time, at least 1 ms, is not that of the paper.
+    #[must_use]
+    pub fn up_to(longest: Duration, seed: u64, branch: usize) -> Self {
         let seed = nth(seed, branch as u64);
         Self {
             random: Random::new(seed),
+            longest_ns: u64::try_from(longest.as_nanos()).unwrap_or(u64::MAX),
         }
     }
 
-    /// Draws the next time: uniform from 1 to 50 ms, in nanoseconds.
+    /// Draws the next time: uniform from 1 ms to the longest, which is 50 ms in the paper.
     pub fn next_time(&mut self) -> Duration {
-        let drawn = self.random.within(1_000_000..=50_000_000);
+        let drawn = self.random.within(1_000_000..=self.longest_ns);
         Duration::from_nanos(drawn)
     }
 }

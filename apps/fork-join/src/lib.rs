@@ -59,6 +59,8 @@ pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
 pub struct Workload {
     /// The number N of parallel subtasks, 1 to [`MOST_PARALLEL`].
     pub parallel: usize,
+    /// The longest time that a parallel subtask executes for; [`WCET`] in the paper.
+    pub longest: Duration,
     /// The number of jobs; 0: without end.
     pub jobs: u64,
     /// The seed of the execution times.
@@ -100,14 +102,14 @@ impl Workload {
         dag.register_periodic_subtask(source, vec!["job"], PERIOD, attributes);
 
         for branch in 0..self.parallel {
-            let mut times = ExecutionTimes::new(self.seed, branch);
+            let mut times = ExecutionTimes::up_to(self.longest, self.seed, branch);
             let work = self.work;
             let execute = move |(job,): (u64,)| {
                 work.execute_for(times.next_time());
                 (job,)
             };
             let attributes = SubtaskAttributes::named(&format!("parallel-{branch}"));
-            let attributes = attributes.wcet(WCET).budget(BUDGET);
+            let attributes = attributes.wcet(self.longest).budget(BUDGET);
             let output = format!("part-{branch}");
             dag.register_subtask(execute, vec!["job"], vec![&output], attributes);
         }
@@ -127,6 +129,7 @@ mod tests {
     fn workload(parallel: usize) -> Workload {
         Workload {
             parallel,
+            longest: WCET,
             jobs: 100,
             seed: 1,
             work: Work::Simulate(Occupation::Hold),

@@ -8,9 +8,10 @@ extern crate alloc;
 mod figures;
 
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use fass::{Occupation, finish_create_dags};
-use fork_join::{MOST_PARALLEL, Pace, Work, Workload};
+use fork_join::{MOST_PARALLEL, Pace, WCET, Work, Workload};
 use kernel::options::{Options, UsageError};
 use kernel::{Ending, Machine, println};
 
@@ -25,7 +26,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         machine.cores()
     );
     println!(
-        "each parallel subtask executes 1 to 50 ms, {}.",
+        "each parallel subtask executes 1 to {} ms, {}.",
+        workloads[0].longest.as_millis(),
         match workloads[0].work {
             Work::Simulate(Occupation::Hold) =>
                 "simulated: it holds its core, which halts meanwhile",
@@ -33,7 +35,9 @@ fn main(machine: &Machine) -> Result<(), Ending> {
             Work::Compute(_) => "computing: so long with a processor for itself",
         }
     );
-    println!("Its mean load is 25.5 / 25: backlog and deadline misses grow with the jobs.");
+    if workloads[0].longest == WCET {
+        println!("Its mean load is 25.5 / 25: backlog and deadline misses grow with the jobs.");
+    }
     let mut all = Vec::new();
     for workload in &workloads {
         match workload.jobs {
@@ -69,13 +73,15 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
     let jobs = options.number("jobs", least_jobs..=1_000_000, 200)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
     let work = work(options)?;
-    options.finish(&["subtasks", "jobs", "seed", "work", "occupy"])?;
+    let longest_ms = options.number("longest", 1..=50, 50)?;
+    options.finish(&["longest", "subtasks", "jobs", "seed", "work", "occupy"])?;
     let parallel = subtasks
         .into_iter()
         .filter_map(|parallel| usize::try_from(parallel).ok());
     Ok(parallel
         .map(|parallel| Workload {
             parallel,
+            longest: Duration::from_millis(longest_ms),
             jobs,
             seed,
             work,

@@ -69,6 +69,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         PolicyUnderTest::Fass => {
             let workload = Workload {
                 parallel,
+                longest: fork_join::WCET,
                 jobs,
                 seed,
                 work: Work::Simulate(Occupation::Hold),

@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
+use sched_dag::wcets::WcetFault;
 use sched_dag::{DagLabel, SubtaskLabel, Warning};
 
 use super::answer::Unproven;
@@ -106,6 +107,13 @@ pub enum Fault {
         /// The source registered second.
         subtask: SubtaskLabel,
     },
+    /// The file of observed WCETs does not fit the DAG.
+    WcetsRefused {
+        /// The DAG.
+        dag: DagLabel,
+        /// What does not fit.
+        fault: WcetFault,
+    },
     /// A subtask samples a latest value of a DAG that is not in the commit.
     LatestNotCommitted {
         /// The DAG of the subtask.
@@ -153,6 +161,7 @@ impl Fault {
             Self::DurationTooLong { .. } => "duration_too_long",
             Self::PeriodsDiffer { .. } => "periods_differ",
             Self::ActivationsDiffer { .. } => "activations_differ",
+            Self::WcetsRefused { .. } => "wcets_refused",
             Self::LatestNotCommitted { .. } => "latest_not_committed",
             Self::SignalNotCommitted { .. } => "signal_not_committed",
             Self::NotProven { .. } => "not_proven",
@@ -262,6 +271,7 @@ impl fmt::Display for Fault {
                 "{subtask} makes a second source of {dag}, which is released by the clock for one \
                  and by a signal for the other; make two DAGs, or both sources alike"
             ),
+            Self::WcetsRefused { dag, fault } => write!(f, "{fault}: {dag}"),
             Self::LatestNotCommitted {
                 dag,
                 subtask,

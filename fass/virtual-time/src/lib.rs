@@ -162,6 +162,31 @@ impl VirtualTime {
         self
     }
 
+    /// Gives the commit a file of WCETs that were observed, as `./scripts/run --observe`
+    /// writes it; what it has for the DAGs counts in place of what they state.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let observed = "margin 20\ndag 3497787414769821261 tick\nwcet 1200000 0 count\nend\n";
+    /// let _machine = VirtualTime::new().wcets(observed);
+    /// let (dag, period) = (create_dag(), Duration::from_millis(10));
+    /// dag.name("tick").period(period).relative_deadline(period);
+    /// dag.register_untyped_subtask(|_| (), SubtaskAttributes::named("count"));
+    /// let commit = finish_create_dags(&[dag]).unwrap();
+    /// assert_eq!(
+    ///     commit.answers()[0].to_string(),
+    ///     "dag `tick` takes at most 1.2ms, by multiple paths; 1 of 1 WCETs are observed ones and 20 %"
+    /// );
+    /// ```
+    #[must_use = "the machine itself is returned"]
+    pub fn wcets(self, file: &str) -> Self {
+        self.machine.wcets.replace(Some(file.into()));
+        self
+    }
+
     /// Contains panics: one in a function ends its DAG only, as a fault does on the
     /// kernel's machine, instead of failing the run.
     ///

@@ -5,6 +5,7 @@
 //! keeps its run in `run`; while a run steps, the run is taken out of there, so
 //! that a function's calls into the platform meet nothing borrowed.
 
+use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
 use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
@@ -26,6 +27,8 @@ pub(crate) struct Machine {
     pub(crate) policy: Cell<Policy>,
     pub(crate) preemption: Cell<Preemption>,
     pub(crate) overheads: Cell<Overheads>,
+    /// A file of observed WCETs.
+    pub(crate) wcets: RefCell<Option<String>>,
     /// What it shares with its run.
     pub(crate) surroundings: Surroundings,
     session: RefCell<Option<Session>>,
@@ -50,6 +53,7 @@ pub(crate) fn make_current() -> Rc<Machine> {
         policy: Cell::new(Policy::Edf),
         preemption: Cell::new(Preemption::Enabled),
         overheads: Cell::new(Overheads::default()),
+        wcets: RefCell::new(None),
         surroundings: Surroundings::default(),
         session: RefCell::new(None),
         plan: Cell::new(None),
@@ -100,6 +104,10 @@ impl Platform for HostPlatform {
 
     fn overheads(&self) -> Overheads {
         current().map_or_else(Overheads::default, |machine| machine.overheads.get())
+    }
+
+    fn wcets(&self) -> Option<Cow<'static, str>> {
+        current()?.wcets.borrow().clone().map(Cow::Owned)
     }
 
     fn now_ns(&self) -> u64 {

@@ -13,6 +13,7 @@ use sched_dag::DagId;
 use super::bound_verdict::BoundVerdict;
 use super::ending::Ending;
 use super::fault_verdict::FaultVerdict;
+use super::wcet_notes;
 use crate::machine;
 use crate::machine::interrupts_off;
 use crate::memory::heap;
@@ -251,6 +252,7 @@ impl Machine {
         let faults = |dag| run.statistics(dag).faults;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
+        wcet_notes::note(&run);
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }

@@ -11,3 +11,4 @@ pub(crate) mod event;
 pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
+mod wcet_notes;

@@ -1,5 +1,7 @@
 //! A run's statistics as machine lines; `docs/serial-protocol.md` has the format.
 
+use core::fmt;
+
 use sched_dag::law::Histogram;
 use sched_dag::{DagId, Instance, SubtaskId};
 
@@ -39,7 +41,8 @@ pub(crate) fn dump(run: &Run) {
                     })
                     .object("execution_time_ns", |object| {
                         describe(&of_subtask.execution_time, object);
-                    });
+                    })
+                    .list("execution_histogram", buckets(&of_subtask.execution_time));
             });
             if let Some(response_time) = &of_subtask.response_time {
                 json::emit("times_sink", |line| {
@@ -56,6 +59,11 @@ pub(crate) fn dump(run: &Run) {
             }
         }
     }
+}
+
+fn buckets(times: &Histogram) -> impl Iterator<Item = impl fmt::Display> {
+    let buckets = times.filled();
+    buckets.map(|(top, count)| fmt::from_fn(move |f| write!(f, "[{top},{count}]")))
 }
 
 fn describe(times: &Histogram, object: &mut Object<'_, '_>) {

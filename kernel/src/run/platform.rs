@@ -1,5 +1,6 @@
 //! The kernel as the platform that `fass` runs on.
 
+use alloc::borrow::Cow;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
@@ -8,6 +9,7 @@ use sched_dag::{DagId, SchedulerOptions};
 
 use super::execution::{self, Terms};
 use super::occupation;
+use crate::machine::once::Once;
 use crate::machine::{clock, this_core};
 use crate::text::graph;
 
@@ -25,6 +27,8 @@ pub(crate) struct Kernel {
     most_events: AtomicU64,
     /// What a commit adds to WCETs: context switch, dispatch, interrupt.
     overheads_ns: [AtomicU64; 3],
+    /// A file of WCETs that were observed.
+    wcets: Once<&'static str>,
 }
 
 pub(crate) static KERNEL: Kernel = Kernel {
@@ -34,6 +38,7 @@ pub(crate) static KERNEL: Kernel = Kernel {
     budget_factor: AtomicU64::new(0),
     most_events: AtomicU64::new(u64::MAX),
     overheads_ns: [const { AtomicU64::new(0) }; 3],
+    wcets: Once::new(),
 };
 
 impl Kernel {
@@ -53,6 +58,12 @@ impl Kernel {
         for (place, value) in self.overheads_ns.iter().zip(values) {
             place.store(value, Ordering::Relaxed);
         }
+    }
+
+    /// Gives commits a file of WCETs that were observed.
+    pub(crate) fn set_wcets(&self, file: &'static str) {
+        // Only the first one counts.
+        let _ = self.wcets.set(file);
     }
 
     /// Chooses the budget of subtasks that have a WCET only, in WCETs; 0 for none.
@@ -110,6 +121,10 @@ impl Platform for Kernel {
             dispatch_ns,
             interrupt_ns,
         }
+    }
+
+    fn wcets(&self) -> Option<Cow<'static, str>> {
+        self.wcets.get().copied().map(Cow::Borrowed)
     }
 
     fn now_ns(&self) -> u64 {

@@ -254,9 +254,16 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
     let options = Options::parse(line)?;
     let settings = settings::apply(&options)?;
     KERNEL.set_most_events(settings.events);
+    let mut module = module_bytes(info);
+    if settings.wcet_bytes > 0 {
+        let parts = module.and_then(|bytes| bytes.split_at_checked(settings.wcet_bytes));
+        let wcets = parts.and_then(|(wcets, _)| core::str::from_utf8(wcets).ok());
+        KERNEL.set_wcets(wcets.ok_or_else(|| usage("`wcets`: the module is no such text"))?);
+        module = parts.map(|(_, rest)| rest).filter(|rest| !rest.is_empty());
+    }
     let machine = Machine {
         options,
-        module: module_bytes(info),
+        module,
         dumps_trace: settings.dump,
         dumps_times: settings.dumps_times,
         wishes: settings.wishes,

@@ -6,6 +6,7 @@
 //! | `preemption=on\|off` | whether a started instance may lose its core | `on` |
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
 //! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
+//! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
 //! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
@@ -44,6 +45,8 @@ pub(crate) struct Settings {
     pub(crate) dump: bool,
     /// Whether each run's statistics are printed after it.
     pub(crate) dumps_times: bool,
+    /// How many bytes of the loader's module are WCETs.
+    pub(crate) wcet_bytes: usize,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
     /// Whether a response time beyond its bound is the app's fault.
@@ -81,8 +84,10 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
         ("on", Some(Echo::Off)),
         ("echo", Some(Echo::On)),
     ];
+    let wcet_bytes = options.number("wcets", 0..=1 << 32, 0)?;
     Ok(Settings {
         events,
+        wcet_bytes: usize::try_from(wcet_bytes).unwrap_or(0),
         dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
         dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,
         wishes: Wishes {

@@ -37,7 +37,8 @@ pub(crate) fn dump(plan: &Plan, options: SchedulerOptions, overhead_ns: Option<u
             line.list("overhead_ns", overhead_ns.iter())
                 .list("bound_ns", bound_ns.iter());
             describe(line, number, dag);
-            line.flag("sporadic", dag.is_sporadic())
+            line.number("hash", dag.graph_hash())
+                .flag("sporadic", dag.is_sporadic())
                 .list("jobs", dag.jobs().iter())
                 .list("topics", topics(dag))
                 .list("states", states(dag))

@@ -13,11 +13,12 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 15] = [
+const KERNELS: [&str; 16] = [
     "policy",
     "preemption",
     "budget_factor",
     "overheads_ns",
+    "wcets",
     "trace",
     "trace_events",
     "times",

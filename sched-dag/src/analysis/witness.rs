@@ -44,6 +44,7 @@ use super::cover::{Chain, covering, heaviest, peel};
 use super::interference::Other;
 use super::intra_task::each_path;
 use super::judge::{Case, with_case};
+use crate::fnv::{EMPTY, fnv_1a};
 use crate::policy::{Policy, Preemption};
 use crate::task_set::TaskSet;
 
@@ -80,7 +81,7 @@ struct Text(String);
 
 impl Text {
     fn hash(&mut self, word: &str) {
-        let hash = fnv_1a(self.0.as_bytes());
+        let hash = fnv_1a(EMPTY, self.0.as_bytes());
         self.line(format_args!("{word} {hash}"));
     }
 
@@ -289,11 +290,4 @@ struct Listed<'a> {
 
 fn most(parallelism: u64) -> usize {
     usize::try_from(parallelism).unwrap_or(usize::MAX)
-}
-
-/// The hash of G. Fowler, L. C. Noll and P. Vo, with 64 bits.
-fn fnv_1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
 }

@@ -29,11 +29,22 @@ impl Journal {
     /// Computes the statistics of the run; `None` if events were neither kept nor
     /// counted.
     #[must_use]
-    #[inline(never)]
     pub fn statistics(&self, task_set: &Arc<TaskSet>) -> Option<Tally> {
+        self.statistics_in(task_set, FINEST)
+    }
+
+    /// Works like [`statistics`](Self::statistics), with the coarsest histograms, which
+    /// take little memory, unless finer ones were kept. Counts and maxima are exact.
+    #[must_use]
+    pub fn coarse_statistics(&self, task_set: &Arc<TaskSet>) -> Option<Tally> {
+        self.statistics_in(task_set, 0)
+    }
+
+    #[inline(never)]
+    fn statistics_in(&self, task_set: &Arc<TaskSet>, bits: u32) -> Option<Tally> {
         let mut tally = match &self.tally {
             Some(tally) => tally.clone(),
-            None => Tally::new(task_set, FINEST),
+            None => Tally::new(task_set, bits),
         };
         self.events().for_each(|event| tally.take(&event));
         self.is_complete.then_some(tally)

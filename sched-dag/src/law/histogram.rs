@@ -108,6 +108,17 @@ impl Histogram {
         self.max
     }
 
+    /// Returns the buckets that are not empty, ascending: the largest value of each, and
+    /// how many values it has. That of the last one is the maximum.
+    pub fn filled(&self) -> impl Iterator<Item = (u64, u32)> {
+        let counts = self.counts.iter().copied().enumerate();
+        let filled = counts.filter(|(_, count)| *count > 0);
+        filled.map(|(bucket, count)| match bucket + 1 == self.counts.len() {
+            true => (self.max, count),
+            false => (self.top(bucket).min(self.max), count),
+        })
+    }
+
     /// Returns a value that at least so many thousandths of the values do not exceed;
     /// 0 if there is none. See the module for how close it is.
     #[must_use]
@@ -115,18 +126,12 @@ impl Histogram {
         let rank = u128::from(self.count) * u128::from(thousandths);
         let rank = rank.div_ceil(1000).max(1);
         let mut below = 0u128;
-        for (bucket, &count) in self.counts.iter().enumerate() {
+        let mut buckets = self.filled();
+        let found = buckets.find(|&(_, count)| {
             below += u128::from(count);
-            if below >= rank {
-                let top = if bucket + 1 == self.counts.len() {
-                    self.max
-                } else {
-                    self.top(bucket)
-                };
-                return top.clamp(self.min(), self.max);
-            }
-        }
-        self.max
+            below >= rank
+        });
+        found.map_or(self.max, |(top, _)| top)
     }
 }
 
@@ -166,6 +171,16 @@ mod tests {
         }
         let (min, max) = (values[0], values[4999]);
         assert_eq!((histogram.min(), histogram.max()), (min, max));
+    }
+
+    #[test]
+    fn buckets_have_all_values_and_end_with_the_maximum() {
+        let mut histogram = Histogram::new(2);
+        [3, 3, 9, 1 << 50]
+            .into_iter()
+            .for_each(|value| histogram.add(value));
+        let buckets: Vec<_> = histogram.filled().collect();
+        assert_eq!(buckets, [(3, 2), (9, 1), (1 << 50, 1)]);
     }
 
     #[test]

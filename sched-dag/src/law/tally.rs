@@ -10,7 +10,7 @@
 //! - *Join latency*, of a subtask's instances: from the last predecessor's finish to
 //!   the start. A source has none.
 //! - *Execution time*, of a subtask's instances: from the start to the finish, without
-//!   the time for which it was suspended.
+//!   the time for which it was suspended. Those above the WCET are counted, too.
 //!
 //! Only complete jobs count in a DAG's response time: neither aborted nor cut short.
 
@@ -55,6 +55,8 @@ pub struct OfSubtask {
     pub join_latency: Histogram,
     /// From the start to the finish, without the time of suspensions.
     pub execution_time: Histogram,
+    /// How many of these are above the WCET.
+    pub beyond_wcet: u64,
     /// From the nominal release to the finish, of each of several sinks.
     pub response_time: Option<Histogram>,
 }
@@ -93,6 +95,7 @@ impl Tally {
         let of_subtask = |is_sink: bool| OfSubtask {
             join_latency: Histogram::new(bits),
             execution_time: Histogram::new(bits),
+            beyond_wcet: 0,
             response_time: is_sink.then(|| Histogram::new(bits)),
         };
         let subtasks = task_set.dags().iter().flat_map(|dag| {
@@ -256,7 +259,10 @@ impl OfDag {
             What::Suspend => times.executed_ns += event.time_ns.saturating_sub(times.since_ns),
             What::Finish => {
                 let last_ns = event.time_ns.saturating_sub(times.since_ns);
-                statistics.execution_time.add(times.executed_ns + last_ns);
+                let executed_ns = times.executed_ns + last_ns;
+                statistics.execution_time.add(executed_ns);
+                let wcet_ns = model.subtask(instance.subtask).wcet_ns();
+                statistics.beyond_wcet += u64::from(wcet_ns.is_some_and(|wcet| executed_ns > wcet));
                 for next in model.successors(instance.subtask) {
                     let join_ns = &mut instances[next.index()].join_ns;
                     *join_ns = event.time_ns.max(*join_ns);

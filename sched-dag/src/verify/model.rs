@@ -15,6 +15,7 @@ use crate::priorities::ranks;
 use crate::spec::DagSpec;
 use crate::task_set::{Adjacency, Dag, Subtask, TaskSet};
 use crate::topic::topics_of;
+use crate::wcets::{WcetSource, graph_hash};
 
 /// Makes the model, or notes that the derived priorities do not fit.
 ///
@@ -99,6 +100,11 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
+            wcet_source: match (subtask.wcet_ns, subtask.wcet_margin_percent) {
+                (None, _) => WcetSource::None,
+                (_, None) => WcetSource::Stated,
+                (_, Some(margin_percent)) => WcetSource::Observed { margin_percent },
+            },
             budget_ns: subtask.budget_ns,
             priority: match ranks.get(index) {
                 Some(rank) => Priority(priority_base + rank),
@@ -118,6 +124,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
     let of_sinks_ns = sinks.iter().map(|sink| deadlines_ns[sink.index()]);
     Dag {
         name: spec.name.clone(),
+        graph_hash: graph_hash(spec),
         activation: spec.activation,
         period_ns: spec.period_ns.expect("verified to be given"),
         relative_deadline_ns: of_sinks_ns.max().expect("verified to have a sink"),

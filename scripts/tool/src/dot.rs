@@ -231,7 +231,7 @@ mod tests {
 
     const LINE: &str = concat!(
         r#"{"kind":"graph","commit":0,"policy":"static","preemption":"on","cores":2,"#,
-        r#""overhead_ns":0,"bound_ns":null,"dag":1,"name":"the \"eye\"","#,
+        r#""overhead_ns":[0],"bound_ns":[],"hash":1,"dag":1,"name":"the \"eye\"","#,
         r#""period_ns":25000000,"relative_deadline_ns":100000000,"offset_ns":500,"in_flight":5,"#,
         r#""overrun":"queue","subtasks":[["camera",1,0,1000000],["",2,1,null],["fuse",3,0,null]],"#,
         r#""edges":[[0,1],[0,2],[1,2]],"sporadic":false,"jobs":[20],"#,

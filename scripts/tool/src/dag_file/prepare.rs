@@ -52,14 +52,14 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Writes the boot module.
+    /// Writes the boot module, with this text before it.
     ///
     /// # Errors
     ///
     /// In words: it cannot be written.
-    pub fn write_module(&mut self) -> Result<(), String> {
+    pub fn write_module(&mut self, before: &str) -> Result<(), String> {
         let module = system::new_log("dag-file")?.with_extension("dag");
-        let written = fs::write(&module, self.file.to_string());
+        let written = fs::write(&module, format!("{before}{}", self.file));
         let written =
             written.map_err(|error| format!("cannot write `{}`: {error}", module.display()));
         self.module = Some(module);
@@ -268,7 +268,7 @@ mod tests {
         let options = RUN.right("--print-dag --jobs 3").with("dag", demo);
         let mut prepared = prepare(&options).unwrap().unwrap();
         assert_eq!(prepared.module, None);
-        prepared.write_module().unwrap();
+        prepared.write_module("").unwrap();
         let module = prepared.module.clone().unwrap();
         assert!(module.is_file());
         drop(prepared);

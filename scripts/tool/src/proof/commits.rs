@@ -18,6 +18,8 @@ pub struct Commit {
     pub task_set: TaskSet,
     /// What the analysis takes for granted besides them.
     pub settings: Settings,
+    /// The hash of each DAG's names and edges.
+    pub hashes: Vec<u64>,
     /// What the guest has proven of each DAG, in nanoseconds.
     pub bounds_ns: Vec<Option<u64>>,
 }
@@ -29,6 +31,7 @@ struct Open {
     overhead_ns: u64,
     dags: Vec<DagSpec>,
     lines: Vec<usize>,
+    hashes: Vec<u64>,
     bounds_ns: Vec<Option<u64>>,
 }
 
@@ -63,14 +66,16 @@ fn add(line: &MachineLine, all: &mut Vec<Open>) -> Result<(), Malformed> {
             overhead_ns: one(&line, "overhead_ns")?.unwrap_or(u64::MAX),
             dags: Vec::new(),
             lines: Vec::new(),
+            hashes: Vec::new(),
             bounds_ns: Vec::new(),
         });
     }
     let bound_ns = one(&line, "bound_ns")?;
-    let spec = dag::spec(&line)?;
+    let (spec, hash) = (dag::spec(&line)?, line.number("hash")?);
     if let Some(open) = all.last_mut() {
         open.dags.push(spec);
         open.lines.push(line.0.number);
+        open.hashes.push(hash);
         open.bounds_ns.push(bound_ns);
     }
     Ok(())
@@ -104,6 +109,7 @@ fn close(open: Open) -> Result<Commit, Malformed> {
                 ..Overheads::default()
             },
         },
+        hashes: open.hashes,
         bounds_ns: open.bounds_ns,
     })
 }
@@ -129,19 +135,19 @@ impl Commit {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::read;
     use crate::protocol::Transcript;
 
     /// A chain of 2 and 3 ms, each charged 1 us.
-    fn log(bound: &str) -> String {
+    pub(crate) fn log(bound: &str) -> String {
         format!(
             "{{\"kind\":\"graph\",\"commit\":0,\"policy\":\"static\",\"preemption\":\"on\",\
              \"cores\":2,\"overhead_ns\":[1000],\"bound_ns\":[{bound}],\"dag\":0,\
              \"name\":\"demo\",\"period_ns\":10000000,\"relative_deadline_ns\":10000000,\
              \"offset_ns\":0,\"in_flight\":1,\"overrun\":\"queue\",\
              \"subtasks\":[[\"a\",0,0,2000000],[\"b\",1,0,3000000]],\"edges\":[[0,1]],\
-             \"sporadic\":false,\"jobs\":[],\"topics\":[],\"states\":[],\"samples\":[]}}\n"
+             \"hash\":5,\"sporadic\":false,\"jobs\":[],\"topics\":[],\"states\":[],\"samples\":[]}}\n"
         )
     }
 

@@ -70,6 +70,7 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "overrun",
             "subtasks",
             "edges",
+            "hash",
             "sporadic",
             "jobs",
             "topics",
@@ -251,6 +252,40 @@ pub const KINDS: &[(&str, &[&str])] = &[
         "bound_exceeded",
         &["dag", "dag_name", "jobs", "job", "response_ns", "bound_ns"],
     ),
+    (
+        "wcet_exceeded",
+        &[
+            "dag",
+            "dag_name",
+            "subtask",
+            "subtask_name",
+            "calls",
+            "beyond",
+            "longest_ns",
+            "wcet_ns",
+        ],
+    ),
+    (
+        "observed",
+        &[
+            "dag",
+            "hash",
+            "subtask",
+            "execution_time_ns",
+            "execution_histogram",
+        ],
+    ),
+    (
+        "overheads",
+        &[
+            "dispatches",
+            "owed_ns",
+            "releases",
+            "late_ns",
+            "margin_percent",
+        ],
+    ),
+    ("proof", &["commit", "dag", "longest_ns"]),
     ("panic", &["cpu", "place", "message"]),
     ("exception", &["cpu", "place", "message"]),
     (
@@ -283,6 +318,7 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "name",
             "join_latency_ns",
             "execution_time_ns",
+            "execution_histogram",
         ],
     ),
     (

@@ -19,6 +19,8 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
         "serial",
         "dot",
         "witness",
+        "observe",
+        "wcets",
         "console",
         "gdb",
     ] {
@@ -59,7 +61,7 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
                 failed += 1;
             }
         }
-        conclude(&booted, dags.as_ref());
+        conclude(&booted, dags.as_ref(), &one);
         if shows_lines {
             batch::lines(file, &booted.outcome).for_each(|line| println!("{line}"));
         } else {

@@ -12,10 +12,12 @@ mod boot;
 mod folder;
 mod loading;
 mod log;
+mod prove;
 mod screen;
 mod seeing;
 mod status;
 mod table;
+mod wcets;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -35,6 +37,7 @@ use crate::qemu::{Ending, Mode, PROGRAM, Qemu};
 use crate::system;
 use log::Log;
 use screen::Screen;
+use wcets::Wcets;
 
 pub use boot::boot;
 pub use table::RUN;
@@ -73,6 +76,16 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     if let Some(folder) = dag_file::batch::folder(options) {
         return folder::run(options, &folder);
     }
+    if prove::is_asked_for(options) {
+        return prove::run(options);
+    }
+    let lonely = ["margin", "seeds"]
+        .into_iter()
+        .find(|name| options.is_given(name));
+    if let Some(name) = lonely {
+        let line = format!("`--{name}` needs `--observe FILE` or `--prove`; give one, too");
+        return Err(Refusal::Usage(line));
+    }
     check_files(options)?;
     let mut dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
@@ -80,7 +93,7 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
         return Ok(ExitCode::SUCCESS);
     }
     let booted = boot_app(options, dags.as_mut(), true)?;
-    Ok(conclude(&booted, dags.as_ref()))
+    Ok(conclude(&booted, dags.as_ref(), options))
 }
 
 /// Reads the file that `--dag` names, if there is one.
@@ -90,8 +103,8 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
-    let inputs = options.named(&["dag", "image", "qemu"]);
-    let outputs = options.named(&["serial", "trace", "dot", "witness"]);
+    let inputs = options.named(&["dag", "image", "qemu", "wcets"]);
+    let outputs = options.named(&["serial", "trace", "dot", "witness", "observe"]);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     log::check(options).map_err(Refusal::Usage)
 }
@@ -116,11 +129,18 @@ fn boot_app(
     let program = choose_program(options)?;
     install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
 
+    let wcets = Wcets::read(options, dags.is_none())?;
     if let Some(dags) = dags.as_deref_mut() {
-        dags.write_module().map_err(Refusal::Failure)?;
+        dags.write_module(wcets.text()).map_err(Refusal::Failure)?;
     }
     let dags = dags.as_deref();
-    let describe = |mode| describe(options, &program, mode, memory_mib, dags);
+    let describe = |mode| {
+        let module = dags.and_then(|dags| dags.module.clone());
+        let mut qemu = describe(options, &program, mode, memory_mib, dags);
+        qemu.guest_words += &wcets.guest_word();
+        qemu.module = module.or_else(|| wcets.module());
+        qemu
+    };
     // No mode has a longer name than this one.
     let longest = describe(named.unwrap_or(Mode::Deterministic));
     longest.check_words().map_err(Refusal::Usage)?;
@@ -262,6 +282,7 @@ fn describe(
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
     words.extend(options.is_given("trace").then(|| "trace=dump".into()));
     words.extend(seeing::guest_words(options));
+    words.extend(prove::guest_words(options));
     words.extend(options.text("append").map(String::from));
     Qemu {
         program: program.into(),
@@ -271,7 +292,7 @@ fn describe(
         cores: options.number("cores").unwrap_or(1),
         memory_mib,
         guest_words: words.join(" "),
-        module: dags.and_then(|dags| dags.module.clone()),
+        module: None,
         has_input: options.is_given("console"),
         logs_instructions: false,
         wait_for_debugger: options.is_given("gdb"),
@@ -309,7 +330,7 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say("");
 }
 
-fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
+fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitCode {
     let Booted {
         outcome,
         log,
@@ -323,6 +344,10 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>) -> ExitCode {
         log.discard();
         return ExitCode::SUCCESS;
     };
+    if prove::refused(options, &fault.reason) {
+        log.restore();
+        return ExitCode::from(2);
+    }
     if fault.status == Status::Usage {
         let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
         let lines = of_file

@@ -26,6 +26,7 @@ pub(super) struct Screen {
     quiet: bool,
     traces: bool,
     graphs: bool,
+    times: bool,
     on_terminal: bool,
     bar_is_shown: bool,
     status: StatusLine,
@@ -41,8 +42,11 @@ impl Screen {
                 && (options.is_given("json") || !options.is_given("console")),
             quiet: options.is_given("quiet"),
             // Who wants these in a file does not want megabytes of them here.
-            traces: !options.is_given("trace"),
-            graphs: !options.is_given("dot") && !options.is_given("witness"),
+            traces: !options.is_given("trace") && !super::prove::is_asked_for(options),
+            graphs: !["dot", "witness", "observe", "prove"]
+                .iter()
+                .any(|name| options.is_given(name)),
+            times: !super::prove::is_asked_for(options),
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,
             status: StatusLine::default(),
@@ -76,6 +80,7 @@ impl Screen {
         }
         if let Some(Ok(machine)) = &read
             && (machine.kind.starts_with("trace") && !self.traces
+                || machine.kind.starts_with("times") && !self.times
                 || machine.kind == "graph" && !self.graphs)
         {
             return;

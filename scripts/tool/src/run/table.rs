@@ -14,6 +14,7 @@ pub(super) const GUEST_WORDS: &[&str] = &[
     "seed",
     "execution",
     "subtasks",
+    "longest",
     "work",
     "occupy",
 ];
@@ -64,6 +65,12 @@ pub static RUN: Command = Command {
             "subtasks",
             Takes::numbers(1..=MOST_SUBTASKS),
             "fork-join: parallel subtasks, one run each; the app's default is 2,4,6.",
+        ),
+        Opt::new(
+            "longest",
+            Takes::number(1..=50),
+            "fork-join: the longest execution of a parallel subtask in ms; the paper's 50 is more \
+             than a period, and so nothing is proven of it.",
         ),
         Opt::new(
             "work",
@@ -166,6 +173,33 @@ pub static RUN: Command = Command {
             Takes::File("FILE"),
             "Write what proves the commit's bounds to this file, which ./scripts/check-witness \
              checks; of a second commit to FILE.1, and so on.",
+        ),
+        Opt::new(
+            "observe",
+            Takes::File("FILE"),
+            "Write what calls take to this file, as WCETs with a margin, and show it; \
+             docs/proving.md.",
+        ),
+        Opt::new(
+            "margin",
+            Takes::number(0..=1_000),
+            "--observe, --prove: what a WCET is above the longest call, in per cent; 20.",
+        ),
+        Opt::new(
+            "seeds",
+            Takes::number(1..=1_000),
+            "--observe, --prove: observe a run for each of so many seeds, from --seed on; 1.",
+        ),
+        Opt::new(
+            "wcets",
+            Takes::File("FILE"),
+            "Commit with the WCETs of a file that --observe has written.",
+        ),
+        Opt::new(
+            "prove",
+            Takes::Nothing,
+            "Observe a run (or take --wcets), commit with these WCETs, run again, and compare: \
+             for each DAG its bound, its longest response, and what the bound is made of.",
         ),
         Opt::new(
             "console",

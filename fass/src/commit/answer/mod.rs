@@ -20,19 +20,18 @@
 //! - A DAG without all its WCETs is not analysed, and neither are those that
 //!   it may delay; they are not proven. A WCET of 0 is none.
 
+mod text;
+
 use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
-use core::fmt;
 use core::time::Duration;
 
 use sched_dag::analysis::{self, Reason, Settings, TaskError, Test};
-use sched_dag::{DagId, DagLabel, SubtaskId, SubtaskLabel, TaskSet};
+use sched_dag::wcets::WcetSource;
+use sched_dag::{DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet};
 
 use crate::platform::Platform;
-
-/// So many subtasks without WCET are named, and the rest counted.
-const MOST_NAMED: usize = 8;
 
 /// What is known at commit about the deadlines of one DAG.
 ///
@@ -69,6 +68,8 @@ pub struct Answer {
     pub verdict: Verdict,
     /// What is known of each sink, in the order of registration.
     pub sinks: Vec<SinkAnswer>,
+    /// Where the WCET of each subtask is from, in the order of registration.
+    pub wcets: Vec<WcetSource>,
 }
 
 /// What is known at commit about the deadline of one sink.
@@ -278,6 +279,9 @@ impl Answers {
             };
             Answer {
                 sinks: sinks(task_set, dag, &answer.sinks_ns[dag.index()]),
+                wcets: (task_set.dag(dag).subtasks().iter())
+                    .map(Subtask::wcet_source)
+                    .collect(),
                 dag: dag_label(task_set, dag),
                 verdict,
             }
@@ -339,54 +343,4 @@ fn dag_label(task_set: &TaskSet, id: DagId) -> DagLabel {
 fn subtask_label(task_set: &TaskSet, dag: DagId, id: SubtaskId) -> SubtaskLabel {
     let name = task_set.dag(dag).subtask(id).name().into();
     SubtaskLabel { id, name }
-}
-
-impl fmt::Display for Answer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let dag = &self.dag;
-        match &self.verdict {
-            Verdict::Proven { bound, test } => {
-                write!(f, "{dag} takes at most {bound:?}, by {test}")
-            }
-            Verdict::NotProven(unproven) => {
-                write!(f, "{dag} is not proven to meet its deadlines: {unproven}")
-            }
-        }
-    }
-}
-
-impl fmt::Display for Unproven {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.reason, &self.subtasks[..], &self.other) {
-            (Reason::Unknown(TaskError::MissingWcet { .. }), [first, others @ ..], _) => {
-                write!(f, "no WCET above 0 is given for {first}")?;
-                let (named, more) = others.split_at(others.len().min(MOST_NAMED - 1));
-                named.iter().try_for_each(|other| write!(f, ", {other}"))?;
-                if !more.is_empty() {
-                    write!(f, " and {} more", more.len())?;
-                }
-                f.write_str("; give every subtask one to have the DAG analysed")
-            }
-            (Reason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
-                f,
-                "{subtask} alone takes more than a period; split it or lengthen the period"
-            ),
-            (Reason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
-                f,
-                "the longest path to {sink} alone takes {:?}, which is more than the relative \
-                 deadline of that sink; shorten the path or relax the deadline",
-                Duration::from_nanos(*length_ns)
-            ),
-            (Reason::NoSinkBound { .. }, [sink, ..], _) => write!(
-                f,
-                "no test bounds the response time of {sink} by the relative deadline of that sink \
-                 (it may still meet it); add cores or relax the deadline"
-            ),
-            (Reason::DelayedBy { .. }, _, Some(other)) => write!(
-                f,
-                "{other}, which may delay it, is not proven itself; see to that one first"
-            ),
-            (reason, _, _) => reason.fmt(f),
-        }
-    }
 }

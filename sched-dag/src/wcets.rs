@@ -1,0 +1,267 @@
+//! WCETs that come from a file: those that runs of the same graph were observed to need.
+//!
+//! The file is text, a record a line; `#` begins a comment. `./scripts/run --observe` writes
+//! it, and a commit takes it back:
+//!
+//! ```text
+//! margin PERCENT                 what was added to the longest call
+//! dag HASH NAME                  of the DAG whose subtasks follow
+//! wcet NANOSECONDS NUMBER NAME   of a subtask, in the order of registration
+//! end
+//! ```
+//!
+//! The hash is of names and edges, so that WCETs of another graph are told from these. What
+//! the file does not say stays as the app has stated it. Nothing here trusts the file.
+
+use core::fmt;
+
+use crate::fnv::{EMPTY, fnv_1a};
+use crate::spec::DagSpec;
+
+/// Where a WCET is from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WcetSource {
+    /// There is none.
+    None,
+    /// The app or the DAG file states it.
+    Stated,
+    /// It is the longest call of a run, and a margin.
+    Observed {
+        /// The margin, in hundredths of the longest call.
+        margin_percent: u32,
+    },
+}
+
+/// One line of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Record<'t> {
+    /// What was added to each longest call, in hundredths.
+    Margin(u32),
+    /// A DAG begins.
+    Dag {
+        /// The hash of its names and edges.
+        hash: u64,
+        /// Its name.
+        name: &'t str,
+    },
+    /// A WCET of the latest DAG.
+    Wcet {
+        /// The WCET, in nanoseconds, at least 1.
+        wcet_ns: u64,
+        /// The subtask's number.
+        subtask: usize,
+        /// Its name.
+        name: &'t str,
+    },
+    /// The file ends.
+    End,
+}
+
+/// Why a commit does not take a file of WCETs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WcetFault {
+    /// The line, counted from 1.
+    pub line: usize,
+    /// Fact and remedy.
+    pub problem: &'static str,
+}
+
+const NO_RECORD: &str =
+    "this is no record of a file of WCETs; have one written by `./scripts/run --observe`";
+const ZERO: &str = "a WCET of 0; give at least 1 ns, or leave the line out";
+const UNKNOWN: &str = "the DAG has no such subtask; observe it again";
+const FOREIGN: &str = "the DAG of this name has another graph now; observe it again";
+
+/// Returns the records of a file with their lines, counted from 1.
+pub fn records(text: &str) -> impl Iterator<Item = Result<(usize, Record<'_>), WcetFault>> {
+    let lines = (1..).zip(text.lines());
+    let lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    lines.map(|(line, text)| match record(text) {
+        Some(Record::Wcet { wcet_ns: 0, .. }) => Err(WcetFault {
+            line,
+            problem: ZERO,
+        }),
+        Some(record) => Ok((line, record)),
+        None => Err(WcetFault {
+            line,
+            problem: NO_RECORD,
+        }),
+    })
+}
+
+fn record(line: &str) -> Option<Record<'_>> {
+    let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
+    let (number, name) = rest.split_once(' ').unwrap_or((rest, ""));
+    let number: Option<u64> = number.parse().ok();
+    Some(match word {
+        "margin" => Record::Margin(u32::try_from(number?).ok()?),
+        "dag" => Record::Dag {
+            hash: number?,
+            name,
+        },
+        "wcet" => {
+            let (subtask, name) = name.split_once(' ').unwrap_or((name, ""));
+            Record::Wcet {
+                wcet_ns: number?,
+                subtask: subtask.parse().ok()?,
+                name,
+            }
+        }
+        "end" => Record::End,
+        _ => return None,
+    })
+}
+
+/// Gives the subtasks of a DAG the WCETs that a file has for them.
+///
+/// # Errors
+///
+/// The first line that is no record; one that names a subtask that the DAG does not have;
+/// or that of the DAG of this name, if the file has it with another graph only.
+pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
+    let own = graph_hash(spec);
+    let (mut margin_percent, mut is_own, mut was_found, mut foreign) = (0, false, false, None);
+    for record in records(text) {
+        let (line, record) = record?;
+        match record {
+            Record::Margin(percent) => margin_percent = percent,
+            Record::Dag { hash, name } => {
+                is_own = hash == own;
+                was_found |= is_own;
+                if name == spec.name {
+                    foreign = foreign.or(Some(line));
+                }
+            }
+            Record::Wcet {
+                wcet_ns,
+                subtask,
+                name,
+            } if is_own => {
+                let found = spec.subtasks.get_mut(subtask);
+                let found = found.filter(|subtask| subtask.name == name);
+                let problem = UNKNOWN;
+                let found = found.ok_or(WcetFault { line, problem })?;
+                found.wcet_ns = Some(wcet_ns);
+                found.wcet_margin_percent = Some(margin_percent);
+            }
+            Record::Wcet { .. } | Record::End => {}
+        }
+    }
+    match foreign {
+        Some(line) if !was_found => Err(WcetFault {
+            line,
+            problem: FOREIGN,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Returns a hash of a DAG's names and edges, and of nothing else.
+#[must_use]
+pub fn graph_hash(spec: &DagSpec) -> u64 {
+    // What may stand in no name ends each.
+    let word = |hash, word: &str| fnv_1a(fnv_1a(hash, word.as_bytes()), &[0xff]);
+    let mut hash = word(EMPTY, &spec.name);
+    for subtask in &spec.subtasks {
+        hash = word(hash, &subtask.name);
+        for ports in [&subtask.inputs, &subtask.outputs] {
+            hash = ports
+                .iter()
+                .fold(hash, |hash, port| word(hash, &port.topic));
+            hash = fnv_1a(hash, &[0xfe]);
+        }
+    }
+    for &(from, to) in &spec.edges {
+        for end in [from, to] {
+            hash = fnv_1a(hash, &(end as u64).to_le_bytes());
+        }
+    }
+    hash
+}
+
+impl fmt::Display for WcetFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { line, problem } = self;
+        write!(f, "line {line} of the WCETs: {problem}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::SubtaskSpec;
+
+    fn spec(names: &[&str], edges: &[(usize, usize)]) -> DagSpec {
+        let subtask = |name: &&str| SubtaskSpec {
+            name: (*name).into(),
+            wcet_ns: Some(5),
+            ..SubtaskSpec::default()
+        };
+        DagSpec {
+            name: "a b".into(),
+            subtasks: names.iter().map(subtask).collect(),
+            edges: edges.into(),
+            ..DagSpec::default()
+        }
+    }
+
+    fn file(of: &DagSpec, lines: &str) -> String {
+        format!(
+            "# made\n\nmargin 20\ndag {} a b\n{lines}end\n",
+            graph_hash(of)
+        )
+    }
+
+    #[test]
+    fn a_dag_takes_what_its_own_graph_was_observed_to_need() {
+        let mut own = spec(&["x", "y z"], &[(0, 1)]);
+        let text = file(&own, "wcet 12 1 y z\n");
+        assert_eq!(apply(&text, &mut own), Ok(()));
+        let found: Vec<_> = (own.subtasks.iter())
+            .map(|subtask| (subtask.wcet_ns, subtask.wcet_margin_percent))
+            .collect();
+        assert_eq!(found, [(Some(5), None), (Some(12), Some(20))]);
+        // One of another name is not spoken of.
+        let mut other = spec(&["x"], &[]);
+        other.name = "b".into();
+        assert_eq!(apply(&text, &mut other), Ok(()));
+        assert_eq!(other.subtasks[0].wcet_ns, Some(5));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        let own = spec(&["x", "y"], &[(0, 1)]);
+        let refused = |text: &str| {
+            let fault = apply(text, &mut own.clone()).unwrap_err();
+            (fault.line, fault.problem)
+        };
+        for line in ["wcet 12 2 z\n", "wcet 12 1 x\n"] {
+            assert_eq!(refused(&file(&own, line)), (5, UNKNOWN), "{line}");
+        }
+        assert_eq!(refused(&file(&own, "wcet 0 1 y\n")), (5, ZERO));
+        for line in [
+            "wcet 1\n",
+            "wcet -1 0 x\n",
+            "wcet 99999999999999999999 0 x\n",
+            "dag x\n",
+            "else\n",
+        ] {
+            assert_eq!(refused(&file(&own, line)), (5, NO_RECORD), "{line}");
+        }
+        for other in [
+            spec(&["x", "y"], &[]),
+            spec(&["x", "z"], &[(0, 1)]),
+            spec(&["x"], &[]),
+        ] {
+            assert_eq!(refused(&file(&other, "")), (4, FOREIGN));
+        }
+    }
+
+    #[test]
+    fn of_two_graphs_of_one_name_each_takes_its_own() {
+        let (mut one, other) = (spec(&["x"], &[]), spec(&["x", "y"], &[]));
+        let text = file(&other, "wcet 7 1 y\n") + &file(&one, "wcet 8 0 x\n");
+        assert_eq!(apply(&text, &mut one), Ok(()));
+        assert_eq!(one.subtasks[0].wcet_ns, Some(8));
+    }
+}

@@ -1,0 +1,174 @@
+//! What was proven next to what was observed: a table, machine lines, and a verdict.
+
+use std::fmt::Write;
+
+use sched_dag::DagId;
+
+use super::commits::Commit;
+use super::observed::OfDag;
+use super::slack::{self, Slack};
+use super::wcets::shown;
+use crate::json::Object;
+
+/// One DAG of one commit.
+#[derive(Clone, Debug)]
+pub struct Row {
+    commit: u64,
+    dag: String,
+    bound_ns: Option<u64>,
+    longest_ns: u64,
+    slack: Slack,
+}
+
+/// Puts the bounds of commits next to the longest responses of their DAGs.
+///
+/// # Errors
+///
+/// In words: a DAG was committed and not run.
+pub fn rows(commits: &[Commit], observed: &[OfDag]) -> Result<Vec<Row>, String> {
+    let mut rows = Vec::new();
+    for commit in commits {
+        let dags = commit.task_set.dags().iter().zip(&commit.hashes);
+        for (number, (dag, &hash)) in (0..).map(DagId).zip(dags) {
+            let of_dag = observed.iter().find(|observed| observed.hash == hash);
+            let longest_ns = of_dag.and_then(|dag| dag.longest_responses_ns.get(&commit.number));
+            let longest_ns = longest_ns.ok_or_else(|| {
+                let (name, commit) = (dag.name(), commit.number);
+                format!("dag `{name}` of commit {commit} has not run")
+            })?;
+            rows.push(Row {
+                commit: commit.number,
+                dag: dag.name().into(),
+                bound_ns: commit.bounds_ns[number.index()],
+                longest_ns: *longest_ns,
+                slack: slack::of(commit, number),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+impl Row {
+    /// Returns the longest response in thousandths of the bound.
+    fn permille(&self) -> Option<u64> {
+        let permille = u128::from(self.longest_ns) * 1000 / u128::from(self.bound_ns?.max(1));
+        u64::try_from(permille).ok()
+    }
+
+    fn parts(&self) -> [(&'static str, Option<u64>); 5] {
+        [
+            ("longest_path_ns", self.slack.length_ns),
+            ("own_order_ns", self.slack.own_order_ns),
+            ("interference_ns", self.slack.interference_ns),
+            ("blocking_ns", self.slack.blocking_ns),
+            ("overheads_ns", self.slack.overheads_ns),
+        ]
+    }
+
+    /// Returns the row as a machine line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let mut line = Object::new()
+            .text("kind", "proof")
+            .number("commit", self.commit)
+            .text("dag", &self.dag)
+            .number("longest_ns", self.longest_ns);
+        let permille = [
+            ("bound_ns", self.bound_ns),
+            ("tightness_permille", self.permille()),
+        ];
+        let parts = self.parts();
+        for (name, number) in permille.into_iter().chain(parts) {
+            if let (Some(number), true) = (number, self.bound_ns.is_some()) {
+                line = line.number(name, number);
+            }
+        }
+        line.end()
+    }
+}
+
+/// Returns the table.
+#[must_use]
+pub fn table(rows: &[Row]) -> String {
+    let mut text = format!(
+        "\n{:<20}{:>12}{:>12}{:>9}   where the bound is from:\n{:<20}{:>12}{:>12}{:>9}",
+        "", "", "", "", "dag", "bound", "longest", "ratio"
+    );
+    // Writing into a `String` cannot fail.
+    for name in ["path", "own order", "others", "blocking", "overheads"] {
+        let _ = write!(text, "{name:>12}");
+    }
+    text.push('\n');
+    for row in rows {
+        let ratio = |permille| format!("{}.{} %", permille / 10, permille % 10);
+        let none = || "-".to_string();
+        let _ = write!(
+            text,
+            "{:<20}{:>12}{:>12}{:>9}",
+            row.dag,
+            row.bound_ns.map_or("not proven".into(), shown),
+            shown(row.longest_ns),
+            row.permille().map_or_else(none, ratio)
+        );
+        for (_, part) in row.parts().into_iter().filter(|_| row.bound_ns.is_some()) {
+            let _ = write!(text, "{:>12}", part.map_or_else(none, shown));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Returns what makes the proof worthless, if anything does: a response above its bound.
+#[must_use]
+pub fn complaint(rows: &[Row]) -> Option<String> {
+    let exceeds = |row: &&Row| {
+        row.bound_ns
+            .is_some_and(|bound_ns| row.longest_ns > bound_ns)
+    };
+    let row = rows.iter().find(exceeds)?;
+    Some(format!(
+        "dag `{}` of commit {} took {}, beyond its bound of {}; a WCET or an overhead is too small",
+        row.dag,
+        row.commit,
+        shown(row.longest_ns),
+        shown(row.bound_ns?)
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{commits, observed};
+    use super::{complaint, rows, table};
+    use crate::protocol::Transcript;
+
+    fn rows_with(longest_ns: u64) -> Vec<super::Row> {
+        let commits = commits::read(&Transcript::read(&commits::tests::log("5002000"))).unwrap();
+        let mut seen = observed::tests::observed(&[observed::tests::log(9)]);
+        seen[0].hash = 5;
+        seen[0].longest_responses_ns.insert(0, longest_ns);
+        rows(&commits, &seen).unwrap()
+    }
+
+    #[test]
+    fn a_response_above_its_bound_is_a_complaint() {
+        let within = rows_with(2_501_000);
+        assert_eq!(complaint(&within), None);
+        assert!(table(&within).contains("50.0 %"), "{}", table(&within));
+        assert!(
+            within[0]
+                .line()
+                .contains("\"tightness_permille\":500,\"longest_path_ns\":5000000")
+        );
+        let said = complaint(&rows_with(5_002_001)).unwrap();
+        assert!(
+            said.starts_with("dag `demo` of commit 0 took 5.002 ms"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn a_dag_that_has_not_run_proves_nothing() {
+        let commits = commits::read(&Transcript::read(&commits::tests::log("5002000"))).unwrap();
+        assert!(rows(&commits, &[]).unwrap_err().contains("has not run"));
+    }
+}

@@ -1,0 +1,175 @@
+//! `run --observe` and `run --prove`: what calls took, and whether bounds have held.
+//!
+//! Both boot with the words by which a guest tells its DAGs and its times. `--prove` boots
+//! twice: the first run is observed, the second one commits with the WCETs and the overheads
+//! that the first has shown, except for what the person states.
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+
+use super::wcets::Temporary;
+use super::{Booted, RUN, Refusal, boot_app, check_files, conclude, prepare};
+use crate::files;
+use crate::options::Parsed;
+use crate::proof::observed::{self, OfDag};
+use crate::proof::overheads::{self, Measured};
+use crate::proof::{commits, report, wcets};
+use crate::system;
+
+/// What the platform costs; an error in words if no trace was kept.
+type Measurement = Result<Measured, String>;
+
+/// Reports whether the options ask for any of this.
+pub(super) fn is_asked_for(options: &Parsed) -> bool {
+    options.is_given("observe") || options.is_given("prove")
+}
+
+/// Does what the options ask for.
+pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
+    if let Some(name) = ["console", "gdb", "print-dag"]
+        .into_iter()
+        .find(|name| options.is_given(name))
+    {
+        let line = format!("`--{name}` is for a run that is not observed; leave one of them out");
+        return Err(Refusal::Usage(line));
+    }
+    check_files(options)?;
+    if !options.is_given("prove") {
+        return Ok(match observe(options, options.path("observe"))? {
+            Some(_) => ExitCode::SUCCESS,
+            None => ExitCode::FAILURE,
+        });
+    }
+    let log = system::new_log("observed").map_err(Refusal::Failure)?;
+    let own = Temporary(Some(log.with_extension("wcets")));
+    let Some(proving) = observe_first(options, own.0.as_deref())? else {
+        return Ok(ExitCode::FAILURE);
+    };
+    let mut dags = prepare(&proving)?;
+    let booted = boot_app(&proving, dags.as_mut(), true)?;
+    let is_well = booted.outcome.judge().is_ok();
+    let code = conclude(&booted, dags.as_ref(), &proving);
+    let rows = compare(&booted).map_err(Refusal::Failure);
+    match rows {
+        // There are worse news.
+        Err(_) if !is_well => return Ok(code),
+        Err(refusal) => return Err(refusal),
+        Ok(rows) => {
+            say(
+                options,
+                &report::table(&rows),
+                rows.iter().map(report::Row::line),
+            );
+            if let (Some(complaint), true) = (report::complaint(&rows), is_well) {
+                return Err(Refusal::Failure(complaint));
+            }
+        }
+    }
+    Ok(code)
+}
+
+/// Observes a run, unless the person states both WCETs and overheads, and returns the command
+/// line by which the next one commits with what was seen; `None` if the run has failed.
+fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>, Refusal> {
+    let append = options.text("append").unwrap_or_default();
+    let measures = !append.contains("overheads_ns=");
+    if options.is_given("wcets") && !measures {
+        return Ok(Some(options.clone()));
+    }
+    let mut first = options.with("quiet", "yes").with("plain", "yes");
+    if measures {
+        first = first.with("append", format!("{append} trace=dump"));
+    }
+    let file = options.path("observe").or(own);
+    let Some(seen) = observe(&first, file.filter(|_| !options.is_given("wcets")))? else {
+        return Ok(None);
+    };
+    let mut next = options.clone();
+    if let (Some(file), false) = (file, options.is_given("wcets")) {
+        next = next.with("wcets", file);
+    }
+    if measures {
+        let measured = seen.map_err(Refusal::Failure)?;
+        let margin = options.number("margin").unwrap_or(wcets::MARGIN_PERCENT);
+        let line = measured.line(margin);
+        say(options, &measured.text(margin), [line].into_iter());
+        next = next.with("append", format!("{append} {}", measured.word(margin)));
+    }
+    Ok(Some(next))
+}
+
+fn compare(booted: &Booted) -> Result<Vec<report::Row>, String> {
+    let transcript = &booted.outcome.transcript;
+    let commits = commits::read(transcript)?;
+    let mut all = Vec::new();
+    observed::add(&mut all, transcript)?;
+    report::rows(&commits, &all)
+}
+
+/// Observes a run for each seed, says what the calls took, and writes the file of WCETs.
+/// Returns what else was seen; `None` if a run has failed, which has been said.
+fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
+    let first = options.number("seed").unwrap_or(1);
+    let seeds = options.number("seeds").unwrap_or(1);
+    let mut all: Vec<OfDag> = Vec::new();
+    let mut log = String::new();
+    for seed in first..first.saturating_add(seeds) {
+        let one = match seeds {
+            1 => options.clone(),
+            _ => options.with("seed", seed.to_string()),
+        };
+        let mut dags = prepare(&one)?;
+        let booted = boot_app(&one, dags.as_mut(), true)?;
+        let is_well = booted.outcome.judge().is_ok();
+        conclude(&booted, dags.as_ref(), &one);
+        if !is_well {
+            return Ok(None);
+        }
+        observed::add(&mut all, &booted.outcome.transcript).map_err(Refusal::Failure)?;
+        log = booted.outcome.serial;
+    }
+    let margin = options.number("margin").unwrap_or(wcets::MARGIN_PERCENT);
+    say(options, &wcets::table(&all, margin), observed::lines(&all));
+    if let Some(path) = file {
+        let place = files::place(path);
+        fs::write(path, wcets::text(&all, margin)).map_err(|error| {
+            Refusal::Failure(format!("`--observe {place}`: cannot be written: {error}"))
+        })?;
+        if options.is_given("observe") && !options.is_given("json") {
+            println!("{place}: the WCETs; `--wcets {place}` commits with them");
+        }
+    }
+    // Those of the last seed stand for all.
+    Ok(Some(overheads::measure(&log)))
+}
+
+/// Says a table to people and lines to programs, as the options want it.
+fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
+    if !options.is_given("json") {
+        print!("{table}");
+    }
+    if !options.is_given("plain") {
+        lines.for_each(|line| println!("{line}"));
+    }
+}
+
+/// Returns the words for the guest, and nothing if nobody asks.
+pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
+    match is_asked_for(options) {
+        true => vec!["times=dump".into()],
+        false => Vec::new(),
+    }
+}
+
+/// Says what a guest has refused of a file of WCETs, by its name and line.
+pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
+    let path = options.path("wcets");
+    match path.and_then(|path| wcets::translate(reason, path)) {
+        Some(line) => {
+            RUN.complain(&line);
+            true
+        }
+        None => false,
+    }
+}
