@@ -300,11 +300,8 @@ fn missing_others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
     };
     // The fault of any subtask raises the DAG's; the first stands for them.
     let of_faults = draft.on_fault.iter().take(draft.spec.subtasks.len());
-    let raises = draft
-        .raises
-        .iter()
-        .map(|(subtask, signal)| (*subtask, signal));
-    let raises = raises.chain(of_faults.map(|signal| (0, signal)));
+    let of_faults = of_faults.map(|signal| (0, Arc::clone(signal)));
+    let raises = draft.raises.iter().cloned().chain(of_faults);
     let unknown = raises.filter(|(_, signal)| !dags.iter().any(|other| is_target(signal, other)));
     let signals = unknown.map(|(subtask, _)| Fault::SignalNotCommitted {
         dag: label.clone(),
