@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 20] = [
     "run",
     "boot",
     "test",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 19] = [
     "trace",
     "soak",
     "bench",
+    "bench build",
     "bench scheduler",
     "bench hand-off",
     "bench join-latency",

@@ -6,6 +6,7 @@
 //! virtual time have. The exit code is 0 if all limits hold, 1 if one does not, and 2
 //! for a refused command line.
 //!
+//! - [`build`]: what compiling takes, from a clone and after a change;
 //! - [`bounds`]: random sets of DAGs that the analysis proves;
 //! - [`scheduler`]: the commit, and the cost of a dispatched instance;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
@@ -15,6 +16,7 @@
 //! - [`sizes`]: what each part of an image takes of its room.
 
 pub mod bounds;
+pub mod build;
 mod code;
 pub mod hand_off;
 pub mod join_latency;
@@ -40,6 +42,11 @@ static BENCH: Menu = Menu {
             name: "bounds",
             about: "random sets that the analysis proves, by load and cores",
             work: bounds::run,
+        },
+        Choice {
+            name: "build",
+            about: "what compiling takes: from a clone to the first boot, and after a change",
+            work: build::run,
         },
         Choice {
             name: "scheduler",
