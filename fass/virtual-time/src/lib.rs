@@ -3,7 +3,8 @@
 //! For our purposes *virtual time* is a clock that jumps from one event to the
 //! next (other words are in `docs/glossary.md`). The real functions run, with real values on real topics, under the very
 //! scheduler that the kernel uses; only the passing of time is made up: a
-//! function takes no time except where it says so with `fass::execute_for`. A
+//! function takes no time except where it says so with `fass::execute_for`, or
+//! [`VirtualTime::silent`] does. A
 //! second of a DAG's life takes about a millisecond, and every run of the same
 //! DAGs gives the same events at the same nanosecond.
 //!
@@ -36,6 +37,7 @@ mod platform;
 mod record;
 mod report;
 mod session;
+mod silent;
 mod surroundings;
 
 use std::rc::Rc;
@@ -52,6 +54,7 @@ use platform::Machine;
 pub use record::{InstanceRecord, JobRecord, PanicRecord};
 pub use report::Report;
 pub use sched_dag::journal::{Event, What};
+pub use silent::Silent;
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///
@@ -184,6 +187,36 @@ impl VirtualTime {
     #[must_use = "the machine itself is returned"]
     pub fn wcets(self, file: &str) -> Self {
         self.machine.wcets.replace(Some(file.into()));
+        self
+    }
+
+    /// Sets how long a call takes whose function does not say so by `fass::execute_for`:
+    /// no time, unless this says otherwise. What executes counts from the call's start, so
+    /// `fass::now_ns` in the function does not show it.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::{Silent, VirtualTime};
+    ///
+    /// let response_ns = |silent| {
+    ///     let machine = VirtualTime::new().silent(silent);
+    ///     let (dag, period) = (create_dag(), Duration::from_millis(10));
+    ///     dag.period(period).relative_deadline(period).jobs(1);
+    ///     let tick = SubtaskAttributes::named("tick").wcet(Duration::from_millis(2));
+    ///     dag.register_untyped_subtask(|_| (), tick);
+    ///     finish_create_dags(&[dag]).unwrap();
+    ///     let report = machine.run();
+    ///     assert_eq!(report.took_no_time(), silent == Silent::NoTime);
+    ///     report.jobs[0].response_time_ns().unwrap()
+    /// };
+    /// assert_eq!(response_ns(Silent::NoTime), 0);
+    /// assert_eq!(response_ns(Silent::Wcet), 2_000_000);
+    /// assert!((1..=2_000_000).contains(&response_ns(Silent::Drawn { seed: 7 })));
+    /// ```
+    #[must_use = "the machine itself is returned"]
+    pub fn silent(self, silent: Silent) -> Self {
+        self.machine.surroundings.silent.set(silent);
         self
     }
 

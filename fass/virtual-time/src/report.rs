@@ -84,6 +84,15 @@ impl Report {
         (self.instances.iter()).find(|record| record.instance == instance)
     }
 
+    /// Reports whether no call took any time: then response times and deadlines met say
+    /// nothing.
+    ///
+    /// See [`VirtualTime::silent`](crate::VirtualTime::silent).
+    #[must_use]
+    pub fn took_no_time(&self) -> bool {
+        self.instances.iter().all(|record| record.execution_ns == 0)
+    }
+
     /// Returns the verified model that ran.
     ///
     /// See [`Report`].

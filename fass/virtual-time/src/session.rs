@@ -68,6 +68,7 @@ impl Session {
             }
         };
         let mut runner = Runner {
+            task_set: &self.task_set,
             machine,
             bodies: &mut self.bodies,
             after_fault: &self.after_fault,
@@ -169,6 +170,7 @@ struct Recording {
 
 /// The workload of the driver: runs bodies, and passes all else to the recorder.
 struct Runner<'s> {
+    task_set: &'s TaskSet,
     machine: &'s Surroundings,
     bodies: &'s mut [Vec<Body>],
     after_fault: &'s [Option<DagId>],
@@ -196,7 +198,11 @@ impl Workload for Runner<'_> {
         // Unwind safety: a body that panicked is never run again, and the
         // machine's cells hold plain numbers.
         let result = catch_unwind(AssertUnwindSafe(|| body.run(instance.job)));
-        let executed_ns = machine.executed_ns.take().unwrap_or(0);
+        let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
+        if executed_ns == 0 && result.is_ok() {
+            let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
+            executed_ns = machine.silent.get().of_call_ns(instance, subtask.wcet_ns());
+        }
         if let Err(payload) = result {
             let message = (payload.downcast_ref::<String>().map(String::as_str))
                 .or_else(|| payload.downcast_ref::<&str>().copied())

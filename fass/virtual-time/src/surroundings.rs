@@ -5,9 +5,13 @@ use std::collections::BTreeMap;
 
 use sched_dag::DagId;
 
+use crate::silent::Silent;
+
 /// The time, the signals to come, and what is to become of a panic.
 #[derive(Debug, Default)]
 pub(crate) struct Surroundings {
+    /// How long calls take that do not say.
+    pub(crate) silent: Cell<Silent>,
     /// Whether a panic of a function ends its DAG only.
     pub(crate) contains_panics: Cell<bool>,
     /// The time that functions are told: the start of the instance and what it

@@ -1,0 +1,51 @@
+//! Calls whose functions do not say how long they take.
+
+use sched_dag::Instance;
+
+/// The time that a call takes if its function executes nothing by `fass::execute_for`, and
+/// the subtask has a WCET.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Silent {
+    /// None.
+    #[default]
+    NoTime,
+    /// Its WCET: stated, or observed ([`VirtualTime::wcets`](crate::VirtualTime::wcets)).
+    Wcet,
+    /// A time from 1 ns to the WCET, drawn uniformly. It follows from the seed and the
+    /// instance alone.
+    Drawn {
+        /// The seed.
+        seed: u64,
+    },
+}
+
+impl Silent {
+    /// Returns how long a call takes, in nanoseconds.
+    pub(crate) fn of_call_ns(self, instance: Instance, wcet_ns: Option<u64>) -> u64 {
+        let wcet_ns = wcet_ns.unwrap_or(0);
+        match self {
+            Self::NoTime => 0,
+            Self::Wcet => wcet_ns,
+            Self::Drawn { seed } => {
+                let numbers = [
+                    instance.dag.0.into(),
+                    instance.subtask.0.into(),
+                    instance.job,
+                ];
+                let drawn = numbers
+                    .into_iter()
+                    .fold(mix(seed), |drawn, n| mix(drawn ^ n));
+                let scaled = (u128::from(drawn) * u128::from(wcet_ns)) >> 64;
+                u64::try_from(scaled).map_or(wcet_ns, |ns| (ns + 1).min(wcet_ns))
+            }
+        }
+    }
+}
+
+/// The step of the generator SplitMix64 (Steele, Lea and Flood 2014).
+fn mix(state: u64) -> u64 {
+    let z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
