@@ -86,6 +86,27 @@ fn a_machine_that_cannot_be_ended_stays_silent_after_its_verdict() {
     assert_eq!(status, Ok(Status::Success), "{}", outcome.tail());
 }
 
+/// From the first of 64 bits to those of today, of both makers.
+#[test]
+fn nine_models_of_processors() {
+    for model in [
+        "qemu64",
+        "core2duo",
+        "Nehalem",
+        "Haswell",
+        "Skylake-Server",
+        "Denverton",
+        "EPYC",
+        "EPYC-Milan",
+        "Opteron_G5",
+    ] {
+        let program = qemu_with("#max", model);
+        let guest = Guest::new("fork-join").in_real_time().program(&program);
+        boots_with(guest.machine(Machine::Q35), 2);
+        fs::remove_file(&program).expect("it is ours");
+    }
+}
+
 #[test]
 fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
     let endless = qemu_with("iobase=0xf4", "iobase=0xf8");
