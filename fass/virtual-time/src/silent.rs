@@ -4,6 +4,12 @@ use sched_dag::Instance;
 
 /// The time that a call takes if its function executes nothing by `fass::execute_for`, and
 /// the subtask has a WCET.
+///
+/// ```
+/// use virtual_time::{Silent, VirtualTime};
+///
+/// let machine = VirtualTime::new().silent(Silent::Wcet);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Silent {
     /// None.
