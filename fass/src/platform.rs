@@ -227,7 +227,7 @@ pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> 
 /// Returns the installed platform, if there is one.
 #[inline]
 pub(crate) fn installed() -> Option<&'static dyn Platform> {
-    PLATFORM.get()
+    PLATFORM.get().copied()
 }
 
 /// Returns the platform's time in nanoseconds.

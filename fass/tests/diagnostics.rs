@@ -97,6 +97,14 @@ const CASES: &[Case] = &[
         says: &["`Signal` is nothing that a subtask uses"],
     },
     Case {
+        what: "a function that can be replaced, of a subtask that samples a latest value",
+        code: "fn main() { let dag = create_dag(); let pose = dag.latest::<u32>(\"pose\"); dag.using(pose.sample()).restarting(|| |_: Option<fass::Sample<'_, u32>>, (_,): (u32,)| ()); }",
+        says: &[
+            "a subtask that uses `Sampling<u32>` cannot be replaced after a fault",
+            "let another subtask sample the latest value or raise the signal, and send along an edge",
+        ],
+    },
+    Case {
         what: "a use among what is none",
         code: "fn main() { let dag = create_dag(); let map = dag.state(\"map\", 0_u32); dag.using((map.read(), 5)); }",
         says: &["is nothing that a subtask uses"],

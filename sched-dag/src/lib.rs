@@ -54,7 +54,8 @@
 //! A DAG can be *ended* before its time, by an instance that [fails](Moment::fail)
 //! or by a [stop](Moment::stop): it starts nothing any more, and the others are
 //! scheduled on. The rules E1 to E8 for that stand in `scheduler/ending.rs`,
-//! their tests in `tests/ending.rs`.
+//! their tests in `tests/ending.rs`; those for a fault that costs only its job, D1 to D7,
+//! in `scheduler/dropping.rs` and `tests/dropping.rs`.
 //!
 //! # The parts, in the order of their use
 //!
@@ -117,7 +118,8 @@ pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use nearest::nearest;
 pub use policy::{
-    Activation, JobOutcome, Order, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions,
+    Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,
+    Priority, SchedulerOptions,
 };
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use recorder::{Events, Recorder};

@@ -114,6 +114,11 @@ impl<Body, Parked> Placement<Body, Parked> {
         Some(vertex)
     }
 
+    /// Puts another body to rest, in the place of one that was [lost](Self::lose).
+    pub fn replace(&mut self, vertex: Vertex, body: Body) {
+        *self.place(vertex) = Place::Resting(body);
+    }
+
     /// Takes note that an instance has finished that no core has: on a driver where a
     /// parked one may still be executed.
     pub fn finish_parked(&mut self, vertex: Vertex, body: Body) {
@@ -370,6 +375,15 @@ mod tests {
         assert!(!cores.must_suspend(0));
         cores.decide(1, Some(Y));
         assert_eq!(cores.next(1), Next::Start(Y, 'y'));
+    }
+
+    #[test]
+    fn another_body_takes_the_place_of_a_lost_one() {
+        let mut cores = about_to_preempt();
+        assert_eq!(cores.lose(0), Some(X));
+        cores.replace(X, 'z');
+        cores.decide(1, Some(X));
+        assert_eq!(cores.next(1), Next::Start(X, 'z'));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The choices that govern scheduling: policy, preemption, priority, overrun; and what
+//! The choices that govern scheduling: policy, preemption, priority, overrun, faults; and what
 //! may become of a job.
 
 /// What releases the jobs of a DAG.
@@ -73,6 +73,30 @@ pub enum OverrunPolicy {
     Abort,
 }
 
+/// What a fault of an instance costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum OnFault {
+    /// The DAG: it is ended.
+    #[default]
+    EndDag,
+    /// The job, as long as faults are survived: the DAG goes on with the next one, and the
+    /// subtask with another function. It is ended by a fault beyond that, and by one of a
+    /// subtask that has no other function.
+    DropJob(FaultLimit),
+}
+
+/// How many faults of a DAG are survived.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct FaultLimit {
+    /// The most faults within a [`window`](Self::window), at least 1.
+    pub faults: u32,
+    /// How many jobs that window has, at least 1.
+    pub window: u64,
+    /// The most faults in all, at least 1. Each may cost memory until the end of the run, so
+    /// this bounds it.
+    pub in_all: u32,
+}
+
 /// Whether the commit may fix an order in which a DAG's subtasks use the cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Order {
@@ -105,6 +129,8 @@ pub enum JobOutcome {
     Missed,
     /// The job was aborted.
     Aborted,
+    /// A fault of one of its instances has cut the job, and the DAG goes on.
+    Failed,
     /// The DAG was ended while the job was in flight.
     DagEnded,
 }

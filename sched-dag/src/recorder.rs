@@ -132,6 +132,10 @@ impl<J: Events> Observer for Recorder<J> {
         self.of_job(What::Aborted, dag, job);
     }
 
+    fn restarted(&mut self, instance: Instance) {
+        self.on_core(What::Restarted, instance, self.here);
+    }
+
     fn ended(&mut self, dag: DagId) {
         self.of_job(What::Stopped, dag, 0);
     }

@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
 
-use crate::policy::{Activation, Order, OverrunPolicy, Priority};
+use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
 
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
@@ -28,6 +28,8 @@ pub struct DagSpec {
     pub in_flight: Option<u32>,
     /// What happens at a release beyond `in_flight`.
     pub overrun: OverrunPolicy,
+    /// What a fault of an instance costs.
+    pub on_fault: OnFault,
     /// Whether the commit may fix an order of the subtasks.
     pub order: Order,
     /// The number of jobs to release; `None`: without end.

@@ -7,7 +7,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 
 use crate::ids::{DagId, Instance, SubtaskId, Vertex, to_u32};
-use crate::policy::{Activation, OverrunPolicy, Priority};
+use crate::policy::{Activation, OnFault, OverrunPolicy, Priority};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -32,6 +32,7 @@ pub struct Dag {
     pub(crate) offset_ns: u64,
     pub(crate) in_flight: u32,
     pub(crate) overrun: OverrunPolicy,
+    pub(crate) on_fault: OnFault,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
     pub(crate) sources: Box<[SubtaskId]>,
@@ -205,6 +206,12 @@ impl Dag {
     #[must_use]
     pub const fn overrun(&self) -> OverrunPolicy {
         self.overrun
+    }
+
+    /// Returns what a fault of an instance costs.
+    #[must_use]
+    pub const fn on_fault(&self) -> OnFault {
+        self.on_fault
     }
 
     /// Returns the number of jobs to release, or `None` if there is no end.

@@ -9,7 +9,8 @@
 //! follows, and so on until nothing happens any more.
 //!
 //! A workload may let an instance fail at the end of its execution time, which
-//! ends its DAG. Of what ends at one instant, completions come before failures.
+//! ends its DAG or costs its job. Of what ends at one instant, completions come before
+//! failures, and these in the order of their instances.
 //!
 //! After [`VirtualTime::new`] nothing is allocated here.
 //!
@@ -56,9 +57,16 @@ pub trait Workload: Observer {
     fn execute(&mut self, instance: Instance, now_ns: u64) -> u64;
 
     /// Reports whether an instance fails, instead of finishing, when its
-    /// execution time is over: then its DAG is ended. Called once for each
+    /// execution time is over: then its DAG is ended, or its job dropped. Called once for each
     /// instance, at its end.
     fn fails(&mut self, instance: Instance) -> bool {
+        let _ = instance;
+        false
+    }
+
+    /// Reports whether there is another function for the subtask of an instance that
+    /// fails. Called once for each, right before the scheduler is told.
+    fn is_replaceable(&mut self, instance: Instance) -> bool {
         let _ = instance;
         false
     }
@@ -108,7 +116,7 @@ pub trait Workload: Observer {
         let _ = (instance, core, now_ns);
     }
 
-    /// The instance has failed on the core; called before its DAG is ended.
+    /// The instance has failed on the core; called before what follows from that.
     fn failed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
         let _ = (instance, core, now_ns);
     }
@@ -235,9 +243,14 @@ impl VirtualTime {
             return done;
         }
         let mut moment = self.scheduler.at(now_ns);
+        self.failing.sort_unstable();
         for (instance, core) in self.failing.drain(..) {
             workload.failed(instance, core, now_ns);
-            moment.fail(instance, workload);
+            if workload.is_replaceable(instance) {
+                moment.fail_replaceable(instance, workload);
+            } else {
+                moment.fail(instance, workload);
+            }
         }
         while let Some(dag) = workload.take_signal(now_ns) {
             moment.signal(dag, workload);

@@ -36,18 +36,32 @@ fn a_panic_in_the_kernel_ends_in_failure_and_names_its_place() {
     }
 }
 
-/// Every fault that a subtask commits ends its DAG and no other.
+/// Every fault that a subtask commits costs its DAG what its policy says, and no other
+/// anything.
 fn faults_are_contained(cores: u64) {
     let outcome = Guest::new("faults").cores(cores).succeed();
     let transcript = &outcome.transcript;
     let verdicts: Vec<_> = transcript.of_kind("containment").collect();
-    assert_eq!(verdicts.len(), 13, "{}", outcome.tail());
+    assert_eq!(verdicts.len(), 3 * 13, "{}", outcome.tail());
     for line in &verdicts {
         assert_eq!(line.text_at("verdict"), Some("contained"), "{}", line.text);
+        // The jobs that the DAG at fault has completed, of 30, and those that it has lost.
+        let expected = match line.text_at("on_fault") {
+            Some("end") => [10, 0],
+            _ => [29, 1],
+        };
+        let jobs = ["doomed_jobs", "lost_jobs"].map(|member| line.number_at(member));
+        assert_eq!(jobs, expected.map(Some), "{}", line.text);
     }
     let faults: Vec<_> = transcript.of_kind("fault").collect();
     assert_eq!(faults.len(), verdicts.len(), "{}", outcome.tail());
-    for line in faults {
+    for (line, verdict) in faults.into_iter().zip(verdicts) {
+        let cost = match verdict.text_at("on_fault") {
+            Some("end") => "dag",
+            Some("restart") => "job",
+            _ => "degraded",
+        };
+        assert_eq!(line.text_at("cost"), Some(cost), "{}", line.text);
         assert_eq!(line.text_at("dag_name"), Some("doomed"), "{}", line.text);
         assert_eq!(
             line.text_at("subtask_name"),

@@ -32,8 +32,15 @@ const FILES: [&str; 10] = [
 ];
 
 /// What is public only within its crate, because its module is not.
-const INTERNAL: [&str; 6] = [
-    "Shared", "Changing", "Looking", "Sampler", "Looked", "Sealed",
+const INTERNAL: [&str; 8] = [
+    "Shared",
+    "Changing",
+    "Looking",
+    "Sampler",
+    "Looked",
+    "Sealed",
+    "Resettable",
+    "Reset",
 ];
 
 /// The words that begin an item that can have an example.

@@ -3,7 +3,8 @@
 //! Two DAGs run at once. The *healthy* one has a deadline that it meets with
 //! ease. The *doomed* one does the same work until its job [`FATAL_JOB`], in
 //! which its middle subtask commits a crime. What is shown is how many jobs of
-//! the healthy DAG met their deadlines before, while and after that happened.
+//! the healthy DAG met their deadlines before, while and after that happened, and what
+//! it cost the doomed DAG, under each [`Policy`].
 
 #![cfg_attr(not(test), no_std)]
 
@@ -16,7 +17,7 @@ use alloc::format;
 use alloc::vec;
 use core::time::Duration;
 
-use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
+use fass::{Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag};
 
 use crimes::{Crime, Unpunished};
 
@@ -32,29 +33,61 @@ pub const BUDGET: Duration = Duration::from_millis(6);
 /// The job in which the doomed DAG commits its crime.
 pub const FATAL_JOB: u64 = 10;
 
+/// What the doomed DAG survives, unless it is ended.
+const FAULT_LIMIT: FaultLimit = FaultLimit {
+    faults: 1,
+    window: 10,
+    in_all: 2,
+};
+
 /// The jobs of each DAG.
 pub const JOBS: u64 = 30;
+
+/// What becomes of the doomed DAG after its crime.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Policy {
+    /// It is ended.
+    End,
+    /// It goes on with the next job, and the middle subtask is made anew.
+    Restart,
+    /// It goes on with the next job, and the middle subtask falls back on a second
+    /// function.
+    FallBack,
+}
+
+/// Every policy, by name.
+pub const POLICIES: [(&str, Policy); 3] = [
+    ("end", Policy::End),
+    ("restart", Policy::Restart),
+    ("fall_back", Policy::FallBack),
+];
 
 /// Builds the DAG that must not notice anything.
 #[must_use]
 pub fn healthy() -> Dag {
-    pipeline("healthy", 0, None, Some(BUDGET))
+    pipeline("healthy", 0, None, Some(BUDGET), Policy::End)
 }
 
 /// Builds the DAG that commits `crime` in its job [`FATAL_JOB`].
 #[must_use]
-pub fn doomed(crime: Crime) -> Dag {
-    pipeline("doomed", 1, Some(crime), Some(BUDGET))
+pub fn doomed(crime: Crime, policy: Policy) -> Dag {
+    pipeline("doomed", 1, Some(crime), Some(BUDGET), policy)
 }
 
-/// Builds the same DAG, with all the time it wants for its crime.
+/// Builds the DAG that is ended by its crime, with all the time it wants for that.
 #[must_use]
 pub fn doomed_at_leisure(crime: Crime) -> Dag {
-    pipeline("doomed", 1, Some(crime), None)
+    pipeline("doomed", 1, Some(crime), None, Policy::End)
 }
 
 /// Builds source -> middle -> sink; the middle has a WCET if it has a budget.
-fn pipeline(name: &str, priority: u32, crime: Option<Crime>, budget: Option<Duration>) -> Dag {
+fn pipeline(
+    name: &str,
+    priority: u32,
+    crime: Option<Crime>,
+    budget: Option<Duration>,
+    policy: Policy,
+) -> Dag {
     let dag = create_dag();
     dag.name(name).jobs(JOBS);
     let attributes = |part: &str| SubtaskAttributes::named(part).priority(priority);
@@ -79,7 +112,24 @@ fn pipeline(name: &str, priority: u32, crime: Option<Crime>, budget: Option<Dura
         Some(budget) => attributes("process").wcet(EXECUTION).budget(budget),
         None => attributes("process"),
     };
-    dag.register_subtask(process, vec![&input], vec![&output], middle);
+    let topics = (vec![&*input], vec![&*output]);
+    match policy {
+        Policy::End => dag.register_subtask(process, topics.0, topics.1, middle),
+        Policy::Restart => {
+            dag.survive_faults(FAULT_LIMIT);
+            dag.restarting(move || process)
+                .register_subtask(topics.0, topics.1, middle);
+        }
+        Policy::FallBack => {
+            dag.survive_faults(FAULT_LIMIT);
+            let innocent = |(job,): (u64,)| {
+                fass::execute_for(EXECUTION, Occupation::Hold);
+                (job,)
+            };
+            dag.falling_back(process, innocent)
+                .register_subtask(topics.0, topics.1, middle);
+        }
+    }
     dag.register_sink_subtask(
         |(_,): (u64,)| (),
         vec![&output],
@@ -97,7 +147,11 @@ mod tests {
     #[test]
     fn both_meet_every_deadline_without_a_crime() {
         let machine = VirtualTime::new().cores(1);
-        fass::finish_create_dags(&[healthy(), pipeline("doomed", 1, None, None)]).unwrap();
+        fass::finish_create_dags(&[
+            healthy(),
+            pipeline("doomed", 1, None, None, Policy::Restart),
+        ])
+        .unwrap();
         let report = machine.run();
         let misses: u64 = report.statistics.iter().map(|of_dag| of_dag.misses).sum();
         assert_eq!((report.jobs.len(), misses), (60, 0));

@@ -9,7 +9,7 @@ use alloc::format;
 
 use fass::finish_create_dags;
 use faults::crimes::{CRIMES, Crime};
-use faults::{FATAL_JOB, JOBS, PERIOD, doomed, healthy};
+use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy};
 use kernel::{Ending, Machine, Run, json, println};
 use sched_dag::DagId;
 
@@ -41,14 +41,20 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     println!("the doomed one is at fault in its job {FATAL_JOB}.");
     machine.accept_faults(); // here they are what is wanted
     let mut counts = [0; 3];
-    for (name, crime) in CRIMES {
-        if only.is_none_or(|only| only == name) {
-            counts[commit_crime(machine, name, crime)? as usize] += 1;
+    for (on_fault, policy) in POLICIES {
+        println!("The doomed DAG's policy: {on_fault}");
+        for (name, crime) in CRIMES {
+            if only.is_none_or(|only| only == name) {
+                let verdict = commit_crime(machine, (name, crime), (on_fault, policy))?;
+                counts[verdict as usize] += 1;
+            }
         }
     }
     let [contained, unclear, harmful] = counts;
     let tried = contained + unclear + harmful;
-    println!("{contained} of {tried} faults ended their own DAG and harmed no other");
+    println!(
+        "{contained} of {tried} faults cost their own DAG what its policy says, and no other anything"
+    );
     if unclear > 0 {
         println!("{unclear} cannot be judged: the healthy DAG was late even before the fault");
     }
@@ -67,13 +73,18 @@ enum Verdict {
     Contained,
     /// The healthy DAG was late before the fault: the host is too busy to judge.
     Unclear,
-    /// The healthy DAG was late or incomplete, or the doomed one lived on.
+    /// The healthy DAG was late or incomplete, or the doomed one lost more jobs, or fewer,
+    /// than its policy says.
     Harmful,
 }
 
 /// Runs both DAGs and judges whether only the doomed one was harmed.
-fn commit_crime(machine: &Machine, name: &str, crime: Crime) -> Result<Verdict, Ending> {
-    finish_create_dags(&[healthy(), doomed(crime)])?;
+fn commit_crime(
+    machine: &Machine,
+    (name, crime): (&str, Crime),
+    (on_fault, policy): (&str, Policy),
+) -> Result<Verdict, Ending> {
+    finish_create_dags(&[healthy(), doomed(crime, policy)])?;
     let run = machine.run()?;
     let on_time = |jobs: core::ops::Range<u64>| jobs.filter(|job| is_on_time(&run, *job)).count();
     let parts = [
@@ -85,7 +96,12 @@ fn commit_crime(machine: &Machine, name: &str, crime: Crime) -> Result<Verdict, 
     let [before, during, after] = parts.map(on_time);
     let healthy_jobs = run.statistics(HEALTHY).completed;
     let doomed_jobs = run.statistics(DOOMED).completed;
-    let verdict = if healthy_jobs < JOBS || doomed_jobs > FATAL_JOB {
+    let lost_jobs = run.statistics(DOOMED).failed;
+    let expected = match policy {
+        Policy::End => (FATAL_JOB, 0),
+        Policy::Restart | Policy::FallBack => (JOBS - 1, 1),
+    };
+    let verdict = if healthy_jobs < JOBS || (doomed_jobs, lost_jobs) != expected {
         Verdict::Harmful
     } else if [before, during, after] == totals {
         Verdict::Contained
@@ -97,17 +113,19 @@ fn commit_crime(machine: &Machine, name: &str, crime: Crime) -> Result<Verdict, 
     let word = ["contained", "unclear", "harmful"][verdict as usize];
     println!(
         "  {name:<22} {word}: healthy jobs on time {before}/{} before, {during}/{} during, \
-         {after}/{} after; {doomed_jobs} doomed jobs completed",
+         {after}/{} after; {doomed_jobs} doomed jobs completed, {lost_jobs} lost",
         totals[0], totals[1], totals[2]
     );
     json::emit("containment", |line| {
         line.text("fault", name)
+            .text("on_fault", on_fault)
             .text("verdict", word)
             .number("on_time_before", before as u64)
             .number("on_time_during", during as u64)
             .number("on_time_after", after as u64)
             .number("healthy_jobs", healthy_jobs)
-            .number("doomed_jobs", doomed_jobs);
+            .number("doomed_jobs", doomed_jobs)
+            .number("lost_jobs", lost_jobs);
     });
     Ok(verdict)
 }

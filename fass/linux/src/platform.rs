@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
-use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions};
+use sched_dag::{Dag, DagId, Journal, OnFault, Scheduler, SchedulerOptions};
 
 use crate::level::Levels;
 use crate::requests::Request;
@@ -126,6 +126,14 @@ impl Platform for Host {
             let line =
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
+        }
+        let drops_jobs = |dag: &&Dag| dag.on_fault() != OnFault::EndDag;
+        if let Some(dag) = plan.task_set.dags().iter().find(drops_jobs) {
+            return Err(LaunchError::new(format!(
+                "dag `{}` drops a job at a fault and goes on, which Linux does not do; let a fault \
+                 end it, or run it on the kernel or in virtual time",
+                dag.name()
+            )));
         }
         let options = SchedulerOptions {
             policy: terms.policy,

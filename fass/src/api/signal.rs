@@ -234,7 +234,7 @@ impl Dag {
     }
 
     #[track_caller]
-    fn signal(&self) -> Signal {
+    pub(super) fn signal(&self) -> Signal {
         let mut draft = self.open();
         let target = draft.signal.get_or_insert_with(|| Arc::new(Target::new()));
         Signal {

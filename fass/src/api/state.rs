@@ -25,17 +25,21 @@
 //! - A state does not leave its DAG. Between DAGs there is the [latest
 //!   value](crate::Latest).
 
+use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::fmt;
 
 use sched_dag::{StateSpec, StateUser};
 
 use super::dag::Dag;
-use super::uses::{Uses, sealed};
+use super::uses::{ResettableUses, Uses, sealed};
 use crate::draft::Draft;
-use crate::run::cell::{Changing, Looking, Shared};
+use crate::run::cell::{Changing, Looking};
+use crate::run::reset::{Reset, Resettable};
 
 /// What can be a state: any type that several cores may use in turn.
 ///
@@ -95,7 +99,7 @@ pub struct State<T> {
     draft: Rc<RefCell<Draft>>,
     /// The position among the DAG's states.
     position: usize,
-    value: Arc<Shared<T>>,
+    value: Arc<Resettable<T>>,
 }
 
 /// The use of a [`State`] that may change it: the function gets a `&mut T`. Made
@@ -130,6 +134,26 @@ impl<T: StateValue> State<T> {
         Read(self.handle())
     }
 
+    /// States what the state is reset to after a fault of a subtask that uses it, where the
+    /// DAG goes on ([`Dag::survive_faults`]). The commit makes a value for each fault that is
+    /// survived.
+    ///
+    /// See [`Replaceable`](crate::Replaceable).
+    ///
+    /// # Panics
+    ///
+    /// If the DAG is committed.
+    #[track_caller]
+    pub fn reset_to(&self, mut make: impl FnMut() -> T + 'static) -> &Self {
+        let value = Arc::clone(&self.value);
+        let provide = move |faults| value.provide((0..faults).map(|_| make()));
+        let dag = Dag {
+            draft: Rc::clone(&self.draft),
+        };
+        dag.open().resets.insert(self.position, Box::new(provide));
+        self
+    }
+
     fn handle(&self) -> Self {
         Self {
             draft: Rc::clone(&self.draft),
@@ -139,7 +163,7 @@ impl<T: StateValue> State<T> {
     }
 
     /// Notes a use, and returns the value that the subtask will claim.
-    fn note(&self, dag: &Dag, subtask: usize, updates: bool) -> Arc<Shared<T>> {
+    fn note(&self, dag: &Dag, subtask: usize, updates: bool) -> Arc<Resettable<T>> {
         let user = StateUser { subtask, updates };
         dag.draft.borrow_mut().spec.states[self.position]
             .users
@@ -176,7 +200,7 @@ impl Dag {
         State {
             draft: Rc::clone(&self.draft),
             position,
-            value: Arc::new(Shared::new(initial)),
+            value: Arc::new(Resettable::new(initial)),
         }
     }
 }
@@ -185,7 +209,7 @@ impl<T> sealed::Sealed for Update<T> {}
 
 impl<T: StateValue> Uses for Update<T> {
     type Borrowed<'a> = &'a mut T;
-    type Held = Arc<Shared<T>>;
+    type Held = Arc<Resettable<T>>;
     type Guard<'a> = Changing<'a, T>;
 
     fn is_of(&self, dag: &Dag) -> bool {
@@ -197,7 +221,7 @@ impl<T: StateValue> Uses for Update<T> {
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held.change().unwrap_or_else(|| refuse())
+        held.present().change().unwrap_or_else(|| refuse())
     }
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
@@ -209,7 +233,7 @@ impl<T> sealed::Sealed for Read<T> {}
 
 impl<T: StateValue> Uses for Read<T> {
     type Borrowed<'a> = &'a T;
-    type Held = Arc<Shared<T>>;
+    type Held = Arc<Resettable<T>>;
     type Guard<'a> = Looking<'a, T>;
 
     fn is_of(&self, dag: &Dag) -> bool {
@@ -221,11 +245,31 @@ impl<T: StateValue> Uses for Read<T> {
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held.look().unwrap_or_else(|| refuse())
+        held.present().look().unwrap_or_else(|| refuse())
     }
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
         &*guard
+    }
+}
+
+impl<T: StateValue> ResettableUses for Update<T> {
+    fn another(held: &Self::Held) -> Self::Held {
+        Arc::clone(held)
+    }
+
+    fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>> {
+        vec![Arc::<Resettable<T>>::clone(held)]
+    }
+}
+
+impl<T: StateValue> ResettableUses for Read<T> {
+    fn another(held: &Self::Held) -> Self::Held {
+        Arc::clone(held)
+    }
+
+    fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>> {
+        vec![Arc::<Resettable<T>>::clone(held)]
     }
 }
 

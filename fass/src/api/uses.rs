@@ -16,7 +16,11 @@
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
 
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
 use super::dag::Dag;
+use crate::run::reset::Reset;
 
 pub(crate) mod sealed {
     /// Keeps the trait to the types of this crate.
@@ -69,7 +73,34 @@ pub trait Uses: sealed::Sealed {
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a>;
 }
 
-/// Implements the trait for tuples.
+/// Uses of a subtask whose function can be replaced after a fault: states, which are then
+/// reset, or a tuple of such.
+///
+/// Apps do not call its methods; they meet the trait in
+/// [`Using::restarting`](crate::Using::restarting).
+///
+/// ```
+/// use fass::{ResettableUses, create_dag};
+///
+/// fn can_be_reset(_: &impl ResettableUses) {}
+/// can_be_reset(&create_dag().state("pose", 0.0).update());
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "a subtask that uses `{Self}` cannot be replaced after a fault",
+    label = "can be reset only if all of it are states",
+    note = "let another subtask sample the latest value or raise the signal, and send along an edge"
+)]
+pub trait ResettableUses: Uses {
+    /// Returns what another function of the subtask keeps.
+    #[doc(hidden)]
+    fn another(held: &Self::Held) -> Self::Held;
+
+    /// Returns the states.
+    #[doc(hidden)]
+    fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>>;
+}
+
+/// Implements the traits for tuples.
 macro_rules! implement_tuple {
     ($(($Use:ident $use_:ident $guard:ident))*) => {
         impl<$($Use: Uses),*> sealed::Sealed for ($($Use,)*) {}
@@ -97,6 +128,20 @@ macro_rules! implement_tuple {
             fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
                 let ($($guard,)*) = guard;
                 ($($Use::borrow($guard),)*)
+            }
+        }
+
+        impl<$($Use: ResettableUses),*> ResettableUses for ($($Use,)*) {
+            fn another(held: &Self::Held) -> Self::Held {
+                let ($($use_,)*) = held;
+                ($($Use::another($use_),)*)
+            }
+
+            fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>> {
+                let ($($use_,)*) = held;
+                let mut states = Vec::new();
+                $(states.append(&mut $Use::states($use_));)*
+                states
             }
         }
     };

@@ -45,7 +45,7 @@ impl Dag {
     }
 }
 
-impl<U: Uses> Using<'_, U> {
+impl<'d, U: Uses> Using<'d, U> {
     /// Works like [`Dag::register_periodic_subtask`].
     ///
     /// ```
@@ -170,10 +170,7 @@ impl<U: Uses> Using<'_, U> {
 
     /// Notes the uses of the subtask that is registered next.
     #[track_caller]
-    fn hold<'d>(self) -> (&'d Dag, U::Held)
-    where
-        Self: 'd,
-    {
+    pub(super) fn hold(self) -> (&'d Dag, U::Held) {
         let subtask = self.dag.open().spec.subtasks.len();
         (self.dag, self.uses.hold(self.dag, subtask))
     }

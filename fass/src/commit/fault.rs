@@ -13,6 +13,7 @@ use sched_dag::wcets::WcetFault;
 use sched_dag::{DagLabel, SubtaskLabel, Warning};
 
 use super::answer::Unproven;
+use super::count::Count;
 use crate::draft::flaw::Flaw;
 use crate::platform::LaunchError;
 
@@ -130,6 +131,28 @@ pub enum Fault {
         /// The subtask.
         subtask: SubtaskLabel,
     },
+    /// A subtask has a function for after a fault, and a fault ends its DAG.
+    ReplacedInVain {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+    },
+    /// A DAG goes on after faults, and no subtask has a function for that.
+    NothingReplaceable {
+        /// The DAG.
+        dag: DagLabel,
+    },
+    /// A subtask that has a function for after a fault uses a state that has no value for
+    /// that.
+    StateWithoutReset {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The name of the state.
+        state: String,
+    },
     /// The DAG demands a proof that it meets its deadlines, and there is none.
     /// Found only where nothing else is wrong.
     NotProven {
@@ -164,6 +187,9 @@ impl Fault {
             Self::WcetsRefused { .. } => "wcets_refused",
             Self::LatestNotCommitted { .. } => "latest_not_committed",
             Self::SignalNotCommitted { .. } => "signal_not_committed",
+            Self::ReplacedInVain { .. } => "replaced_in_vain",
+            Self::NothingReplaceable { .. } => "nothing_replaceable",
+            Self::StateWithoutReset { .. } => "state_without_reset",
             Self::NotProven { .. } => "not_proven",
             Self::Model(fault) => fault.code(),
             Self::NotLaunched(_) => "not_launched",
@@ -286,6 +312,25 @@ impl fmt::Display for Fault {
                 "{subtask} of {dag} may raise the signal of a dag that is not in the commit; \
                  commit both dags in one call"
             ),
+            Self::ReplacedInVain { dag, subtask } => write!(
+                f,
+                "{subtask} of {dag} has another function for after a fault, and a fault ends the \
+                 dag; let the dag survive faults by `survive_faults`, or register one function"
+            ),
+            Self::NothingReplaceable { dag } => write!(
+                f,
+                "{dag} drops a job at a fault and goes on, and no subtask of it has another function \
+                 for that; register one by `restarting` or `falling_back`"
+            ),
+            Self::StateWithoutReset {
+                dag,
+                subtask,
+                state,
+            } => write!(
+                f,
+                "{subtask} of {dag} has another function for after a fault, and the state `{state}`, \
+                 which it uses, no other value; give it one by `reset_to`"
+            ),
             Self::NotProven { dag, unproven } => write!(
                 f,
                 "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}"
@@ -293,17 +338,6 @@ impl fmt::Display for Fault {
             Self::Model(fault) => fault.fmt(f),
             Self::NotLaunched(error) => write!(f, "the platform did not take the plan: {error}"),
         }
-    }
-}
-
-/// A number of things, in the singular or the plural.
-struct Count(usize, &'static str);
-
-impl fmt::Display for Count {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(number, thing) = self;
-        let plural = if *number == 1 { "" } else { "s" };
-        write!(f, "{number} {thing}{plural}")
     }
 }
 

@@ -11,7 +11,10 @@
 //! 4. *Launch.* The platform takes the plan.
 
 pub(crate) mod answer;
+mod count;
 pub(crate) mod fault;
+mod missing;
+mod replaceable;
 mod staleness;
 mod tie;
 
@@ -25,7 +28,6 @@ use sched_dag::{Policy, TaskSet, Verified, Warning, wcets};
 
 use crate::api::dag::Dag;
 use crate::platform;
-use crate::run::signal::Target;
 use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
 use fault::{CommitError, Fault};
@@ -283,33 +285,6 @@ impl Commit {
     }
 }
 
-/// Returns a fault for each use of something of a DAG that is not in the commit.
-fn missing_others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
-    let draft = dag.draft.borrow();
-    let samples = draft.samples.iter();
-    let not_there = samples.filter(|(_, latest)| staleness::writer_of(dags, &**latest).is_none());
-    let latest = not_there.map(|(subtask, latest)| Fault::LatestNotCommitted {
-        dag: label.clone(),
-        subtask: staleness::label_of(dag, *subtask),
-        topic: latest.topic().into(),
-    });
-    let is_target = |signal: &Arc<Target>, other: &Dag| {
-        let other = other.draft.borrow();
-        let own = other.signal.as_ref();
-        own.is_some_and(|target| Arc::ptr_eq(signal, target))
-    };
-    // The fault of any subtask raises the DAG's; the first stands for them.
-    let of_faults = draft.on_fault.iter().take(draft.spec.subtasks.len());
-    let of_faults = of_faults.map(|signal| (0, Arc::clone(signal)));
-    let raises = draft.raises.iter().cloned().chain(of_faults);
-    let unknown = raises.filter(|(_, signal)| !dags.iter().any(|other| is_target(signal, other)));
-    let signals = unknown.map(|(subtask, _)| Fault::SignalNotCommitted {
-        dag: label.clone(),
-        subtask: staleness::label_of(dag, subtask),
-    });
-    latest.chain(signals).collect()
-}
-
 /// Returns a fault for each DAG that demands a proof and has none.
 fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
     let demanding =
@@ -360,7 +335,8 @@ fn verify(
             let dag = label.clone();
             faults.push(Fault::WcetsRefused { dag, fault });
         }
-        faults.extend(missing_others(dags, dag, &label));
+        faults.extend(missing::others(dags, dag, &label));
+        faults.extend(replaceable::check(&draft, &label));
         specs.push(spec);
     }
     // A commit of nothing but repeated DAGs has been told what is wrong.

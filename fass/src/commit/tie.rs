@@ -7,7 +7,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::{DagId, DagSpec, SubtaskSpec, TaskSet};
+use sched_dag::{DagId, DagSpec, OnFault, SubtaskSpec, TaskSet};
 
 use super::answer::Answers;
 use crate::api::dag::Dag;
@@ -27,9 +27,9 @@ pub(crate) fn tie(
     staleness: Vec<Staleness>,
 ) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
-    let bodies = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
+    let (bodies, others) = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
         .map(|((id, dag), verified)| {
-            let (spec, make_bodies, latest, effects) = {
+            let (spec, make_bodies, latest, effects, resets) = {
                 let mut draft = dag.draft.borrow_mut();
                 draft.is_committed = true;
                 let name = draft.spec.name.clone();
@@ -43,14 +43,24 @@ pub(crate) fn tie(
                 }
                 let effects = core::mem::take(&mut draft.effects);
                 let make_bodies = core::mem::take(&mut draft.make_bodies);
-                (spec, make_bodies, draft.latest.clone(), effects)
+                let resets = core::mem::take(&mut draft.resets);
+                (spec, make_bodies, draft.latest.clone(), effects, resets)
             };
             let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
-            let mut wiring = Wiring::new(&spec, &latest, slots);
+            let faults = match verified.on_fault() {
+                OnFault::EndDag => 0,
+                OnFault::DropJob(limit) => limit.in_all,
+            };
+            resets.into_iter().for_each(|provide| provide.1(faults));
+            let mut wiring = Wiring::new(&spec, &latest, slots, faults);
             let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
                 make_body(&mut wiring, subtask)
             };
             let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
+            let mut others: Vec<Vec<Body>> = bodies.iter().map(|_| Vec::new()).collect();
+            for (subtask, of_subtask) in wiring.others {
+                others[subtask] = of_subtask;
+            }
             for (subtask, effect) in effects {
                 bodies[subtask].add_effects([effect]);
             }
@@ -59,17 +69,20 @@ pub(crate) fn tie(
                     (subtask.outputs.iter()).any(|port| port.topic == latest.topic())
                 };
                 if let Some(writer) = spec.subtasks.iter().position(writes) {
-                    bodies[writer].add_effects(latest.effects());
+                    for body in others[writer].iter_mut().chain([&mut bodies[writer]]) {
+                        body.add_effects(latest.effects());
+                    }
                 }
             }
-            bodies
+            (bodies, others)
         })
-        .collect();
+        .unzip();
     let handler = |dag: &Dag| Some(dag.draft.borrow().on_fault.as_ref()?.get()?.1);
     Plan {
         task_set,
         number,
         bodies,
+        others,
         bounds_ns: answers.bounds_ns(),
         sink_bounds_ns: answers.sink_bounds_ns(),
         after_fault: dags.iter().map(handler).collect(),

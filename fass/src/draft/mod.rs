@@ -11,6 +11,7 @@ pub(crate) mod attributes;
 pub(crate) mod flaw;
 
 use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -23,6 +24,7 @@ use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 use crate::run::effect::Effect;
 use crate::run::latest::AnyLatest;
 use crate::run::message::MessageType;
+use crate::run::replaceable::{self, Functions};
 use crate::run::signal::Target;
 use crate::run::subtask::{MakeBody, defer};
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -51,6 +53,10 @@ pub(crate) struct Draft {
     pub(crate) raises: Vec<(usize, Arc<Target>)>,
     /// What completions of subtasks do beyond the DAG, latest values apart.
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
+    /// The subtasks whose functions can be replaced.
+    pub(crate) replaceable: Vec<usize>,
+    /// What provides so many values of a state for after faults.
+    pub(crate) resets: BTreeMap<usize, Box<dyn FnOnce(u32)>>,
     /// What releases this DAG, if it is sporadic.
     pub(crate) signal: Option<Arc<Target>>,
     /// The signal that is raised when a fault ends the DAG.
@@ -78,6 +84,21 @@ impl Draft {
         let inputs = (inputs, Args::input_types());
         let outputs = (outputs, Ret::output_types());
         self.make_bodies.push(defer(f));
+        self.enter(inputs, outputs, attributes)
+    }
+
+    /// Adds a subtask whose function can be replaced, and returns its label.
+    pub(crate) fn register_replaceable<Args: VecToSubs, Ret: VecToPubs>(
+        &mut self,
+        functions: Functions<Args, Ret>,
+        inputs: &[&str],
+        outputs: &[&str],
+        attributes: SubtaskAttributes,
+    ) -> SubtaskLabel {
+        let inputs = (inputs, Args::input_types());
+        let outputs = (outputs, Ret::output_types());
+        self.replaceable.push(self.make_bodies.len());
+        self.make_bodies.push(replaceable::defer(functions));
         self.enter(inputs, outputs, attributes)
     }
 

@@ -11,6 +11,8 @@ pub(crate) mod effect;
 pub(crate) mod latest;
 pub(crate) mod message;
 pub(crate) mod plan;
+pub(crate) mod replaceable;
+pub(crate) mod reset;
 pub(crate) mod signal;
 pub(crate) mod staleness;
 pub(crate) mod subtask;

@@ -36,6 +36,9 @@ pub struct Plan {
     pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<Body>>,
+    /// The bodies that replace these after faults: `others[dag][subtask]`, the next one
+    /// last. Empty for a subtask whose faults end its DAG.
+    pub others: Vec<Vec<Vec<Body>>>,
     /// The response time of each DAG that the commit has proven, if it has
     /// ([`Commit::answers`](crate::Commit::answers)).
     pub bounds_ns: Vec<Option<u64>>,
@@ -87,6 +90,19 @@ pub(crate) trait Subtask: Send {
 
     /// Gives up what has arrived for a job that the subtask will not run.
     fn discard(&mut self, job: u64);
+
+    /// Reports whether it could go on where another body of its subtask was lost.
+    fn can_take_over(&self) -> bool {
+        false
+    }
+
+    /// Gives up the states that the lost one used.
+    fn take_over(&mut self) {}
+
+    /// Reports whether its function is the one to fall back on.
+    fn is_fallback(&self) -> bool {
+        false
+    }
 }
 
 impl Body {
@@ -189,6 +205,51 @@ impl Body {
     /// ```
     pub fn discard(&mut self, job: u64) {
         self.subtask.discard(job);
+    }
+
+    /// Reports whether it can [take over](Self::take_over), from a body that a fault has
+    /// ended: it is one of [`Plan::others`], and the fault did not come while the lost
+    /// body received or sent its values.
+    ///
+    /// ```
+    /// fn is_replaceable(others: &[fass::Body]) -> bool {
+    ///     others.last().is_some_and(|next| next.can_take_over())
+    /// }
+    /// ```
+    #[must_use]
+    pub fn can_take_over(&self) -> bool {
+        self.subtask.can_take_over()
+    }
+
+    /// Makes it go on where another body of its subtask was lost to a fault: the states
+    /// that this one used are reset.
+    ///
+    /// To be called once, before anything else of the DAG starts that was not started at
+    /// the fault, on one that [can](Self::can_take_over). The lost body must not be used
+    /// any more. Takes a bounded time and runs no code of the app.
+    ///
+    /// ```
+    /// fn replacement(others: &mut Vec<fass::Body>) -> Option<fass::Body> {
+    ///     let mut next = others.pop()?;
+    ///     next.take_over();
+    ///     Some(next)
+    /// }
+    /// ```
+    pub fn take_over(&mut self) {
+        self.subtask.take_over();
+    }
+
+    /// Reports whether its function is the one that its subtask falls back on: then its
+    /// DAG is degraded.
+    ///
+    /// ```
+    /// fn is_degraded(bodies: &[fass::Body]) -> bool {
+    ///     bodies.iter().any(fass::Body::is_fallback)
+    /// }
+    /// ```
+    #[must_use]
+    pub fn is_fallback(&self) -> bool {
+        self.subtask.is_fallback()
     }
 }
 

@@ -151,7 +151,7 @@ pub trait MulSend {
 )]
 pub trait VecToSubs: Sized + Send + 'static {
     /// The subscribers, one for each element.
-    type Subs: MulRecv<Items = Self> + Send + 'static;
+    type Subs: MulRecv<Items = Self> + Send + Sync + 'static;
 
     /// Returns the types of the elements, in order.
     ///
@@ -206,7 +206,7 @@ pub trait VecToSubs: Sized + Send + 'static {
 )]
 pub trait VecToPubs: Sized + Send + 'static {
     /// The publishers, one for each element.
-    type Pubs: MulSend<Items = Self> + Send + 'static;
+    type Pubs: MulSend<Items = Self> + Send + Sync + 'static;
 
     /// Returns the types of the elements, in order.
     ///

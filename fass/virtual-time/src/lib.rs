@@ -220,11 +220,12 @@ impl VirtualTime {
         self
     }
 
-    /// Contains panics: one in a function ends its DAG only, as a fault does on the
-    /// kernel's machine, instead of failing the run.
+    /// Contains panics: one in a function ends its DAG only, or costs a job of it
+    /// (`Dag::survive_faults`), as on the kernel's machine, instead of failing the run.
     ///
     /// The instance fails when it has executed what it had executed up to the
-    /// panic; from then on its DAG starts nothing, and the other DAGs go on.
+    /// panic; then its DAG starts nothing, or goes on with the next job, and the other
+    /// DAGs go on.
     /// [`Report::panics`] has every panic: a test that means none has to look
     /// there, because an assertion inside a function panics, too.
     ///

@@ -44,6 +44,8 @@ pub struct Report {
     /// The panics that were [contained](crate::VirtualTime::contain_panics), in
     /// the order in which their functions ran; none without containment.
     pub panics: Vec<PanicRecord>,
+    /// For each DAG whether a subtask of it has fallen back on its second function.
+    pub degraded: Vec<bool>,
     /// All events in the order in which they happened.
     pub events: Vec<Event>,
     /// The scheduler's counters, one set for each DAG.

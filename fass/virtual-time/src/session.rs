@@ -31,6 +31,8 @@ pub(crate) struct Session {
     bodies: Vec<Vec<Body>>,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
+    /// What replaces them after faults.
+    others: Vec<Vec<Vec<Body>>>,
     recording: Recording,
 }
 
@@ -43,10 +45,12 @@ impl Session {
                 journal: Recorder::new(Arc::clone(&task_set)),
                 executed_ns: BTreeMap::new(),
                 panics: Vec::new(),
+                degraded: vec![false; task_set.dags().len()],
                 run_until_ns: 0,
             },
             bodies: plan.bodies,
             after_fault: plan.after_fault,
+            others: plan.others,
             task_set,
         }
     }
@@ -72,6 +76,7 @@ impl Session {
             machine,
             bodies: &mut self.bodies,
             after_fault: &self.after_fault,
+            others: &mut self.others,
             recording: &mut self.recording,
             panic: None,
         };
@@ -139,12 +144,16 @@ impl Session {
         let sink_misses = dags.clone().map(sink_misses).collect();
         let statistics = dags.map(|(dag, _)| *scheduler.statistics(dag)).collect();
         let Recording {
-            journal, panics, ..
+            journal,
+            panics,
+            degraded,
+            ..
         } = &self.recording;
         let mut report = Report {
             instances: Vec::new(),
             jobs: Vec::new(),
             panics: panics.clone(),
+            degraded: degraded.clone(),
             events: journal.events.clone(),
             statistics,
             sink_misses,
@@ -165,6 +174,8 @@ struct Recording {
     executed_ns: BTreeMap<Instance, u64>,
     /// The contained panics.
     panics: Vec<PanicRecord>,
+    /// For each DAG whether a subtask of it has fallen back.
+    degraded: Vec<bool>,
     run_until_ns: u64,
 }
 
@@ -174,6 +185,7 @@ struct Runner<'s> {
     machine: &'s Surroundings,
     bodies: &'s mut [Vec<Body>],
     after_fault: &'s [Option<DagId>],
+    others: &'s mut [Vec<Vec<Body>>],
     recording: &'s mut Recording,
     /// The panic that fails the run and stops it. In what is left of its instant
     /// nothing runs, and nothing is recorded.
@@ -225,6 +237,11 @@ impl Workload for Runner<'_> {
         panics.any(|panic| panic.instance == instance)
     }
 
+    fn is_replaceable(&mut self, instance: Instance) -> bool {
+        let others = &self.others[instance.dag.index()][instance.subtask.index()];
+        others.last().is_some_and(Body::can_take_over)
+    }
+
     fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
         self.recording.journal.on_core(What::Start, instance, core);
     }
@@ -266,11 +283,8 @@ impl Workload for Runner<'_> {
         self.recording.journal.on_core(What::Finish, instance, core);
     }
 
-    fn failed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+    fn failed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
         self.recording.journal.on_core(What::Ended, instance, core);
-        if let Some(handler) = self.after_fault[instance.dag.index()] {
-            self.machine.signal_at(now_ns, handler);
-        }
     }
 }
 
@@ -304,8 +318,23 @@ impl Observer for Runner<'_> {
         }
     }
 
+    fn restarted(&mut self, instance: Instance) {
+        self.recording.journal.restarted(instance);
+        let others = &mut self.others[instance.dag.index()][instance.subtask.index()];
+        if let Some(mut next) = others.pop() {
+            next.take_over();
+            self.recording.degraded[instance.dag.index()] |= next.is_fallback();
+            *self.body(instance) = next;
+        }
+    }
+
     fn ended(&mut self, dag: DagId) {
         self.recording.journal.ended(dag);
+        // Nothing but a fault ends a DAG here.
+        if let Some(handler) = self.after_fault[dag.index()] {
+            self.machine
+                .signal_at(self.recording.journal.now_ns, handler);
+        }
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {

@@ -249,7 +249,7 @@ impl Machine {
         }
         let ended = execution::end().ok_or_else(nothing)?;
         let run = Run::new(ended, allocations, locks, epoch_ns);
-        let faults = |dag| run.statistics(dag).faults;
+        let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
         wcet_notes::note(&run);

@@ -1,9 +1,14 @@
 //! Faults of apps, kept from harming anyone else.
 //!
 //! A subtask that panics, causes an exception or exceeds its budget ends its DAG:
-//! what it may have left half done can belong to that DAG alone. The fault is
-//! reported with DAG, subtask, job, core, cause and place, the context that it
-//! happened in is never used again, and all other DAGs go on.
+//! what it may have left half done can belong to that DAG alone. If that DAG survives
+//! the fault, it costs the job only. The fault is reported with DAG, subtask, job,
+//! core, cause and place, the context that it happened in is never used again, and all
+//! other DAGs go on.
+//!
+//! What a fault pins, until the machine is reset: the context's stack, the body that was
+//! on it with the function and what that owns, and locks and states that it held. For
+//! each fault that is survived the commit has taken another stack and another body.
 //!
 //! That is possible because code that may be at fault is told apart by the
 //! interrupt flag: apps run with interrupts enabled, while code that holds a
@@ -16,6 +21,7 @@ use core::time::Duration;
 
 use sched_dag::Instance;
 
+use super::execution::Cost;
 use super::{contexts, execution};
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
@@ -155,9 +161,14 @@ fn report(instance: Instance, fault: &Fault<'_>) {
     let subtask = dag.map(|dag| dag.subtask(instance.subtask));
     let dag = Excerpt::<NAME_BYTES>::of(dag.map_or("", |dag| dag.name()));
     let subtask = Excerpt::<NAME_BYTES>::of(subtask.map_or("", |subtask| subtask.name()));
+    let (cost, consequence) = match execution::cost_of_fault(instance) {
+        Cost::Dag => ("dag", "the DAG is ended"),
+        Cost::Job => ("job", "the job is lost, and the subtask is made anew"),
+        Cost::Degraded => ("degraded", "the job is lost, and the subtask falls back"),
+    };
     crate::println!(
         "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \
-         at {place}; the DAG is ended",
+         at {place}; {consequence}",
         instance.job
     );
     json::report("fault", |line| {
@@ -167,6 +178,7 @@ fn report(instance: Instance, fault: &Fault<'_>) {
             .number("subtask", instance.subtask.0)
             .text("subtask_name", &subtask)
             .number("job", instance.job)
+            .text("cost", cost)
             .number("cpu", core)
             .text("place", place)
             .text("message", message);

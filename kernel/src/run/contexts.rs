@@ -2,8 +2,10 @@
 //!
 //! A preempted instance keeps its context, stack and all. At any time a core
 //! runs one context and keeps at most one to spare, and each subtask has at most
-//! one suspended instance: so twice the cores and once the subtasks are enough,
-//! and that many are made at a commit, never later. Contexts are never freed;
+//! one suspended instance: so twice the cores and once the subtasks are enough. A
+//! fault abandons one, after which the subtask needs none, unless the fault is survived:
+//! so there is one more for each such fault that there may be. That many are made at
+//! a commit, never later. Contexts are never freed;
 //! the next commit uses them again.
 
 use alloc::vec::Vec;

@@ -8,7 +8,7 @@ use core::fmt;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fass::{OverrunPolicy, Plan, Policy, Preemption};
-use sched_dag::{Dag, DagId, SchedulerOptions, SubtaskId};
+use sched_dag::{Dag, DagId, OnFault, SchedulerOptions, SubtaskId};
 
 use super::json::{self, Object};
 
@@ -80,6 +80,10 @@ pub(crate) fn describe(line: &mut Object<'_, '_>, number: u32, dag: &Dag) {
         .list("edges", edges(dag));
     if dag.sinks().len() > 1 {
         line.list("sinks", sinks(dag));
+    }
+    if let OnFault::DropJob(of) = dag.on_fault() {
+        let numbers = [of.faults.into(), of.window, of.in_all.into()];
+        line.list("on_fault", numbers.into_iter());
     }
 }
 

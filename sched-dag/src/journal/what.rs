@@ -52,10 +52,13 @@ pub enum What {
     /// A DAG starts no further instance, because of a fault or a stop. The event's job
     /// is 0 and means nothing.
     Stopped,
+    /// The instance was ended by a fault, which has cut its job, and its subtask goes on
+    /// with another function.
+    Restarted,
 }
 
 /// All of it, by number, as it is printed.
-const WORDS: [(What, &str); 18] = [
+const WORDS: [(What, &str); 19] = [
     (What::Released, "released"),
     (What::Queued, "queued"),
     (What::Skipped, "skipped"),
@@ -74,6 +77,7 @@ const WORDS: [(What, &str); 18] = [
     (What::Dropped, "dropped"),
     (What::Due, "due"),
     (What::Stopped, "stopped"),
+    (What::Restarted, "restarted"),
 ];
 
 /// A text that is none of the words.
@@ -101,7 +105,11 @@ impl What {
     /// Reports whether it happens to a job or a DAG, not to an instance.
     #[must_use]
     pub const fn is_of_job(self) -> bool {
-        !matches!(self, Self::Ready | Self::Cancelled | Self::Request) && !self.is_of_machine()
+        let is_of_instance = matches!(
+            self,
+            Self::Ready | Self::Cancelled | Self::Request | Self::Restarted
+        );
+        !is_of_instance && !self.is_of_machine()
     }
 
     /// Reports whether it happens on a core, not only in the scheduler's books.
@@ -142,7 +150,7 @@ mod tests {
             assert_eq!(What::from_number(number), Some(what));
             assert_eq!(what.to_string().parse(), Ok(what));
         }
-        assert_eq!(What::from_number(18), None);
+        assert_eq!(What::from_number(19), None);
         assert_eq!("Start".parse::<What>(), Err(UnknownWord));
     }
 }

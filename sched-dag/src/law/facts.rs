@@ -35,7 +35,12 @@ impl Record {
                     stopped_ns[index].get_or_insert(event.time_ns);
                 }
                 _ => match event.instance() {
-                    Some(instance) => record.note_instance(instance, &event),
+                    Some(instance) => {
+                        record.note_instance(instance, &event);
+                        if event.what == What::Restarted {
+                            record.note_failure(&event);
+                        }
+                    }
                     None => {
                         let release_ns = match task_set.dag(event.dag).is_sporadic() {
                             true => due_ns[index],
@@ -74,6 +79,7 @@ impl Record {
             What::Completed => {
                 job.ended_ns = Some(time_ns);
                 job.outcome = Some(match (job.cut_ns, stopped_ns, job.missed_ns) {
+                    (Some(_), _, _) if job.has_failed => JobOutcome::Failed,
                     (Some(_), _, _) => JobOutcome::Aborted,
                     (None, Some(_), _) => JobOutcome::DagEnded,
                     (None, None, Some(_)) => JobOutcome::Missed,
@@ -81,6 +87,14 @@ impl Record {
                 });
             }
             _ => {}
+        }
+    }
+
+    /// Takes note that a fault has cut a job, unless it was cut before.
+    fn note_failure(&mut self, event: &Event) {
+        if let Some(job) = self.job_mut(event.dag, event.job) {
+            job.has_failed |= job.cut_ns.is_none();
+            job.cut_ns.get_or_insert(event.time_ns);
         }
     }
 

@@ -68,9 +68,11 @@ pub struct JobRecord {
     pub release_ns: Option<u64>,
     /// When the release was carried out.
     pub released_ns: Option<u64>,
-    /// When it was cut, because it was aborted or its DAG was ended: from then
-    /// on it starts no instance.
+    /// When it was cut, because it was aborted, had a fault, or its DAG was ended: from
+    /// then on it starts no instance.
     pub cut_ns: Option<u64>,
+    /// Whether a fault has cut it while its DAG went on.
+    pub has_failed: bool,
     /// When its deadline was seen to have passed without it being complete.
     pub missed_ns: Option<u64>,
     /// When no instance of it was left.

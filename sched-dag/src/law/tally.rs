@@ -12,7 +12,7 @@
 //! - *Execution time*, of a subtask's instances: from the start to the finish, without
 //!   the time for which it was suspended. Those above the WCET are counted, too.
 //!
-//! Only complete jobs count in a DAG's response time: neither aborted nor cut short.
+//! Only complete jobs count in a DAG's response time: none that was cut.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -178,7 +178,7 @@ impl Tally {
         let Some(place) = dag.place(event.job) else {
             return;
         };
-        let Some(instance) = event.instance() else {
+        let Some(instance) = event.instance().filter(|_| event.what != What::Restarted) else {
             dag.of_job(place, event.what);
             return;
         };
@@ -223,7 +223,7 @@ impl OfDag {
     fn of_job(&mut self, place: usize, what: What) {
         let job = &mut self.open[place];
         match what {
-            What::Aborted => job.is_cut = true,
+            What::Aborted | What::Restarted => job.is_cut = true,
             What::Completed => {
                 if !job.is_cut {
                     let response_ns = job.last_finish_ns.saturating_sub(job.release_ns);

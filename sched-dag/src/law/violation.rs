@@ -130,6 +130,8 @@ pub enum Violation {
     },
     /// One life: an instance was cancelled of a job that nothing had cut.
     CancelledUncut { event: Event },
+    /// D1: a DAG went on after a fault that it does not survive.
+    FaultBeyondLimit { event: Event },
     /// One core: an instance began on a core that still ran another one.
     CoreNotFree { event: Event, occupant: Instance },
     /// R5: an instance waited although a core was idle, or ran an instance that it
@@ -167,9 +169,10 @@ impl Violation {
             | Self::MissedEarly { .. }
             | Self::MissedInTime { .. }
             | Self::NotMissed { .. } => Rule::JobCompletion,
-            Self::OutOfTurn { .. } | Self::Backwards { .. } | Self::CancelledUncut { .. } => {
-                Rule::OneLife
-            }
+            Self::OutOfTurn { .. }
+            | Self::Backwards { .. }
+            | Self::CancelledUncut { .. }
+            | Self::FaultBeyondLimit { .. } => Rule::OneLife,
             Self::CoreNotFree { .. } => Rule::OneCore,
             Self::PassedOver(_) | Self::LostItsCore { .. } => Rule::Dispatch,
         }
@@ -196,6 +199,7 @@ impl Violation {
             | Self::OutOfTurn { event, .. }
             | Self::Backwards { event, .. }
             | Self::CancelledUncut { event }
+            | Self::FaultBeyondLimit { event }
             | Self::CoreNotFree { event, .. }
             | Self::LostItsCore { event } => event.time_ns,
             Self::TooSoon { release_ns, .. } => release_ns,

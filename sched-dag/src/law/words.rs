@@ -92,6 +92,7 @@ impl Words<'_> {
             What::Resume => "is resumed",
             What::Finish => "finishes",
             What::Cancelled => "is cancelled",
+            What::Restarted => "is replaced",
             _ => "is ended",
         };
         write!(f, "{} {does}", self.names.instance(instance))?;
@@ -245,7 +246,10 @@ impl Words<'_> {
                 " before its `{before}` at {before_ns} ns, which comes first"
             ),
             Violation::CancelledUncut { .. } => {
-                f.write_str(" although its job was not aborted, nor its DAG ended")
+                f.write_str(" although its job was not cut, nor its DAG ended")
+            }
+            Violation::FaultBeyondLimit { .. } => {
+                f.write_str(" although its DAG does not survive that fault")
             }
             Violation::LostItsCore { .. } => {
                 f.write_str(" although it keeps its core until it finishes")
@@ -333,6 +337,7 @@ impl fmt::Display for Words<'_> {
             | Violation::OutOfTurn { event, .. }
             | Violation::Backwards { event, .. }
             | Violation::CancelledUncut { event }
+            | Violation::FaultBeyondLimit { event }
             | Violation::LostItsCore { event } => {
                 self.what(&event, f)?;
                 self.why(f)

@@ -1,8 +1,9 @@
 //! Ending a DAG before its time: by a fault of one of its instances, or a stop.
 //!
 //! Words: an instance *fails* when a fault has ended it: its function will never
-//! return. A DAG is *ended* by the first instance of it that fails, or by a
-//! *stop*, which needs no fault; it stays ended. It is *over* when nothing of it
+//! return. A DAG is *ended* by the first instance of it that fails, unless
+//! that costs the job only (the module `dropping`), or by a *stop*, which needs no fault; it
+//! stays ended. It is *over* when nothing of it
 //! is in flight or to come. The rules, whose tests in `tests/ending.rs` bear
 //! their numbers:
 //!

@@ -1,7 +1,7 @@
 //! The life of an instance: ready, started, ended.
 //!
-//! An instance ends by finishing, by a fault or, in a job that is aborted or
-//! whose DAG is ended, by being cancelled. In all cases all its outgoing edges
+//! An instance ends by finishing, by a fault or, in a job that is cut (aborted, at fault,
+//! or of a DAG that is ended), by being cancelled. In all cases all its outgoing edges
 //! are released at that instant (R3), so such a job ends by the same rules as
 //! any other, only without running.
 
@@ -101,6 +101,10 @@ impl Scheduler {
     pub(super) fn end(&mut self, vertex: u32, observer: &mut impl Observer) {
         self.end_one(vertex, observer);
         if !self.ending.is_empty() {
+            // Its next instance may be among them, and then hide that this one was late.
+            if self.now_ns >= self.quiet_until_ns {
+                self.judge_ended(vertex, observer);
+            }
             self.end_all(observer);
         }
     }
@@ -131,9 +135,9 @@ impl Scheduler {
         let ended = vertices.end(number);
         let (dag, sequence) = (ended.dag, ended.progress);
         let jobs = &mut dags[dag.index()].jobs;
-        let is_cut = jobs.is_cut(sequence);
         let overlaps = sequence + 1 < jobs.next;
         let job = jobs.job_mut(sequence);
+        let is_cut = job.cut.is_some();
         let successors = Vertices::successors(&ended);
         job.unfinished -= u32::from(successors.is_empty());
         let is_last = job.unfinished == 0;
@@ -163,7 +167,7 @@ impl Scheduler {
         if let Some(vertex) = self.vertices.next_is_ready(number) {
             let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
-            if jobs.is_cut(vertex.progress) {
+            if job.cut.is_some() {
                 observer.cancelled(vertex.instance(job));
                 self.ending.push(number);
             } else {
@@ -183,15 +187,13 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);
-        let outcome = if state.jobs.is_aborted(sequence) {
+        let outcome = if let Some(cut) = job.cut {
             if !state.jobs.is_ended() {
                 let first = self.task_set.first_vertex(dag) as usize;
                 let subtasks = self.task_set.dag(dag).subtasks().len();
                 self.vertices.allow_passing_on(first..first + subtasks);
             }
-            JobOutcome::Aborted
-        } else if state.jobs.is_ended() {
-            JobOutcome::DagEnded
+            cut
         } else if job.missed {
             state.statistics.completed += 1;
             JobOutcome::Missed

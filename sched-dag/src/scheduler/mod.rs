@@ -10,7 +10,7 @@
 //! dispatch that sees both. The types force this order:
 //!
 //! 1. [`Scheduler::at`] begins the instant and gives a [`Moment`], which takes
-//!    completions, signals to sporadic DAGs, and faults and stops, which end a DAG;
+//!    completions, signals to sporadic DAGs, and faults and stops;
 //! 2. [`Moment::release_due`] turns it into a [`Released`], which takes none;
 //! 3. [`Released::dispatch`] ends it with the [`Decision`]s.
 //!
@@ -24,8 +24,8 @@
 //!   job is released, skipped, or dropped with its DAG's end, exactly once.
 //! - Bounded steps: a release costs the sources of its DAG, a completion the
 //!   successors of its subtask, a decision the logarithm of the number of
-//!   subtasks. Beside that a job that is aborted or in flight when its DAG is
-//!   ended costs its instances, once; at one instant that is at most the DAG's
+//!   subtasks. Beside that a job that is cut costs its
+//!   instances, once; at one instant that is at most the DAG's
 //!   subtasks and edges times the jobs that may be in flight. After a
 //!   pause of the driver, each release and each deadline that has passed
 //!   meanwhile costs its step.
@@ -41,6 +41,7 @@ mod by_deadline;
 mod cores;
 mod decision;
 mod dispatch;
+mod dropping;
 mod ending;
 mod hand_off;
 pub(crate) mod heap;
@@ -68,6 +69,7 @@ pub use observer::Observer;
 pub use statistics::DagStatistics;
 
 use cores::Cores;
+use dropping::Survived;
 use heap::IndexedHeap;
 use jobs::Jobs;
 use ready_queue::ReadyQueue;
@@ -114,6 +116,7 @@ const OWED: u32 = 1 << 31;
 struct DagState {
     jobs: Jobs,
     statistics: DagStatistics,
+    survived: Survived,
     is_paused: bool,
     /// When the latest pause has ended; what was due before is skipped.
     resumed_ns: u64,
@@ -148,6 +151,7 @@ impl Scheduler {
                 DagState {
                     jobs: Jobs::new(dag, first_slot),
                     statistics: DagStatistics::default(),
+                    survived: Survived::new(dag.on_fault()),
                     is_paused: false,
                     resumed_ns: 0,
                 }

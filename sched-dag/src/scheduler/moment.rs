@@ -53,6 +53,19 @@ impl<'s> Moment<'s> {
         self.scheduler.fail(instance, observer);
     }
 
+    /// Takes note that an instance has ended by a fault, and that the driver has another
+    /// function for its subtask. If the DAG [survives](crate::FaultLimit) the fault, only
+    /// the instance's job is cut, and the observer is told that the subtask is
+    /// [restarted](Observer::restarted); else the DAG is ended, as by
+    /// [`fail`](Self::fail). (The module `dropping` states the rules.)
+    ///
+    /// # Panics
+    ///
+    /// If the instance has not started or has ended before.
+    pub fn fail_replaceable(&mut self, instance: Instance, observer: &mut impl Observer) {
+        self.scheduler.fail_replaceable(instance, observer);
+    }
+
     /// Ends a DAG as [`fail`](Self::fail) does, without an instance that has
     /// failed. Does nothing if the DAG is ended.
     ///

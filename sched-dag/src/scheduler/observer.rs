@@ -38,7 +38,7 @@ pub trait Observer {
         let _ = instance;
     }
 
-    /// The instance will not run, because its job was aborted or its DAG is
+    /// The instance will not run, because its job is cut or its DAG is
     /// ended; what its predecessors have sent to it can be dropped.
     fn cancelled(&mut self, instance: Instance) {
         let _ = instance;
@@ -47,6 +47,13 @@ pub trait Observer {
     /// Job `job` starts no further instance, to make room for a newer job.
     fn aborted(&mut self, dag: DagId, job: u64) {
         let _ = (dag, job);
+    }
+
+    /// The instance has failed, and its DAG goes on (D1): its job is cut, and its
+    /// subtask's next instances are another function's. Reported before all that
+    /// follows from it.
+    fn restarted(&mut self, instance: Instance) {
+        let _ = instance;
     }
 
     /// The DAG is ended, by a fault or a stop: it starts no further instance.
@@ -96,6 +103,7 @@ pass_on! {
     ready(instance: Instance);
     cancelled(instance: Instance);
     aborted(dag: DagId, job: u64);
+    restarted(instance: Instance);
     ended(dag: DagId);
     deadline_missed(dag: DagId, job: u64, deadline_ns: u64);
     job_completed(dag: DagId, job: u64, outcome: JobOutcome);

@@ -30,7 +30,7 @@
 //! # Abort
 //!
 //! A due job that cannot be released aborts the oldest job in flight that is
-//! not aborted yet, and waits. If all in flight are aborted already, the oldest
+//! not cut yet, by an abort or a fault, and waits. If all in flight are cut already, the oldest
 //! waiting job, which may be the due one itself, is skipped.
 //!
 //! An aborted job starts no further instance: those that are ready are

@@ -26,7 +26,11 @@ pub struct DagStatistics {
     pub dropped_signals: u64,
     /// Instances that a fault has ended.
     pub faults: u64,
-    /// Jobs that were in flight when the DAG was ended, without aborted ones.
+    /// Jobs that a fault has cut while the DAG went on.
+    pub failed: u64,
+    /// Faults after which the DAG went on.
+    pub restarts: u64,
+    /// Jobs that were in flight when the DAG was ended, without those cut before.
     pub cut_short: u64,
     /// Releases that still waited for an older job when the DAG was ended.
     pub dropped: u64,

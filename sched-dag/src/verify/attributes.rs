@@ -13,7 +13,7 @@ use super::options::CommitOptions;
 use super::states::is_shared;
 use super::warning::Warning;
 use crate::order::sorted;
-use crate::policy::{Policy, Priority};
+use crate::policy::{OnFault, Policy, Priority};
 use crate::spec::DagSpec;
 
 /// Checks the numbers of the whole commit.
@@ -103,6 +103,14 @@ fn check_counts(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     }
     if spec.in_flight == Some(0) {
         findings.fault(dag, Fault::ZeroInFlight { dag: label() });
+    }
+    if let OnFault::DropJob(limit) = spec.on_fault {
+        if limit.faults == 0 || limit.in_all == 0 {
+            findings.fault(dag, Fault::ZeroFaults { dag: label() });
+        }
+        if limit.window == 0 {
+            findings.fault(dag, Fault::ZeroWindow { dag: label() });
+        }
     }
 }
 

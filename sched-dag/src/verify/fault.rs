@@ -168,6 +168,10 @@ pub enum Fault {
     ZeroJobs { dag: DagLabel },
     /// A DAG with room for 0 jobs in flight.
     ZeroInFlight { dag: DagLabel },
+    /// A DAG drops jobs at faults, at most 0 times.
+    ZeroFaults { dag: DagLabel },
+    /// A DAG survives faults within a window of 0 jobs.
+    ZeroWindow { dag: DagLabel },
     /// A time that 64 bits of nanoseconds do not hold.
     TimeOverflow { dag: DagLabel, time: Time },
     /// Under static priority: some subtasks of a DAG have a priority, these not.
@@ -285,6 +289,8 @@ impl Fault {
             Self::WcetExceedsDeadline { .. } => "wcet_exceeds_deadline",
             Self::ZeroJobs { .. } => "zero_jobs",
             Self::ZeroInFlight { .. } => "zero_in_flight",
+            Self::ZeroFaults { .. } => "zero_faults",
+            Self::ZeroWindow { .. } => "zero_window",
             Self::TimeOverflow { .. } => "time_overflow",
             Self::PrioritiesPartlyGiven { .. } => "priorities_partly_given",
             Self::PrioritiesExhausted { .. } => "priorities_exhausted",

@@ -153,6 +153,14 @@ impl Display for Fault {
                     "{dag} has room for 0 jobs in flight; give at least 1, or leave it out"
                 )
             }
+            Self::ZeroFaults { dag } => write!(
+                f,
+                "{dag} survives 0 faults; let it survive at least 1, or end it by a fault"
+            ),
+            Self::ZeroWindow { dag } => write!(
+                f,
+                "{dag} survives faults within a window of 0 jobs; give the window at least 1"
+            ),
             Self::TimeOverflow { dag, time } => write!(
                 f,
                 "{} of {dag} exceeds {} ns, the last time there is; {}",

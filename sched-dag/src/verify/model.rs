@@ -131,6 +131,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         offset_ns: spec.offset_ns,
         in_flight: u32::try_from(in_flight(spec)).expect("verified to fit the instance limit"),
         overrun: spec.overrun,
+        on_fault: spec.on_fault,
         jobs: spec.jobs,
         subtasks: subtasks.collect(),
         sources: without_neighbours(&graph.predecessors),

@@ -86,9 +86,10 @@ impl Driver<'_> {
             self.scheduler.anticipate(core_id(core));
         }
         let mut ended = self.take_ended();
-        let failed: Vec<_> = ended
+        let mut failed: Vec<_> = ended
             .extract_if(.., |&mut (_, instance)| self.record.fails(instance))
             .collect();
+        failed.sort_unstable_by_key(|&(_, instance)| instance);
         let is_quiet = failed.is_empty()
             && !self.has_commands()
             && self
@@ -111,7 +112,11 @@ impl Driver<'_> {
             self.record.failed(instance, core, now_ns);
             self.idle.push(core);
             let mut moment = self.scheduler.at(now_ns);
-            moment.fail(instance, &mut self.record);
+            if self.record.is_replaceable(instance) {
+                moment.fail_replaceable(instance, &mut self.record);
+            } else {
+                moment.fail(instance, &mut self.record);
+            }
         }
         self.command();
         let decisions = self.scheduler.at(now_ns).release_due(&mut self.record);

@@ -57,6 +57,8 @@ struct JobOutcome {
     missed_ns: Option<u64>,
     /// Whether the DAG was ended while the job was in flight.
     is_cut: bool,
+    /// Whether a fault has cut it, and the DAG went on.
+    has_failed: bool,
 }
 
 /// Returns the first difference between the scheduler and the reference.

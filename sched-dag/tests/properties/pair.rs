@@ -73,7 +73,9 @@ fn walk(set: &Set) -> Result<(), String> {
             for side in [&mut short, &mut long] {
                 let mut moment = side.scheduler.at(now_ns);
                 match (kind % 10, failing) {
-                    (0, Some(instance)) if step > 20 => moment.fail(instance, &mut side.log),
+                    (0, Some(instance)) if step > 20 => {
+                        moment.fail_replaceable(instance, &mut side.log);
+                    }
                     (1, _) if step > 60 => moment.stop(dag, &mut side.log),
                     (2, _) => moment.pause(dag, &mut side.log),
                     (3 | 4, _) => moment.resume(dag),
@@ -225,6 +227,10 @@ impl Observer for Log {
 
     fn aborted(&mut self, dag: DagId, job: u64) {
         self.note("aborted", dag, job);
+    }
+
+    fn restarted(&mut self, instance: Instance) {
+        self.note("restarted", instance.dag, instance);
     }
 
     fn ended(&mut self, dag: DagId) {

@@ -15,6 +15,8 @@ pub(crate) struct Record<'a> {
     instances: Vec<Vec<Vec<InstanceOutcome>>>,
     jobs: Vec<Vec<JobOutcome>>,
     busy: u32,
+    /// The instances whose subtasks were replaced.
+    restarted: Vec<Instance>,
     /// The DAGs that were reported as ended.
     ends: Vec<DagId>,
     /// The signals that are to come, with their DAGs, in order.
@@ -47,6 +49,7 @@ impl<'a> Record<'a> {
                 .map(|dag| jobs(dag).map(|_| JobOutcome::default()).collect())
                 .collect(),
             busy: 0,
+            restarted: Vec::new(),
             ends: Vec::new(),
             signals: signals.into(),
             contradiction: None,
@@ -91,11 +94,13 @@ impl<'a> Record<'a> {
     }
 
     /// A DAG is ended, and reported so once, if and only if one of its instances
-    /// has failed or it was stopped; nothing is left of it.
+    /// has failed and was not replaced, or it was stopped; nothing is left of it.
     fn check_end(&self, scheduler: &Scheduler, dag: DagId) -> Result<(), String> {
-        let mut instances = self.instances[dag.index()].iter().flatten();
-        let is_ended = instances.any(|instance| instance.failed_ns.is_some())
-            || self.set.dags[dag.index()].stop_ns.is_some();
+        let instances = self.instances[dag.index()].iter().flatten();
+        let failed = instances.filter(|instance| instance.failed_ns.is_some());
+        let restarted = self.restarted.iter().filter(|it| it.dag == dag);
+        let is_ended =
+            failed.count() > restarted.count() || self.set.dags[dag.index()].stop_ns.is_some();
         let reports = self.ends.iter().filter(|&&ended| ended == dag).count();
         let is_right = scheduler.is_ended(dag) == is_ended
             && reports == usize::from(is_ended)
@@ -153,6 +158,7 @@ impl Observer for Record<'_> {
 
     fn job_completed(&mut self, dag: DagId, job: u64, outcome: sched_dag::JobOutcome) {
         self.job(dag, job).is_cut = outcome == sched_dag::JobOutcome::DagEnded;
+        self.job(dag, job).has_failed = outcome == sched_dag::JobOutcome::Failed;
         self.once(|job| &mut job.ended_ns, dag, job);
     }
 
@@ -162,6 +168,10 @@ impl Observer for Record<'_> {
         if cancelled_ns.replace(now_ns).is_some() {
             self.contradiction = Some(format!("{instance} is cancelled twice"));
         }
+    }
+
+    fn restarted(&mut self, instance: Instance) {
+        self.restarted.push(instance);
     }
 
     fn ended(&mut self, dag: DagId) {
@@ -178,6 +188,10 @@ impl Workload for Record<'_> {
     fn fails(&mut self, instance: Instance) -> bool {
         let dag = &self.set.dags[instance.dag.index()];
         dag.subtasks[instance.subtask.index()].fails_in == Some(instance.job)
+    }
+
+    fn is_replaceable(&mut self, instance: Instance) -> bool {
+        self.set.dags[instance.dag.index()].subtasks[instance.subtask.index()].is_replaceable
     }
 
     fn instant(&mut self, now_ns: u64) {

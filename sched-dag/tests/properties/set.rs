@@ -3,7 +3,8 @@
 use std::fmt;
 
 use sched_dag::{
-    Activation, DagSpec, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec,
+    Activation, DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority,
+    SchedulerOptions, SubtaskSpec,
 };
 
 use crate::random::Random;
@@ -33,6 +34,8 @@ pub(crate) struct Dag {
     pub(crate) pauses_ns: Vec<(u64, u64)>,
     /// When it is stopped.
     pub(crate) stop_ns: Option<u64>,
+    /// The faults that cost a job only.
+    pub(crate) fault_limit: Option<FaultLimit>,
 }
 
 #[derive(Clone)]
@@ -43,6 +46,8 @@ pub(crate) struct Subtask {
     pub(crate) executions_ns: Vec<u64>,
     /// The job in which it fails at the end of its execution, if it starts.
     pub(crate) fails_in: Option<u64>,
+    /// Whether there is another function for it.
+    pub(crate) is_replaceable: bool,
     /// Of a sink, its own relative deadline.
     pub(crate) deadline_ns: Option<u64>,
 }
@@ -152,6 +157,7 @@ fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
             non_preemptive: random.chance(often_non_preemptive),
             executions_ns: (0..jobs).map(|_| random.between(1, longest)).collect(),
             fails_in: None,
+            is_replaceable: random.chance(80),
             deadline_ns: None,
         })
         .collect();
@@ -185,6 +191,7 @@ fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
         signals_ns: None,
         pauses_ns: Vec::new(),
         stop_ns: None,
+        fault_limit: random.chance(50).then(|| draw_fault_limit(random)),
     };
     if random.chance(50) {
         for subtask in 0..dag.subtasks.len() {
@@ -194,6 +201,14 @@ fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
         }
     }
     dag
+}
+
+fn draw_fault_limit(random: &mut Random) -> FaultLimit {
+    FaultLimit {
+        faults: u32::try_from(random.between(1, 3)).expect("few faults"),
+        window: random.between(1, 4),
+        in_all: u32::try_from(random.between(1, 5)).expect("few faults"),
+    }
 }
 
 /// Draws edges along a random order, so that indices are not sorted by
@@ -250,6 +265,7 @@ impl Dag {
             offset_ns: self.offset_ns,
             in_flight: Some(u32::try_from(self.in_flight).expect("few jobs")),
             overrun: self.overrun,
+            on_fault: self.fault_limit.map_or(OnFault::EndDag, OnFault::DropJob),
             jobs: Some(self.jobs),
             subtasks: self.subtasks.iter().map(subtask).collect(),
             edges: self.edges.clone(),
@@ -303,7 +319,8 @@ impl fmt::Display for Set {
                     }
                 )?;
                 if let Some(job) = subtask.fails_in {
-                    writeln!(f, "    fails in job {job}")?;
+                    let is_replaceable = subtask.is_replaceable;
+                    writeln!(f, "    fails in job {job}, replaceable: {is_replaceable}")?;
                 }
             }
             for (from, to) in &dag.edges {
@@ -319,6 +336,9 @@ impl fmt::Display for Set {
             }
             for (from_ns, to_ns) in &dag.pauses_ns {
                 writeln!(f, "    paused at {from_ns}, resumed at {to_ns}")?;
+            }
+            if let Some(fault_limit) = dag.fault_limit {
+                writeln!(f, "    {fault_limit:?}")?;
             }
             if let Some(stop_ns) = dag.stop_ns {
                 writeln!(f, "    stopped at {stop_ns}")?;

@@ -60,6 +60,9 @@ fn steps(set: &Set) -> Vec<Set> {
                 set.dags[dag].pauses_ns.remove(pause);
             });
         }
+        if set.dags[dag].fault_limit.is_some() {
+            add(&|set| set.dags[dag].fault_limit = None);
+        }
         if set.dags[dag].stop_ns.is_some() {
             add(&|set| set.dags[dag].stop_ns = None);
         }

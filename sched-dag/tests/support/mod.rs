@@ -85,6 +85,8 @@ pub(crate) struct Log<F> {
     execution_ns: F,
     /// The instances that fail at the end of their execution.
     pub(crate) failing: Vec<Instance>,
+    /// Whether there are other functions for their subtasks.
+    pub(crate) is_replaceable: bool,
 }
 
 impl<F: FnMut(Instance) -> u64> Log<F> {
@@ -94,6 +96,7 @@ impl<F: FnMut(Instance) -> u64> Log<F> {
             now_ns: 0,
             execution_ns,
             failing: Vec::new(),
+            is_replaceable: true,
         }
     }
 
@@ -183,6 +186,10 @@ impl<F: FnMut(Instance) -> u64> Observer for Log<F> {
         self.note(format_args!("aborted {}.{job}", dag.0));
     }
 
+    fn restarted(&mut self, instance: Instance) {
+        self.note(format_args!("restarted {}", Short(instance)));
+    }
+
     fn ended(&mut self, dag: DagId) {
         self.note(format_args!("end {}", dag.0));
     }
@@ -203,6 +210,10 @@ impl<F: FnMut(Instance) -> u64> Workload for Log<F> {
 
     fn fails(&mut self, instance: Instance) -> bool {
         self.failing.contains(&instance)
+    }
+
+    fn is_replaceable(&mut self, _instance: Instance) -> bool {
+        self.is_replaceable
     }
 
     fn instant(&mut self, now_ns: u64) {

@@ -58,7 +58,7 @@
 //!
 //! # The set-once
 //!
-//! [`SetOnce`] holds the installed platform: empty, then set for good.
+//! [`SetOnce`] holds what is given later, such as the platform: empty, then set for good.
 //!
 //! > **Set-once invariant.** The caller that moves the state from `EMPTY` to
 //! > `WRITING` is the only one that ever writes the value, and does so before it stores
@@ -254,7 +254,7 @@ impl<T> Drop for Slot<T> {
 const CHANGING: u32 = u32::MAX;
 
 /// A value that one may change or several look at.
-pub struct Shared<T> {
+pub(crate) struct Shared<T> {
     claims: AtomicU32,
     value: UnsafeCell<T>,
 }
@@ -341,19 +341,16 @@ const WRITING: u8 = 1;
 const SET: u8 = 2;
 
 /// A value that is set at most once and then read by everybody.
-///
-/// `T: Copy`, so that nothing needs to be dropped and reads are by value.
-pub(crate) struct SetOnce<T: Copy> {
+pub(crate) struct SetOnce<T> {
     state: AtomicU8,
     value: UnsafeCell<MaybeUninit<T>>,
 }
 
 // SAFETY: by the set-once invariant the value is written by one thread before
-// any thread reads it. `T: Send` because the setter hands it to the readers,
-// `T: Sync` because they hold copies at the same time.
-unsafe impl<T: Copy + Send + Sync> Sync for SetOnce<T> {}
+// any thread reads it. `T: Send` as the owner drops it, `T: Sync` as all look at it.
+unsafe impl<T: Send + Sync> Sync for SetOnce<T> {}
 
-impl<T: Copy> SetOnce<T> {
+impl<T> SetOnce<T> {
     pub(crate) const fn new() -> Self {
         Self {
             state: AtomicU8::new(EMPTY),
@@ -379,14 +376,23 @@ impl<T: Copy> SetOnce<T> {
 
     /// Returns the value, or `None` while none is set.
     #[inline]
-    pub(crate) fn get(&self) -> Option<T> {
+    pub(crate) fn get(&self) -> Option<&T> {
         if self.state.load(Ordering::Acquire) != SET {
             return None;
         }
         let place = self.value.get().cast::<T>();
         // SAFETY: the state is `SET`, so by the set-once invariant the value is
-        // initialised and no longer written; `T: Copy` allows many reads.
-        Some(unsafe { place.read() })
+        // initialised and no longer written, as long as this borrow of the cell lasts.
+        Some(unsafe { &*place })
+    }
+}
+
+impl<T> Drop for SetOnce<T> {
+    fn drop(&mut self) {
+        if *self.state.get_mut() == SET {
+            // SAFETY: by the set-once invariant it is initialised, and `&mut self` is alone.
+            unsafe { self.value.get_mut().assume_init_drop() };
+        }
     }
 }
 

@@ -247,7 +247,7 @@ fn set_once_keeps_the_first_value() {
     assert_eq!(cell.get(), None);
     assert!(cell.set(1));
     assert!(!cell.set(2));
-    assert_eq!(cell.get(), Some(1));
+    assert_eq!(cell.get(), Some(&1));
 }
 
 #[test]
@@ -264,7 +264,7 @@ fn set_once_has_one_winner_and_all_see_it() {
                             winners.fetch_add(1, Ordering::Relaxed);
                         }
                         if let Some(value) = cell.get() {
-                            assert_eq!(value, [value[0]; 4], "never half written");
+                            assert_eq!(*value, [value[0]; 4], "never half written");
                         }
                     })
                 })

@@ -89,7 +89,7 @@ impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
 }
 
 /// Where a writer puts what shall show at its completion.
-pub(crate) trait Stage<T>: Send {
+pub(crate) trait Stage<T>: Send + Sync {
     fn stage(&mut self, job: u64, value: T);
 }
 

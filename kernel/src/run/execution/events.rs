@@ -79,7 +79,7 @@ pub(crate) fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     take_turns(core, work)
 }
 
-/// Ends this core's instance, and with it its DAG, because of a fault. The
+/// Ends this core's instance because of a fault, and with it its DAG or its job. The
 /// context that ran it must not be resumed. Interrupts are disabled.
 pub(crate) fn fail(now_ns: u64) {
     let mut place = EXECUTION.lock();

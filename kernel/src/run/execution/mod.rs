@@ -26,7 +26,8 @@ use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
 use sched_dag::placement::Placement;
-use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, SubtaskId, TaskSet};
+use sched_dag::{Dag, DagId, Instance, Journal, OnFault, Scheduler, SchedulerOptions};
+use sched_dag::{SubtaskId, TaskSet};
 
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
@@ -37,8 +38,8 @@ pub(crate) use runner::Runner;
 use signals::Signals;
 pub(crate) use signals::raise;
 pub(crate) use status::{
-    budget_ns, is_finished, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
-    try_names, with_journal,
+    Cost, budget_ns, cost_of_fault, is_finished, jobs_ended, lock_acquisitions, next_event_ns,
+    running, try_journal, try_names, with_journal,
 };
 pub(crate) use time::{arm_next_event, since_epoch};
 use watcher::Watcher;
@@ -59,7 +60,7 @@ enum Event {
     Time,
     /// The instance has finished.
     Completed(Instance),
-    /// The instance was ended by a fault, and its DAG ends with it.
+    /// The instance was ended by a fault.
     Failed(Instance),
     /// A sporadic DAG gets a signal from outside.
     Signalled(DagId),
@@ -129,17 +130,22 @@ pub(crate) fn prepare(
     }
     let subtasks: usize = plan.bodies.iter().map(|bodies| bodies.len()).sum();
     let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
+    let faults = plan.task_set.dags().iter().map(survived_faults);
+    let faults = faults.fold(0, usize::saturating_add);
     let total = subtasks.saturating_add(cores.saturating_mul(2));
+    let total = total.saturating_add(faults);
     contexts::provide(total).map_err(|_| {
         let kib = contexts::STACK_BYTES / 1024;
         LaunchError::new(format!(
-            "{subtasks} subtasks and {cores} cores need {total} stacks of {kib} KiB, more than \
-             there is memory for; register fewer subtasks or give the machine more memory"
+            "{subtasks} subtasks, {cores} cores and {faults} survived faults need {total} stacks \
+             of {kib} KiB, more than there is memory for; register fewer subtasks, survive fewer \
+             faults, or give the machine more memory"
         ))
     })?;
     let signals = Signals::new(&plan);
     let task_set = plan.task_set;
     let runners = runner::runners(&task_set, plan.bodies, terms.budget_factor);
+    let others = runner::others(&task_set, plan.others, terms.budget_factor);
     let placement = Placement::new(runners, cores);
     let heap = crate::memory::heap::usage();
     let execution = Execution {
@@ -151,6 +157,7 @@ pub(crate) fn prepare(
                 terms.most_events,
             ),
             placement,
+            others,
             task_set,
             instant_ns: 0,
             has_job_news: false,
@@ -168,6 +175,14 @@ pub(crate) fn prepare(
     };
     *EXECUTION.lock() = Some(execution);
     Ok(())
+}
+
+/// Returns how many faults a DAG survives, each of which keeps a context for good.
+fn survived_faults(dag: &Dag) -> usize {
+    match dag.on_fault() {
+        OnFault::EndDag => 0,
+        OnFault::DropJob(of) => of.in_all as usize,
+    }
 }
 
 /// Sets time 0 of the prepared run, from which the releases count. Returns the

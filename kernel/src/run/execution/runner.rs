@@ -55,15 +55,48 @@ pub(super) fn runners(
     bodies: Vec<Vec<Body>>,
     budget_factor: u64,
 ) -> impl Iterator<Item = Box<Runner>> {
-    let of_dags = (0..).map(DagId).zip(bodies);
-    of_dags.flat_map(move |(dag, bodies)| {
-        let of_subtasks = (0..).map(SubtaskId).zip(bodies);
-        of_subtasks.map(move |(subtask, body)| {
-            let job = 0;
-            let first = Instance { dag, job, subtask };
-            let model = task_set.dag(dag).subtask(subtask);
-            let budget_ns = model.most_execution_ns(budget_factor);
-            Box::new(Runner::new(body, task_set.vertex(first), first, budget_ns))
+    let of_subtasks = by_subtask(bodies);
+    of_subtasks.map(move |(any, body)| runner(task_set, any, body, budget_factor))
+}
+
+/// What takes the places of runners that faults have lost, by vertex, the next one last.
+#[allow(clippy::vec_box, reason = "at the fault nothing may be boxed any more")]
+pub(super) type Others = Box<[Vec<Box<Runner>>]>;
+
+/// Makes a runner for each body that takes the place of another one, by vertex.
+pub(super) fn others(
+    task_set: &TaskSet,
+    bodies: Vec<Vec<Vec<Body>>>,
+    budget_factor: u64,
+) -> Others {
+    let of_subtask = |(any, bodies): (Instance, Vec<Body>)| {
+        let bodies = bodies.into_iter();
+        let runners = bodies.map(|body| runner(task_set, any, body, budget_factor));
+        runners.collect()
+    };
+    by_subtask(bodies).map(of_subtask).collect()
+}
+
+/// Returns what there is of each subtask, with any instance of that.
+fn by_subtask<T>(of_dags: Vec<Vec<T>>) -> impl Iterator<Item = (Instance, T)> {
+    let of_dags = (0..).map(DagId).zip(of_dags);
+    of_dags.flat_map(|(dag, of_dag)| {
+        let of_subtasks = (0..).map(SubtaskId).zip(of_dag);
+        of_subtasks.map(move |(subtask, of)| {
+            (
+                Instance {
+                    dag,
+                    job: 0,
+                    subtask,
+                },
+                of,
+            )
         })
     })
+}
+
+fn runner(task_set: &TaskSet, any: Instance, body: Body, budget_factor: u64) -> Box<Runner> {
+    let model = task_set.dag(any.dag).subtask(any.subtask);
+    let budget_ns = model.most_execution_ns(budget_factor);
+    Box::new(Runner::new(body, task_set.vertex(any), any, budget_ns))
 }

@@ -70,6 +70,33 @@ pub(crate) fn budget_ns(instance: Instance) -> u64 {
     })
 }
 
+/// What a fault costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cost {
+    /// The DAG is ended.
+    Dag,
+    /// The job is lost, and the subtask goes on with a function that was made anew.
+    Job,
+    /// The job is lost, and the subtask goes on with the function to fall back on.
+    Degraded,
+}
+
+/// Returns what a fault of an instance costs if it comes now. Of two faults of a DAG at
+/// one moment, either may take what is left to be survived; the journal tells.
+pub(crate) fn cost_of_fault(instance: Instance) -> Cost {
+    let place = EXECUTION.lock();
+    let Some(execution) = place.as_ref() else {
+        return Cost::Dag;
+    };
+    let vertex = execution.task_set().vertex(instance);
+    let is_survived = execution.scheduler.survives(instance.dag, instance.job);
+    match execution.watcher.other(vertex).filter(|_| is_survived) {
+        None => Cost::Dag,
+        Some(other) if other.body.is_fallback() => Cost::Degraded,
+        Some(_) => Cost::Job,
+    }
+}
+
 /// Looks at the journal of the run, or changes what it records, if a run goes on. To
 /// be done shortly: nothing is completed meanwhile.
 pub(crate) fn with_journal<R>(look: impl FnOnce(&mut Journal) -> R) -> Option<R> {

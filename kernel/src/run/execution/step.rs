@@ -95,12 +95,21 @@ impl Execution {
         } = self;
         let instant_ns = since_epoch(now_ns);
         watcher.instant_ns = instant_ns.max(scheduler.now_ns());
+        let is_survived = match event {
+            Event::Failed(failed) if scheduler.survives(failed.dag, failed.job) => {
+                watcher.other(watcher.task_set.vertex(failed)).is_some()
+            }
+            _ => false,
+        };
         let mut moment = scheduler.at(instant_ns);
         match event {
             Event::Time => {}
             Event::Completed(instance) => {
                 moment.complete(instance, watcher);
                 signals.send(&mut moment, watcher);
+            }
+            Event::Failed(instance) if is_survived => {
+                moment.fail_replaceable(instance, watcher);
             }
             Event::Failed(instance) => {
                 moment.fail(instance, watcher);

@@ -7,8 +7,9 @@ use alloc::sync::Arc;
 
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Placement;
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, Journal, Observer, TaskSet};
+use sched_dag::{CoreId, DagId, Instance, JobOutcome, Journal, Observer, TaskSet, Vertex};
 
+use super::runner::Others;
 use super::time::here;
 use super::{JOBS_ENDED, Runner};
 use crate::machine::context::Parked;
@@ -20,6 +21,7 @@ pub(super) struct Watcher {
     pub(super) journal: Journal,
     /// The bodies, and which core has which.
     pub(super) placement: Placement<Box<Runner>, Parked>,
+    pub(super) others: Others,
     pub(super) task_set: Arc<TaskSet>,
     /// The instant, on the run's time.
     pub(super) instant_ns: u64,
@@ -39,6 +41,12 @@ impl Watcher {
         // The compiler need not find that out each time.
         core::mem::forget(before);
         self.finish_ns = finish_ns;
+    }
+
+    /// Returns what would take the place of a body if a fault lost it now.
+    pub(super) fn other(&self, vertex: Vertex) -> Option<&Runner> {
+        let next = self.others[vertex.index()].last()?;
+        next.body.can_take_over().then_some(&**next)
     }
 
     /// Writes down what has happened to a whole job.
@@ -84,6 +92,15 @@ impl Observer for Watcher {
 
     fn aborted(&mut self, dag: DagId, job: u64) {
         self.of_job(What::Aborted, dag, job);
+    }
+
+    fn restarted(&mut self, instance: Instance) {
+        self.note(What::Restarted, self.instant_ns, Subject::of(instance));
+        let vertex = self.task_set.vertex(instance);
+        if let Some(mut next) = self.others[vertex.index()].pop() {
+            next.body.take_over();
+            self.placement.replace(vertex, next);
+        }
     }
 
     fn ended(&mut self, dag: DagId) {

@@ -221,14 +221,15 @@ fn count(dag: &Dag, snapshot: &Snapshot) {
     } = snapshot;
     println!(
         "`{}`: {}; {} jobs released, {} completed, {in_flight} in flight, {waiting} waiting; \
-         {} deadlines missed, {} jobs skipped, {} aborted",
+         {} deadlines missed, {} jobs skipped, {} aborted, {} lost to faults",
         dag.name(),
         word(*state),
         statistics.released,
         statistics.completed,
         statistics.misses,
         statistics.skips,
-        statistics.aborts
+        statistics.aborts,
+        statistics.failed
     );
 }
 
@@ -254,7 +255,9 @@ fn show(dag: DagId, model: &Dag, snapshot: &Snapshot, print: fn(&Dag, &Snapshot)
             .number("misses", of.misses)
             .number("skips", of.skips)
             .number("aborts", of.aborts)
-            .number("faults", of.faults);
+            .number("faults", of.faults)
+            .number("failed", of.failed)
+            .number("restarts", of.restarts);
     });
 }
 

@@ -8,8 +8,7 @@ use super::sweep::{Change, Key, Ranking, Stage, Sweep, Waits, Wrong};
 use super::{Terms, Violation};
 use crate::ids::{CoreId, DagId, Instance};
 use crate::journal::{Event, What};
-use crate::policy::SchedulerOptions;
-use crate::policy::{Policy, Preemption};
+use crate::policy::{OnFault, Policy, Preemption, SchedulerOptions};
 use crate::task_set::TaskSet;
 
 /// The model and the options of a run.
@@ -90,7 +89,12 @@ pub fn judge_dispatch(
     let changes = events.clone().flat_map(|event| {
         latest_ns = event.time_ns.max(latest_ns);
         let is_new = event.what.is_of_machine() && known.insert(event.core);
-        let stops = matches!(event.what, What::Stopped | What::Ended);
+        let ends_its_dag = task_set.dag(event.dag).on_fault() == OnFault::EndDag;
+        let stops = match event.what {
+            What::Stopped => true,
+            What::Ended => ends_its_dag,
+            _ => false,
+        };
         let stage = event.instance().filter(|_| event.what != What::Request);
         let changes = [
             is_new.then_some(Change::CoreIsKnown),

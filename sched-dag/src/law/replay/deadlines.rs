@@ -53,7 +53,7 @@ impl Replay<'_> {
                 .filter(|due| due.finish_ns.is_some() && !due.is_met());
             let late = late.max_by_key(|due| due.finish_ns)?;
             let may_be_lost = self.may_be_lost(&dues);
-            let is_cut = known.aborted.is_some() || of_dag.is_stopped;
+            let is_cut = known.cut.is_some() || of_dag.is_stopped;
             return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
                 dag,
                 job,
@@ -118,7 +118,7 @@ impl Replay<'_> {
             return None;
         }
         let judged = self.missed_wrongly(dag, job);
-        if judged.is_some() || known.missed.is_some() || known.aborted.is_some() {
+        if judged.is_some() || known.missed.is_some() || known.cut.is_some() {
             return judged;
         }
         let dues = self.dues(dag, known)?;

@@ -28,7 +28,8 @@ pub(super) struct Job {
     pub(super) released: Option<Moment>,
     queued: Option<Moment>,
     skipped: Option<Moment>,
-    pub(super) aborted: Option<Moment>,
+    /// When it was aborted, or a fault has cut it.
+    pub(super) cut: Option<Moment>,
     pub(super) missed: Option<Moment>,
     pub(super) completed: Option<Moment>,
     pub(super) lives: BTreeMap<SubtaskId, Life>,
@@ -49,7 +50,7 @@ impl Job {
             What::Released => &mut self.released,
             What::Queued => &mut self.queued,
             What::Skipped => &mut self.skipped,
-            What::Aborted => &mut self.aborted,
+            What::Aborted => &mut self.cut,
             What::Missed => &mut self.missed,
             _ => &mut self.completed,
         };
@@ -247,7 +248,7 @@ impl Replay<'_> {
         let mut last = completed;
         let mut last_ns = 0;
         let is_same_step = |moment: Moment| moment.is_same_step(completed);
-        let mut has_cause = known.aborted.is_some_and(is_same_step);
+        let mut has_cause = known.cut.is_some_and(is_same_step);
         for subtask in (0..self.subtasks(dag)).map(SubtaskId) {
             let life = known.lives.get(&subtask);
             match life.and_then(Life::over) {

@@ -148,7 +148,7 @@ impl Replay<'_> {
     pub(super) fn never_ready(&self, instance: Instance) -> Option<Violation> {
         let of_dag = &self.dags[instance.dag.index()];
         let job = of_dag.jobs.get(&instance.job)?;
-        let is_cut = job.aborted.is_some() || of_dag.is_stopped;
+        let is_cut = job.cut.is_some() || of_dag.is_stopped;
         if is_cut || job.lives.contains_key(&instance.subtask) {
             return None;
         }

@@ -15,6 +15,7 @@ use crate::ids::Instance;
 use crate::journal::{Event, What};
 use crate::law::Violation;
 use crate::law::sweep::Stage;
+use crate::policy::OnFault;
 
 /// What is known of an instance.
 pub(super) struct Life {
@@ -58,7 +59,9 @@ impl Life {
             place.get_or_insert(moment);
         }
         let event = *event;
-        if !is_allowed(stage, &event) {
+        let was_ended = last.is_some_and(|(what, _)| what == What::Ended);
+        let is_answer = was_ended && event.what == What::Restarted;
+        if !is_answer && !is_allowed(stage, &event) {
             return Some(Violation::OutOfTurn { event, stage });
         }
         let (before, before_ns) = last.filter(|last| event.time_ns < last.1)?;
@@ -111,8 +114,9 @@ impl Replay<'_> {
         self.occupy(event, instance);
         let moment = self.moment(event);
         let is_known = self.find_job(event);
+        let ends_its_dag = self.task_set.dag(instance.dag).on_fault() == OnFault::EndDag;
         let of_dag = self.dag(instance.dag);
-        of_dag.is_stopped |= event.what == What::Ended;
+        of_dag.is_stopped |= event.what == What::Ended && ends_its_dag;
         let is_stopped = of_dag.is_stopped;
         let Some(job) = of_dag.jobs.get_mut(&instance.job).filter(|_| is_known) else {
             return;
@@ -121,7 +125,10 @@ impl Replay<'_> {
             true => stage_before(event),
             false => Stage::Absent,
         };
-        let is_uncut = job.aborted.is_none() && !is_stopped && !job.is_partial;
+        if event.what == What::Restarted {
+            job.cut.get_or_insert(moment);
+        }
+        let is_uncut = job.cut.is_none() && !is_stopped && !job.is_partial;
         let lives = &mut job.lives;
         let life = lives
             .entry(instance.subtask)
@@ -130,6 +137,10 @@ impl Replay<'_> {
         let out_of_turn = life.note(event, moment);
         self.found.extend(out_of_turn);
         let event = *event;
+        if event.what == What::Restarted {
+            let beyond_limit = self.beyond_limit(event);
+            self.found.extend(beyond_limit);
+        }
         if event.what == What::Cancelled && is_uncut {
             self.found.push(Violation::CancelledUncut { event });
         }
@@ -138,6 +149,21 @@ impl Replay<'_> {
         if event.what == What::Ready || is_first {
             self.join(&event, instance, moment);
         }
+    }
+
+    /// D1: a fault after which a DAG went on, although it should have ended.
+    fn beyond_limit(&mut self, event: Event) -> Option<Violation> {
+        let OnFault::DropJob(limit) = self.task_set.dag(event.dag).on_fault() else {
+            return Some(Violation::FaultBeyondLimit { event });
+        };
+        let faults = &mut self.dag(event.dag).faults;
+        let nth_before = faults.len().checked_sub(limit.faults as usize);
+        let is_too_early = nth_before
+            .and_then(|nth| faults.get(nth))
+            .is_some_and(|job| job.saturating_add(limit.window) > event.job);
+        faults.push(event.job);
+        let is_wrong = is_too_early || faults.len() > limit.in_all as usize;
+        is_wrong.then_some(Violation::FaultBeyondLimit { event })
     }
 
     fn occupy(&mut self, event: &Event, instance: Instance) {

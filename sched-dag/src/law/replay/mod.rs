@@ -108,6 +108,8 @@ struct OfDag {
     /// When a job was complete last.
     completed_ns: Option<u64>,
     is_stopped: bool,
+    /// The jobs of the faults after which it went on.
+    faults: Vec<u64>,
 }
 
 #[derive(Clone, Default)]

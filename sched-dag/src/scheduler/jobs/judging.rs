@@ -3,8 +3,8 @@
 //! To *judge* a job by a deadline is to find out whether the sinks that have it are
 //! late. By each relative deadline jobs are judged in the order of their numbers, each
 //! once: a job in flight when the deadline has passed, or when it ends; a waiting one, of
-//! which no sink can have finished, when it has passed. A job that is aborted, or in
-//! flight when its DAG is ended, is judged by that.
+//! which no sink can have finished, when it has passed. A job that is cut is judged by
+//! that.
 //!
 //! Which sinks are late shows in their progress, as long as each is looked at before
 //! another instant begins. So a sink that ends after a deadline that nobody has noticed
@@ -81,11 +81,6 @@ impl Deadline {
         }
     }
 
-    /// Takes all jobs in flight before the one with a sequence number for judged.
-    pub(super) fn judge_before(&mut self, sequence: u64) {
-        self.judged = self.judged.max(sequence);
-    }
-
     /// Reports whether a waiting job is judged.
     #[inline]
     pub(in crate::scheduler) const fn has_judged_waiting(&self, number: u64) -> bool {
@@ -116,8 +111,9 @@ impl Jobs {
 
     #[inline(always)]
     fn unjudged(&self, dag: &Dag, at: usize, deadline: &Deadline) -> Option<Unjudged> {
-        let sequence = deadline.judged.max(self.oldest);
-        if sequence < self.next {
+        let first = deadline.judged.max(self.oldest);
+        let mut uncut = (first..self.next).filter(|&sequence| self.job(sequence).cut.is_none());
+        if let Some(sequence) = uncut.next() {
             let job = self.job(sequence);
             return Some(Unjudged {
                 number: job.number,

@@ -24,6 +24,7 @@ mod judging;
 use alloc::boxed::Box;
 
 use crate::ids::to_u32;
+use crate::policy::JobOutcome;
 use crate::task_set::Dag;
 use judging::Deadline;
 
@@ -40,8 +41,6 @@ pub(super) struct Jobs {
     pub(super) oldest: u64,
     /// The sequence number of the next job to be released.
     pub(super) next: u64,
-    /// The sequence number of the first job in flight that is not aborted.
-    pub(super) aborted: u64,
     /// Whether the DAG is ended: no job is released, and none in flight starts
     /// a further instance.
     ended: bool,
@@ -77,6 +76,8 @@ pub(super) struct Job {
     pub(super) slot: u32,
     /// Whether its deadline has passed before it was complete.
     pub(super) missed: bool,
+    /// How it will end, if it is *cut*: it starts no further instance.
+    pub(super) cut: Option<JobOutcome>,
 }
 
 impl Jobs {
@@ -95,7 +96,6 @@ impl Jobs {
             ends: to_u32(ends.count()),
             oldest: 0,
             next: 0,
-            aborted: 0,
             ended: false,
             next_due: 0,
             next_due_ns: due_ns(dag, 0),
@@ -233,6 +233,7 @@ impl Jobs {
             unfinished,
             slot: job.slot,
             missed,
+            cut: None,
         };
         sequence
     }
@@ -257,36 +258,21 @@ impl Jobs {
         }
     }
 
-    /// Marks the oldest job in flight that is not aborted, and returns its
+    /// Cuts the oldest job in flight that is not cut, to make room, and returns its
     /// sequence number.
     #[inline]
     pub(super) fn abort_oldest(&mut self) -> Option<u64> {
-        let sequence = self.aborted.max(self.oldest);
-        if sequence == self.next {
-            return None;
-        }
-        self.aborted = sequence + 1;
-        self.judge_before(self.aborted);
-        Some(sequence)
+        let mut in_flight = self.oldest..self.next;
+        in_flight.find(|&sequence| self.cut(sequence, JobOutcome::Aborted))
     }
 
-    /// Takes all jobs in flight before the one with a sequence number for judged.
-    fn judge_before(&mut self, sequence: u64) {
-        for deadline in &mut self.deadlines {
-            deadline.judge_before(sequence);
-        }
-    }
-
+    /// Cuts a job in flight, and reports whether it was not cut before.
     #[inline]
-    pub(super) fn is_aborted(&self, sequence: u64) -> bool {
-        sequence < self.aborted
-    }
-
-    /// Reports whether a job starts no further instance: it is aborted, or the
-    /// DAG is ended.
-    #[inline]
-    pub(super) fn is_cut(&self, sequence: u64) -> bool {
-        self.ended || self.is_aborted(sequence)
+    pub(super) fn cut(&mut self, sequence: u64, outcome: JobOutcome) -> bool {
+        let cut = &mut self.job_mut(sequence).cut;
+        let is_first = cut.is_none();
+        cut.get_or_insert(outcome);
+        is_first
     }
 
     #[inline]
@@ -295,14 +281,16 @@ impl Jobs {
     }
 
     /// Drops all that waits and all that is ahead, and lets those in flight
-    /// start no further instance. Returns how many were in flight and not aborted,
+    /// start no further instance. Returns how many were in flight and not cut,
     /// and how many waited.
     #[inline]
     pub(super) fn end_all(&mut self) -> (u64, u64) {
-        let cut_short = self.next - self.aborted.max(self.oldest);
+        let mut cut_short = 0;
+        for sequence in self.oldest..self.next {
+            cut_short += u64::from(self.cut(sequence, JobOutcome::DagEnded));
+        }
         let dropped = self.waiting();
         self.ended = true;
-        self.judge_before(self.next);
         self.next_due_ns = None;
         self.first_waiting = self.next_due;
         (cut_short, dropped)

@@ -5,6 +5,7 @@
 //! the words of the rules: no counters, no queue, no events, nothing shared with
 //! the crate but the names of the policies and counters.
 
+mod faults;
 mod releases;
 
 use sched_dag::{DagStatistics, Policy, Preemption};
@@ -29,6 +30,11 @@ struct Reference<'a> {
     /// has not come.
     due_ns: Vec<Vec<Option<u64>>>,
     executed_ns: Vec<Vec<Vec<u64>>>,
+    is_ended: Vec<bool>,
+    /// The failures of the present instant of which it is known what they cost.
+    judged: Vec<Place>,
+    /// For each DAG the jobs of the faults after which it went on.
+    survived: Vec<Vec<usize>>,
     outcome: Outcome,
 }
 
@@ -51,6 +57,9 @@ pub(crate) fn simulate(set: &Set) -> Outcome {
             .iter()
             .map(|dag| vec![vec![0; dag.subtasks.len()]; per_job(dag)])
             .collect(),
+        is_ended: vec![false; set.dags.len()],
+        judged: Vec::new(),
+        survived: set.dags.iter().map(|_| Vec::new()).collect(),
         outcome: Outcome {
             instances: set
                 .dags
@@ -70,6 +79,7 @@ pub(crate) fn simulate(set: &Set) -> Outcome {
     while !reference.is_over() {
         reference.note_ready();
         reference.notice_misses();
+        reference.judge_failures();
         reference.end_dags();
         reference.cancel_and_end();
         reference.pause();
@@ -168,63 +178,30 @@ impl Reference<'_> {
         }
     }
 
-    fn has_ended(&self, (dag, job, subtask): Place) -> bool {
+    /// Whether an instance has ended, as far as that is told yet.
+    fn has_ended(&self, place: Place) -> bool {
+        let (dag, job, subtask) = place;
         let instance = self.outcome.instances[dag][job][subtask];
         instance.finish_ns.is_some()
-            || instance.failed_ns.is_some()
+            || instance.failed_ns.is_some_and(|at_ns| at_ns < self.now_ns)
+            || self.judged.contains(&place)
             || instance.cancelled_ns.is_some()
     }
 
     /// Whether a job starts no further instance.
     fn is_cut(&self, dag: usize, job: usize) -> bool {
         let job = &self.outcome.jobs[dag][job];
-        job.aborted_ns.is_some() || job.is_cut
+        job.aborted_ns.is_some() || job.is_cut || job.has_failed
     }
 
     /// Notes which instances have become ready by what has happened so far: none
-    /// of a job that is cut, and none by a failure, which ends the DAG.
+    /// of a job that is cut.
     fn note_ready(&mut self) {
         for place in self.all_instances() {
             let (dag, job, subtask) = place;
             let is_known = self.outcome.instances[dag][job][subtask].ready_ns.is_some();
-            if is_known || self.is_cut(dag, job) || !self.is_ready(place) {
-                continue;
-            }
-            let fails = |job: usize, subtask: usize| {
-                let instance = &self.outcome.instances[dag][job][subtask];
-                instance.failed_ns == Some(self.now_ns)
-            };
-            let mut edges = self.set.dags[dag].edges.iter();
-            let by_failure = edges.any(|&(from, to)| to == subtask && fails(job, from))
-                || (0..job).any(|before| fails(before, subtask));
-            if !by_failure {
+            if !is_known && !self.is_cut(dag, job) && self.is_ready(place) {
                 self.outcome.instances[dag][job][subtask].ready_ns = Some(self.now_ns);
-            }
-        }
-    }
-
-    /// Ends DAGs of which an instance has just failed, or that are stopped: what is in flight and
-    /// not complete is cut, the rest does not happen.
-    fn end_dags(&mut self) {
-        for dag in 0..self.states.len() {
-            let mut instances = self.outcome.instances[dag].iter().flatten();
-            let has_failed = instances.any(|instance| instance.failed_ns == Some(self.now_ns));
-            if !has_failed && self.set.dags[dag].stop_ns != Some(self.now_ns) {
-                continue;
-            }
-            for job in 0..self.states[dag].len() {
-                let is_complete = self.outcome.instances[dag][job]
-                    .iter()
-                    .all(|instance| instance.finish_ns.is_some());
-                match self.states[dag][job] {
-                    State::InFlight if is_complete || self.is_cut(dag, job) => {}
-                    State::InFlight => self.outcome.jobs[dag][job].is_cut = true,
-                    State::Waiting => self.outcome.statistics[dag].dropped += 1,
-                    State::Ahead | State::Over => {}
-                }
-                if self.states[dag][job] != State::InFlight {
-                    self.states[dag][job] = State::Over;
-                }
             }
         }
     }
@@ -365,11 +342,14 @@ impl Reference<'_> {
             statistics.faults = failed.count() as u64;
             statistics.released = count(|job| job.released_ns.is_some());
             statistics.skips = count(|job| job.skipped_ns.is_some());
+            statistics.restarts = self.survived[dag].len() as u64;
+            statistics.failed = count(|job| job.has_failed);
             statistics.aborts = count(|job| job.aborted_ns.is_some());
             statistics.misses = count(|job| job.missed_ns.is_some());
             statistics.cut_short = count(|job| job.is_cut);
-            statistics.completed =
-                count(|job| job.ended_ns.is_some() && job.aborted_ns.is_none() && !job.is_cut);
+            statistics.completed = count(|job| {
+                job.ended_ns.is_some() && job.aborted_ns.is_none() && !job.is_cut && !job.has_failed
+            });
         }
     }
 }

@@ -91,8 +91,7 @@ impl Reference<'_> {
             OverrunPolicy::Skip => self.skip(dag, job),
             OverrunPolicy::Abort => {
                 let oldest = (0..self.states[dag].len()).find(|&other| {
-                    self.states[dag][other] == State::InFlight
-                        && self.outcome.jobs[dag][other].aborted_ns.is_none()
+                    self.states[dag][other] == State::InFlight && !self.is_cut(dag, other)
                 });
                 if let Some(oldest) = oldest {
                     self.outcome.jobs[dag][oldest].aborted_ns = Some(self.now_ns);

@@ -50,6 +50,8 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "skips",
             "aborts",
             "faults",
+            "failed",
+            "restarts",
         ],
     ),
     (
@@ -231,6 +233,7 @@ pub const KINDS: &[(&str, &[&str])] = &[
             "subtask",
             "subtask_name",
             "job",
+            "cost",
             "cpu",
             "place",
             "message",
@@ -240,12 +243,14 @@ pub const KINDS: &[(&str, &[&str])] = &[
         "containment",
         &[
             "fault",
+            "on_fault",
             "verdict",
             "on_time_before",
             "on_time_during",
             "on_time_after",
             "healthy_jobs",
             "doomed_jobs",
+            "lost_jobs",
         ],
     ),
     (

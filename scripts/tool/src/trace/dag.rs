@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use sched_dag::{
-    Activation, CommitOptions, ConstructionPolicy, DagSpec, OverrunPolicy, Policy, Preemption,
-    Priority, SchedulerOptions, SubtaskSpec, TaskSet, verify,
+    Activation, CommitOptions, ConstructionPolicy, DagSpec, FaultLimit, OnFault, OverrunPolicy,
+    Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec, TaskSet, verify,
 };
 
 use super::line::Line;
@@ -74,10 +74,28 @@ pub fn spec(line: &Line<'_>) -> Result<DagSpec, Malformed> {
             "abort" => OverrunPolicy::Abort,
             other => return Err(line.unknown("overrun", other, "queue, skip or abort")),
         },
+        on_fault: on_fault(line)?,
         subtasks,
         edges,
         ..DagSpec::default()
     })
+}
+
+/// Reads what a fault costs: the DAG, unless something is stated.
+fn on_fault(line: &Line<'_>) -> Result<OnFault, Malformed> {
+    if line.0.value.get("on_fault").is_none() {
+        return Ok(OnFault::EndDag);
+    }
+    let numbers = line.elements("on_fault")?.iter().map(Value::as_u64);
+    let numbers: Option<Vec<u64>> = numbers.collect();
+    let Some(&[faults, window, in_all]) = numbers.as_deref() else {
+        return Err(line.malformed("`on_fault` is [faults, window in jobs, faults in all]"));
+    };
+    Ok(OnFault::DropJob(FaultLimit {
+        faults: line.small(faults)?,
+        window,
+        in_all: line.small(in_all)?,
+    }))
 }
 
 fn subtask(line: &Line<'_>, value: &Value) -> Result<SubtaskSpec, Malformed> {

@@ -11,7 +11,7 @@ mod output;
 
 use fass::finish_create_dags;
 use faults::crimes::Crime;
-use faults::{JOBS, doomed, doomed_at_leisure, healthy};
+use faults::{JOBS, Policy, doomed, doomed_at_leisure, healthy};
 use kernel::{Ending, Machine, json};
 use sched_dag::DagId;
 
@@ -56,7 +56,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test", "attack"])?;
     machine.accept_faults(); // here they are what is wanted
     let attacker = match time {
-        Time::Limited => doomed(crime),
+        Time::Limited => doomed(crime, Policy::End),
         Time::Unlimited => doomed_at_leisure(crime),
     };
     finish_create_dags(&[healthy(), attacker])?;

@@ -15,7 +15,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::{Dag, FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
 
 /// A fault's name and what builds the DAGs with that fault.
 type Case = (&'static str, fn() -> Vec<Dag>);
@@ -57,6 +57,8 @@ pub const CASES: &[Case] = &[
     ("priorities_exhausted", values::priorities_exhausted),
     ("zero_jobs", values::zero_jobs),
     ("zero_in_flight", values::zero_in_flight),
+    ("zero_faults", values::zero_faults),
+    ("zero_window", values::zero_window),
     ("too_many_instances", values::too_many_instances),
     ("time_overflow", values::time_overflow),
     ("activations_differ", shared::activations_differ),
@@ -64,6 +66,9 @@ pub const CASES: &[Case] = &[
     ("unused_state", shared::unused_state),
     ("state_never_updated", shared::state_never_updated),
     ("state_used_twice", shared::state_used_twice),
+    ("state_without_reset", shared::state_without_reset),
+    ("replaced_in_vain", shared::replaced_in_vain),
+    ("nothing_replaceable", shared::nothing_replaceable),
     ("state_over_jobs", shared::state_over_jobs),
     ("latest_unwritten", shared::latest_unwritten),
     ("latest_unread", shared::latest_unread),
@@ -92,6 +97,13 @@ pub fn provoke(mut report: impl FnMut(&str, &str, &str)) {
 }
 
 const PERIOD: Duration = Duration::from_millis(10);
+
+/// One fault within 100 jobs, and 8 in all.
+const FAULT_LIMIT: FaultLimit = FaultLimit {
+    faults: 1,
+    window: 100,
+    in_all: 8,
+};
 
 fn named(name: &str) -> Dag {
     let dag = create_dag();

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use fass::{Dag, Latest, Raiser, Sample, SubtaskAttributes, Unique, create_dag};
 
-use super::{PERIOD, named, sound, source};
+use super::{FAULT_LIMIT, PERIOD, named, sound, source};
 
 pub(super) fn activations_differ() -> Vec<Dag> {
     let dag = named("lidar");
@@ -55,6 +55,34 @@ pub(super) fn state_used_twice() -> Vec<Dag> {
         PERIOD,
         attributes,
     );
+    vec![dag]
+}
+
+pub(super) fn state_without_reset() -> Vec<Dag> {
+    let dag = named("lidar");
+    dag.survive_faults(FAULT_LIMIT);
+    source(&dag, "read", "points");
+    let map = dag.state("map", 0_u32);
+    let attributes = SubtaskAttributes::named("store");
+    let store = || |map: &mut u32, (points,): (u32,)| *map += points;
+    dag.using(map.update())
+        .restarting(store)
+        .register_sink_subtask(vec!["points"], PERIOD, attributes);
+    vec![dag]
+}
+
+pub(super) fn replaced_in_vain() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    let attributes = SubtaskAttributes::named("store");
+    dag.restarting(|| |(_,): (u32,)| ())
+        .register_sink_subtask(vec!["points"], PERIOD, attributes);
+    vec![dag]
+}
+
+pub(super) fn nothing_replaceable() -> Vec<Dag> {
+    let dag = sound("lidar", "points");
+    dag.survive_faults(FAULT_LIMIT);
     vec![dag]
 }
 

@@ -4,9 +4,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{Dag, SubtaskAttributes};
+use fass::{Dag, FaultLimit, SubtaskAttributes};
 
-use super::{PERIOD, joining_sink, named, sink, sound, source};
+use super::{FAULT_LIMIT, PERIOD, joining_sink, named, sink, sound, source};
 
 pub(super) fn missing_period() -> Vec<Dag> {
     let dag = named("lidar");
@@ -114,6 +114,26 @@ pub(super) fn priorities_exhausted() -> Vec<Dag> {
 pub(super) fn zero_jobs() -> Vec<Dag> {
     let dag = sound("lidar", "points");
     dag.jobs(0);
+    vec![dag]
+}
+
+pub(super) fn zero_faults() -> Vec<Dag> {
+    let dag = sound("lidar", "points");
+    let in_all = 0;
+    dag.survive_faults(FaultLimit {
+        in_all,
+        ..FAULT_LIMIT
+    });
+    vec![dag]
+}
+
+pub(super) fn zero_window() -> Vec<Dag> {
+    let dag = sound("lidar", "points");
+    let window = 0;
+    dag.survive_faults(FaultLimit {
+        window,
+        ..FAULT_LIMIT
+    });
     vec![dag]
 }
 

@@ -95,6 +95,7 @@ fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
             What::Request => "preempt for",
             What::Suspend => "preempted",
             What::Ended => "fault in",
+            What::Restarted => "goes on without",
             _ => continue,
         };
         if let Some(instance) = event.instance()
