@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
-             budget_factor, overheads_ns, trace, trace_events, times, graph, measure, \
+             budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, measure, \
              idle, console, status, mode, probe, end"
         );
     }
