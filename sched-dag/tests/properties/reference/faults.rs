@@ -6,6 +6,8 @@ impl Reference<'_> {
     /// Judges what has just failed, in the order of the instances.
     pub(super) fn judge_failures(&mut self) {
         self.judged.clear();
+        // What completions of this instant bring about comes first, cancellations included.
+        self.cancel_and_end();
         for (dag, job, subtask) in self.all_instances() {
             let instance = &self.outcome.instances[dag][job][subtask];
             if instance.failed_ns != Some(self.now_ns) {
