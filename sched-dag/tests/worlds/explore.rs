@@ -47,6 +47,8 @@ enum What {
     Complete(Place),
     Both(Place, Place),
     Fail(Place),
+    /// Another function is there.
+    Drop(Place),
     Stop(usize),
     Pause(usize),
     Resume(usize),
@@ -59,6 +61,7 @@ impl What {
             Self::Nothing => "time",
             Self::Complete(_) | Self::Both(..) => "complete",
             Self::Fail(_) => "fail",
+            Self::Drop(_) => "drop",
             Self::Stop(_) => "stop",
             Self::Pause(_) => "pause",
             Self::Resume(_) => "resume",
@@ -148,6 +151,13 @@ fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, What)> {
     }
     if node.disturbances < world.disturbances() {
         whats.extend(started.iter().map(|&place| What::Fail(place)));
+        let may_survive = |place: &&Place| world.dags[place.0].survives.is_some();
+        whats.extend(
+            started
+                .iter()
+                .filter(may_survive)
+                .map(|&place| What::Drop(place)),
+        );
         for (dag, model) in world.dags.iter().enumerate() {
             whats.push(What::Stop(dag));
             whats.push(match node.facts.dags[dag].is_paused {
@@ -199,6 +209,10 @@ fn take(node: &mut Node<'_>, time_ns: u64, what: What) -> Result<(), String> {
         What::Fail(place) => {
             moment.fail(instance(place), &mut heard);
             facts.fail(place);
+        }
+        What::Drop(place) => {
+            moment.fail_replaceable(instance(place), &mut heard);
+            facts.fail_replaceable(place);
         }
         What::Stop(dag) => {
             moment.stop(id(dag), &mut heard);
@@ -281,6 +295,10 @@ impl Observer for Heard {
 
     fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
         self.hear(dag, |job| Said::Completed(job, outcome), job);
+    }
+
+    fn restarted(&mut self, failed: Instance) {
+        self.hear(failed.dag, Said::Restarted, failed.job);
     }
 
     fn ended(&mut self, dag: DagId) {

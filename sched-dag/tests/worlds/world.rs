@@ -1,7 +1,8 @@
 //! The worlds: one or two DAGs of one to three subtasks, two jobs each, on one or two cores.
 
 use sched_dag::{
-    Activation, DagSpec, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec,
+    Activation, DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority,
+    SchedulerOptions, SubtaskSpec,
 };
 
 /// How many jobs each DAG has.
@@ -28,6 +29,8 @@ pub(crate) struct Dag {
     pub(crate) edges: &'static [(usize, usize)],
     /// Whether its first subtask, once started, keeps its core.
     pub(crate) is_first_non_preemptive: bool,
+    /// How many faults it survives, in a window of how many jobs; two in all.
+    pub(crate) survives: Option<FaultLimit>,
 }
 
 /// All shapes of one to three subtasks, but for their names.
@@ -49,9 +52,18 @@ const OVERRUNS: [OverrunPolicy; 3] = [
     OverrunPolicy::Abort,
 ];
 
+/// One fault in so many jobs, and two in all.
+const fn one_in(window: u64) -> FaultLimit {
+    FaultLimit {
+        faults: 1,
+        window,
+        in_all: 2,
+    }
+}
+
 /// Returns every world: each shape alone, and each pair of shapes, with each policy,
-/// preemption and number of cores; overrun policies, jobs in flight, signals and
-/// non-preemptive subtasks go round.
+/// preemption and number of cores; overrun policies, jobs in flight, signals,
+/// faults that are survived and non-preemptive subtasks go round.
 pub(crate) fn all() -> Vec<World> {
     let mut worlds = Vec::new();
     for policy in [Policy::StaticPriority, Policy::Edf] {
@@ -76,6 +88,7 @@ fn add(options: SchedulerOptions, worlds: &mut Vec<World>) {
                 for is_sporadic in [false, true] {
                     let mut dag = dag(first, 2, overrun, in_flight);
                     dag.is_sporadic = is_sporadic;
+                    dag.survives = Some(one_in(in_flight as u64));
                     let dags = vec![dag];
                     worlds.push(World { options, dags });
                 }
@@ -91,6 +104,7 @@ fn add(options: SchedulerOptions, worlds: &mut Vec<World>) {
             let mut other_dag = dag(second, 3, overrun(number), 1 + other % JOBS);
             urgent.is_first_non_preemptive = (number + other) % 4 == 3;
             other_dag.is_sporadic = (number + 2 * other) % 3 == 0;
+            urgent.survives = (other % 2 == 0).then(|| one_in(1));
             // The first subtasks of both are next to each other in the order.
             for (at, priority) in other_dag.priorities.iter_mut().enumerate() {
                 *priority = u32::from(at > 0);
@@ -117,6 +131,7 @@ fn dag(
         priorities: (0..3).rev().take(subtasks).collect(),
         edges,
         is_first_non_preemptive: false,
+        survives: None,
     }
 }
 
@@ -166,6 +181,7 @@ impl Dag {
             jobs: Some(JOBS as u64),
             in_flight: u32::try_from(self.in_flight).ok(),
             overrun: self.overrun,
+            on_fault: self.survives.map_or(OnFault::EndDag, OnFault::DropJob),
             activation: match self.is_sporadic {
                 true => Activation::Sporadic,
                 false => Activation::default(),

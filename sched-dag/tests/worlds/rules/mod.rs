@@ -3,6 +3,7 @@
 //! Which jobs there are and how far, what has started, finished, failed or was cancelled;
 //! everything else is asked of these, each time anew.
 
+mod faults;
 mod releases;
 
 use std::collections::BTreeSet;
@@ -21,6 +22,7 @@ pub(crate) enum Said {
     Missed(usize),
     Completed(usize, JobOutcome),
     Ended,
+    Restarted(usize),
 }
 
 /// An instance as DAG, job and subtask.
@@ -52,6 +54,7 @@ pub(crate) struct Job {
     due_ns: Option<u64>,
     is_aborted: bool,
     is_cut: bool,
+    has_failed: bool,
     is_judged: bool,
     is_missed: bool,
     /// Those that the DAG does not have are absent.
@@ -64,6 +67,8 @@ pub(crate) struct OfDag {
     pub(crate) is_ended: bool,
     pub(crate) is_paused: bool,
     resumed_ns: u64,
+    /// The jobs of the faults that were survived.
+    survived: Vec<usize>,
     pub(crate) statistics: DagStatistics,
 }
 
@@ -84,6 +89,7 @@ impl<'w> Facts<'w> {
             due_ns: (!dag.is_sporadic).then(|| dag.period_ns * number as u64),
             is_aborted: false,
             is_cut: false,
+            has_failed: false,
             is_judged: false,
             is_missed: false,
             parts: [Part::Absent; MOST_SUBTASKS],
@@ -93,6 +99,7 @@ impl<'w> Facts<'w> {
             is_ended: false,
             is_paused: false,
             resumed_ns: 0,
+            survived: Vec::new(),
             statistics: DagStatistics::default(),
         };
         Self {
@@ -138,44 +145,6 @@ impl<'w> Facts<'w> {
         self.running.remove(&place);
         if self.world.dags[dag].is_sink(subtask) {
             self.judge(dag, Some(place));
-        }
-        self.settle(dag);
-    }
-
-    pub(crate) fn fail(&mut self, place: Place) {
-        self.running.remove(&place);
-        self.dags[place.0].statistics.faults += 1;
-        self.stop(place.0);
-        *self.part_mut(place) = Part::Failed;
-        self.settle(place.0);
-    }
-
-    pub(crate) fn stop(&mut self, dag: usize) {
-        if self.dags[dag].is_ended {
-            return;
-        }
-        self.judge(dag, None);
-        let OfDag {
-            jobs,
-            is_ended,
-            statistics,
-            ..
-        } = &mut self.dags[dag];
-        *is_ended = true;
-        self.said[dag].push(Said::Ended);
-        for job in jobs {
-            match job.state {
-                State::InFlight if !job.is_aborted => {
-                    job.is_cut = true;
-                    statistics.cut_short += 1;
-                }
-                State::InFlight => {}
-                State::Waiting => {
-                    statistics.dropped += 1;
-                    job.state = State::Over;
-                }
-                _ => job.state = State::Over,
-            }
         }
         self.settle(dag);
     }
@@ -254,11 +223,16 @@ impl<'w> Facts<'w> {
         } = &mut self.dags[dag];
         let job = &mut jobs[number];
         job.state = State::Over;
-        let outcome = match (job.is_aborted, job.is_cut, job.is_missed) {
-            (true, ..) => JobOutcome::Aborted,
-            (_, true, _) => JobOutcome::DagEnded,
-            (.., true) => JobOutcome::Missed,
-            _ => JobOutcome::Met,
+        let outcome = if job.is_aborted {
+            JobOutcome::Aborted
+        } else if job.is_cut {
+            JobOutcome::DagEnded
+        } else if job.has_failed {
+            JobOutcome::Failed
+        } else if job.is_missed {
+            JobOutcome::Missed
+        } else {
+            JobOutcome::Met
         };
         statistics.completed += u64::from(!job.starts_nothing());
         if outcome == JobOutcome::Met {
@@ -338,7 +312,7 @@ impl<'w> Facts<'w> {
 
 impl Job {
     fn starts_nothing(&self) -> bool {
-        self.is_aborted || self.is_cut
+        self.is_aborted || self.is_cut || self.has_failed
     }
 
     fn is_unjudged(&self) -> bool {

@@ -79,7 +79,7 @@ impl Facts<'_> {
     }
 
     fn make_room(&mut self, dag: usize) {
-        let in_flight = |job: &Job| job.state == State::InFlight && !job.is_aborted;
+        let in_flight = |job: &Job| job.state == State::InFlight && !job.starts_nothing();
         let oldest = self.dags[dag].jobs.iter_mut().enumerate();
         match oldest.into_iter().find(|(_, job)| in_flight(job)) {
             Some((number, oldest)) => {
