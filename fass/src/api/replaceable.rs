@@ -15,7 +15,7 @@ use sched_dag::{Activation, FaultLimit, OnFault};
 
 use super::dag::Dag;
 use super::signal::Signal;
-use super::uses::ResettableUses;
+use super::uses::{ResettableUses, Uses};
 use super::using::Using;
 use crate::draft::attributes::SubtaskAttributes;
 use crate::run::replaceable::{Function, Functions};
@@ -152,7 +152,8 @@ fn once<Args: VecToSubs, Ret: VecToPubs>(
     })
 }
 
-impl<'d, U: ResettableUses + 'static> Using<'d, U> {
+// The bound is each method's own, so that the compiler says our sentence where it is not met.
+impl<'d, U: Uses + 'static> Using<'d, U> {
     /// Works like [`Dag::restarting`]. The states that the subtask uses are reset, too, to
     /// what is given by [`State::reset_to`](crate::State::reset_to).
     ///
@@ -160,6 +161,7 @@ impl<'d, U: ResettableUses + 'static> Using<'d, U> {
     #[track_caller]
     pub fn restarting<M, F, Args, Ret>(self, mut make: M) -> Replaceable<'d, Args, Ret>
     where
+        U: ResettableUses,
         M: FnMut() -> F + 'static,
         F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
         Args: VecToSubs,
@@ -198,6 +200,7 @@ impl<'d, U: ResettableUses + 'static> Using<'d, U> {
     #[track_caller]
     pub fn falling_back<F, G, Args, Ret>(self, first: F, second: G) -> Replaceable<'d, Args, Ret>
     where
+        U: ResettableUses,
         F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
         G: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
         Args: VecToSubs,
