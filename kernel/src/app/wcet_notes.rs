@@ -38,13 +38,13 @@ pub(crate) fn note(run: &Run) {
                 continue;
             }
             crate::println!(
-                "WCET exceeded: subtask `{}` of dag `{}`, {} of {} calls, the longest {}; its WCET \
+                "WCET exceeded: subtask `{}` of dag `{}`, {} of {} calls, by {} at most; its WCET \
                  is {}",
                 of_subtask.name(),
                 model.name(),
                 counted.beyond_wcet,
                 calls.count(),
-                Ns(longest_ns),
+                Ns(longest_ns - wcet_ns),
                 Ns(wcet_ns)
             );
             json::emit("wcet_exceeded", |line| {
