@@ -44,7 +44,7 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 /// let distance = dag.state("distance", 0_u32);
 /// distance.reset_to(|| 0);
 ///
-/// let mut steps = 0..;
+/// let mut steps = 0_u32..;
 /// let wheel = SubtaskAttributes::named("wheel");
 /// dag.register_periodic_subtask(move || (steps.next().unwrap(),), vec!["step"], period, wheel);
 /// dag.using(distance.update())
@@ -77,7 +77,7 @@ impl Dag {
     /// Lets the DAG go on after faults, within a limit: a fault costs the job only, where
     /// the subtask has another function. Without it a fault ends the DAG.
     ///
-    /// See [`Replaceable`], and [`FaultLimit`](crate::FaultLimit) for the memory that it
+    /// See [`Replaceable`], and [`FaultLimit`] for the memory that it
     /// takes: each fault keeps a stack and what is on it until the end of the run.
     #[track_caller]
     pub fn survive_faults(&self, limit: FaultLimit) -> &Self {
