@@ -215,6 +215,7 @@ fn every_reason_of_a_platform_is_listed() {
         "kernel/src/run/execution/mod.rs",
         "fass/virtual-time/src/platform.rs",
         "fass/native/src/platform.rs",
+        "fass/linux/src/platform.rs",
     ]);
     let reasons = sources.matches("LaunchError::new(").count();
     assert_eq!(reasons, documented.len(), "{documented:?}");

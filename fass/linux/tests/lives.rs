@@ -7,7 +7,7 @@ use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+use fass::{FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
 use sched_dag::DagId;
 use support::{alone, ms, ticking};
@@ -42,6 +42,27 @@ fn a_panic_ends_its_dag_alone() {
         assert_eq!(run.statistics(DagId(0)).completed, 5);
         assert_eq!(run.statistics(DagId(1)).completed, 20);
     }
+}
+
+#[test]
+fn a_dag_that_would_survive_faults_is_refused() {
+    let _alone = alone(1, Mechanism::Normal);
+    let dag = create_dag();
+    dag.name("odometry").jobs(1).relative_deadline(ms(1));
+    dag.survive_faults(FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: 1,
+    });
+    dag.restarting(|| |()| ()).register_periodic_subtask(
+        vec![],
+        ms(1),
+        SubtaskAttributes::named("wheel"),
+    );
+    let refused = finish_create_dags(&[dag]);
+    let text = refused.expect_err("Linux cannot").to_string();
+    let says = "dag `odometry` drops a job at a fault and goes on, which Linux does not do";
+    assert!(text.contains(says), "{text}");
 }
 
 #[test]
