@@ -1,0 +1,27 @@
+//! The file: a mark, a header, entries, and an end, each with a checksum.
+//!
+//! ```text
+//! 0x89 "FASSREC"  version, 2 bytes   then frames:
+//! kind, 1 byte    length, 4 bytes    payload    checksum, 4 bytes
+//! ```
+//!
+//! The checksum of a frame is that of all bytes from the file's first one on, checksums left
+//! out. So a frame that is altered, left out, doubled or moved is found, and so is a cut at a
+//! frame's end, by the missing frame of the end.
+
+pub(crate) mod entry;
+pub(crate) mod header;
+pub(crate) mod read;
+pub(crate) mod write;
+
+/// The first bytes of each recording. The first one is no text, so that a transfer of text is
+/// found, which would alter the rest.
+pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
+
+/// The version of the format that is written and read, of values included.
+pub const VERSION: u16 = 1;
+
+/// The kinds of frames.
+const HEADER: u8 = 1;
+const ENTRY: u8 = 2;
+const END: u8 = 3;

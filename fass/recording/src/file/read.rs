@@ -1,0 +1,211 @@
+//! Reading a recording, all of which may be wrong.
+
+use super::entry::{Entry, What};
+use super::header::Header;
+use super::{END, ENTRY, HEADER, MAGIC, VERSION};
+use crate::value::crc::Crc;
+use crate::value::decode::{Decoder, Malformed};
+use crate::value::recordable::Recordable;
+
+/// A recording that is whole and unaltered.
+///
+/// See [`Writer`](crate::Writer).
+#[derive(Clone, Debug)]
+pub struct Recording<'b> {
+    bytes: &'b [u8],
+    header: Header,
+    /// Where the first entry stands.
+    first: usize,
+    count: u64,
+    lost: u64,
+}
+
+/// The entries of a recording, in the order in which they were written.
+///
+/// See [`Recording::entries`].
+#[derive(Clone, Debug)]
+pub struct Entries<'b>(Decoder<'b>);
+
+/// A frame, and where its payload stands.
+struct Frame<'b> {
+    kind: u8,
+    offset: usize,
+    payload: &'b [u8],
+    checksum: u32,
+}
+
+const CHECKSUM: &str = "the checksum of all before; the file is altered";
+
+impl<'b> Recording<'b> {
+    /// Reads all of a recording once, and makes sure that it is whole, that no byte was
+    /// altered, and that every value is one of its type.
+    ///
+    /// # Errors
+    ///
+    /// The first place that is otherwise.
+    ///
+    /// See [`Writer`](crate::Writer).
+    pub fn read(bytes: &'b [u8]) -> Result<Self, Malformed> {
+        let mut input = Decoder::new(bytes);
+        let mark = "the mark of a recording, 0x89 and `FASSREC`";
+        if input.take(MAGIC.len(), mark)? != MAGIC {
+            return Err(Decoder::new(bytes).expected(mark));
+        }
+        let malformed = input.expected("version 1 of recordings, which is the one that is read");
+        if u16::from_le_bytes(input.array(malformed.expected)?) != VERSION {
+            return Err(malformed);
+        }
+        let mut crc = Crc::new();
+        crc.update(&bytes[..input.offset()]);
+
+        let frame = checked(&mut input, &mut crc)?;
+        if frame.kind != HEADER {
+            return Err(frame.expected("a header, frame kind 1"));
+        }
+        let header =
+            Header::from_bytes(frame.payload).map_err(|error| error.behind(frame.offset))?;
+        check_header(&header).map_err(|expected| Malformed {
+            offset: frame.offset,
+            expected,
+        })?;
+
+        let first = input.offset();
+        let (mut count, mut lost) = (0, 0);
+        loop {
+            let frame = checked(&mut input, &mut crc)?;
+            let inside = |malformed: Malformed| malformed.behind(frame.offset);
+            match frame.kind {
+                ENTRY => {
+                    let entry = Entry::decode(frame.payload).map_err(inside)?;
+                    entry.check(&header).map_err(inside)?;
+                    count += 1;
+                    lost += u64::from(entry.what == What::Lost);
+                }
+                END => {
+                    let said = <(u64, u64)>::from_bytes(frame.payload).map_err(inside)?;
+                    if said != (count, lost) {
+                        return Err(inside(Malformed {
+                            offset: 0,
+                            expected: "how many entries there are, and how many of them are lost",
+                        }));
+                    }
+                    if input.remaining() > 0 {
+                        return Err(input.expected("the end of the file"));
+                    }
+                    return Ok(Self {
+                        bytes,
+                        header,
+                        first,
+                        count,
+                        lost,
+                    });
+                }
+                _ => return Err(frame.expected("an entry, frame kind 2, or the end, 3")),
+            }
+        }
+    }
+
+    /// Returns what the recording says of itself.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub const fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Returns the number of entries.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Returns how many entries are of what was lost; 0: the recording is complete.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub const fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Returns the entries.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub fn entries(&self) -> Entries<'b> {
+        Entries(Decoder::new(&self.bytes[self.first..]))
+    }
+}
+
+impl<'b> Iterator for Entries<'b> {
+    type Item = Entry<'b>;
+
+    fn next(&mut self) -> Option<Entry<'b>> {
+        // Whatever could be wrong was found when the recording was read.
+        let frame = frame(&mut self.0).ok()?;
+        match frame.kind {
+            ENTRY => Entry::decode(frame.payload).ok(),
+            _ => None,
+        }
+    }
+}
+
+impl Frame<'_> {
+    /// Says what was expected where the frame begins.
+    const fn expected(&self, expected: &'static str) -> Malformed {
+        Malformed {
+            offset: self.offset - 5,
+            expected,
+        }
+    }
+}
+
+/// Reads the next frame.
+fn frame<'b>(input: &mut Decoder<'b>) -> Result<Frame<'b>, Malformed> {
+    let [kind] = input.array("another frame; the recording has no end, so a part is missing")?;
+    let length = u32::from_le_bytes(input.array("4 bytes, how long the frame is")?);
+    let length = usize::try_from(length).unwrap_or(usize::MAX);
+    let offset = input.offset();
+    let payload = input.take(
+        length,
+        "a frame of the length that it states, and more after it",
+    )?;
+    let checksum = input.array("4 bytes of a checksum, and more after them")?;
+    Ok(Frame {
+        kind,
+        offset,
+        payload,
+        checksum: u32::from_le_bytes(checksum),
+    })
+}
+
+/// Reads the next frame, and makes sure that no byte up to its end was altered.
+fn checked<'b>(input: &mut Decoder<'b>, crc: &mut Crc) -> Result<Frame<'b>, Malformed> {
+    let frame = frame(input)?;
+    crc.update(&[frame.kind]);
+    // It was a `u32`.
+    let length = u32::try_from(frame.payload.len()).unwrap_or(u32::MAX);
+    crc.update(&length.to_le_bytes());
+    crc.update(frame.payload);
+    match crc.value() == frame.checksum {
+        true => Ok(frame),
+        false => Err(Malformed {
+            offset: frame.offset + frame.payload.len(),
+            expected: CHECKSUM,
+        }),
+    }
+}
+
+/// Makes sure that the parts of a header fit to each other.
+fn check_header(header: &Header) -> Result<(), &'static str> {
+    let dags = header.dags.len();
+    match header
+        .channels
+        .iter()
+        .all(|channel| usize::from(channel.dag) < dags)
+    {
+        true => Ok(()),
+        false => Err("channels of DAGs that the header has"),
+    }
+}

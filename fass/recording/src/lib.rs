@@ -1,0 +1,67 @@
+//! What crosses the edge of a run, as bytes: values with their schemas, and files of them.
+//!
+//! What a DAG of functions computes follows from what enters it. So a *recording*, that is a
+//! file of the values that sources returned, samples found, and of what became of jobs, is
+//! enough to compute every value again. This crate has what is needed to write values down:
+//!
+//! - [`Recordable`]: a type whose values become bytes and come back; [`recordable!`] makes one
+//!   of an app's struct;
+//! - [`Schema`]: what such a type looks like, so that a program that does not know the type can
+//!   read its values;
+//! - [`Recording`], [`Writer`]: the file, read and written.
+//!
+//! The crate knows no DAG and no machine, for those that read recordings need neither: the host
+//! tool, an app that takes a recording as its input.
+//!
+//! # The form of values
+//!
+//! Numbers are little-endian and as wide as their type, without padding: what has the same type
+//! and the same value has the same bytes, on every machine.
+//!
+//! | type | bytes |
+//! |---|---|
+//! | `u8` to `u128`, `i8` to `i128`, `f32`, `f64` | 1 to 16 |
+//! | `bool` | 1: 0 or 1 |
+//! | `char` | 4: the scalar value |
+//! | `Option<T>` | 1: 0, or 1 and the value |
+//! | `Vec<T>` | 4: how many, and these |
+//! | `String` | 4: how many bytes of UTF-8, and these |
+//! | array, tuple, struct | the elements or fields, one after the other |
+//! | `Arc<T>`, `Box<T>` | as `T` |
+//!
+//! `usize` and `isize` have no width of their own, so they cannot be recorded.
+//!
+//! # What is guaranteed
+//!
+//! - Writing into a buffer allocates nothing, and a buffer that is too small is told with what
+//!   is needed.
+//! - Reading any bytes gives a value or the offset of what is wrong. It does not panic, recurses
+//!   to a depth that the type fixes, and allocates at most [`MOST_GROWTH`] times the bytes that
+//!   it is given, for each level of that depth. Bytes that are accepted are those that the value would be written as.
+//!
+//! # What is not
+//!
+//! A checksum finds accidents, not intent: a person can make a file that says something else.
+
+#![no_std]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+mod file;
+mod value;
+
+pub use file::entry::{Entry, What};
+pub use file::header::{Channel, DagHeader, Header, Role};
+pub use file::read::{Entries, Recording};
+pub use file::write::Writer;
+pub use file::{MAGIC, VERSION};
+#[doc(hidden)]
+pub use value::containers::deepest;
+pub use value::crc::Crc;
+pub use value::decode::{Decoder, Malformed};
+pub use value::encode::{Encoder, Full};
+pub use value::recordable::{MOST_GROWTH, Recordable, to_bytes};
+pub use value::schema::{Field, MOST_DEPTH, Scalar, Schema};
+pub use value::shown::{Shown, write_json};
+pub use value::walk::Part;

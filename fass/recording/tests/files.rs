@@ -1,0 +1,218 @@
+//! Recordings that were altered: each is refused.
+
+use std::collections::BTreeSet;
+
+use recording::{
+    Channel, DagHeader, Entry, Header, MAGIC, Malformed, Recordable, Recording, Role, What, Writer,
+    to_bytes,
+};
+
+fn header() -> Header {
+    let channel = |dag, role, topic: &str, schema| Channel {
+        dag,
+        subtask: 0,
+        role,
+        topic: topic.into(),
+        schema,
+    };
+    let dag = |name: &str, graph| DagHeader {
+        name: name.into(),
+        graph,
+    };
+    Header {
+        app: "demo".into(),
+        dags: vec![dag("fast", 7), dag("slow", 8)],
+        channels: vec![
+            channel(0, Role::Source, "samples", Vec::<f64>::schema()),
+            channel(
+                1,
+                Role::Sample,
+                "samples",
+                <Option<(u64, u64, Vec<f64>)>>::schema(),
+            ),
+        ],
+    }
+}
+
+/// Returns a recording of some jobs, a job of which is lost.
+fn recording() -> Vec<u8> {
+    let mut writer = Writer::new(&header());
+    for job in 0..10 {
+        let samples = vec![0.5; usize::try_from(job % 4).expect("it is small")];
+        let value = to_bytes(&samples);
+        let sample = to_bytes(&Some((job, job * 10, samples)));
+        let entry = |what, dag, place, value| Entry {
+            what,
+            dag,
+            place,
+            job,
+            release_ns: job * 1_000,
+            at_ns: job * 1_000 + 10,
+            value,
+        };
+        writer.write(&match job {
+            5 => entry(What::Lost, 0, 0, &[]),
+            6 => entry(What::Skip, 0, 0, &[]),
+            7 => entry(What::Cut, 0, 3, &[]),
+            _ => entry(What::Value, 0, 0, &value),
+        });
+        writer.write(&entry(What::Value, 1, 1, &sample));
+    }
+    writer.finish()
+}
+
+#[test]
+fn what_is_written_is_read() {
+    let bytes = recording();
+    let recording = Recording::read(&bytes).unwrap();
+    assert_eq!(recording.header(), &header());
+    assert_eq!((recording.count(), recording.lost()), (20, 1));
+    let entries: Vec<Entry<'_>> = recording.entries().collect();
+    assert_eq!(entries.len(), 20);
+    assert_eq!((entries[10].what, entries[10].job), (What::Lost, 5));
+    assert_eq!(Vec::<f64>::from_bytes(entries[6].value), Ok(vec![0.5; 3]));
+}
+
+#[test]
+fn every_altered_byte_is_found() {
+    let bytes = recording();
+    for place in 0..bytes.len() {
+        for bit in 0..8 {
+            let mut altered = bytes.clone();
+            altered[place] ^= 1 << bit;
+            assert!(
+                Recording::read(&altered).is_err(),
+                "bit {bit} of byte {place}"
+            );
+        }
+        assert!(Recording::read(&bytes[..place]).is_err(), "{place} bytes");
+    }
+}
+
+#[test]
+fn ten_thousand_altered_recordings_are_refused() {
+    let bytes = recording();
+    let mut state = 1_u64;
+    let mut below = |limit: usize| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from((state >> 33) % limit as u64).unwrap()
+    };
+    let mut expected = BTreeSet::new();
+    let mut refused = 0;
+    while refused < 10_000 {
+        let mut altered = bytes.clone();
+        for _ in 0..=below(3) {
+            let (place, other) = (below(altered.len()), below(altered.len()));
+            let part = place.min(other)..place.max(other).min(place.min(other) + 60);
+            let byte = u8::try_from(below(256)).unwrap();
+            match below(7) {
+                0 => altered.truncate(place.max(1)),
+                1 => altered.insert(place, byte),
+                2 => _ = altered.remove(place),
+                3 => altered[place] = byte,
+                // Parts that are left out, doubled, or swapped with what follows.
+                4 => _ = altered.drain(part),
+                5 => {
+                    let part = altered[part].to_vec();
+                    altered.splice(place..place, part);
+                }
+                _ => altered[part].rotate_left(1.min(place.abs_diff(other))),
+            }
+            if altered.is_empty() {
+                altered.push(0);
+            }
+        }
+        if altered == bytes {
+            continue;
+        }
+        let malformed = Recording::read(&altered).expect_err("it is not what was written");
+        assert!(malformed.offset <= altered.len());
+        expected.insert(malformed.expected);
+        refused += 1;
+    }
+    println!("{expected:#?}");
+    assert!(expected.len() >= 6, "{expected:?}");
+}
+
+/// Returns a recording that one frame was added to, with a right checksum.
+fn refused(entry: Entry<'_>) -> Malformed {
+    let mut writer = Writer::new(&header());
+    writer.write(&entry);
+    Recording::read(&writer.finish()).expect_err("it is wrong")
+}
+
+#[test]
+fn what_was_written_wrongly_is_refused_in_spite_of_its_checksum() {
+    let value = to_bytes(&vec![1.0]);
+    let right = Entry {
+        what: What::Value,
+        dag: 0,
+        place: 0,
+        job: 0,
+        release_ns: 0,
+        at_ns: 0,
+        value: &value,
+    };
+    let payload = refused(Entry { dag: 9, ..right }).offset - 1;
+    for (wrong, offset, expected) in [
+        (
+            Entry { dag: 9, ..right },
+            1,
+            "the number of a DAG of the header",
+        ),
+        (
+            Entry { place: 1, ..right },
+            3,
+            "the number of a channel of the DAG",
+        ),
+        (
+            Entry {
+                value: &value[..9],
+                ..right
+            },
+            29 + 4,
+            "an f64, 8 bytes",
+        ),
+        (
+            Entry {
+                what: What::Skip,
+                ..right
+            },
+            29,
+            "the end of the value",
+        ),
+    ] {
+        let malformed = refused(wrong);
+        if !malformed.expected.starts_with("how many") {
+            assert_eq!(
+                malformed,
+                Malformed {
+                    offset: payload + offset,
+                    expected
+                }
+            );
+        }
+    }
+    let mut of_no_dag = header();
+    of_no_dag.channels[1].dag = 2;
+    let malformed = Recording::read(&Writer::new(&of_no_dag).finish()).unwrap_err();
+    assert_eq!(malformed.expected, "channels of DAGs that the header has");
+}
+
+#[test]
+fn foreign_and_newer_files_are_told() {
+    let said = |bytes: &[u8]| Recording::read(bytes).unwrap_err().to_string();
+    let foreign = "at byte 0: expected the mark of a recording, 0x89 and `FASSREC`";
+    assert_eq!(said(b""), foreign);
+    assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
+    let newer = [&MAGIC[..], &[2, 0]].concat();
+    assert_eq!(
+        said(&newer),
+        "at byte 8: expected version 1 of recordings, which is the one that is read"
+    );
+    let mut more = recording();
+    more.push(0);
+    assert!(said(&more).ends_with("expected the end of the file"));
+}
