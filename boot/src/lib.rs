@@ -129,6 +129,14 @@ impl BootInfo {
         self.memory.push(MemoryRegion { start, end, usable })
     }
 
+    /// Takes an entry of a memory map: PVH and Multiboot2 have the same beginning of one, start,
+    /// size and kind. Returns nothing if it is not there or does not fit.
+    fn take_region(&mut self, memory: &impl PhysicalMemory, entry: u64) -> Option<()> {
+        let (start, size) = (memory.u64(entry)?, memory.u64(entry + 8)?);
+        let kind = memory.u32(entry + 16)?;
+        self.add_memory(start, size, kind).ok()
+    }
+
     /// Adds a module, unless it has no bytes.
     fn add_module(&mut self, start: u64, end: u64) -> Result<(), Full> {
         match start < end {

@@ -68,14 +68,7 @@ fn read_memory_map(memory: &impl PhysicalMemory, start: u64, end: u64, info: &mu
     }
     let mut entry = start + 8;
     while entry + KNOWN <= end {
-        let (Some(start), Some(size), Some(kind)) = (
-            memory.u64(entry),
-            memory.u64(entry + 8),
-            memory.u32(entry + 16),
-        ) else {
-            return;
-        };
-        if info.add_memory(start, size, kind).is_err() {
+        if info.take_region(memory, entry).is_none() {
             return;
         }
         entry += entry_size;

@@ -70,15 +70,7 @@ fn read_memory_map(memory: &impl PhysicalMemory, address: u64, info: &mut BootIn
         return;
     };
     for index in 0..u64::from(length) {
-        let entry = map + index * ENTRY_SIZE;
-        let (Some(start), Some(size), Some(kind)) = (
-            memory.u64(entry),
-            memory.u64(entry + 8),
-            memory.u32(entry + 16),
-        ) else {
-            return;
-        };
-        if info.add_memory(start, size, kind).is_err() {
+        if info.take_region(memory, map + index * ENTRY_SIZE).is_none() {
             return;
         }
     }
