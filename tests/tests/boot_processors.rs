@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use harness::Guest;
-use tool::protocol::Status;
+use tool::protocol::{Status, Transcript};
 use tool::qemu::Ending;
 use tool::{Machine, Mode, system};
 
@@ -63,8 +63,15 @@ fn four_processors_in_real_time_on_a_q35() {
 
 /// Makes a program that is QEMU with another word in place of one of ours.
 fn qemu_with(other: &str, word: &str) -> PathBuf {
+    qemu_and(&[(other, word)], "")
+}
+
+/// Makes a program that is QEMU with other words in place of ours, and with these added.
+fn qemu_and(changes: &[(&str, &str)], more: &str) -> PathBuf {
     let program = system::new_log("altered").expect("a file");
-    let script = format!("#!/bin/bash\nexec qemu-system-x86_64 \"${{@/{other}/{word}}}\"\n");
+    let change = |(other, word): &(&str, &str)| format!("set -- \"${{@/{other}/{word}}}\"\n");
+    let changes: String = changes.iter().map(change).collect();
+    let script = format!("#!/bin/bash\n{changes}exec qemu-system-x86_64 \"$@\" {more}\n");
     fs::write(&program, script).expect("the script is written");
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
     program
@@ -126,15 +133,33 @@ fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
     fs::remove_file(&endless).expect("it is ours");
 }
 
-/// What would be printed goes nowhere, at once.
+/// What would be printed goes nowhere, at once. The absent port is never ready here, and two
+/// devices in its place show what is sent all the same: in counted time, without a wait.
 #[test]
 fn a_machine_without_a_serial_port_runs() {
-    let mute = qemu_with("#microvm", "microvm,isa-serial=off");
+    let bytes = system::new_log("bytes").expect("a file");
+    let never_ready =
+        "-chardev null,id=none -device isa-debugcon,iobase=0x3fd,readback=0,chardev=none";
+    let more = format!(
+        "{never_ready} -chardev file,id=bytes,path={} \
+         -device isa-debugcon,iobase=0x3f8,readback=0,chardev=bytes",
+        bytes.display()
+    );
+    let mute = qemu_and(&[("#microvm", "microvm,isa-serial=off")], &more);
     let guest = Guest::new("fork-join").cores(2).program(&mute);
-    let outcome = guest.word("jobs=2").word("subtasks=2").boot();
+    let guest = guest.word("jobs=2").word("subtasks=2");
+    let outcome = guest.limit(Duration::from_secs(120)).boot();
     fs::remove_file(&mute).expect("it is ours");
     assert_eq!(outcome.ending, Ending::Guest(Status::Success));
     assert_eq!(outcome.serial, "");
+    let sent = fs::read_to_string(&bytes).expect("what was sent");
+    fs::remove_file(&bytes).expect("it is ours");
+    // The port's divisor comes first.
+    let sent = Transcript::read(sent.trim_start_matches('\u{1}'));
+    let number = |kind, member| sent.of_kind(kind).next()?.number_at(member);
+    let ready_ns = number("boot", "ready_ns").expect("a boot line");
+    let first_ns = number("fork_join", "first_release_ns").expect("a result");
+    assert!(first_ns - ready_ns < 10_000_000, "{ready_ns}, {first_ns}");
 }
 
 /// The board has no ACPI timer, and the processor does not say that it is QEMU's.

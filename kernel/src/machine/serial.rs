@@ -29,19 +29,29 @@ pub(crate) fn initialize() {
         (2, 0xc7), // FIFOs on and cleared
         (4, 0x03), // ready to send
     ];
-    // A byte that means nothing to the port, and that only a port keeps.
+    /// The register that means nothing to the port.
     const SCRATCH: u16 = BASE + 7;
-    let keeps = |value: u8| {
+    let is_there = keeps_bytes(
         // SAFETY: the ports from 0x3f8 are the serial port's, which is this module's.
-        unsafe { port::write_u8(SCRATCH, value) };
+        |value| unsafe { port::write_u8(SCRATCH, value) },
         // SAFETY: likewise.
-        unsafe { port::read_u8(SCRATCH) == value }
-    };
-    IS_THERE.store(keeps(0x5a) && keeps(0xa5), Ordering::Release);
+        || unsafe { port::read_u8(SCRATCH) },
+    );
+    IS_THERE.store(is_there, Ordering::Release);
     for (register, value) in SETUP {
         // SAFETY: the ports from 0x3f8 are the serial port's, which is this module's.
         unsafe { port::write_u8(BASE + register, value) };
     }
+}
+
+/// Reports whether a register keeps what is written to it, as none does where there is no
+/// port: that reads as the same byte each time.
+fn keeps_bytes(write: impl Fn(u8), read: impl Fn() -> u8) -> bool {
+    let keeps = |byte: &u8| {
+        write(*byte);
+        read() == *byte
+    };
+    [0x5a, 0xa5].iter().all(keeps)
 }
 
 /// Sends one byte, waiting until there is room for it.
@@ -98,4 +108,20 @@ pub(crate) fn receive() -> Option<u8> {
     }
     // SAFETY: the data register of this module's device.
     Some(unsafe { port::read_u8(BASE) })
+}
+
+#[cfg(test)]
+mod tests {
+    use core::cell::Cell;
+
+    use super::keeps_bytes;
+
+    #[test]
+    fn only_a_register_is_taken_for_a_port() {
+        let register = Cell::new(0);
+        assert!(keeps_bytes(|byte| register.set(byte), || register.get()));
+        for absent in 0..=u8::MAX {
+            assert!(!keeps_bytes(|_| (), || absent), "{absent:#x}");
+        }
+    }
 }
