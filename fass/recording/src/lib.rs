@@ -54,6 +54,7 @@ mod value;
 pub use file::entry::{Entry, What};
 pub use file::header::{Channel, DagHeader, Header, Role};
 pub use file::read::{Entries, Recording};
+pub use file::values::{Mismatch, Values};
 pub use file::write::Writer;
 pub use file::{MAGIC, VERSION};
 #[doc(hidden)]

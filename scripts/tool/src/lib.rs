@@ -17,6 +17,7 @@
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`markdown`], [`fault_page`], [`promises`]: pages that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
+//! - [`recordings`]: what entered a run, and other formats of that;
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
 //! - [`mod@bench`]: what is measured, and compared with a baseline;
 //! - [`oracle`]: reference schedules, bounds and synchronizers;
@@ -56,6 +57,7 @@ pub mod promises;
 pub mod proof;
 pub mod protocol;
 pub mod qemu;
+pub mod recordings;
 pub mod run;
 pub mod soak;
 pub mod stick;

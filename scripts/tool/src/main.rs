@@ -57,6 +57,11 @@ static TOOL: Menu = Menu {
             work: tool::trace::trace,
         },
         Choice {
+            name: "recording",
+            about: "show a recording, and convert it from and to other formats",
+            work: tool::recordings::recording,
+        },
+        Choice {
             name: "bench",
             about: "measure parts of the project on this host",
             work: tool::bench::bench,

@@ -9,13 +9,14 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 20] = [
+const COMMANDS: [&str; 21] = [
     "run",
     "boot",
     "test",
     "new-app",
     "check-trace",
     "trace",
+    "recording",
     "soak",
     "bench",
     "bench build",

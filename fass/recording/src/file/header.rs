@@ -82,6 +82,16 @@ impl Role {
             Self::Sample => "sample",
         }
     }
+
+    /// Reports whether the DAG writes the values itself.
+    ///
+    /// ```
+    /// assert!(!recording::Role::Sample.is_written());
+    /// ```
+    #[must_use]
+    pub const fn is_written(self) -> bool {
+        !matches!(self, Self::Sample)
+    }
 }
 
 impl Recordable for Role {

@@ -12,6 +12,7 @@
 pub(crate) mod entry;
 pub(crate) mod header;
 pub(crate) mod read;
+pub(crate) mod values;
 pub(crate) mod write;
 
 /// The first bytes of each recording. The first one is no text, so that a transfer of text is

@@ -1,0 +1,202 @@
+//! The subcommand `recording`: what is in a recording, and other formats of it.
+//!
+//! A recording is the file of what entered a run; the crate `recording` has its format. It is
+//! shown as a table, written as tables of comma-separated values ([`table_out`]) and as an MCAP
+//! file ([`mcap`]), and made of a table ([`table_in`]).
+
+pub mod mcap;
+mod mcap_schema;
+mod summary;
+mod table_in;
+mod table_out;
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+use recording::Recording;
+
+use crate::files::{self, Named};
+use crate::options::{Command, Opt, Parsed, Takes};
+
+/// The table of `recording`.
+pub static RECORDING: Command = Command {
+    invocation: "./scripts/recording",
+    about: "Shows a recording, and converts it from and to other formats.",
+    positional: Some((
+        Takes::File("FILE"),
+        "A recording; with --from-csv, a table to make one of.",
+    )),
+    options: &[
+        Opt::new(
+            "csv",
+            Takes::File("DIR"),
+            "Write a table of each channel into this folder, and one of what else happened.",
+        ),
+        Opt::new(
+            "mcap",
+            Takes::File("FILE"),
+            "Write an MCAP file, with messages in JSON, for Foxglove and others.",
+        ),
+        Opt::new(
+            "from-csv",
+            Takes::Nothing,
+            "Make a recording of a table whose rows are what a source returns.",
+        ),
+        Opt::new(
+            "out",
+            Takes::File("FILE"),
+            "--from-csv: write the recording to this file.",
+        )
+        .short('o'),
+        Opt::new(
+            "dag",
+            Takes::Text("NAME"),
+            "--from-csv: the DAG of the source.",
+        ),
+        Opt::new(
+            "topic",
+            Takes::Text("NAME"),
+            "--from-csv: the topic that it writes.",
+        ),
+        Opt::new(
+            "type",
+            Takes::Text("TYPE"),
+            "--from-csv: the type of the values, as `Seen { at: [f64; 3], name: text }`, its \
+             numbers in the order of the columns; else each column is a field of type f64.",
+        ),
+        Opt::new(
+            "ignore",
+            Takes::Text("COLUMNS"),
+            "--from-csv: columns that are no part of the values, with commas between.",
+        ),
+        Opt::new(
+            "period",
+            Takes::Text("TIME"),
+            "--from-csv: the time from row to row, such as 10ms, if there is no column \
+             release_ns.",
+        ),
+    ],
+    notes: "\
+Without an option it says what is in the recording. docs/recordings.md explains all of it.
+
+exit codes: 0 all is well; 1 an output cannot be written; 2 a refused command line, or a
+file that is no whole and unaltered recording, or no such table
+",
+};
+
+/// Why nothing came of it.
+enum Refusal {
+    /// The command line or a file is at fault: exit code 2.
+    Usage(String),
+    /// Something else is: exit code 1.
+    Failure(String),
+}
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn recording(words: &[OsString]) -> ExitCode {
+    let options = match RECORDING.read(words) {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    match attempt(&options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Refusal::Usage(line)) => RECORDING.refuse(&line),
+        Err(Refusal::Failure(line)) => RECORDING.fail(&line),
+    }
+}
+
+fn attempt(options: &Parsed) -> Result<(), Refusal> {
+    let question = "which file? name a recording, or with --from-csv a table";
+    let file = options
+        .files()
+        .next()
+        .ok_or(Refusal::Usage(question.into()))?;
+    check(file, options).map_err(Refusal::Usage)?;
+    if options.is_given("from-csv") {
+        let bytes = table_in::convert(file, options).map_err(Refusal::Usage)?;
+        let out = options.path("out").unwrap_or(Path::new(""));
+        write(out, |out| out.write_all(&bytes)).map_err(Refusal::Failure)?;
+        println!("{}: {} bytes", files::place(out), bytes.len());
+        return Ok(());
+    }
+    let bytes = read(file).map_err(Refusal::Usage)?;
+    let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
+    print!("{}", summary::of(&recording));
+    if let Some(folder) = options.path("csv") {
+        for (name, table) in table_out::tables(&recording) {
+            let path = folder.join(name);
+            write(&path, |out| out.write_all(table.as_bytes())).map_err(Refusal::Failure)?;
+            println!("{}", files::place(&path));
+        }
+    }
+    if let Some(path) = options.path("mcap") {
+        let mut messages = 0;
+        write(path, |out| {
+            messages = mcap::write(&recording, out)?;
+            Ok(())
+        })
+        .map_err(Refusal::Failure)?;
+        println!("{}: {messages} messages", files::place(path));
+    }
+    Ok(())
+}
+
+/// Makes sure of the options and of all files, before any is opened.
+fn check(file: &Path, options: &Parsed) -> Result<(), String> {
+    let (of_tables, of_recordings) = (["out", "dag", "topic"], ["csv", "mcap"]);
+    let others = ["type", "ignore", "period"];
+    if options.is_given("from-csv") {
+        if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {
+            return Err(format!("`--from-csv` needs `--{name}`; give it, too"));
+        }
+        if let Some(name) = of_recordings
+            .into_iter()
+            .find(|name| options.is_given(name))
+        {
+            let line = "`--from-csv` exclude each other; convert what it has written";
+            return Err(format!("`--{name}` and {line}"));
+        }
+    } else if let Some(name) = of_tables
+        .into_iter()
+        .chain(others)
+        .find(|name| options.is_given(name))
+    {
+        return Err(format!("`--{name}` needs `--from-csv`; give it, too"));
+    }
+    let input = Named {
+        option: "",
+        path: file,
+    };
+    files::check(&[input], &options.named(&["out", "mcap"]))?;
+    (options.named(&["csv"]).iter()).try_for_each(files::check_folder)
+}
+
+/// Reads a file that should be a recording.
+pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
+    files::read(file).map_err(|why| format!("{}: {why}; name another file", files::place(file)))
+}
+
+/// Takes what was read for a recording.
+pub(crate) fn parse<'b>(file: &Path, bytes: &'b [u8]) -> Result<Recording<'b>, String> {
+    let place = files::place(file);
+    Recording::read(bytes).map_err(|malformed| format!("{place}: {malformed}"))
+}
+
+fn write(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<(), String> {
+    let write = || {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        let mut out = BufWriter::new(File::create(path)?);
+        fill(&mut out)?;
+        out.flush()
+    };
+    write().map_err(|error| format!("cannot write {}: {error}", files::place(path)))
+}

@@ -1,0 +1,289 @@
+//! A recording out of a table: each row is what a source returns in one job.
+//!
+//! The columns `job`, `release_ns` and `at_ns`, if they are there, say what their names say.
+//! The others, in their order, are the numbers and texts that the type is made of.
+
+use std::path::Path;
+
+use dag_file::time::parse_ns;
+use recording::{
+    Channel, DagHeader, Entry, Field, Header, Role, Scalar, Schema, What, Writer, to_bytes,
+};
+use replay::shown::quoted;
+
+use super::table_out::spread;
+use crate::files;
+use crate::options::Parsed;
+
+/// Returns the recording.
+pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> {
+    let text = files::read_text(file)?;
+    let place = files::place(file);
+    let mut rows = Rows {
+        text: &text,
+        line: 0,
+    };
+    let at = |line: usize, why: String| format!("{place}:{line}: {why}");
+    let refuse = |(line, why): (usize, String)| at(line, why);
+    let titles = rows.next().transpose().map_err(refuse)?;
+    let titles = titles.ok_or_else(|| {
+        at(
+            1,
+            "the table is empty; the first row names the columns".into(),
+        )
+    })?;
+    let columns = Columns::new(&titles, options)?;
+    let period_ns = match options.text("period").map(parse_ns) {
+        Some(Err(why)) => return Err(format!("`--period`: {why}")),
+        Some(Ok(period_ns)) => Some(period_ns),
+        None => None,
+    };
+    if columns.release_ns.is_none() && period_ns.is_none() {
+        let line = "there is no column release_ns; say by --period how far apart the rows are";
+        return Err(at(1, line.into()));
+    }
+    let schema = schema(&columns, options).map_err(|why| at(1, why))?;
+    let app = options.text("dag").unwrap_or_default();
+    let mut writer = Writer::new(&Header {
+        app: app.into(),
+        dags: vec![DagHeader {
+            name: app.into(),
+            graph: 0,
+        }],
+        channels: vec![Channel {
+            dag: 0,
+            subtask: 0,
+            role: Role::Source,
+            topic: options.text("topic").unwrap_or_default().into(),
+            schema: schema.clone(),
+        }],
+    });
+    let mut row = 0;
+    while let Some(cells) = rows.next() {
+        let cells = cells.map_err(refuse)?;
+        let line = rows.line;
+        if cells.len() != titles.len() {
+            let (here, wanted) = (cells.len(), titles.len());
+            return Err(at(
+                line,
+                format!("{here} cells, and there are {wanted} columns"),
+            ));
+        }
+        let number = |column: Option<usize>, otherwise: u64| match column {
+            None => Ok(otherwise),
+            Some(column) => cells[column].parse().map_err(|_| {
+                let (cell, title) = (quoted(&cells[column]), quoted(&titles[column]));
+                at(
+                    line,
+                    format!("{cell} is no whole number, as column {title} has them"),
+                )
+            }),
+        };
+        let job = number(columns.job, row)?;
+        let release_ns = job.saturating_mul(period_ns.unwrap_or(0));
+        let release_ns = number(columns.release_ns, release_ns)?;
+        let mut value = Vec::new();
+        let mut own = columns.values.iter();
+        encode(
+            &schema,
+            &mut || own.next().map_or("", |&column| &cells[column]),
+            &mut value,
+        )
+        .map_err(|why| at(line, why))?;
+        writer.write(&Entry {
+            what: What::Value,
+            dag: 0,
+            place: 0,
+            job,
+            release_ns,
+            at_ns: number(columns.at_ns, release_ns)?,
+            value: &value,
+        });
+        row += 1;
+    }
+    Ok(writer.finish())
+}
+
+/// What the columns are, by their numbers.
+struct Columns {
+    job: Option<usize>,
+    release_ns: Option<usize>,
+    at_ns: Option<usize>,
+    /// Those of the values, with the names that they have.
+    values: Vec<usize>,
+    names: Vec<String>,
+}
+
+impl Columns {
+    fn new(titles: &[String], options: &Parsed) -> Result<Self, String> {
+        let ignored: Vec<&str> = options
+            .text("ignore")
+            .map_or(Vec::new(), |all| all.split(',').collect());
+        let unknown = ignored
+            .iter()
+            .find(|name| !titles.iter().any(|title| title == *name));
+        if let Some(name) = unknown {
+            let there = titles.join(", ");
+            return Err(format!(
+                "`--ignore`: there is no column {}; there are {there}",
+                quoted(name)
+            ));
+        }
+        let mut columns = Self {
+            job: None,
+            release_ns: None,
+            at_ns: None,
+            values: Vec::new(),
+            names: Vec::new(),
+        };
+        for (number, title) in titles.iter().enumerate() {
+            match title.as_str() {
+                title if ignored.contains(&title) => {}
+                "job" => columns.job = Some(number),
+                "release_ns" => columns.release_ns = Some(number),
+                "at_ns" => columns.at_ns = Some(number),
+                _ => {
+                    columns.values.push(number);
+                    columns.names.push(title.clone());
+                }
+            }
+        }
+        Ok(columns)
+    }
+}
+
+/// Returns the type of the values, which has to fit the columns.
+fn schema(columns: &Columns, options: &Parsed) -> Result<Schema, String> {
+    let Some(text) = options.text("type") else {
+        let field = |name: &String| Field {
+            name: name.clone(),
+            schema: Schema::Scalar(Scalar::F64),
+        };
+        return Ok(Schema::Struct(
+            "Row".into(),
+            columns.names.iter().map(field).collect(),
+        ));
+    };
+    let schema = Schema::parse(text)
+        .map_err(|(column, expected)| format!("`--type`, column {column}: expected {expected}"))?;
+    let mut parts = Vec::new();
+    spread(&schema, "value", &mut parts);
+    let (wanted, here) = (parts.len(), columns.values.len());
+    if wanted != here {
+        let names = columns.names.join(", ");
+        return Err(format!(
+            "the type has {wanted} numbers and texts, and there are {here} columns for them \
+             ({names}); change `--type`, or leave columns out by `--ignore`"
+        ));
+    }
+    Ok(schema)
+}
+
+/// Adds the bytes of a value whose parts are the next cells.
+fn encode<'c>(
+    schema: &Schema,
+    next: &mut dyn FnMut() -> &'c str,
+    out: &mut Vec<u8>,
+) -> Result<(), String> {
+    match schema {
+        Schema::Scalar(scalar) => {
+            let cell = next();
+            let bytes = scalar_bytes(*scalar, cell.trim());
+            *out = [
+                std::mem::take(out),
+                bytes.ok_or_else(|| {
+                    format!("{} is no value of type {}", quoted(cell), scalar.name())
+                })?,
+            ]
+            .concat();
+            Ok(())
+        }
+        Schema::Option(inner) => {
+            let cell = next();
+            out.push(u8::from(!cell.is_empty()));
+            match (&**inner, cell.is_empty()) {
+                (_, true) => Ok(()),
+                (Schema::Scalar(_), false) => encode(inner, &mut || cell, out),
+                _ => Err(format!("a value of type {schema} is not read from a table")),
+            }
+        }
+        Schema::Struct(_, fields) => {
+            (fields.iter()).try_for_each(|field| encode(&field.schema, next, out))
+        }
+        Schema::Tuple(elements) => {
+            (elements.iter()).try_for_each(|element| encode(element, next, out))
+        }
+        Schema::Array(element, count) => (0..*count).try_for_each(|_| encode(element, next, out)),
+        Schema::List(_) => Err(format!("a list, {schema}, is not read from a table")),
+    }
+}
+
+fn scalar_bytes(scalar: Scalar, cell: &str) -> Option<Vec<u8>> {
+    fn of<T: recording::Recordable + std::str::FromStr>(cell: &str) -> Option<Vec<u8>> {
+        cell.parse::<T>().ok().map(|value| to_bytes(&value))
+    }
+    match scalar {
+        Scalar::Bool => of::<bool>(cell),
+        Scalar::Char => of::<char>(cell),
+        Scalar::Text => of::<String>(cell),
+        Scalar::U8 => of::<u8>(cell),
+        Scalar::U16 => of::<u16>(cell),
+        Scalar::U32 => of::<u32>(cell),
+        Scalar::U64 => of::<u64>(cell),
+        Scalar::U128 => of::<u128>(cell),
+        Scalar::I8 => of::<i8>(cell),
+        Scalar::I16 => of::<i16>(cell),
+        Scalar::I32 => of::<i32>(cell),
+        Scalar::I64 => of::<i64>(cell),
+        Scalar::I128 => of::<i128>(cell),
+        Scalar::F32 => of::<f32>(cell),
+        Scalar::F64 => of::<f64>(cell),
+    }
+}
+
+/// The rows of a table, by RFC 4180.
+struct Rows<'t> {
+    text: &'t str,
+    /// The line on which the latest row began, counted from 1.
+    line: usize,
+}
+
+impl Iterator for Rows<'_> {
+    type Item = Result<Vec<String>, (usize, String)>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.text.is_empty() {
+            return None;
+        }
+        self.line += 1;
+        let first = self.line;
+        let (mut cells, mut cell, mut quotes) = (Vec::new(), String::new(), false);
+        let mut letters = self.text.char_indices().peekable();
+        while let Some((place, letter)) = letters.next() {
+            match letter {
+                '"' if quotes && letters.next_if(|(_, next)| *next == '"').is_some() => {
+                    cell.push('"')
+                }
+                '"' if quotes || cell.is_empty() => quotes = !quotes,
+                ',' if !quotes => cells.push(std::mem::take(&mut cell)),
+                '\r' if !quotes => {}
+                '\n' if !quotes => {
+                    self.text = &self.text[place + 1..];
+                    cells.push(cell);
+                    return Some(Ok(cells));
+                }
+                other => {
+                    self.line += usize::from(other == '\n');
+                    cell.push(other);
+                }
+            }
+        }
+        self.text = "";
+        if quotes {
+            let why = "a cell that begins with a quotation mark has no end";
+            return Some(Err((first, why.into())));
+        }
+        cells.push(cell);
+        Some(Ok(cells))
+    }
+}
