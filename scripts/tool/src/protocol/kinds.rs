@@ -108,6 +108,18 @@ pub const KINDS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "gait",
+        &[
+            "jobs",
+            "deadline_misses",
+            "violations",
+            "allocations",
+            "most_udeg",
+            "digest",
+        ],
+    ),
+    ("gait_knee", &["from_job", "angles_udeg"]),
+    (
         "fork_join",
         &[
             "subtasks",

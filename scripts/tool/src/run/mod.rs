@@ -86,6 +86,10 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
         let line = format!("`--{name}` needs `--observe FILE` or `--prove`; give one, too");
         return Err(Refusal::Usage(line));
     }
+    if options.is_given("dag") && options.is_given("module") {
+        let line = "`--dag` and `--module` exclude each other: the DAGs are the module; give one";
+        return Err(Refusal::Usage(line.into()));
+    }
     check_files(options)?;
     let mut dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
@@ -103,7 +107,7 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
-    let inputs = options.named(&["dag", "image", "qemu", "wcets"]);
+    let inputs = options.named(&["dag", "module", "image", "qemu", "wcets"]);
     let outputs = options.named(&["serial", "trace", "dot", "witness", "observe"]);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     log::check(options).map_err(Refusal::Usage)
@@ -239,7 +243,9 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
 fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
     let cores = options.number("cores").unwrap_or(1);
     let loader = loading::chosen(options);
-    let mut least = loader.least_memory_mib().max((cores * 5).div_ceil(8));
+    let module = options.path("module").and_then(|path| path.metadata().ok());
+    let module_mib = module.map_or(0, |module| module.len().div_ceil(1 << 20));
+    let mut least = loader.least_memory_mib().max((cores * 5).div_ceil(8)) + module_mib;
     if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
         least = least.max(dags.memory_mib);
     }
@@ -248,9 +254,13 @@ fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refus
         return Ok(memory_mib);
     }
     if options.is_given("memory") {
+        let with = match module_mib {
+            0 => String::new(),
+            mib => format!(" with a module of {mib} MiB,"),
+        };
         return Err(Refusal::Usage(format!(
-            "`--memory {memory_mib}`: {cores} cores, booted by {loader}, take at least {least} \
-             MiB; give more, or fewer cores"
+            "`--memory {memory_mib}`: {cores} cores,{with} booted by {loader}, take at least \
+             {least} MiB; give more, or fewer cores"
         )));
     }
     Ok(least)

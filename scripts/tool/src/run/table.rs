@@ -91,6 +91,11 @@ pub static RUN: Command = Command {
              or task graphs in .json; of a folder, each of its files, in one table.",
         ),
         Opt::new(
+            "module",
+            Takes::File("FILE"),
+            "Leave this file in the guest's memory, for the app: a recording for gait.",
+        ),
+        Opt::new(
             "print-dag",
             Takes::Nothing,
             "--dag: print the file in our text format; run nothing.",

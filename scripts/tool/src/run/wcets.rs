@@ -1,9 +1,11 @@
-//! What `--wcets FILE` hands to the guest: the file as the first part of the boot module.
+//! What `--wcets FILE` and `--module FILE` hand to the guest: both in one boot module, the WCETs
+//! first.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Refusal;
+use crate::files;
 use crate::options::Parsed;
 use crate::proof::wcets;
 use crate::system;
@@ -11,7 +13,7 @@ use crate::system;
 /// A file of WCETs on its way to the guest; empty if none is given.
 pub(super) struct Wcets {
     text: String,
-    /// Where it lies as a module of its own, if there is no other. It is removed with this
+    /// Where the module of both files lies, if there is no other. It is removed with this
     /// value.
     module: Temporary,
 }
@@ -27,15 +29,21 @@ impl Drop for Temporary {
 }
 
 impl Wcets {
-    /// Reads the file that `--wcets` names, if it does, and writes a module if there is none.
+    /// Reads the files that `--wcets` and `--module` name, if they do, and writes a module of
+    /// them unless DAGs of a file are the module.
     pub(super) fn read(options: &Parsed, is_alone: bool) -> Result<Wcets, Refusal> {
         let read = |path: &Path| wcets::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
+        let own = options.path("module").map(read_module).transpose()?;
         let mut module = Temporary(None);
-        if let (Some(text), true) = (&text, is_alone) {
-            let path = system::new_log("wcets").map_err(Refusal::Failure)?;
-            let path = path.with_extension("wcets");
-            let written = fs::write(&path, text);
+        if is_alone && (text.is_some() || own.is_some()) {
+            let path = system::new_log("module").map_err(Refusal::Failure)?;
+            let path = path.with_extension("module");
+            let parts = [
+                text.as_deref().unwrap_or_default().as_bytes(),
+                &own.unwrap_or_default(),
+            ];
+            let written = fs::write(&path, parts.concat());
             module.0 = Some(path.clone());
             written.map_err(|error| {
                 Refusal::Failure(format!("cannot write `{}`: {error}", path.display()))
@@ -52,7 +60,7 @@ impl Wcets {
         &self.text
     }
 
-    /// Returns the module, if it has nothing else.
+    /// Returns the module that was written.
     pub(super) fn module(&self) -> Option<PathBuf> {
         self.module.0.clone()
     }
@@ -64,4 +72,12 @@ impl Wcets {
             bytes => format!(" wcets={bytes}"),
         }
     }
+}
+
+/// Reads a person's boot module.
+fn read_module(path: &Path) -> Result<Vec<u8>, Refusal> {
+    files::read(path).map_err(|why| {
+        let place = files::place(path);
+        Refusal::Usage(format!("`--module {place}` {why}; name another file"))
+    })
 }

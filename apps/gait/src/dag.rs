@@ -1,0 +1,54 @@
+//! The DAG.
+
+use alloc::vec;
+use core::time::Duration;
+
+use fass::{Dag, SubtaskAttributes, create_dag};
+use recording::{Mismatch, Recording};
+
+use crate::filter::{Quaternion, START, after, conjugate, product};
+use crate::{DAG, PERIOD, Sample, TOPIC, Walk};
+
+/// Each WCET: several times what was observed on two cores in mode `deterministic`.
+const WCET: Duration = Duration::from_micros(50);
+
+/// Builds the DAG, which runs a job for each sample of a recording, and the place of its results.
+///
+/// # Errors
+///
+/// The recording has no samples of ours.
+pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
+    let mut samples = recording.values::<Sample>(DAG, TOPIC)?;
+    let count = samples.clone().count();
+    let walk = Walk::new(count);
+    let dag = create_dag();
+    dag.name(DAG).jobs(count as u64).demand_proof();
+    let taking = |name| SubtaskAttributes::named(name).wcet(WCET);
+    let read = move || {
+        let (_, sample) = samples.next().expect("there is a job for each sample");
+        (sample,)
+    };
+    dag.register_periodic_subtask(read, vec![TOPIC], PERIOD, taking("read"));
+
+    let mut orientation = START;
+    let upper = move |(sample,): (Sample,)| {
+        orientation = after(orientation, &sample.upper);
+        (orientation,)
+    };
+    dag.register_subtask(upper, vec![TOPIC], vec!["upper"], taking("upper"));
+
+    let mut orientation = START;
+    let lower = move |(sample,): (Sample,)| {
+        orientation = after(orientation, &sample.lower);
+        (orientation,)
+    };
+    dag.register_subtask(lower, vec![TOPIC], vec!["lower"], taking("lower"));
+
+    let (results, mut row) = (walk.clone(), 0);
+    let knee = move |(upper, lower): (Quaternion, Quaternion)| {
+        results.take(row, [upper, lower, product(conjugate(upper), lower)]);
+        row += 1;
+    };
+    dag.register_sink_subtask(knee, vec!["upper", "lower"], PERIOD, taking("knee"));
+    Ok((dag, walk))
+}
