@@ -13,12 +13,14 @@
 //! has no guard page. The kernel replaces tables and stack as soon as it can.
 //!
 //! Everything that interprets bytes ([`acpi`], [`multiboot2`], [`pvh`]) works on a borrowed view
-//! of memory and is tested on the host; `unsafe` is in `physical` only.
+//! of memory and is tested on the host; `unsafe` is in `physical` and `memory_functions` only.
 
 #![cfg_attr(not(test), no_std)]
 
 pub mod acpi;
 mod list;
+#[allow(unsafe_code, reason = "C's memory functions take pointers")]
+pub mod memory_functions;
 pub mod multiboot2;
 #[allow(
     unsafe_code,

@@ -8,13 +8,20 @@
 use crate::BootInfo;
 use crate::physical::PhysicalMemory;
 
-mod tag {
-    pub(super) const END: u32 = 0;
-    pub(super) const COMMAND_LINE: u32 = 1;
-    pub(super) const MODULE: u32 = 3;
-    pub(super) const MEMORY_MAP: u32 = 6;
-    pub(super) const OLD_RSDP: u32 = 14;
-    pub(super) const NEW_RSDP: u32 = 15;
+/// The kinds of tags that are read.
+pub mod tag {
+    /// The end of the list.
+    pub const END: u32 = 0;
+    /// The command line.
+    pub const COMMAND_LINE: u32 = 1;
+    /// A file that the loader left in memory.
+    pub const MODULE: u32 = 3;
+    /// The memory map.
+    pub const MEMORY_MAP: u32 = 6;
+    /// A copy of the ACPI root pointer, as it was before ACPI 2.0.
+    pub const OLD_RSDP: u32 = 14;
+    /// A copy of the ACPI root pointer since then.
+    pub const NEW_RSDP: u32 = 15;
 }
 
 /// Adds what the list of tags at `address` tells to `info`.

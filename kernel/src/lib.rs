@@ -63,6 +63,9 @@ mod start;
 mod text;
 mod watch;
 
+#[doc(hidden)]
+pub use boot::memory_functions;
+
 pub use app::ending::Ending;
 pub use app::event::Event;
 pub use app::lock::Lock;

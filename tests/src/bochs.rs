@@ -14,9 +14,10 @@ use std::time::Duration;
 
 use tool::child::{Child, Waited, bound_to_us};
 use tool::install;
-use tool::iso::Temporary;
+use tool::medium::Medium;
 use tool::outcome::judge_lines;
 use tool::protocol::Transcript;
+use tool::qemu::Loader;
 use tool::system::{find_program, host_load, new_log};
 
 use crate::guest::built;
@@ -35,7 +36,7 @@ pub fn succeed(package: &str, words: &str, model: &str, cores: u64) -> Transcrip
     let run = || -> Result<String, String> {
         install::ensure(&install::BOCHS)?;
         let words = format!("{words} end=off");
-        let iso = Temporary::new(&built(package)?.path, &words, None)?;
+        let iso = Medium::new(Loader::Bios, &built(package)?.path, &words, None)?;
         let log = new_log("bochs")?;
         let (settings, said) = (log.with_extension("bochs"), log.with_extension("said"));
         let text = settings_text(model, cores, iso.path(), &log, &said);

@@ -98,8 +98,8 @@ impl Guest {
         self
     }
 
-    /// Boots as a PC does: from a stick, by this loader and GRUB, with its words and its
-    /// module on the stick. It is in real time, as firmware takes long otherwise, on a q35.
+    /// Boots as a PC does: from a stick, by this loader, with its words and its module on
+    /// the stick. It is in real time, as firmware takes long otherwise, on a q35.
     #[must_use]
     pub fn from_stick(self, loader: Loader) -> Guest {
         let mut guest = self.in_real_time().machine(Machine::Q35);

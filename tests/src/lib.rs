@@ -1,11 +1,13 @@
 //! What the boot tests share, above the host tool's library: a [`Guest`] that a test
-//! describes and boots, [`bochs`], where it is not QEMU that boots it, and the tutorials, whose examples are this crate's doctests.
+//! describes and boots, [`stick`] for what it boots from as a PC does, [`bochs`], where it is not
+//! QEMU that boots it, and the tutorials, whose examples are this crate's doctests.
 
 #![forbid(unsafe_code)]
 
 pub mod bochs;
 pub mod guest;
 pub mod guide;
+pub mod stick;
 
 pub use guest::Guest;
 

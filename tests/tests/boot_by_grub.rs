@@ -1,32 +1,7 @@
 //! The image boots from a stick, as on a PC: by GRUB, under a BIOS and under UEFI.
 
-use std::fs;
-
-use harness::Guest;
-use tool::protocol::Status;
+use harness::stick::{self, boots};
 use tool::qemu::Loader;
-use tool::system;
-
-/// Boots the demo and checks that words, processors and memory came through GRUB.
-fn boots(loader: Loader, cores: u64, memory_mib: u64) {
-    let guest = Guest::new("fork-join").from_stick(loader).cores(cores);
-    let guest = guest
-        .memory_mib(memory_mib)
-        .word("jobs=3")
-        .word("subtasks=2");
-    let outcome = guest.succeed();
-    let boots: Vec<_> = outcome.transcript.of_kind("boot").collect();
-    assert_eq!(boots.len(), 1, "one boot line is due\n{}", outcome.tail());
-    let boot = boots[0];
-    assert_eq!(boot.number_at("cpus"), Some(cores), "{}", boot.text);
-    let words = "mode=threads budget_factor=0 jobs=3 subtasks=2";
-    assert_eq!(boot.text_at("command_line"), Some(words));
-    let memory_kib = boot.number_at("memory_kib").expect("the protocol has it");
-    assert!(memory_kib <= memory_mib << 10, "{}", boot.text);
-    assert!(memory_kib > (memory_mib << 10) / 10 * 9, "{}", boot.text);
-    let run = outcome.transcript.of_kind("fork_join").next();
-    assert_eq!(run.and_then(|line| line.number_at("joins")), Some(3));
-}
 
 #[test]
 fn two_processors_by_a_bios() {
@@ -51,15 +26,6 @@ fn four_processors_by_uefi() {
 /// Under UEFI it lies below 1 MiB.
 #[test]
 fn a_file_on_the_stick_reaches_the_app_by_both() {
-    let file = system::new_log("module").expect("a folder for logs");
-    let mut content = vec![b'z'; 100_001];
-    content[..2].copy_from_slice(b"xy");
-    fs::write(&file, content).expect("a file in it");
-    for loader in [Loader::Bios, Loader::Uefi] {
-        let guest = Guest::new("replay").from_stick(loader).module(&file);
-        let outcome = guest.end_in(Status::Usage);
-        let reason = outcome.transcript.verdict().expect("checked before").reason;
-        assert!(reason.contains("found `xyz"), "{reason}");
-    }
-    fs::remove_file(&file).expect("it is ours");
+    stick::hands_over_a_file(Loader::Bios);
+    stick::hands_over_a_file(Loader::Uefi);
 }

@@ -54,6 +54,20 @@ pub static GRUB: Need = Need {
     )],
 };
 
+/// What makes a FAT stick.
+pub static MTOOLS: Need = Need {
+    name: "mtools",
+    what: "mtools, which write FAT file systems",
+    parts: &["mformat", "mmd", "mcopy"],
+    packages: &[
+        ("apt-get", &["mtools"]),
+        ("dnf", &["mtools"]),
+        ("pacman", &["mtools"]),
+        ("zypper", &["mtools"]),
+        ("apk", &["mtools"]),
+    ],
+};
+
 /// UEFI for QEMU.
 pub static OVMF: Need = Need {
     name: "OVMF",
@@ -126,6 +140,7 @@ pub fn ensure_loader(loader: Loader) -> Result<(), String> {
         Loader::Pvh => Ok(()),
         Loader::Bios => ensure(&GRUB),
         Loader::Uefi => ensure(&GRUB).and_then(|()| ensure(&OVMF)),
+        Loader::Efi => ensure(&MTOOLS).and_then(|()| ensure(&OVMF)),
     }
 }
 
@@ -235,7 +250,7 @@ fn is_root() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{BOCHS, GRUB, MANAGERS, Need, OVMF, QEMU, plan};
+    use super::{BOCHS, GRUB, MANAGERS, MTOOLS, Need, OVMF, QEMU, plan};
 
     fn lines(programs: &[&str], root: bool) -> Result<Vec<String>, String> {
         lines_of(&QEMU, programs, root)
@@ -292,7 +307,7 @@ mod tests {
 
     #[test]
     fn packages_are_of_managers_that_we_can_run() {
-        for (manager, packages) in [&QEMU, &GRUB, &OVMF, &BOCHS]
+        for (manager, packages) in [&QEMU, &GRUB, &MTOOLS, &OVMF, &BOCHS]
             .into_iter()
             .flat_map(|n| n.packages)
         {

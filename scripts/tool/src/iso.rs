@@ -6,7 +6,7 @@
 
 use std::ffi::OsString;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use crate::elf;
@@ -106,39 +106,6 @@ fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
         files::place(iso),
         last.into_iter().rev().collect::<Vec<_>>().join("; ")
     ))
-}
-
-/// An ISO for one boot, which is removed with this value.
-#[derive(Debug)]
-pub struct Temporary {
-    path: PathBuf,
-}
-
-impl Temporary {
-    /// Makes an ISO as [`write()`] does.
-    ///
-    /// # Errors
-    ///
-    /// As [`write()`].
-    pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<Temporary, String> {
-        let path = system::new_log("stick")?.with_extension("iso");
-        let iso = Temporary { path };
-        write(&iso.path, image, words, module)?;
-        Ok(iso)
-    }
-
-    /// Returns where it lies.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        // It is ours, and in the way of no one if it cannot be removed.
-        let _ = fs::remove_file(&self.path);
-    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 //! the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
-//! - [`elf`], [`image`], [`iso`], [`places`], [`tiny`]: what is booted;
+//! - [`elf`], [`image`], [`efi`], [`iso`], [`medium`], [`places`], [`tiny`]: what is booted;
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
@@ -38,6 +38,7 @@ pub mod bench;
 pub mod child;
 pub mod dag_file;
 pub mod dot;
+pub mod efi;
 pub mod elf;
 pub mod fault_page;
 pub mod files;
@@ -46,6 +47,7 @@ pub mod install;
 pub mod iso;
 pub mod json;
 pub mod markdown;
+pub mod medium;
 pub mod new_app;
 pub mod options;
 pub mod oracle;

@@ -13,7 +13,7 @@ use std::process::ChildStdin;
 use std::time::Duration;
 
 use crate::files;
-use crate::iso::Temporary;
+use crate::medium::Medium;
 use crate::places::Places;
 use crate::protocol::{MachineLine, Status, Transcript};
 use crate::qemu::{Ending, Qemu};
@@ -82,12 +82,13 @@ pub fn boot_with_input(
     mut show: impl FnMut(&str),
 ) -> Result<Outcome, String> {
     let needs_stick = qemu.loader.needs_stick();
-    let iso = needs_stick.then(|| {
+    let medium = needs_stick.then(|| {
         qemu.check_words()?;
-        Temporary::new(image, &qemu.guest_words, qemu.module.as_deref())
+        let module = qemu.module.as_deref();
+        Medium::new(qemu.loader, image, &qemu.guest_words, module)
     });
-    let iso = iso.transpose()?;
-    let loaded = iso.as_ref().map_or(image, Temporary::path);
+    let medium = medium.transpose()?;
+    let loaded = medium.as_ref().map_or(image, Medium::path);
     let mut running = qemu.start(loaded, log)?;
     talk(running.input());
     let mut tail = Tail::new(log);

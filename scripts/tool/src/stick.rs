@@ -1,21 +1,24 @@
 //! The subcommand `image`: an app as a file that boots on a PC.
 //!
-//! The file is an [`iso`], with the app's image, the words that it is to be given and a file
-//! that it is to find in memory. What can be refused is, before anything is built; the
-//! file is there whole or as it was.
+//! The file is an [`iso`] or an application of UEFI ([`efi`]), with the app's image, the words
+//! that it is to be given and a file that it is to find in memory. What can be refused is,
+//! before anything is built, and nothing is written before all of it is there.
 //!
-//! Exit codes: 0 the file is there, 1 it could not be made, 2 a refused command line.
+//! Exit codes: 0 the files are there, 1 one could not be made, 2 a refused command line.
 
 use std::ffi::OsString;
 use std::fs;
+use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
+use crate::efi;
 use crate::files;
 use crate::image;
-use crate::iso::{self, Temporary};
+use crate::iso;
+use crate::medium::Medium;
 use crate::options::{Command, Opt, Parsed, Takes};
-use crate::qemu::Qemu;
+use crate::qemu::{Loader, Qemu};
 
 /// The table of `image`.
 pub static IMAGE: Command = Command {
@@ -34,6 +37,11 @@ pub static IMAGE: Command = Command {
         .or("fork-join"),
         Opt::new("iso", Takes::File("FILE"), "The ISO to be made."),
         Opt::new(
+            "efi",
+            Takes::File("FILE"),
+            "The application of UEFI to be made: EFI/BOOT/BOOTX64.EFI of any FAT stick.",
+        ),
+        Opt::new(
             "module",
             Takes::File("MODULE"),
             "A file that the app finds in memory, as dag-file does its DAGs.",
@@ -46,12 +54,14 @@ pub static IMAGE: Command = Command {
     ],
     notes: "\
 The ISO boots by GRUB, under BIOS and UEFI. `cp FILE /dev/DEVICE` writes it to a stick,
-and what was there is lost; docs/stick.md says how, and what is known of real PCs.
+and what was there is lost. The application needs UEFI, and no GRUB: a stick with a FAT file
+system keeps what it has, and gets one file more. docs/stick.md says how, and what is known of
+real PCs.
 
 DAGs of a file: `./scripts/run --dag FILE --print-dag > MODULE` makes the module for
 `--app dag-file`, whose words are those that `./scripts/run --dag FILE` shows.
 
-exit codes: 0 the file is there; 1 it could not be made; 2 a refused command line
+exit codes: 0 the files are there; 1 one could not be made; 2 a refused command line
 ",
 };
 
@@ -67,8 +77,8 @@ pub fn image(words: &[OsString]) -> ExitCode {
         Err(line) => return IMAGE.refuse(&line),
     };
     match make(&options, &guest_words) {
-        Ok(line) => {
-            println!("{line}");
+        Ok(lines) => {
+            print!("{lines}");
             ExitCode::SUCCESS
         }
         Err(line) => IMAGE.fail(&line),
@@ -77,11 +87,12 @@ pub fn image(words: &[OsString]) -> ExitCode {
 
 /// Makes sure of everything that can be refused, and returns the words for the guest.
 fn check(options: &Parsed) -> Result<String, String> {
-    if !options.is_given("iso") {
-        return Err("which file? give --iso FILE".into());
+    let outputs = options.named(&["iso", "efi"]);
+    if outputs.is_empty() {
+        return Err("which file? give --iso FILE or --efi FILE".into());
     }
     let inputs = options.named(&["module", "image"]);
-    files::check(&inputs, &options.named(&["iso"]))?;
+    files::check(&inputs, &outputs)?;
     for input in &inputs {
         let (option, place) = (input.option, files::place(input.path));
         let read = match option {
@@ -96,7 +107,9 @@ fn check(options: &Parsed) -> Result<String, String> {
     }
     let words = options.files().map(Path::to_string_lossy);
     let guest_words = words.collect::<Vec<_>>().join(" ");
-    iso::check_words(&guest_words)?;
+    if options.is_given("iso") {
+        iso::check_words(&guest_words)?;
+    }
     let guest = Qemu {
         guest_words,
         ..Qemu::default()
@@ -105,7 +118,7 @@ fn check(options: &Parsed) -> Result<String, String> {
     Ok(guest.guest_words)
 }
 
-/// Makes the ISO, and returns what to say of it.
+/// Makes the files, and returns what to say of each, a line.
 fn make(options: &Parsed, words: &str) -> Result<String, String> {
     let image = match options.path("image") {
         Some(path) => path.into(),
@@ -114,16 +127,33 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
             built.map_err(|error| error.to_string())?.path
         }
     };
-    let made = Temporary::new(&image, words, options.path("module"))?;
-    let path = options.path("iso").unwrap_or(Path::new("")); // checked before
-    let place = files::place(path);
-    let bytes = fs::copy(made.path(), path)
-        .map_err(|why| format!("`--iso {place}`: cannot be written: {why}"))?;
-    Ok(format!(
-        "{place}: {} KiB that boot under BIOS and UEFI; `cp {place} /dev/DEVICE` writes it to a \
-         stick, and what was there is lost",
-        bytes >> 10
-    ))
+    let module = options.path("module");
+    let written = |option: &str, path: &Path, why: io::Error| {
+        let place = files::place(path);
+        format!("`--{option} {place}`: cannot be written: {why}")
+    };
+    let mut lines = String::new();
+    if let Some(path) = options.path("iso") {
+        let made = Medium::new(Loader::Bios, &image, words, module)?;
+        let bytes = fs::copy(made.path(), path).map_err(|why| written("iso", path, why))?;
+        let place = files::place(path);
+        lines += &format!(
+            "{place}: {} KiB that boot under BIOS and UEFI; `cp {place} /dev/DEVICE` writes it to a \
+             stick, and what was there is lost\n",
+            bytes >> 10
+        );
+    }
+    if let Some(path) = options.path("efi") {
+        let made = efi::application(&image, words, module)?;
+        fs::write(path, &made).map_err(|why| written("efi", path, why))?;
+        let place = files::place(path);
+        lines += &format!(
+            "{place}: {} KiB that boot under UEFI; copy it to {} of a FAT stick\n",
+            made.len() >> 10,
+            efi::PLACE
+        );
+    }
+    Ok(lines)
 }
 
 #[cfg(test)]
@@ -141,7 +171,11 @@ mod tests {
         assert!(refused("--image /etc/passwd").starts_with("`--image /etc/passwd`: is no image"));
         assert!(refused(&"x".repeat(2049)).contains("2049 bytes"));
         let why = check(&IMAGE.right("jobs=3")).unwrap_err();
-        assert_eq!(why, "which file? give --iso FILE");
+        assert_eq!(why, "which file? give --iso FILE or --efi FILE");
+        let twice = IMAGE.right("jobs=3").with("iso", &iso).with("efi", &iso);
+        assert!(check(&twice).unwrap_err().contains("`--efi "));
+        let any = check(&IMAGE.right("it's").with("efi", &iso));
+        assert_eq!(any.as_deref(), Ok("it's"), "without GRUB");
         let right = IMAGE.right("jobs=3 seed=7").with("iso", &iso);
         assert_eq!(check(&right).as_deref(), Ok("jobs=3 seed=7"));
         assert!(!iso.exists());

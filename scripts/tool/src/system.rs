@@ -93,7 +93,7 @@ pub fn new_log(name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
 }
 
-/// Removes what processes that were ended from outside have left: boot modules, ISOs, contents
+/// Removes what processes that were ended from outside have left: boot modules, sticks, contents
 /// of logs from before, and logs of guests that were running. The log of a guest that
 /// failed stays, for it was shown to a person.
 fn clear(folder: &Path) {
@@ -110,7 +110,7 @@ fn clear(folder: &Path) {
         let is_process = process.bytes().all(|byte| byte.is_ascii_digit());
         if !is_process
             || is_alive(process)
-            || !["dag", "before", "iso", "log.qemu"].contains(&ending)
+            || !["dag", "before", "iso", "img", "log.qemu"].contains(&ending)
         {
             continue;
         }
@@ -144,7 +144,7 @@ mod tests {
         let mut gone = Command::new("true").spawn().unwrap();
         let (dead, alive) = (gone.id(), id());
         gone.wait().unwrap();
-        let endings = ["dag", "before", "iso", "log", "log.qemu"];
+        let endings = ["dag", "before", "iso", "img", "log", "log.qemu"];
         let names = |process| endings.map(|ending| format!("dag-file-{process}-3.{ending}"));
         let shown = format!("soak-{dead}-7.log");
         let mut all = [names(dead), names(alive)].concat();

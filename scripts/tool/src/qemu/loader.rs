@@ -1,4 +1,5 @@
-//! What brings the image into the guest's memory: QEMU itself, or a firmware and GRUB.
+//! What brings the image into the guest's memory: QEMU itself, or a firmware, with GRUB or
+//! without.
 
 use std::fmt;
 
@@ -16,16 +17,18 @@ pub enum Loader {
     Bios,
     /// GRUB, started from a stick by UEFI.
     Uefi,
+    /// An application of our own, started from a stick by UEFI.
+    Efi,
 }
 
 impl Loader {
     /// The words for [`Loader`] on command lines.
-    pub const NAMES: &[&str] = &["pvh", "bios", "uefi"];
+    pub const NAMES: &[&str] = &["pvh", "bios", "uefi", "efi"];
 
     /// Returns the loader of that name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Loader> {
-        let all = [Loader::Pvh, Loader::Bios, Loader::Uefi];
+        let all = [Loader::Pvh, Loader::Bios, Loader::Uefi, Loader::Efi];
         all.into_iter().find(|loader| loader.name() == name)
     }
 
@@ -36,6 +39,7 @@ impl Loader {
             Loader::Pvh => "pvh",
             Loader::Bios => "bios",
             Loader::Uefi => "uefi",
+            Loader::Efi => "efi",
         }
     }
 
@@ -45,12 +49,24 @@ impl Loader {
         self != Loader::Pvh
     }
 
+    /// Reports whether the words come by GRUB.
+    #[must_use]
+    pub fn is_grub(self) -> bool {
+        matches!(self, Loader::Bios | Loader::Uefi)
+    }
+
+    /// Reports whether the firmware is UEFI.
+    #[must_use]
+    pub fn is_by_uefi(self) -> bool {
+        matches!(self, Loader::Uefi | Loader::Efi)
+    }
+
     /// Returns the least memory in MiB with which it has been seen to come to the image.
     #[must_use]
     pub fn least_memory_mib(self) -> u64 {
         match self {
             Loader::Pvh | Loader::Bios => LEAST_MEMORY_MIB,
-            Loader::Uefi => 96,
+            Loader::Uefi | Loader::Efi => 96,
         }
     }
 }

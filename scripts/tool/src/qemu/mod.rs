@@ -199,7 +199,7 @@ impl Qemu {
             let mut arguments: Vec<OsString> = vec!["-drive".into(), drive];
             let devices = ["-device", "qemu-xhci", "-device", "usb-storage,drive=stick"];
             arguments.extend(devices.map(OsString::from));
-            if self.loader == Loader::Uefi {
+            if self.loader.is_by_uefi() {
                 arguments.extend(["-bios", OVMF_FILE].map(OsString::from));
             }
             return arguments;
@@ -343,14 +343,16 @@ mod tests {
         };
         assert!(with(Loader::Pvh).contains("-kernel image -append jobs=3"));
         let (bios, uefi) = (with(Loader::Bios), with(Loader::Uefi));
-        for line in [&bios, &uefi] {
+        let efi = with(Loader::Efi);
+        for line in [&bios, &uefi, &efi] {
             assert!(line.contains("readonly=on,file=image "), "{line}");
             assert!(
                 !line.contains("-kernel") && !line.contains("jobs"),
                 "{line}"
             );
         }
-        assert!(uefi.contains("-bios /usr/share/ovmf/OVMF.fd") && !bios.contains("-bios"));
+        let firmware = "-bios /usr/share/ovmf/OVMF.fd";
+        assert!(uefi.contains(firmware) && efi.contains(firmware) && !bios.contains("-bios"));
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
              {loader}` does; give --machine q35, or leave --boot out"
         ));
     }
-    if loader == Loader::Uefi && mode == Some(Mode::Deterministic) {
+    if loader.is_by_uefi() && mode == Some(Mode::Deterministic) {
         return Err(
             "`--mode deterministic`: UEFI has been given up after minutes where instructions \
              are counted; give --mode threads, or --boot bios"
@@ -71,7 +71,9 @@ mod tests {
     fn uefi_is_not_counted() {
         let counted = Some(Mode::Deterministic);
         assert_eq!(check(&RUN.right("--boot bios"), counted), Ok(()));
-        let refused = check(&RUN.right("--boot uefi"), counted).unwrap_err();
-        assert!(refused.contains("--mode threads"), "{refused}");
+        for line in ["--boot uefi", "--boot efi"] {
+            let refused = check(&RUN.right(line), counted).unwrap_err();
+            assert!(refused.contains("--mode threads"), "{refused}");
+        }
     }
 }

@@ -148,7 +148,7 @@ fn boot_app(
     // No mode has a longer name than this one.
     let longest = describe(named.unwrap_or(Mode::Deterministic));
     longest.check_words().map_err(Refusal::Usage)?;
-    if longest.loader.needs_stick() {
+    if longest.loader.is_grub() {
         iso::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
     }
     let log = Log::choose(options, &app).map_err(Refusal::Failure)?;

@@ -137,19 +137,20 @@ pub static RUN: Command = Command {
             "mode",
             Takes::OneOf(Mode::NAMES),
             "What time means, see below; kvm where it works, else deterministic, or threads with \
-             --boot bios or uefi.",
+             --boot bios, uefi or efi.",
         ),
         Opt::new(
             "machine",
             Takes::OneOf(Machine::NAMES),
-            "The board that QEMU imitates; with --boot bios or uefi it is q35.",
+            "The board that QEMU imitates; with --boot bios, uefi or efi it is q35.",
         )
         .or("microvm"),
         Opt::new(
             "boot",
             Takes::OneOf(Loader::NAMES),
-            "What brings the image into memory: QEMU (pvh), or GRUB on a stick, started by a \
-             BIOS or by UEFI, as on a PC.",
+            "What brings the image into memory: QEMU (pvh), or as on a PC, from a stick, GRUB, \
+             started by a BIOS (bios) or by UEFI (uefi), or an application of our own, started \
+             by UEFI (efi).",
         )
         .or("pvh"),
         Opt::new(

@@ -47,7 +47,8 @@ impl TestBinary {
 }
 
 /// What test programs need besides QEMU.
-const NEEDS: [(&str, &[&Need]); 2] = [
+const NEEDS: [(&str, &[&Need]); 3] = [
+    ("boot_by_efi", &[&install::MTOOLS, &install::OVMF]),
     ("boot_by_grub", &[&install::GRUB, &install::OVMF]),
     ("boot_in_bochs", &[&install::GRUB, &install::BOCHS]),
 ];
