@@ -23,26 +23,41 @@ pub(crate) fn enable() {
 /// Notes that interrupts have just been disabled here, at `place`.
 pub(super) fn begin(place: &'static Location<'static>) {
     if ENABLED.load(Ordering::Relaxed) {
-        let meter = this_core::get().meter();
-        meter
-            .began_at
-            .store(core::ptr::from_ref(place).cast_mut(), Ordering::Relaxed);
-        meter.began.store(cpu::time_stamp(), Ordering::Relaxed);
+        measure_from(place);
     }
 }
 
 /// Notes that interrupts are about to be enabled.
 pub(super) fn end() {
     if ENABLED.load(Ordering::Relaxed) {
-        let meter = this_core::get().meter();
-        let began = meter.began.swap(0, Ordering::Relaxed);
-        let ticks = cpu::time_stamp().saturating_sub(began);
-        if began != 0 && ticks > meter.longest.load(Ordering::Relaxed) {
-            meter.longest.store(ticks, Ordering::Relaxed);
-            meter
-                .longest_at
-                .store(meter.began_at.load(Ordering::Relaxed), Ordering::Relaxed);
-        }
+        measure_to_here();
+    }
+}
+
+// Not a part of each place that disables interrupts: few runs measure, and an image has
+// many such places and little room.
+
+#[cold]
+#[inline(never)]
+fn measure_from(place: &'static Location<'static>) {
+    let meter = this_core::get().meter();
+    meter
+        .began_at
+        .store(core::ptr::from_ref(place).cast_mut(), Ordering::Relaxed);
+    meter.began.store(cpu::time_stamp(), Ordering::Relaxed);
+}
+
+#[cold]
+#[inline(never)]
+fn measure_to_here() {
+    let meter = this_core::get().meter();
+    let began = meter.began.swap(0, Ordering::Relaxed);
+    let ticks = cpu::time_stamp().saturating_sub(began);
+    if began != 0 && ticks > meter.longest.load(Ordering::Relaxed) {
+        meter.longest.store(ticks, Ordering::Relaxed);
+        meter
+            .longest_at
+            .store(meter.began_at.load(Ordering::Relaxed), Ordering::Relaxed);
     }
 }
 

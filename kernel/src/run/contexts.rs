@@ -65,14 +65,14 @@ pub(crate) fn provide(total: usize) -> Result<(), OutOfMemory> {
     Ok(())
 }
 
-/// Takes a context out of the stock.
+/// Takes a context out of the stock. Interrupts are disabled.
 ///
 /// # Panics
 ///
 /// If there is none, which [`provide`]'s rule excludes.
 fn take() -> Parked {
     STOCK
-        .lock()
+        .lock_uninterrupted()
         .free
         .pop()
         .expect("contexts are provided at commit")

@@ -39,7 +39,7 @@ impl Object<'_, '_> {
     ///
     /// See [`Object`].
     pub fn number(&mut self, name: &str, value: impl Into<u64>) -> &mut Self {
-        self.shown(name, &value.into())
+        self.whole(name, value.into())
     }
 
     /// Writes a field with a truth value.
@@ -53,7 +53,7 @@ impl Object<'_, '_> {
     ///
     /// See [`Object`].
     pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
-        self.shown(name, &quoted(value))
+        self.quoted(name, &value)
     }
 
     /// Writes a field with an object.
@@ -66,48 +66,68 @@ impl Object<'_, '_> {
     /// Writes a field with a list of values, each of which is JSON already.
     ///
     /// See [`Object`].
-    pub fn list(&mut self, name: &str, values: impl Iterator<Item = impl Display>) -> &mut Self {
-        self.field(name, |out| {
-            out.write_str("[")?;
-            for (index, value) in values.enumerate() {
-                let separator = if index == 0 { "" } else { "," };
-                write!(out, "{separator}{value}")?;
-            }
-            out.write_str("]")
+    pub fn list(
+        &mut self,
+        name: &str,
+        mut values: impl Iterator<Item = impl Display>,
+    ) -> &mut Self {
+        self.each(name, &mut |show| {
+            let value = values.next()?;
+            show(&value);
+            Some(())
         })
     }
 
-    /// Writes a field whose value is JSON already. One function for all: lines are not
-    /// written in haste, and an image has little room.
+    // One function for all callers each: lines are not written in haste, and an image has
+    // little room.
+
     #[inline(never)]
-    fn shown(&mut self, name: &str, value: &dyn Display) -> &mut Self {
-        self.field(name, |out| value.fmt(out))
+    fn whole(&mut self, name: &str, value: u64) -> &mut Self {
+        self.shown(name, &value)
     }
 
-    fn field(
+    #[inline(never)]
+    fn quoted(&mut self, name: &str, value: &dyn Display) -> &mut Self {
+        self.shown(name, &quoted(value))
+    }
+
+    /// Writes a list; `next` shows a value, while there is one.
+    #[inline(never)]
+    fn each(
         &mut self,
         name: &str,
-        value: impl FnOnce(&mut Formatter<'_>) -> fmt::Result,
+        next: &mut dyn FnMut(&mut dyn FnMut(&dyn Display)) -> Option<()>,
     ) -> &mut Self {
-        self.begin(name);
-        self.result = self.result.and_then(|()| value(self.out));
+        self.shown(name, &"[");
+        let mut separator = "";
+        let mut show = |value: &dyn Display| {
+            self.result = self
+                .result
+                .and_then(|()| write!(self.out, "{separator}{value}"));
+            separator = ",";
+        };
+        while next(&mut show).is_some() {}
+        self.result = self.result.and_then(|()| self.out.write_str("]"));
         self
     }
 
+    /// Writes a field whose value is JSON already.
     #[inline(never)]
-    fn begin(&mut self, name: &str) {
+    fn shown(&mut self, name: &str, value: &dyn Display) -> &mut Self {
         let separator = if self.first { "" } else { "," };
         self.first = false;
         self.result = self
             .result
-            .and_then(|()| write!(self.out, "{separator}{}:", quoted(name)));
+            .and_then(|()| write!(self.out, "{separator}{}:{value}", quoted(name)));
+        self
     }
 }
 
 /// An object as text.
-struct Fields<F>(F);
+struct Fields<'a>(&'a dyn Fn(&mut Object<'_, '_>));
 
-impl<F: Fn(&mut Object<'_, '_>)> Display for Fields<F> {
+impl Display for Fields<'_> {
+    #[inline(never)]
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
         out.write_str("{")?;
         let mut object = Object {
@@ -153,9 +173,9 @@ impl fmt::Write for Escaped<'_, '_> {
 ///
 /// See [`Object`].
 pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
-    Fields(move |object: &mut Object<'_, '_>| {
-        object.text("kind", kind);
-        fields(object);
+    fmt::from_fn(move |out| {
+        let whole = |object: &mut Object<'_, '_>| fields(object.quoted("kind", &kind));
+        Fields(&whole).fmt(out)
     })
 }
 

@@ -82,7 +82,7 @@ pub(crate) fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
 /// Ends this core's instance because of a fault, and with it its DAG or its job. The
 /// context that ran it must not be resumed. Interrupts are disabled.
 pub(crate) fn fail(now_ns: u64) {
-    let mut place = EXECUTION.lock();
+    let mut place = EXECUTION.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;
     };
@@ -107,7 +107,7 @@ pub(crate) fn fail(now_ns: u64) {
 /// Makes a step of the scheduler if `is_event`, and follows its decisions on this
 /// core. In an interrupt handler.
 pub(crate) fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
-    let mut place = EXECUTION.lock();
+    let mut place = EXECUTION.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;
     };
