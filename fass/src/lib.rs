@@ -119,6 +119,7 @@ pub use platform::{
 };
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan};
+pub use run::record::Recorded;
 pub use run::staleness::Staleness;
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};

@@ -10,11 +10,13 @@ use alloc::string::String;
 use core::fmt;
 use core::time::Duration;
 
+use recording::Channel;
 use sched_dag::analysis::Overheads;
 use sched_dag::{DagId, Policy, Preemption};
 
 use crate::run::cell::SetOnce;
 use crate::run::plan::Plan;
+use crate::run::record::Recorded;
 
 static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
 
@@ -113,6 +115,30 @@ pub trait Platform: Sync {
     fn raise(&self, plan: u64, dag: DagId) {
         let _ = (plan, dag);
         panic!("this platform takes no signals from outside; raise them in subtasks");
+    }
+
+    /// Takes the recorded topics of a DAG ([`Dag::record`](crate::Dag::record)) and the hash
+    /// of its names and edges, before the plan comes. Channels are numbered over all DAGs, in
+    /// the order of the calls.
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel]) {
+        let _ = (dag, graph, channels);
+    }
+
+    /// Takes a value of a recorded topic, at the completion of its writer; without a
+    /// definition it is forgotten. Must not wait.
+    fn record(&self, value: &Recorded<'_>) {
+        let _ = value;
+    }
+
+    /// Reports whether the plan to come shall take the values of recorded sources from
+    /// [`replay`](Self::replay), in place of calling them.
+    fn replays(&self) -> bool {
+        false
+    }
+
+    /// Lends the recorded value of a channel and a job to `take`, if there is one.
+    fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        let _ = (channel, job, take);
     }
 
     /// Takes a plan over. Its first release is the platform's to time.

@@ -27,9 +27,10 @@ pub(crate) fn tie(
     staleness: Vec<Staleness>,
 ) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
+    let mut channels = 0;
     let (bodies, others) = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
         .map(|((id, dag), verified)| {
-            let (spec, make_bodies, latest, effects, resets) = {
+            let (spec, make_bodies, latest, effects, resets, recorded) = {
                 let mut draft = dag.draft.borrow_mut();
                 draft.is_committed = true;
                 let name = draft.spec.name.clone();
@@ -44,8 +45,14 @@ pub(crate) fn tie(
                 let effects = core::mem::take(&mut draft.effects);
                 let make_bodies = core::mem::take(&mut draft.make_bodies);
                 let resets = core::mem::take(&mut draft.resets);
-                (spec, make_bodies, draft.latest.clone(), effects, resets)
+                let recorded = core::mem::take(&mut draft.recorded);
+                let latest = draft.latest.clone();
+                (spec, make_bodies, latest, effects, resets, recorded)
             };
+            if let Some(any) = recorded.first() {
+                any.open_all(&recorded, id, &spec, channels);
+                channels += recorded.len();
+            }
             let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
             let faults = match verified.on_fault() {
                 OnFault::EndDag => 0,
@@ -54,7 +61,9 @@ pub(crate) fn tie(
             resets.into_iter().for_each(|provide| provide.1(faults));
             let mut wiring = Wiring::new(&spec, &latest, slots, faults);
             let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
-                make_body(&mut wiring, subtask)
+                let any = recorded.first();
+                any.and_then(|any| any.source(&recorded, &spec, &mut wiring, subtask))
+                    .unwrap_or_else(|| make_body(&mut wiring, subtask))
             };
             let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
             let mut others: Vec<Vec<Body>> = bodies.iter().map(|_| Vec::new()).collect();

@@ -24,6 +24,7 @@ use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 use crate::run::effect::Effect;
 use crate::run::latest::AnyLatest;
 use crate::run::message::MessageType;
+use crate::run::record::AnyRecorded;
 use crate::run::replaceable::{self, Functions};
 use crate::run::signal::Target;
 use crate::run::subtask::{MakeBody, defer};
@@ -47,6 +48,8 @@ pub(crate) struct Draft {
     pub(crate) demands_proof: bool,
     /// The topics whose latest values are offered.
     pub(crate) latest: Vec<Rc<dyn AnyLatest>>,
+    /// The topics that are recorded; they stand in `latest`, too.
+    pub(crate) recorded: Vec<Rc<dyn AnyRecorded>>,
     /// The latest values that subtasks sample, of whatever DAG.
     pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>)>,
     /// The signals that subtasks may raise, of whatever DAG.

@@ -11,6 +11,7 @@ pub(crate) mod effect;
 pub(crate) mod latest;
 pub(crate) mod message;
 pub(crate) mod plan;
+pub(crate) mod record;
 pub(crate) mod replaceable;
 pub(crate) mod reset;
 pub(crate) mod signal;

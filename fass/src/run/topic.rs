@@ -103,7 +103,9 @@ impl<T: Message> Publisher<T> {
     fn share(&mut self, job: u64, value: T) {
         // The commit refuses several readers of a type that gives `None`.
         let stage = |stage: &mut Box<dyn Stage<T>>, value: &T| {
-            if let Some(clone) = value.for_another_reader() {
+            if !stage.looks_at(job, value)
+                && let Some(clone) = value.for_another_reader()
+            {
                 stage.stage(job, clone);
             }
         };
@@ -117,7 +119,9 @@ impl<T: Message> Publisher<T> {
             put(last, job, value);
         } else if let Some((last, others)) = self.stages.split_last_mut() {
             (others.iter_mut()).for_each(|sampled| stage(sampled, &value));
-            last.stage(job, value);
+            if !last.looks_at(job, &value) {
+                last.stage(job, value);
+            }
         }
     }
 }

@@ -32,6 +32,7 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
+mod edge;
 mod error;
 mod platform;
 mod record;
@@ -44,11 +45,13 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use fass::{Overheads, Policy, Preemption, Signal};
+pub use recording::Malformed;
 pub use sched_dag::law::{Rule, Violation};
 pub use sched_dag::{
     CoreId, DagId, DagLabel, DagStatistics, Instance, JobOutcome, SubtaskId, SubtaskLabel,
 };
 
+pub use edge::Divergence;
 pub use error::RunError;
 use platform::Machine;
 pub use record::{InstanceRecord, JobRecord, PanicRecord};
@@ -257,6 +260,35 @@ impl VirtualTime {
     pub fn contain_panics(self) -> Self {
         self.machine.surroundings.contains_panics.set(true);
         self
+    }
+
+    /// Replays a recording: what [`Dag::record`](fass::Dag::record) says of sources is taken
+    /// from it in place of calling them, jobs of which it has no values are passed over, and
+    /// signals come when they came, from nowhere else. To be called before the commit, which
+    /// is refused if the recording is of another graph or of other types.
+    ///
+    /// What other subtasks write to recorded topics is compared: [`Report::compared`] says how
+    /// many values were, [`Report::uncompared`] how many not, as jobs of the replay were skipped, and
+    /// [`Report::divergence`] which is the first that differs.
+    ///
+    /// # Errors
+    ///
+    /// The bytes are no recording, or are not those that were written.
+    ///
+    /// See [`Dag::record`](fass::Dag::record) for an example.
+    pub fn replay(self, recording: &[u8]) -> Result<Self, Malformed> {
+        self.machine.surroundings.edge.replay(recording)?;
+        Ok(self)
+    }
+
+    /// Returns the recording of all that was run since the commit: the values of the topics
+    /// that [`Dag::record`](fass::Dag::record) names, signals, and jobs that were skipped or
+    /// cut. It is empty if nothing was committed.
+    ///
+    /// See [`Dag::record`](fass::Dag::record).
+    #[must_use]
+    pub fn recording(&self) -> Vec<u8> {
+        self.machine.recording()
     }
 
     /// Raises a signal from outside at a time of the run, counted from the start of

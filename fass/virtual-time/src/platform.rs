@@ -11,8 +11,9 @@ use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded};
 
+use recording::Channel;
 use sched_dag::{DagId, SchedulerOptions};
 
 use crate::error::RunError;
@@ -69,6 +70,15 @@ impl Machine {
         if self.plan.get() == Some(plan) {
             self.surroundings.signal_at(time_ns, dag);
         }
+    }
+
+    /// Returns the recording of the run so far.
+    pub(crate) fn recording(&self) -> Vec<u8> {
+        let session = self.session.borrow();
+        let edge = &self.surroundings.edge;
+        session
+            .as_ref()
+            .map_or(Vec::new(), |session| session.recording(edge))
     }
 
     /// Steps the session to its end or for a duration. Meanwhile this machine
@@ -139,6 +149,25 @@ impl Platform for HostPlatform {
         machine.raise_at(machine.surroundings.now_ns.get(), (plan, dag));
     }
 
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel]) {
+        expect_current()
+            .surroundings
+            .edge
+            .open(dag, graph, channels);
+    }
+
+    fn record(&self, value: &Recorded<'_>) {
+        expect_current().surroundings.edge.record(value);
+    }
+
+    fn replays(&self) -> bool {
+        current().is_some_and(|machine| machine.surroundings.edge.is_replay())
+    }
+
+    fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        expect_current().surroundings.edge.lend(channel, job, take);
+    }
+
     fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
         let Some(machine) = current() else {
             return Err(LaunchError::new(
@@ -150,6 +179,11 @@ impl Platform for HostPlatform {
                 "this `VirtualTime` has a plan already; commit all DAGs in one call, \
                  or make a new `VirtualTime`",
             ));
+        }
+        let surroundings = &machine.surroundings;
+        let signals = surroundings.edge.launch(&plan).map_err(LaunchError::new)?;
+        for (dag, time_ns) in signals {
+            surroundings.signal_of_replay_at(time_ns, dag);
         }
         machine.plan.set(Some(plan.number));
         let options = SchedulerOptions {

@@ -8,6 +8,7 @@ use sched_dag::journal::{Event, What};
 use sched_dag::law::{self, Record, Terms, Violation};
 use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
 
+use crate::edge::Divergence;
 use crate::record::{InstanceRecord, JobRecord, PanicRecord};
 
 /// Everything that happened from the commit to the end of a run.
@@ -55,6 +56,12 @@ pub struct Report {
     pub sink_misses: Vec<Vec<u64>>,
     /// The time of the last event.
     pub end_ns: u64,
+    /// In a replay, how many values were compared with recorded ones.
+    pub compared: u64,
+    /// In a replay, how many recorded values this run has not computed (yet).
+    pub uncompared: u64,
+    /// In a replay, the first value that is not the recorded one.
+    pub divergence: Option<Divergence>,
     pub(crate) task_set: Arc<TaskSet>,
     pub(crate) options: SchedulerOptions,
 }

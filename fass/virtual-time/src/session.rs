@@ -18,6 +18,7 @@ use sched_dag::{
     SubtaskLabel, TaskSet,
 };
 
+use crate::edge::Edge;
 use crate::error::RunError;
 use crate::record::PanicRecord;
 use crate::report::Report;
@@ -93,11 +94,11 @@ impl Session {
                 subtask: self.subtask_label(instance),
                 job: instance.job,
                 message,
-                report: Box::new(self.report()),
+                report: Box::new(self.report(&machine.edge)),
             });
         }
         match end {
-            End::Finished | End::TimeReached | End::Stopped => Ok(self.report()),
+            End::Finished | End::TimeReached | End::Stopped => Ok(self.report(&machine.edge)),
             End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
                 dag: self.dag_label(instance.dag),
                 subtask: self.subtask_label(instance),
@@ -132,7 +133,14 @@ impl Session {
         SubtaskLabel { id, name }
     }
 
-    fn report(&self) -> Report {
+    /// Returns the recording of the run so far.
+    pub(crate) fn recording(&self, edge: &Edge) -> Vec<u8> {
+        let events = &self.recording.journal.events;
+        edge.recording(&self.task_set, events, &self.report(edge).record())
+    }
+
+    fn report(&self, edge: &Edge) -> Report {
+        let (compared, uncompared, divergence) = edge.outcome();
         let scheduler = self.driver.scheduler();
         let dags = (0..).map(DagId).zip(self.task_set.dags());
         let sink_misses = |(dag, model): (DagId, &Dag)| {
@@ -158,6 +166,9 @@ impl Session {
             statistics,
             sink_misses,
             end_ns: journal.now_ns,
+            compared,
+            uncompared,
+            divergence,
             task_set: Arc::clone(&self.task_set),
             options: scheduler.options(),
         };
@@ -204,6 +215,10 @@ impl Workload for Runner<'_> {
             return 0;
         }
         let machine = self.machine;
+        if machine.edge.passes_over(instance) {
+            self.body(instance).discard(instance.job);
+            return 0;
+        }
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
         let body = self.body(instance);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use sched_dag::DagId;
 
+use crate::edge::Edge;
 use crate::silent::Silent;
 
 /// The time, the signals to come, and what is to become of a panic.
@@ -12,6 +13,8 @@ use crate::silent::Silent;
 pub(crate) struct Surroundings {
     /// How long calls take that do not say.
     pub(crate) silent: Cell<Silent>,
+    /// What is recorded and replayed.
+    pub(crate) edge: Edge,
     /// Whether a panic of a function ends its DAG only.
     pub(crate) contains_panics: Cell<bool>,
     /// The time that functions are told: the start of the instance and what it
@@ -24,8 +27,15 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Notes a signal to a DAG of the launched plan.
+    /// Notes a signal to a DAG of the launched plan; in a replay all signals are recorded ones.
     pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
+        if !self.edge.is_replay() {
+            self.signal_of_replay_at(time_ns, dag);
+        }
+    }
+
+    /// Notes a signal that is recorded, or one of a run that is no replay.
+    pub(crate) fn signal_of_replay_at(&self, time_ns: u64, dag: DagId) {
         let mut signals = self.signals.borrow_mut();
         let mut of_this_time = signals.range((time_ns, 0)..=(time_ns, usize::MAX));
         let place = of_this_time

@@ -91,6 +91,11 @@ impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
 /// Where a writer puts what shall show at its completion.
 pub(crate) trait Stage<T>: Send + Sync {
     fn stage(&mut self, job: u64, value: T);
+
+    /// Looks at the value, and reports whether that is enough; else it takes one.
+    fn looks_at(&mut self, _job: u64, _value: &T) -> bool {
+        false
+    }
 }
 
 /// The slots of one sampling subtask.

@@ -1,0 +1,71 @@
+//! Recording topics: stating which values shall be written down.
+
+use alloc::rc::Rc;
+
+use recording::Recordable;
+
+use super::dag::Dag;
+use crate::platform::expect_installed;
+use crate::run::message::Message;
+use crate::run::record::{Edge, RecordedTopic};
+
+static EDGE: Edge = Edge {
+    open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels),
+    replays: || expect_installed().replays(),
+    record: |value| expect_installed().record(value),
+    replay: |channel, job, take| expect_installed().replay(channel, job, take),
+};
+
+impl Dag {
+    /// Records the values of a topic, where the platform records.
+    ///
+    /// What a source writes is what a replay takes in place of calling it; so of a DAG that shall
+    /// be replayed all topics of its sources are recorded. What another subtask writes is what a
+    /// replay compares. A topic that is recorded counts as read. The type must be the
+    /// writer's, which the commit checks; a [`Unique`](crate::Unique) cannot be recorded.
+    ///
+    /// A value is written down when its function has returned, into a buffer that is made at the
+    /// commit, and is given to the platform when the instance is complete. One that takes more
+    /// than 4 KiB, or twice the least of its type if that is more, is lost, which the recording
+    /// says.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// fn commit(mut input: u32) {
+    ///     let dag = create_dag();
+    ///     dag.name("demo").jobs(3).record::<u32>("count").record::<u64>("square");
+    ///     let period = Duration::from_millis(10);
+    ///     let source = move || {
+    ///         input += 1;
+    ///         (input,)
+    ///     };
+    ///     let named = SubtaskAttributes::named;
+    ///     dag.register_periodic_subtask(source, vec!["count"], period, named("count"));
+    ///     let square = |(count,): (u32,)| (u64::from(count) * u64::from(count),);
+    ///     dag.register_subtask(square, vec!["count"], vec!["square"], named("square"));
+    ///     dag.register_sink_subtask(|_: (u64,)| (), vec!["square"], period, named("sink"));
+    ///     finish_create_dags(&[dag]).unwrap();
+    /// }
+    ///
+    /// let machine = VirtualTime::new();
+    /// commit(7);
+    /// machine.run();
+    /// let recording = machine.recording();
+    ///
+    /// let machine = VirtualTime::new().replay(&recording).unwrap();
+    /// commit(70); // it is not called
+    /// let report = machine.run();
+    /// assert_eq!((report.compared, report.divergence), (3, None));
+    /// ```
+    #[track_caller]
+    pub fn record<T: Message + Recordable>(&self, topic: &str) -> &Self {
+        let recorded = Rc::new(RecordedTopic::<T>::new(topic, &EDGE));
+        let mut draft = self.open();
+        draft.latest.push(Rc::<RecordedTopic<T>>::clone(&recorded));
+        draft.recorded.push(recorded);
+        self
+    }
+}

@@ -1,0 +1,307 @@
+//! A recorded topic: what writes its values down, and what gives them back in a replay.
+//!
+//! Such a topic has a reader of its own, the *tap*. It takes no value but looks at it, when the
+//! writer's function has returned, and writes it into a buffer; the writer's completion gives
+//! the buffer to the platform. In a replay the body of a source is another one, which asks the
+//! platform for the values of the job, and sends them.
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::any::Any;
+use core::marker::PhantomData;
+use core::sync::atomic::{AtomicU16, Ordering};
+
+use recording::{Channel, Encoder, Recordable, Role, Schema};
+use sched_dag::wcets::graph_hash;
+use sched_dag::{DagId, DagSpec, TopicPort};
+
+use super::cell::Shared;
+use super::effect::Effect;
+use super::latest::{AnyLatest, Stage};
+use super::message::{Message, MessageType};
+use super::plan::{Body, Subtask};
+use super::topic::{Ports, Publisher, Wiring};
+
+/// The least room for a value.
+const ROOM: usize = 4096;
+
+/// A value that a recorded topic gives to the platform, when its writer's instance is complete.
+///
+/// ```
+/// fn show(value: &fass::Recorded<'_>) {
+///     match value.bytes {
+///         Some(bytes) => println!("channel {}, job {}: {bytes:?}", value.channel, value.job),
+///         None => println!("channel {}, job {} is lost", value.channel, value.job),
+///     }
+/// }
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Recorded<'v> {
+    /// The number of the channel ([`Platform::open_channels`](crate::Platform::open_channels)).
+    pub channel: u16,
+    /// The job.
+    pub job: u64,
+    /// When the instance was complete, on the clock of [`crate::now_ns`].
+    pub completed_ns: u64,
+    /// The value; `None` if there was no room for it.
+    pub bytes: Option<&'v [u8]>,
+}
+
+/// The way from a topic to the platform, and back. What a commit does about recorded topics is
+/// reached through them only, so that an image without any has no code for it.
+pub(crate) struct Edge {
+    /// Takes the recorded topics of a DAG, and the hash of its graph.
+    pub(crate) open: fn(DagId, u64, &[Channel]),
+    /// Reports whether there is a replay.
+    pub(crate) replays: fn() -> bool,
+    /// Takes a value.
+    pub(crate) record: fn(&Recorded<'_>),
+    /// Lends a value, if there is one.
+    pub(crate) replay: Lend,
+}
+
+/// Lends the value of a channel and a job.
+type Lend = fn(u16, u64, &mut dyn FnMut(&[u8]));
+
+/// A recorded topic while DAGs are built.
+pub(crate) struct RecordedTopic<T> {
+    topic: String,
+    line: Arc<Line>,
+    of: PhantomData<fn() -> T>,
+}
+
+/// A recorded topic of whatever type.
+pub(crate) trait AnyRecorded {
+    fn topic(&self) -> &str;
+
+    fn edge(&self) -> &'static Edge;
+
+    /// Takes the number of the channel, and returns the type of its values.
+    fn open(&self, number: u16) -> Schema;
+
+    /// Returns what sends recorded values, in the place of the writer's next output port.
+    fn replayed(&self, ports: &mut Ports<'_>) -> Box<dyn Replayed>;
+
+    /// Numbers all recorded topics of a DAG, and tells the platform.
+    fn open_all(&self, all: &[Rc<dyn AnyRecorded>], dag: DagId, spec: &DagSpec, first: usize) {
+        let channels = (first..).zip(all);
+        let channels: Vec<Channel> = channels
+            .map(|(number, topic)| channel(&**topic, number, dag, spec))
+            .collect();
+        (self.edge().open)(dag, graph_hash(spec), &channels);
+    }
+
+    /// Returns the body of a source in a replay, if there is one and the source is recorded.
+    fn source(
+        &self,
+        all: &[Rc<dyn AnyRecorded>],
+        spec: &DagSpec,
+        wiring: &mut Wiring,
+        subtask: usize,
+    ) -> Option<Body> {
+        let source = &spec.subtasks[subtask];
+        let find = |topic: &str| all.iter().find(|recorded| recorded.topic() == topic);
+        let is_recorded = source
+            .outputs
+            .iter()
+            .any(|port| find(&port.topic).is_some());
+        if !is_recorded || !source.inputs.is_empty() || !(self.edge().replays)() {
+            return None;
+        }
+        let mut ports = wiring.ports(subtask);
+        let outputs = source.outputs.iter().map(|port| match find(&port.topic) {
+            Some(recorded) => recorded.replayed(&mut ports),
+            None => Box::new(NotRecorded(port.topic.clone())) as Box<dyn Replayed>,
+        });
+        Some(Body::new(Box::new(ReplayedSource(outputs.collect()))))
+    }
+}
+
+/// Numbers a recorded topic.
+fn channel(topic: &dyn AnyRecorded, number: usize, dag: DagId, spec: &DagSpec) -> Channel {
+    let narrow = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
+    let mut subtasks = spec.subtasks.iter().enumerate();
+    let writer = subtasks.find(|(_, subtask)| {
+        let mut outputs = subtask.outputs.iter();
+        outputs.any(|port| port.topic == topic.topic())
+    });
+    let role = match writer {
+        Some((_, writer)) if writer.inputs.is_empty() => Role::Source,
+        _ => Role::Result,
+    };
+    Channel {
+        dag: narrow(dag.index()),
+        subtask: narrow(writer.map_or(0, |(number, _)| number)),
+        role,
+        topic: topic.topic().into(),
+        schema: topic.open(narrow(number)),
+    }
+}
+
+/// What sends recorded values to a topic.
+pub(crate) trait Replayed: Send {
+    fn send(&mut self, job: u64);
+}
+
+/// What the tap, the completion and a replay of a topic share.
+struct Line {
+    number: AtomicU16,
+    edge: &'static Edge,
+    room: Shared<Room>,
+}
+
+/// The value of an instance that is not complete yet.
+struct Room {
+    bytes: Vec<u8>,
+    /// Its job, and how many bytes it has, if it fitted.
+    value: Option<(u64, Option<usize>)>,
+}
+
+impl<T: Recordable> RecordedTopic<T> {
+    pub(crate) fn new(topic: &str, edge: &'static Edge) -> Self {
+        let room = ROOM.max(2 * T::LEAST_BYTES);
+        Self {
+            topic: topic.into(),
+            line: Arc::new(Line {
+                number: AtomicU16::new(0),
+                edge,
+                room: Shared::new(Room {
+                    bytes: alloc::vec![0; room],
+                    value: None,
+                }),
+            }),
+            of: PhantomData,
+        }
+    }
+}
+
+impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
+    fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    fn port(&self) -> TopicPort {
+        MessageType::of::<T>().port(&self.topic)
+    }
+
+    /// The tap, which is a reader.
+    fn samplers(&self) -> usize {
+        1
+    }
+
+    fn stages(&self) -> Box<dyn Any> {
+        let tap: Box<dyn Stage<T>> = Box::new(Tap(Arc::clone(&self.line)));
+        Box::new(Vec::from([tap]))
+    }
+
+    fn effects(&self) -> Vec<Box<dyn Effect>> {
+        Vec::from([Box::new(Tap(Arc::clone(&self.line))) as Box<dyn Effect>])
+    }
+}
+
+impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
+    fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    fn edge(&self) -> &'static Edge {
+        self.line.edge
+    }
+
+    fn open(&self, number: u16) -> Schema {
+        self.line.number.store(number, Ordering::Relaxed);
+        T::schema()
+    }
+
+    fn replayed(&self, ports: &mut Ports<'_>) -> Box<dyn Replayed> {
+        Box::new(Source {
+            publisher: ports.publisher::<T>(),
+            line: Arc::clone(&self.line),
+        })
+    }
+}
+
+/// The tap of a topic: the reader that looks, and what the completion does.
+struct Tap(Arc<Line>);
+
+impl Tap {
+    /// Claims the room. Only the writer's body uses it, which is `&mut` there.
+    fn change(&self, change: impl FnOnce(&mut Room)) {
+        if let Some(mut room) = self.0.room.change() {
+            change(&mut room);
+        }
+    }
+}
+
+impl<T: Recordable> Stage<T> for Tap {
+    fn looks_at(&mut self, job: u64, value: &T) -> bool {
+        self.change(|room| {
+            let mut out = Encoder::new(&mut room.bytes);
+            value.encode(&mut out);
+            room.value = Some((job, out.finish().ok()));
+        });
+        true
+    }
+
+    fn stage(&mut self, _job: u64, _value: T) {}
+}
+
+impl Effect for Tap {
+    fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
+        self.change(|room| {
+            if let Some((job, length)) = room.value.take() {
+                (self.0.edge.record)(&Recorded {
+                    channel: self.0.number.load(Ordering::Relaxed),
+                    job,
+                    completed_ns,
+                    bytes: length.and_then(|length| room.bytes.get(..length)),
+                });
+            }
+        });
+    }
+}
+
+/// Sends recorded values.
+struct Source<T> {
+    publisher: Publisher<T>,
+    line: Arc<Line>,
+}
+
+impl<T: Message + Recordable> Replayed for Source<T> {
+    fn send(&mut self, job: u64) {
+        let mut value = None;
+        let number = self.line.number.load(Ordering::Relaxed);
+        (self.line.edge.replay)(number, job, &mut |bytes| value = T::from_bytes(bytes).ok());
+        match value {
+            Some(value) => self.publisher.send(job, value),
+            None => panic!("the recording has no value of this job, or one of another type"),
+        }
+    }
+}
+
+/// An output of a source that is replayed, and is not recorded.
+struct NotRecorded(String);
+
+impl Replayed for NotRecorded {
+    fn send(&mut self, _job: u64) {
+        panic!(
+            "topic `{topic}` is not recorded, and another one of the source is; add \
+             `dag.record::<T>(\"{topic}\")`, and record again",
+            topic = self.0
+        );
+    }
+}
+
+/// A source that is not called.
+struct ReplayedSource(Vec<Box<dyn Replayed>>);
+
+impl Subtask for ReplayedSource {
+    fn take_turn(&mut self, job: u64) {
+        self.0.iter_mut().for_each(|output| output.send(job));
+    }
+
+    fn discard(&mut self, _job: u64) {}
+}
