@@ -93,11 +93,7 @@ impl Object<'_, '_> {
 
     /// Writes a list; `next` shows a value, while there is one.
     #[inline(never)]
-    fn each(
-        &mut self,
-        name: &str,
-        next: &mut dyn FnMut(&mut dyn FnMut(&dyn Display)) -> Option<()>,
-    ) -> &mut Self {
+    fn each(&mut self, name: &str, next: &mut dyn FnMut(Show<'_>) -> Option<()>) -> &mut Self {
         self.shown(name, &"[");
         let mut separator = "";
         let mut show = |value: &dyn Display| {
@@ -122,6 +118,9 @@ impl Object<'_, '_> {
         self
     }
 }
+
+/// Writes a value of a list.
+type Show<'s> = &'s mut dyn FnMut(&dyn Display);
 
 /// An object as text.
 struct Fields<'a>(&'a dyn Fn(&mut Object<'_, '_>));
