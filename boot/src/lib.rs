@@ -13,7 +13,8 @@
 //! has no guard page. The kernel replaces tables and stack as soon as it can.
 //!
 //! Everything that interprets bytes ([`acpi`], [`multiboot2`], [`pvh`]) works on a borrowed view
-//! of memory and is tested on the host; `unsafe` is in `physical` and `memory_functions` only.
+//! of memory and is tested on the host; `unsafe` is in `physical`, `screen` and
+//! `memory_functions` only.
 
 #![cfg_attr(not(test), no_std)]
 
@@ -29,6 +30,8 @@ pub mod multiboot2;
 pub mod physical;
 pub mod power;
 pub mod pvh;
+#[allow(unsafe_code, reason = "pixels are at addresses")]
+pub mod screen;
 
 use physical::PhysicalMemory;
 
@@ -55,6 +58,8 @@ pub struct BootInfo {
     /// The files that the loader left in memory, in its order. Where they lie is the
     /// loader's word, which the kernel compares with the memory map.
     pub modules: List<Module, MAX_MODULES>,
+    /// The screen, if the loader left one.
+    pub screen: Option<Framebuffer>,
     /// The physical address of the ACPI root pointer, if the loader named it.
     pub rsdp: Option<u64>,
     /// The time stamp counter when Rust code began to run, in ticks.
@@ -70,6 +75,30 @@ pub struct MemoryRegion {
     pub end: u64,
     /// Whether it is ordinary memory that nobody uses.
     pub usable: bool,
+}
+
+/// A screen of coloured pixels in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Framebuffer {
+    /// The physical address of the upper left pixel.
+    pub start: u64,
+    /// The bytes from a row to the next, at least those of the pixels.
+    pub pitch: u32,
+    /// The pixels of a row.
+    pub width: u32,
+    /// The rows.
+    pub height: u32,
+    /// The bytes of a pixel: 2 to 4.
+    pub pixel_bytes: u8,
+}
+
+impl Framebuffer {
+    /// Returns the memory that it takes.
+    #[must_use]
+    pub fn range(&self) -> core::ops::Range<u64> {
+        let bytes = u64::from(self.pitch) * u64::from(self.height);
+        self.start..self.start.saturating_add(bytes)
+    }
 }
 
 /// A file that the loader left in memory: `qemu -initrd FILE`, GRUB's `module2 FILE`.
@@ -97,6 +126,7 @@ impl BootInfo {
                 usable: false,
             }),
             modules: List::new(Module { start: 0, end: 0 }),
+            screen: None,
             rsdp: None,
             entry_tsc,
         }

@@ -5,8 +5,8 @@
 //! pointer, of which a tag holds a copy, only its place is kept. What is not known is
 //! passed over, and a list that is cut short tells what it tells.
 
-use crate::BootInfo;
 use crate::physical::PhysicalMemory;
+use crate::{BootInfo, Framebuffer};
 
 /// The kinds of tags that are read.
 pub mod tag {
@@ -18,6 +18,8 @@ pub mod tag {
     pub const MODULE: u32 = 3;
     /// The memory map.
     pub const MEMORY_MAP: u32 = 6;
+    /// The screen.
+    pub const SCREEN: u32 = 8;
     /// A copy of the ACPI root pointer, as it was before ACPI 2.0.
     pub const OLD_RSDP: u32 = 14;
     /// A copy of the ACPI root pointer since then.
@@ -56,6 +58,7 @@ fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info:
                 let _ = info.add_module(u64::from(start), u64::from(end));
             }
         }
+        tag::SCREEN => info.screen = read_screen(memory, start),
         tag::MEMORY_MAP => read_memory_map(memory, start, end, info),
         // This copy ends before what a later revision would have.
         tag::OLD_RSDP if memory.u8(start + REVISION) == Some(0) => {
@@ -64,6 +67,21 @@ fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info:
         tag::NEW_RSDP => info.rsdp = Some(start),
         _ => {}
     }
+}
+
+/// Reads where the screen is, unless it has text alone, or colours by numbers.
+fn read_screen(memory: &impl PhysicalMemory, at: u64) -> Option<Framebuffer> {
+    const DIRECT_COLOUR: u8 = 1;
+    let screen = Framebuffer {
+        start: memory.u64(at)?,
+        pitch: memory.u32(at + 8)?,
+        width: memory.u32(at + 12)?,
+        height: memory.u32(at + 16)?,
+        pixel_bytes: memory.u8(at + 20)?.div_ceil(8),
+    };
+    let has_colours = memory.u8(at + 21)? == DIRECT_COLOUR;
+    let fits = screen.width.checked_mul(screen.pixel_bytes.into())? <= screen.pitch;
+    (has_colours && fits && (2..=4).contains(&screen.pixel_bytes)).then_some(screen)
 }
 
 fn read_memory_map(memory: &impl PhysicalMemory, start: u64, end: u64, info: &mut BootInfo) {
@@ -190,6 +208,28 @@ mod tests {
         assert_eq!(at(&[new.clone(), old.clone()]), Some(32));
         assert_eq!(at(&[old, new]), Some(64));
         assert_eq!(at(&[rsdp(tag::OLD_RSDP, 2)]), None, "cut off");
+    }
+
+    #[test]
+    fn a_screen_is_one_of_coloured_pixels() {
+        let screen = |pitch: u32, depth: u8, kind: u8| {
+            let mut bytes = 0xc000_0000_u64.to_le_bytes().to_vec();
+            bytes.extend([pitch, 800, 600].map(u32::to_le_bytes).concat());
+            bytes.extend([depth, kind, 0, 0]);
+            info(&list(&[(tag::SCREEN, bytes)])).screen
+        };
+        let wanted = Framebuffer {
+            start: 0xc000_0000,
+            pitch: 3328,
+            width: 800,
+            height: 600,
+            pixel_bytes: 4,
+        };
+        assert_eq!(screen(3328, 32, 1), Some(wanted));
+        assert_eq!(screen(3328, 24, 1).map(|it| it.pixel_bytes), Some(3));
+        assert_eq!(screen(3199, 32, 1), None, "rows that overlap");
+        assert_eq!(screen(3328, 8, 0), None, "colours by numbers");
+        assert_eq!(screen(160, 16, 2), None, "text");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! As much of UEFI as it takes to get memory, to say a line, and to leave.
 //!
 //! The tables and calls are those of the UEFI specification 2.10, 4.3 (system table), 7.2
-//! (memory), 7.4.6 (leaving), 9.1 (the loaded application) and 12.4 (text). Of a table the
+//! (memory), 7.4.6 (leaving), 9.1 (the loaded application), 12.4 (text) and 12.9 (screen). Of a table the
 //! fields up to the last one in use are listed.
 //!
 //! **Firmware invariant**: while the value [`Firmware`] lives the boot services are there, and
@@ -22,6 +22,7 @@ type Guid = [u64; 2];
 
 const LOADED_IMAGE: Guid = [0x11d2_9562_5b1b_31a1, 0x3b72_69c9_a000_3f8e];
 const NEW_ACPI: Guid = [0x11d3_e4f1_8868_e871, 0x8188_3cc7_8000_22bc];
+const GRAPHICS: Guid = [0x4a38_23dc_9042_a9de, 0x6a51_80d0_de7a_fb96];
 const OLD_ACPI: Guid = [0x11d3_2d88_eb9d_2d30, 0x4dc1_3f27_9000_169a];
 
 /// What the firmware starts an application with.
@@ -66,6 +67,8 @@ struct BootServices {
     more_protocols: [*const c_void; 5],
     images: [*const c_void; 4],
     exit: extern "efiapi" fn(Handle, usize) -> Status,
+    miscellaneous: [*const c_void; 10],
+    locate_protocol: extern "efiapi" fn(*const Guid, *const c_void, *mut *mut c_void) -> Status,
 }
 
 #[repr(C)]
@@ -79,6 +82,33 @@ struct LoadedImage {
     options: *const c_void,
     start: *const u8,
     length: u64,
+}
+
+#[repr(C)]
+struct GraphicsOutput {
+    calls: [*const c_void; 3],
+    mode: *const GraphicsMode,
+}
+
+#[repr(C)]
+struct GraphicsMode {
+    count: u32,
+    number: u32,
+    info: *const GraphicsInfo,
+    info_length: usize,
+    start: u64,
+    length: usize,
+}
+
+#[repr(C)]
+pub(crate) struct GraphicsInfo {
+    version: u32,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    format: u32,
+    masks: [u32; 4],
+    /// The pixels from a row to the next.
+    pub(crate) pitch: u32,
 }
 
 /// Which pages [`BootServices::allocate_pages`] is to give.
@@ -168,6 +198,23 @@ impl Firmware {
             unsafe { core::slice::from_raw_parts(table, bytes) },
             bytes == 36,
         ))
+    }
+
+    /// Returns the screen's address and shape, if it has pixels of 32 bits in memory.
+    pub(crate) fn screen(&self) -> Option<(u64, &'static GraphicsInfo)> {
+        let mut found = null_mut();
+        let locate = self.services().locate_protocol;
+        if locate(&GRAPHICS, null_mut(), &mut found) != 0 {
+            return None;
+        }
+        // SAFETY: by the firmware invariant that is what this protocol leads to.
+        let output = unsafe { &*found.cast::<GraphicsOutput>() };
+        // SAFETY: likewise.
+        let mode = unsafe { &*output.mode };
+        // SAFETY: likewise.
+        let info = unsafe { &*mode.info };
+        // Both formats of 8 bits a colour.
+        (info.format <= 1).then_some((mode.start, info))
     }
 
     /// Takes pages for at least `bytes`, which become ordinary memory when the firmware is left.

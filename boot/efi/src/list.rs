@@ -36,6 +36,17 @@ impl<'b> List<'b> {
         self.tag(tag::COMMAND_LINE, &[words, &[0]]);
     }
 
+    /// Adds the screen, of pixels of 32 bits.
+    pub fn screen(&mut self, start: u64, pitch: u32, width: u32, height: u32) {
+        const DEPTH_AND_KIND: [u8; 4] = [32, 1, 0, 0];
+        let numbers = [pitch, width, height].map(u32::to_le_bytes);
+        let numbers = numbers.as_flattened();
+        self.tag(
+            tag::SCREEN,
+            &[&start.to_le_bytes(), numbers, &DEPTH_AND_KIND],
+        );
+    }
+
     /// Adds a file that lies in `start..end`.
     pub fn module(&mut self, start: u32, end: u32) {
         self.tag(
@@ -122,6 +133,7 @@ mod tests {
     fn write(list: &mut List<'_>) {
         list.command_line(b"jobs=3 k=\xc3\xa4");
         list.module(0x7000, 0x7005);
+        list.screen(1 << 33, 4096, 1000, 600);
         let mut copy = [0; 36];
         copy[15] = 2;
         list.root_pointer(&copy, true);
@@ -142,6 +154,10 @@ mod tests {
         let mut info = BootInfo::new(0);
         multiboot2::read(&machine, 0, &mut info);
         assert_eq!(info.command_line(), Ok("jobs=3 k=\u{e4}"));
+        assert_eq!(
+            info.screen.map(|it| (it.start, it.width)),
+            Some((1 << 33, 1000))
+        );
         let module = Module {
             start: 0x7000,
             end: 0x7005,

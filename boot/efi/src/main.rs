@@ -66,6 +66,10 @@ extern "efiapi" fn efi_main(handle: Handle, system: *const SystemTable) -> ! {
         let start = low.wrapping_add(module_at);
         list.module(address(start), address(start.wrapping_add(module.len())));
     }
+    if let Some((start, shape)) = firmware.screen() {
+        let pitch = shape.pitch.saturating_mul(4);
+        list.screen(start, pitch, shape.width, shape.height);
+    }
     if let Some((copy, is_new)) = firmware.root_pointer() {
         list.root_pointer(copy, is_new);
     }

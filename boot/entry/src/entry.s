@@ -23,6 +23,10 @@ multiboot2_header:
     .long -(0xe85250d6 + multiboot2_header_end - multiboot2_header)
     .word 6, 0                      # modules begin on pages
     .long 8
+    .word 5, 1                      # a screen, if there is one, of any size
+    .long 20
+    .long 0, 0, 32
+    .balign 8
     .word 0, 0                      # the end
     .long 8
 multiboot2_header_end:

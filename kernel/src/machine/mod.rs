@@ -25,6 +25,7 @@ pub(crate) mod paging;
 pub(crate) mod port;
 pub(crate) mod power;
 pub(crate) mod processors;
+pub(crate) mod screen;
 pub(crate) mod section;
 pub(crate) mod serial;
 pub(crate) mod spinlock;

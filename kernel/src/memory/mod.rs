@@ -58,11 +58,12 @@ pub(crate) struct Layout {
 /// 1. The boot page table is in use, and `map` is the machine's memory map.
 /// 2. It is called once, by the boot processor, before anything is allocated.
 /// 3. `module`, if any, [lies in memory](lies_in_memory) by that map.
-/// 4. At `devices` there are registers.
+/// 4. At `devices` there are registers, and `screen`, whole pages, is a screen.
 pub(crate) unsafe fn initialize(
     map: &[MemoryRegion],
     module: Option<Module>,
     devices: &[u64],
+    screen: Range<u64>,
 ) -> Result<Layout, OutOfMemory> {
     let mut frames = Frames::new(map, &[boot_entry::image::whole(), pages_of(module)]);
     let total_bytes = frames.total_bytes();
@@ -73,6 +74,7 @@ pub(crate) unsafe fn initialize(
     let mut table = unsafe { PageTable::new(&mut new_frame) }?;
     map_all(&mut table, map, pages_of(module), &mut new_frame)?;
     map_devices(&mut table, map, devices, &mut new_frame)?;
+    table.map(screen.clone(), screen.start, Access::Device, &mut new_frame)?;
     let root_table = table.root();
     // SAFETY: image, data (so the boot stack) and all usable memory are mapped
     // to where they were.
@@ -178,6 +180,17 @@ fn map_devices(
         }
     }
     Ok(())
+}
+
+/// Returns the whole pages that a screen in `range` takes, unless a firmware is mistaken that
+/// puts it into memory, or into what is used for something else.
+#[inline(never)]
+pub(crate) fn pages_of_screen(range: Range<u64>, map: &[MemoryRegion]) -> Option<Range<u64>> {
+    let pages = range.start / PAGE * PAGE..range.end.checked_next_multiple_of(PAGE)?;
+    let is_hit = |region: &MemoryRegion| {
+        region.usable && region.start < pages.end && pages.start < region.end
+    };
+    (pages.end <= STACK_WINDOW && !map.iter().any(is_hit)).then_some(pages)
 }
 
 fn take_zeroed(frames: &mut Frames) -> Option<u64> {

@@ -3,10 +3,11 @@
 use alloc::format;
 use alloc::vec::Vec;
 use core::cell::Cell;
+use core::ops::Range;
 
 use boot::acpi::{self, MAX_IO_APICS, Platform};
 use boot::physical::LowMemory;
-use boot::{BootInfo, List, Module};
+use boot::{BootInfo, Framebuffer, List, Module};
 
 use super::{probe, settings};
 use crate::app::bound_verdict::BoundVerdict;
@@ -17,7 +18,8 @@ use crate::interrupts;
 use crate::machine::power::{self, End};
 use crate::machine::this_core::{self, Stacks};
 use crate::machine::{
-    clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic, processors, serial,
+    clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic, processors, screen,
+    serial,
 };
 use crate::memory::{self, OutOfMemory};
 use crate::println;
@@ -37,6 +39,12 @@ const HANDLER_STACK: u64 = 16 * 1024;
 /// boot stack has no guard page.
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
     serial::initialize();
+    let screen = screen_pages(info);
+    // The boot table maps no more; what is to be said before the kernel's shows later.
+    let is_early = screen.end <= 1 << 32;
+    if is_early {
+        show_text(info, &screen);
+    }
     for (word, end) in [("end=off", End::Off), ("end=reset", End::Reset)] {
         if info.has_word(word) {
             power::set_end(end);
@@ -65,9 +73,13 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
             info.memory.as_slice(),
             module,
             devices(&platform).as_slice(),
+            screen.clone(),
         )
     };
     let layout = layout.expect("the machine has too little memory: give it 16 MiB or more");
+    if !is_early {
+        show_text(info, &screen);
+    }
     // SAFETY: `memory::initialize` mapped one page of registers there.
     unsafe { local_apic::set_base(platform.local_apic) };
     // SAFETY: the tables name these registers, and `devices` had them mapped.
@@ -102,6 +114,24 @@ fn devices(platform: &Platform) -> List<u64, { MAX_IO_APICS + 3 }> {
             .expect("there is room for all of them");
     }
     devices
+}
+
+/// Returns the pages of the screen, if there is one.
+#[inline(never)]
+fn screen_pages(info: &BootInfo) -> Range<u64> {
+    let range = info.screen.as_ref().map(Framebuffer::range);
+    let pages = range.and_then(|range| memory::pages_of_screen(range, info.memory.as_slice()));
+    pages.unwrap_or(0..0)
+}
+
+/// Shows text from now on on the screen that takes these pages.
+#[inline(never)]
+fn show_text(info: &BootInfo, pages: &Range<u64>) {
+    if let Some(buffer) = info.screen.filter(|_| !pages.is_empty()) {
+        // SAFETY: 1. The pages are mapped by the table in use and by the kernel's, and lie
+        // in no memory (`pages_of_screen`). 2. `multiboot2` takes no other screen.
+        unsafe { screen::initialize(buffer) };
+    }
 }
 
 /// Returns the first module that the loader left in memory.

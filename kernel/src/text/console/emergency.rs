@@ -8,7 +8,7 @@ use core::fmt::{self, Display, Write};
 
 use super::BUFFER;
 use super::piece::{Kind, Pieces};
-use crate::machine::serial;
+use crate::machine::{screen, serial};
 
 /// The most bytes of one text.
 const MOST_BYTES: usize = 8 * 1024;
@@ -25,16 +25,23 @@ pub(crate) fn write_line_in_emergency(line: &dyn Display) {
 
 fn send(kind: Kind, text: fmt::Arguments<'_>) {
     if let Some(mut buffer) = BUFFER.try_lock() {
-        core::iter::from_fn(|| buffer.pop()).for_each(serial::send);
+        core::iter::from_fn(|| buffer.pop()).for_each(send_byte);
     }
     let mut pieces = Pieces::new(kind, |piece: &[u8], begins| {
         let before = kind == Kind::Text && begins && piece[0] == b'{';
         let before: &[u8] = if before { b" " } else { b"" };
-        before.iter().chain(piece).copied().for_each(serial::send);
+        before.iter().chain(piece).copied().for_each(send_byte);
     });
     // It fails where it is cut off.
     let _ = AtMost(&mut pieces, MOST_BYTES).write_fmt(text);
     pieces.end();
+    screen::draw_all();
+}
+
+#[inline(never)]
+fn send_byte(byte: u8) {
+    serial::send(byte);
+    screen::put(byte);
 }
 
 /// Passes on a number of bytes, and then fails.

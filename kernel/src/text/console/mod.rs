@@ -21,6 +21,7 @@ mod piece;
 use core::fmt::{self, Write};
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use crate::machine::screen;
 use crate::machine::serial;
 use crate::machine::spinlock::SpinLock;
 use buffer::Buffer;
@@ -93,8 +94,8 @@ pub(crate) fn has_pending() -> bool {
     PENDING.load(Ordering::Acquire)
 }
 
-/// Sends one byte that waits, if any, and reports whether there was one. It waits for
-/// the port, with interrupts and locks as they are.
+/// Sends one byte that waits, if any, or else draws one cell of the screen, and reports whether
+/// there was one. It waits for the port, with interrupts and locks as they are.
 #[inline(never)]
 pub(crate) fn send_pending_byte() -> bool {
     if !has_pending() {
@@ -109,8 +110,19 @@ pub(crate) fn send_pending_byte() -> bool {
     let byte = buffer.pop();
     if let Some(byte) = byte {
         serial::write(byte);
+        screen::put(byte);
     }
-    PENDING.store(!buffer.is_empty(), Ordering::Release);
+    let cell = if byte.is_none() {
+        screen::take_cell()
+    } else {
+        None
+    };
+    PENDING.store(!buffer.is_empty() || screen::is_behind(), Ordering::Release);
+    drop(buffer);
+    if let Some(cell) = cell {
+        screen::draw(cell);
+        return true;
+    }
     byte.is_some()
 }
 

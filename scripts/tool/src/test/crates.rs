@@ -47,8 +47,12 @@ impl TestBinary {
 }
 
 /// What test programs need besides QEMU.
-const NEEDS: [(&str, &[&Need]); 3] = [
+const NEEDS: [(&str, &[&Need]); 4] = [
     ("boot_by_efi", &[&install::MTOOLS, &install::OVMF]),
+    (
+        "boot_on_screen",
+        &[&install::GRUB, &install::MTOOLS, &install::OVMF],
+    ),
     ("boot_by_grub", &[&install::GRUB, &install::OVMF]),
     ("boot_in_bochs", &[&install::GRUB, &install::BOCHS]),
 ];
