@@ -10,11 +10,12 @@ mod summary;
 mod table_in;
 mod table_out;
 
+use std::env;
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{self, ExitCode};
 
 use recording::Recording;
 
@@ -199,4 +200,23 @@ fn write(
         out.flush()
     };
     write().map_err(|error| format!("cannot write {}: {error}", files::place(path)))
+}
+
+/// Returns a Python that has PyPI's `mcap`, which reads such files independently of us.
+///
+/// # Errors
+///
+/// In words: it has not.
+pub fn independent_reader() -> Result<OsString, String> {
+    let python = env::var_os("MCAP_PYTHON").unwrap_or("python3".into());
+    let tried = process::Command::new(&python)
+        .args(["-c", "import mcap"])
+        .output();
+    match tried.is_ok_and(|output| output.status.success()) {
+        true => Ok(python),
+        false => Err(format!(
+            "{} has no package mcap; install it, or name a Python that has it by MCAP_PYTHON",
+            files::place(Path::new(&python))
+        )),
+    }
 }

@@ -15,6 +15,7 @@ use crate::bench::hand_off;
 use crate::image;
 use crate::probe;
 use crate::qemu::Qemu;
+use crate::recordings;
 use crate::system;
 
 /// The most lines of a source file.
@@ -45,6 +46,13 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
             (false, _) => {}
             (true, true) => tally.skip(name, "left out by --quick"),
             (true, false) => tally.run(name, check),
+        }
+    }
+    let name = "an independent reader opens MCAP files in their test";
+    if plan.wants(name) {
+        match recordings::independent_reader() {
+            Ok(_) => tally.add(name, Ok(())),
+            Err(why) => tally.skip(name, &why),
         }
     }
     if plan.quick {
