@@ -117,6 +117,7 @@ pub mod wcets;
 pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use nearest::nearest;
+pub use order::sorted_by_key;
 pub use policy::{
     Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,
     Priority, SchedulerOptions,

@@ -39,8 +39,8 @@ pub(crate) fn sort_by_key<K: Ord>(positions: &mut [usize], key: impl Fn(usize) -
 }
 
 /// Returns the positions of a list in the order of their keys, ascending; equal
-/// ones stay in their order.
-pub(crate) fn sorted_by_key<K: Ord>(count: usize, key: impl Fn(usize) -> K) -> Vec<usize> {
+/// ones stay in their order. An image has one sort for all that call this.
+pub fn sorted_by_key<K: Ord>(count: usize, key: impl Fn(usize) -> K) -> Vec<usize> {
     let mut positions: Vec<usize> = (0..count).collect();
     sort_by_key(&mut positions, key);
     positions

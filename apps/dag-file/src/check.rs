@@ -4,13 +4,14 @@
 //! each fault is given that of the edge, subtask or DAG that it is about.
 
 use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use replay::lines::Malformed;
 use replay::of_file;
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Fault, MOST_FAULTS, Policy, SubtaskId,
-    SubtaskLabel, verify,
+    SubtaskLabel, sorted_by_key, verify,
 };
 
 use crate::build::Length;
@@ -33,19 +34,23 @@ pub fn check(set: &Set, policy: Policy, cores: u32, length: Length) -> Result<()
         return Ok(());
     };
     let faults = of_file(&rejected);
-    let mut found: Vec<Malformed> = faults
-        .map(|(fault, reason)| Malformed {
-            line: line_of(set, fault),
-            reason,
-        })
+    let found: Vec<(usize, String)> = faults
+        .map(|(fault, reason)| (line_of(set, fault), reason))
         .collect();
-    found.sort_by_key(|malformed| malformed.line);
+    let order = sorted_by_key(found.len(), |fault| found[fault].0);
     let more = found.len().saturating_sub(MOST_FAULTS);
-    if more > 0 {
-        found.truncate(MOST_FAULTS + 1);
-        found[MOST_FAULTS].reason = format!("and {more} more faults from this line on");
-    }
-    Err(found)
+    let told = order.iter().zip(0..=MOST_FAULTS).map(|(&fault, rank)| {
+        let (line, reason) = &found[fault];
+        let reason = match rank {
+            MOST_FAULTS => format!("and {more} more faults from this line on"),
+            _ => reason.clone(),
+        };
+        Malformed {
+            line: *line,
+            reason,
+        }
+    });
+    Err(told.collect())
 }
 
 /// Returns the line that a fault is about; 1 if it is about no line in particular.

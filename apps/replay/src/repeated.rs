@@ -2,15 +2,17 @@
 
 use alloc::vec::Vec;
 
+use sched_dag::sorted_by_key;
+
 /// Returns the first of the items that equals one before it: the positions of that one
 /// and of itself.
 #[must_use]
 pub fn repeated<T: Ord>(items: impl IntoIterator<Item = T>) -> Option<(usize, usize)> {
-    let mut sorted: Vec<(T, usize)> = items.into_iter().zip(0..).collect();
-    sorted.sort_unstable();
-    let pairs = sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0);
-    let positions = pairs.map(|pair| (pair[0].1, pair[1].1));
-    positions.min_by_key(|&(_, second)| second)
+    let items: Vec<T> = items.into_iter().collect();
+    let order = sorted_by_key(items.len(), |position| &items[position]);
+    let pairs = order.windows(2).map(|pair| (pair[0], pair[1]));
+    let equal = pairs.filter(|&(first, second)| items[first] == items[second]);
+    equal.min_by_key(|&(_, second)| second)
 }
 
 #[cfg(test)]
