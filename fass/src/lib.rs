@@ -110,8 +110,9 @@ pub use api::state::{Read, State, StateValue, Update};
 pub use api::untyped::Untyped;
 pub use api::uses::{ResettableUses, Uses};
 pub use api::using::Using;
-pub use commit::answer::{Answer, SinkAnswer, Unproven, Verdict};
-pub use commit::fault::{CommitError, Fault};
+pub use commit::answer::{Answer, Placement, SinkAnswer, Unproven, Verdict};
+pub use commit::error::CommitError;
+pub use commit::fault::Fault;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
 pub use platform::{
@@ -125,5 +126,7 @@ pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use sched_dag::analysis::{Overheads, Reason, Test};
 pub use sched_dag::wcets::{WcetFault, WcetSource};
-pub use sched_dag::{ConstructionPolicy, Count, FaultLimit, Order, OverrunPolicy, Policy};
-pub use sched_dag::{Preemption, Warning};
+pub use sched_dag::{
+    ClusterId, Clusters, ConstructionPolicy, Count, FaultLimit, Order, OverrunPolicy, Policy,
+};
+pub use sched_dag::{Preemption, Warning, Why};

@@ -12,7 +12,7 @@ use core::time::Duration;
 
 use recording::Channel;
 use sched_dag::analysis::Overheads;
-use sched_dag::{DagId, Policy, Preemption};
+use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::run::cell::SetOnce;
 use crate::run::plan::Plan;
@@ -68,6 +68,25 @@ pub trait Platform: Sync {
 
     /// Returns the number of processors that run subtasks, at least 1.
     fn cores(&self) -> u32;
+
+    /// Returns how these are divided; a platform that cannot divide them does not define
+    /// this. In one that does, DAGs say which cluster is theirs
+    /// ([`Dag::cluster`](crate::Dag::cluster)).
+    fn clusters(&self) -> Clusters {
+        Clusters::Undivided
+    }
+
+    /// Divides the cores for these DAGs, as [`sched_dag::analysis::assign()`] does; a platform
+    /// that does not leave that to the commit does not define this. (So an image that never
+    /// divides its cores has none of that code.)
+    ///
+    /// # Errors
+    ///
+    /// If a DAG gets no cores.
+    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+        let _ = task_set;
+        Ok(())
+    }
 
     /// Returns what the platform's own work costs an instance at most, as
     /// measured on it. The commit adds it to each WCET before it answers about
@@ -170,7 +189,7 @@ pub enum Occupation {
     Hold,
 }
 
-/// Why a platform did not take a plan.
+/// Why a platform did not take a plan, or found no cores for a DAG.
 ///
 /// # Examples
 ///

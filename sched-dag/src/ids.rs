@@ -21,6 +21,10 @@ pub struct Vertex(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CoreId(pub u32);
 
+/// A cluster of cores, by its position among those of one commit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct ClusterId(pub u32);
+
 /// One execution of a subtask: the part of job `job` that `subtask` does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instance {
@@ -34,6 +38,14 @@ pub struct Instance {
 
 impl DagId {
     /// Returns the position as an index into a table of DAGs.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl ClusterId {
+    /// Returns the position as an index into a table of clusters.
     #[must_use]
     pub const fn index(self) -> usize {
         self.0 as usize

@@ -95,6 +95,7 @@
 extern crate alloc;
 
 pub mod analysis;
+mod clusters;
 mod fnv;
 mod ids;
 pub mod journal;
@@ -114,7 +115,8 @@ mod verify;
 pub mod virtual_time;
 pub mod wcets;
 
-pub use ids::{CoreId, DagId, Instance, SubtaskId, Vertex};
+pub use clusters::{Clusters, Why};
+pub use ids::{ClusterId, CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use nearest::nearest;
 pub use order::sorted_by_key;

@@ -7,6 +7,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
 
+use crate::ids::ClusterId;
 use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
 
 /// A DAG task as its app describes it.
@@ -32,6 +33,8 @@ pub struct DagSpec {
     pub on_fault: OnFault,
     /// Whether the commit may fix an order of the subtasks.
     pub order: Order,
+    /// The cluster whose cores run it; `None` where they are not divided.
+    pub cluster: Option<ClusterId>,
     /// The number of jobs to release; `None`: without end.
     pub jobs: Option<u64>,
     /// The subtasks in the order of their registration.

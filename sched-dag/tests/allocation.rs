@@ -98,7 +98,7 @@ fn nothing_is_allocated_from_first_release_to_last_completion() {
             assert_eq!(end, End::Finished);
             assert_eq!(allocated, 0, "{policy:?} {preemption:?}");
             // The run was worth counting: all policies had something to do.
-            let counted = [0, 1, 2].map(|dag| *run.scheduler().statistics(DagId(dag)));
+            let counted = [0, 1, 2].map(|dag| *run.scheduler_of(DagId(dag)).statistics(DagId(dag)));
             assert!(counted[0].queued > 0 && counted[1].skips > 0 && counted[2].aborts > 0);
         }
     }
@@ -146,9 +146,9 @@ fn nothing_is_allocated_when_dags_are_ended() {
         let allocated = ALLOCATIONS.get() - before;
 
         assert_eq!(end, End::Finished);
-        assert!(run.scheduler().is_finished(), "seed {seed}");
+        assert!(run.is_finished(), "seed {seed}");
         assert_eq!(allocated, 0, "seed {seed}");
-        for counted in [0, 1, 2].map(|dag| run.scheduler().statistics(DagId(dag))) {
+        for counted in [0, 1, 2].map(|dag| run.scheduler_of(DagId(dag)).statistics(DagId(dag))) {
             faults += counted.faults;
             dropped += counted.dropped;
         }

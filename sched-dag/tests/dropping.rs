@@ -62,8 +62,8 @@ fn d1_a_fault_that_cannot_be_replaced_ends_the_dag() {
     log.is_replaceable = false;
     let mut run = VirtualTime::new(scheduler(&[spec], PREEMPTIVE));
     assert_eq!(run.run(&mut log), End::Finished);
-    assert!(run.scheduler().is_ended(DagId(0)));
-    assert_eq!(run.scheduler().statistics(DagId(0)).restarts, 0);
+    assert!(run.scheduler_of(DagId(0)).is_ended(DagId(0)));
+    assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).restarts, 0);
 }
 
 #[test]

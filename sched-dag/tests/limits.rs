@@ -61,9 +61,9 @@ fn releases_go_on_as_long_as_there_is_an_instant_after_the_deadline() {
         let mut run = VirtualTime::new(scheduler(&[spec], options));
         assert_eq!(run.run(&mut ExecutionTimes(|_| 1)), End::Finished);
         assert_eq!(run.now_ns(), u64::MAX - 3);
-        let statistics = run.scheduler().statistics(DAG);
+        let statistics = run.scheduler_of(DAG).statistics(DAG);
         assert_eq!((statistics.completed, statistics.misses), (3, 0));
-        assert_eq!(run.scheduler().next_event_ns(), None);
+        assert_eq!(run.scheduler_of(DAG).next_event_ns(), None);
     }
 }
 
@@ -108,7 +108,7 @@ fn the_second_job_of_an_endless_period_is_never_due() {
     };
     let mut run = VirtualTime::new(scheduler(&[spec], PREEMPTIVE));
     assert_eq!(run.run(&mut ExecutionTimes(|_| 1)), End::Finished);
-    assert_eq!(run.scheduler().statistics(DAG).released, 1);
+    assert_eq!(run.scheduler_of(DAG).statistics(DAG).released, 1);
 }
 
 #[test]

@@ -158,7 +158,9 @@ fn run(
     assert_eq!(driver.run(&mut run), End::Finished);
     assert_eq!(run.violations(), []);
     let ids = (0..=last.0).map(DagId);
-    let statistics = ids.map(|dag| *driver.scheduler().statistics(dag)).collect();
+    let statistics = ids
+        .map(|dag| *driver.scheduler_of(dag).statistics(dag))
+        .collect();
     (run, statistics)
 }
 

@@ -52,6 +52,56 @@ fn wcets_refused() -> fass::CommitError {
     error
 }
 
+fn cluster_without_cores() -> fass::CommitError {
+    let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[2, 0]);
+    let dag = fass::create_dag();
+    dag.name("lidar")
+        .cluster(0)
+        .period(PERIOD)
+        .relative_deadline(PERIOD);
+    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
+    let error = finish_create_dags(&[dag]).expect_err("nothing can run in cluster 1");
+    drop(machine);
+    error
+}
+
+fn clusters_beyond_cores() -> fass::CommitError {
+    let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[1, 2]);
+    let dag = fass::create_dag();
+    dag.name("lidar")
+        .cluster(0)
+        .period(PERIOD)
+        .relative_deadline(PERIOD);
+    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
+    let error = finish_create_dags(&[dag]).expect_err("there are no 3 cores");
+    drop(machine);
+    error
+}
+
+fn no_cluster() -> fass::CommitError {
+    let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[1, 1]);
+    let dag = fass::create_dag();
+    dag.name("lidar").period(PERIOD).relative_deadline(PERIOD);
+    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
+    let error = finish_create_dags(&[dag]).expect_err("it could run in either");
+    drop(machine);
+    error
+}
+
+fn not_assigned() -> fass::CommitError {
+    let machine = virtual_time::VirtualTime::new().cores(2).assign_clusters();
+    let dag = fass::create_dag();
+    dag.name("lidar").period(PERIOD).relative_deadline(PERIOD);
+    for _ in 0..3 {
+        let start = fass::SubtaskAttributes::default().wcet(PERIOD * 2 / 3);
+        dag.register_untyped_subtask(|_job| (), start);
+    }
+    let any_graph = fass::ConstructionPolicy::any_graph();
+    let error = fass::finish_create_dags_with(&[dag], any_graph).expect_err("it needs 3 cores");
+    drop(machine);
+    error
+}
+
 fn no_cores() -> Vec<Fault> {
     let options = CommitOptions::new(Policy::Edf, 0);
     faults(&[lidar()], &options)
@@ -130,7 +180,15 @@ fn every_fault_is_found_and_said_as_documented() {
         let fault = fault.unwrap_or_else(|| panic!("{code} is not found, but {faults:?}"));
         said.insert(code.to_string(), fault.to_string());
     }
-    for refused in [not_launched(), wcets_refused()] {
+    let of_platforms = [
+        not_launched(),
+        wcets_refused(),
+        cluster_without_cores(),
+        clusters_beyond_cores(),
+        no_cluster(),
+        not_assigned(),
+    ];
+    for refused in of_platforms {
         said.insert(refused.faults()[0].code().into(), refused.to_string());
     }
 

@@ -5,7 +5,8 @@
 //!
 //! ```text
 //! case NAME m edf(0/1) preemptive(0/1) ndags
-//! dag T D O K nsub nedge        then nsub lines:  sub wcet prio e_0 .. e_{K-1}
+//! clusters m_0 m_1 ..           if the cores are divided; the sum is m
+//! dag T D O K nsub nedge        then, if there are clusters: in C; then nsub lines:  sub wcet prio e_0 .. e_{K-1}
 //!                               then nedge lines: edge u v
 //! sink v D_v                    for sinks with a deadline of their own, D_v <= D
 //! x dag job subtask start finish preemptions      (each instance once)
@@ -21,7 +22,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::{Policy, Preemption, TaskSet};
+use sched_dag::{Clusters, Policy, Preemption, TaskSet};
 
 /// One set of DAGs with its expected schedule.
 #[derive(Debug)]
@@ -30,6 +31,8 @@ pub struct Case {
     pub name: String,
     /// The number of cores.
     pub cores: u32,
+    /// How these are divided.
+    pub clusters: Clusters,
     /// How ready instances are ordered.
     pub policy: Policy,
     /// Whether a started instance may lose its core.

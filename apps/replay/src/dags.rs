@@ -135,6 +135,9 @@ pub fn build(
             .offset(scale.duration(model.offset_ns())?)
             .jobs(u64::try_from(times.jobs).unwrap_or(u64::MAX))
             .in_flight(model.in_flight());
+        if case.task_set.is_divided() {
+            dag.cluster(model.cluster().0);
+        }
         let subtasks: Vec<_> = (model.subtasks().iter().zip(&times.executions_ns))
             .map(|(subtask, executions)| {
                 let (executions, epoch) = (executions.clone(), epoch.clone());

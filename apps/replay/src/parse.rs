@@ -9,8 +9,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, Priority, SubtaskSpec, TaskSet,
-    verify,
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, Priority,
+    SubtaskSpec, TaskSet, verify,
 };
 
 use crate::case::{Case, CaseDag, InstanceTimes, JobTimes};
@@ -42,7 +42,12 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     } else {
         Preemption::Disabled
     };
+    let clusters = match lines.next_if("clusters") {
+        Some(line) => Clusters::Of(parse_clusters(&line, cores)?),
+        None => Clusters::Undivided,
+    };
     let options = CommitOptions::new(policy, cores)
+        .with_clusters(clusters.clone())
         .with_construction(ConstructionPolicy::any_graph())
         .with_instance_limit(u32::MAX);
 
@@ -53,7 +58,9 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         let first_instance = dags.last().map_or(0, |before| {
             before.first_instance + before.jobs * before.subtasks
         });
-        let (spec, dag) = parse_dag(&line, lines, first_instance)?;
+        let cluster = parse_cluster(&clusters, lines)?;
+        let (mut spec, dag) = parse_dag(&line, lines, first_instance)?;
+        spec.cluster = cluster;
         commit(&line, core::slice::from_ref(&spec), &options)?;
         specs.push(spec);
         dags.push(dag);
@@ -64,6 +71,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     Ok(Case {
         name: name.to_owned(),
         cores,
+        clusters,
         policy,
         preemption,
         dags,
@@ -71,6 +79,35 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         instances,
         jobs,
     })
+}
+
+/// Reads the cores of each cluster, which are all there are.
+fn parse_clusters(line: &Line<'_>, cores: u32) -> Result<Vec<u32>, Malformed> {
+    let sizes: Vec<u32> = line.numbers(line.words.len())?;
+    if sizes.contains(&0) {
+        return Err(line.malformed("expected at least 1 core for each cluster, found 0"));
+    }
+    let sum: u64 = sizes.iter().copied().map(u64::from).sum();
+    match sum == cores.into() {
+        true => Ok(sizes),
+        false => Err(line.malformed(format!(
+            "expected clusters of {cores} cores in all, found {sum}"
+        ))),
+    }
+}
+
+/// Reads the cluster of a DAG, which stands after its first record.
+fn parse_cluster(
+    clusters: &Clusters,
+    lines: &mut Lines<'_>,
+) -> Result<Option<ClusterId>, Malformed> {
+    if *clusters == Clusters::Undivided {
+        return Ok(None);
+    }
+    let line = lines.expect("in")?;
+    let number = line.numbers::<u64>(1)?[0];
+    let cluster = in_range(&line, "cluster", number, clusters.sizes().len())?;
+    Ok(u32::try_from(cluster).ok().map(ClusterId))
 }
 
 fn parse_dag(

@@ -5,20 +5,26 @@ use fass::{ConstructionPolicy, finish_create_dags_with};
 use replay::{Case, Epoch, Scale, build, parse};
 use virtual_time::VirtualTime;
 
-const PUBLIC: &str = include_str!("../../../tests/oracle/schedules.txt");
+const PUBLIC: [(&str, usize); 2] = [
+    (include_str!("../../../tests/oracle/schedules.txt"), 40),
+    (include_str!("../../../tests/oracle/clusters.txt"), 30),
+];
 
 #[test]
 fn all_public_cases_run_as_expected() {
-    let cases = parse(PUBLIC).expect("the file is well formed");
-    assert_eq!(cases.len(), 40);
-    for case in &cases {
-        runs_as_expected(case, 1000);
+    for (text, count) in PUBLIC {
+        let cases = parse(text).expect("the file is well formed");
+        assert_eq!(cases.len(), count);
+        for case in &cases {
+            runs_as_expected(case, 1000);
+        }
     }
 }
 
 fn runs_as_expected(case: &Case, unit_ns: u64) {
     let machine = VirtualTime::new()
         .cores(case.cores)
+        .clusters(case.clusters.sizes())
         .policy(case.policy)
         .preemption(case.preemption);
     let scale = Scale {

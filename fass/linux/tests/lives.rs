@@ -45,6 +45,19 @@ fn a_panic_ends_its_dag_alone() {
 }
 
 #[test]
+fn a_dag_in_a_cluster_is_refused() {
+    let _alone = alone(2, Mechanism::Normal);
+    let dag = ticking("odometry", 1, ms(1), 1, 100);
+    dag.cluster(1);
+    let error = finish_create_dags(&[dag]).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "dag `odometry` is in cluster 1, and this machine's cores are not divided; leave its cluster \
+         out"
+    );
+}
+
+#[test]
 fn a_dag_that_would_survive_faults_is_refused() {
     let _alone = alone(1, Mechanism::Normal);
     let dag = create_dag();

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 use core::time::Duration;
 
-use sched_dag::{Activation, Order, OverrunPolicy};
+use sched_dag::{Activation, ClusterId, Order, OverrunPolicy};
 
 use crate::draft::Draft;
 use crate::draft::attributes::SubtaskAttributes;
@@ -119,6 +119,33 @@ impl Dag {
     #[track_caller]
     pub fn order(&self, order: Order) -> &Self {
         self.open().spec.order = order;
+        self
+    }
+
+    /// Puts the DAG into a cluster, on whose cores alone it runs; they are counted from 0.
+    /// Where the machine's cores are divided, each DAG is to be in one.
+    ///
+    /// What a DAG shares with another one, that is latest values and signals, may cross
+    /// clusters.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// let machine = virtual_time::VirtualTime::new().cores(3).clusters(&[1, 2]);
+    /// let period = Duration::from_millis(10);
+    /// let dags = [("brakes", 0), ("vision", 1)].map(|(name, cluster)| {
+    ///     let dag = create_dag();
+    ///     dag.name(name).cluster(cluster).jobs(1).period(period).relative_deadline(period);
+    ///     dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
+    ///     dag
+    /// });
+    /// finish_create_dags(&dags).unwrap();
+    /// assert_eq!(machine.run().violations(), []);
+    /// ```
+    #[track_caller]
+    pub fn cluster(&self, cluster: u32) -> &Self {
+        self.open().spec.cluster = Some(ClusterId(cluster));
         self
     }
 

@@ -5,12 +5,11 @@
 //! be seen from this side: the shape of functions, durations, the platform.
 
 use alloc::string::String;
-use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
 use sched_dag::wcets::WcetFault;
-use sched_dag::{DagLabel, SubtaskLabel, Warning};
+use sched_dag::{DagLabel, SubtaskLabel};
 
 use super::answer::Unproven;
 use super::count::Count;
@@ -153,6 +152,8 @@ pub enum Fault {
         /// The name of the state.
         state: String,
     },
+    /// The commit is to find the clusters, and a DAG gets no cores.
+    NotAssigned(LaunchError),
     /// The DAG demands a proof that it meets its deadlines, and there is none.
     /// Found only where nothing else is wrong.
     NotProven {
@@ -190,6 +191,7 @@ impl Fault {
             Self::ReplacedInVain { .. } => "replaced_in_vain",
             Self::NothingReplaceable { .. } => "nothing_replaceable",
             Self::StateWithoutReset { .. } => "state_without_reset",
+            Self::NotAssigned(_) => "not_assigned",
             Self::NotProven { .. } => "not_proven",
             Self::Model(fault) => fault.code(),
             Self::NotLaunched(_) => "not_launched",
@@ -331,6 +333,7 @@ impl fmt::Display for Fault {
                 "{subtask} of {dag} has another function for after a fault, and the state `{state}`, \
                  which it uses, no other value; give it one by `reset_to`"
             ),
+            Self::NotAssigned(error) => error.fmt(f),
             Self::NotProven { dag, unproven } => write!(
                 f,
                 "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}"
@@ -340,59 +343,3 @@ impl fmt::Display for Fault {
         }
     }
 }
-
-/// A refused commit: all its faults, and the warnings.
-///
-/// Its `Display` prints one line for each fault; of very many the first 20, and how
-/// many more there are.
-///
-/// # Examples
-///
-/// ```
-/// # let machine = virtual_time::VirtualTime::new();
-/// let dag = fass::create_dag(); // empty
-/// let error = fass::finish_create_dags(&[dag]).unwrap_err();
-/// for fault in error.faults() {
-///     println!("{}: {fault}", fault.code());
-/// }
-/// assert_eq!(error.to_string().lines().count(), error.faults().len());
-/// ```
-#[derive(Clone, Debug)]
-pub struct CommitError {
-    pub(crate) faults: Vec<Fault>,
-    pub(crate) warnings: Vec<Warning>,
-}
-
-impl CommitError {
-    /// Returns the faults, at least one.
-    ///
-    /// ```
-    /// # let machine = virtual_time::VirtualTime::new();
-    /// let error = fass::finish_create_dags(&[fass::create_dag()]).unwrap_err();
-    /// assert!(!error.faults().is_empty());
-    /// ```
-    #[must_use]
-    pub fn faults(&self) -> &[Fault] {
-        &self.faults
-    }
-
-    /// Returns what would not have refused the commit but deserves a look.
-    ///
-    /// ```
-    /// # let machine = virtual_time::VirtualTime::new();
-    /// let error = fass::finish_create_dags(&[fass::create_dag()]).unwrap_err();
-    /// assert!(error.warnings().is_empty());
-    /// ```
-    #[must_use]
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
-    }
-}
-
-impl fmt::Display for CommitError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        sched_dag::write_faults(&self.faults, f)
-    }
-}
-
-impl core::error::Error for CommitError {}

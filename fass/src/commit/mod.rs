@@ -1,17 +1,20 @@
 //! The commit: from drafts to a running plan, or to all that is wrong with them.
 //!
-//! Four steps, each of which either goes through for all DAGs or stops there:
+//! Five steps, each of which either goes through for all DAGs or stops there:
 //!
 //! 1. *Verify.* Every fault of every DAG is collected, ours and the model's. If
 //!    there is one, nothing has happened; the handles are as they were.
-//! 2. *Answer.* The response times are bounded where that can be done, for the
+//! 2. *Assign.* Where the platform leaves that to the commit, the cores are divided among the
+//!    DAGs.
+//! 3. *Answer.* The response times are bounded where that can be done, for the
 //!    model that the platform will run. A lacking proof that was demanded ends
 //!    the commit as a fault does.
-//! 3. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
-//! 4. *Launch.* The platform takes the plan.
+//! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
+//! 5. *Launch.* The platform takes the plan.
 
 pub(crate) mod answer;
 mod count;
+pub(crate) mod error;
 pub(crate) mod fault;
 mod missing;
 mod replaceable;
@@ -30,7 +33,8 @@ use crate::api::dag::Dag;
 use crate::platform;
 use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
-use fault::{CommitError, Fault};
+use error::CommitError;
+use fault::Fault;
 use tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
@@ -131,11 +135,15 @@ pub fn finish_create_dags_with(
         error.faults.insert(0, Fault::NoPlatform);
         return Err(error);
     };
-    let options = with(platform.policy(), platform.cores());
+    let options = with(platform.policy(), platform.cores()).with_clusters(platform.clusters());
     let Verified {
-        task_set,
+        mut task_set,
         mut warnings,
     } = verify(dags, options, platform.wcets().as_deref())?;
+    if let Err(error) = platform.assign(&mut task_set) {
+        let faults = Vec::from([Fault::NotAssigned(error)]);
+        return Err(CommitError { faults, warnings });
+    }
     let answers = Answers::new(&task_set, platform);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));

@@ -44,7 +44,7 @@ mod surroundings;
 use std::rc::Rc;
 use std::time::Duration;
 
-use fass::{Overheads, Policy, Preemption, Signal};
+use fass::{Clusters, Overheads, Policy, Preemption, Signal};
 pub use recording::Malformed;
 pub use sched_dag::law::{Rule, Violation};
 pub use sched_dag::{
@@ -53,6 +53,7 @@ pub use sched_dag::{
 
 pub use edge::Divergence;
 pub use error::RunError;
+use error::or_panic;
 use platform::Machine;
 pub use record::{InstanceRecord, JobRecord, PanicRecord};
 pub use report::Report;
@@ -126,6 +127,22 @@ impl VirtualTime {
     #[must_use = "the machine itself is returned"]
     pub fn cores(self, cores: u32) -> Self {
         self.machine.cores.set(cores);
+        self
+    }
+
+    /// Divides the cores into clusters of so many each, from core 0 on. Each schedules its own
+    /// DAGs; all have one clock. See [`fass::Dag::cluster`].
+    #[must_use = "the machine itself is returned"]
+    pub fn clusters(self, sizes: &[u32]) -> Self {
+        self.machine.clusters.replace(Clusters::Of(sizes.to_vec()));
+        self
+    }
+
+    /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
+    /// others share clusters of one core each. All subtasks need WCETs. See [`fass::Placement`].
+    #[must_use = "the machine itself is returned"]
+    pub fn assign_clusters(self) -> Self {
+        self.machine.assigns.set(true);
         self
     }
 
@@ -378,13 +395,5 @@ impl VirtualTime {
     /// See [`RunError`]. The run is over then.
     pub fn try_run_for(&self, duration: Duration) -> Result<Report, RunError> {
         self.machine.run(Some(duration))
-    }
-}
-
-#[track_caller]
-fn or_panic(result: Result<Report, RunError>) -> Report {
-    match result {
-        Ok(report) => report,
-        Err(error) => panic!("{error}"),
     }
 }

@@ -11,10 +11,13 @@ use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded};
+use fass::{
+    Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
+};
 
 use recording::Channel;
-use sched_dag::{DagId, SchedulerOptions};
+use sched_dag::analysis::{self, NotAssigned, Settings};
+use sched_dag::{DagId, DagLabel, SchedulerOptions, TaskSet};
 
 use crate::error::RunError;
 use crate::report::Report;
@@ -25,6 +28,9 @@ use crate::surroundings::Surroundings;
 #[derive(Debug)]
 pub(crate) struct Machine {
     pub(crate) cores: Cell<u32>,
+    pub(crate) clusters: RefCell<Clusters>,
+    /// Whether the commit divides the cores.
+    pub(crate) assigns: Cell<bool>,
     pub(crate) policy: Cell<Policy>,
     pub(crate) preemption: Cell<Preemption>,
     pub(crate) overheads: Cell<Overheads>,
@@ -51,6 +57,8 @@ pub(crate) fn make_current() -> Rc<Machine> {
     );
     let machine = Rc::new(Machine {
         cores: Cell::new(1),
+        clusters: RefCell::default(),
+        assigns: Cell::new(false),
         policy: Cell::new(Policy::Edf),
         preemption: Cell::new(Preemption::Enabled),
         overheads: Cell::new(Overheads::default()),
@@ -110,6 +118,32 @@ impl Platform for HostPlatform {
 
     fn cores(&self) -> u32 {
         current().map_or(1, |machine| machine.cores.get())
+    }
+
+    fn clusters(&self) -> Clusters {
+        let machine = current();
+        machine.map_or_else(Clusters::default, |machine| {
+            machine.clusters.borrow().clone()
+        })
+    }
+
+    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+        if !current().is_some_and(|machine| machine.assigns.get()) {
+            return Ok(());
+        }
+        let settings = Settings {
+            policy: self.policy(),
+            preemption: self.preemption(),
+            cores: self.cores(),
+            overheads: self.overheads(),
+        };
+        let assigned = analysis::assign(task_set, &settings);
+        let refused = assigned.map_err(|NotAssigned { dag: id, reason }| {
+            let name = task_set.dag(id).name().to_owned();
+            let dag = DagLabel { id, name };
+            format!("{dag} gets no cores: {reason}")
+        });
+        refused.map_err(LaunchError::new)
     }
 
     fn overheads(&self) -> Overheads {

@@ -14,8 +14,8 @@ use sched_dag::Recorder;
 use sched_dag::journal::What;
 use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
 use sched_dag::{
-    CoreId, Dag, DagId, DagLabel, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions,
-    SubtaskLabel, TaskSet,
+    CoreId, Dag, DagId, DagLabel, Instance, JobOutcome, Observer, SchedulerOptions, SubtaskLabel,
+    TaskSet,
 };
 
 use crate::edge::Edge;
@@ -28,6 +28,7 @@ use crate::surroundings::Surroundings;
 #[derive(Debug)]
 pub(crate) struct Session {
     task_set: Arc<TaskSet>,
+    options: SchedulerOptions,
     driver: Driver,
     bodies: Vec<Vec<Body>>,
     /// By DAG, the one that gets a signal when a fault ends it.
@@ -41,7 +42,8 @@ impl Session {
     pub(crate) fn new(plan: Plan, options: SchedulerOptions) -> Self {
         let task_set = plan.task_set;
         Self {
-            driver: Driver::new(Scheduler::new(Arc::clone(&task_set), options)),
+            driver: Driver::of_clusters(&task_set, options),
+            options,
             recording: Recording {
                 journal: Recorder::new(Arc::clone(&task_set)),
                 executed_ns: BTreeMap::new(),
@@ -141,16 +143,15 @@ impl Session {
 
     fn report(&self, edge: &Edge) -> Report {
         let (compared, uncompared, divergence) = edge.outcome();
-        let scheduler = self.driver.scheduler();
         let dags = (0..).map(DagId).zip(self.task_set.dags());
         let sink_misses = |(dag, model): (DagId, &Dag)| {
             let sinks = model.sinks().iter();
             sinks
-                .map(|&sink| scheduler.sink_misses(dag, sink))
+                .map(|&sink| self.driver.scheduler_of(dag).sink_misses(dag, sink))
                 .collect()
         };
         let sink_misses = dags.clone().map(sink_misses).collect();
-        let statistics = dags.map(|(dag, _)| *scheduler.statistics(dag)).collect();
+        let statistics = dags.map(|(dag, _)| *self.driver.scheduler_of(dag).statistics(dag));
         let Recording {
             journal,
             panics,
@@ -163,14 +164,14 @@ impl Session {
             panics: panics.clone(),
             degraded: degraded.clone(),
             events: journal.events.clone(),
-            statistics,
+            statistics: statistics.collect(),
             sink_misses,
             end_ns: journal.now_ns,
             compared,
             uncompared,
             divergence,
             task_set: Arc::clone(&self.task_set),
-            options: scheduler.options(),
+            options: self.options,
         };
         report.look_at_events(&self.recording.executed_ns);
         report

@@ -8,8 +8,8 @@
 //! remaining cores, and a core takes light DAGs while the sum of their
 //! densities `volume / D` is at most 1 (partitioned EDF).
 //!
-//! This is an offer to the app, not a verdict: the scheduler of this crate is
-//! global and pins nothing. Assumes `D <= T`.
+//! This is what the literature compares; a commit that makes its own clusters asks `assign`.
+//! Assumes `D <= T`.
 //!
 //! Light DAGs are placed first-fit by descending density, ties by position;
 //! another placement may succeed where this one fails.

@@ -20,9 +20,10 @@
 //! | `non_preemptive` | subtasks that keep their core | derived here |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
-//! | `federated` | dedicated cores, as an offer | Li 2014; Baruah 2015 |
+//! | `federated` | dedicated cores | Li 2014; Baruah 2015 |
 //! | `sinks` | sinks with deadlines of their own | derived here |
 //! | `judge`, `relation`, `answer`, `overheads` | the verdict at commit | |
+//! | `assign` | the commit's own clusters | Li 2014 |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -56,12 +57,14 @@
 //!
 //! - A WCET that is exceeded voids the bounds of every DAG.
 //! - Time that the platform takes is covered as far as [`Overheads`] says.
-//! - The cores must be identical and serve these DAGs only.
+//! - The cores must be identical and serve these DAGs only. Where they are divided, each
+//!   cluster is analysed by itself.
 //! - The form of overlapping jobs rests on the argument given in its module and on that
 //!   evidence, not on a reviewed proof. The multi-path bound is proven in
 //!   `docs/multi-path-bound.md`.
 
 mod answer;
+mod assign;
 mod bonifaci;
 mod capacity;
 mod closure;
@@ -86,6 +89,7 @@ mod witness;
 mod workload;
 
 pub use answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
+pub use assign::{NotAssigned, Unassigned, assign};
 pub use bonifaci::{bonifaci_dm, bonifaci_edf};
 pub use capacity::{gedf_capacity, grm_capacity};
 pub use closure::SUBTASK_LIMIT;

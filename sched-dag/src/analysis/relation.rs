@@ -29,15 +29,15 @@ pub(super) enum Mixture {
 }
 
 impl Relation {
-    pub(super) fn new(dags: &[Dag], policy: Policy, preemption: Preemption) -> Self {
+    /// Makes the relation between those that are at the positions `own`.
+    pub(super) fn new(dags: &[Dag], own: &[usize], policy: Policy, preemption: Preemption) -> Self {
+        let has_sink_deadlines =
+            |&dag: &usize| dags[dag].least_deadline_ns() != dags[dag].relative_deadline_ns();
         Self {
             policy,
-            preemption: mixture(dags, preemption),
+            preemption: mixture(dags, own, preemption),
             priorities: dags.iter().map(priority_range).collect(),
-            ranks_sinks: policy == Policy::Edf
-                && dags
-                    .iter()
-                    .any(|dag| dag.least_deadline_ns() != dag.relative_deadline_ns()),
+            ranks_sinks: policy == Policy::Edf && own.iter().any(has_sink_deadlines),
         }
     }
 
@@ -90,8 +90,8 @@ fn priority_range(dag: &Dag) -> (u32, u32) {
     (numbers().min().unwrap_or(0), numbers().max().unwrap_or(0))
 }
 
-fn mixture(dags: &[Dag], preemption: Preemption) -> Mixture {
-    let mut subtasks = dags.iter().flat_map(Dag::subtasks);
+fn mixture(dags: &[Dag], own: &[usize], preemption: Preemption) -> Mixture {
+    let mut subtasks = own.iter().flat_map(|&dag| dags[dag].subtasks());
     let keeps = |non_preemptive: bool| non_preemptive || preemption == Preemption::Disabled;
     let Some(first) = subtasks
         .next()

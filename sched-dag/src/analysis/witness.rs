@@ -45,16 +45,28 @@ use super::interference::Other;
 use super::intra_task::each_path;
 use super::judge::{Case, with_case};
 use crate::fnv::{EMPTY, fnv_1a};
+use crate::ids::to_u32;
 use crate::policy::{Policy, Preemption};
-use crate::task_set::TaskSet;
+use crate::task_set::{Dag, TaskSet};
 
-/// Writes a witness for the bounds that [`answer()`](super::answer()) gives.
+/// Writes a witness for the bounds that [`answer()`](super::answer()) gives; where the cores
+/// are divided, one for each cluster, with its DAGs counted from 0.
 #[must_use]
 pub fn witness(task_set: &TaskSet, settings: &Settings) -> String {
+    let parts = task_set.clusters().map(|cluster| {
+        let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
+        whole(&task_set.part(cluster), &Settings { cores, ..*settings })
+    });
+    parts.collect()
+}
+
+fn whole(dags: &[Dag], settings: &Settings) -> String {
     let mut text = Text(String::new());
-    text.statement(task_set, settings);
+    text.statement(dags, settings);
     text.hash("hash");
-    with_case(task_set, settings, |case, reasons| {
+    let all: Vec<usize> = (0..dags.len()).collect();
+    let mut reasons = alloc::vec![None; dags.len()];
+    with_case(dags, &all, settings, &mut reasons, |case, reasons| {
         let bounds = case.verdict().bounds;
         for dag in 0..case.members.len() {
             text.graph(case, dag);
@@ -98,10 +110,10 @@ impl Text {
         self.0.push('\n');
     }
 
-    fn statement(&mut self, task_set: &TaskSet, settings: &Settings) {
-        let mut dags = task_set.dags().iter();
-        let has_sink_deadlines =
-            dags.any(|dag| dag.least_deadline_ns() != dag.relative_deadline_ns());
+    fn statement(&mut self, dags: &[Dag], settings: &Settings) {
+        let has_sink_deadlines = dags
+            .iter()
+            .any(|dag| dag.least_deadline_ns() != dag.relative_deadline_ns());
         let policy = match settings.policy {
             Policy::StaticPriority => "static",
             Policy::Edf if has_sink_deadlines => "edf-sinks",
@@ -110,7 +122,7 @@ impl Text {
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let (cores, overhead_ns) = (settings.cores, overhead_ns.unwrap_or(u64::MAX));
         self.line(format_args!("machine {cores} {policy} {overhead_ns}"));
-        for (id, dag) in task_set.dags().iter().enumerate() {
+        for (id, dag) in dags.iter().enumerate() {
             let ids = || (0..).map(crate::ids::SubtaskId).take(dag.subtasks().len());
             let edges: usize = ids().map(|from| dag.successors(from).len()).sum();
             self.line(format_args!(

@@ -33,6 +33,9 @@ pub trait Ranking {
 
     /// Reports whether a started instance keeps its core until it finishes.
     fn keeps_its_core(&self, instance: Instance) -> bool;
+
+    /// Returns the first core of those that are dispatched together.
+    fn first_core(&self) -> u32;
 }
 
 /// What an instance is, for the dispatch.
@@ -282,7 +285,8 @@ impl<'r, R: Ranking> Sweep<'r, R> {
             Some((key, core)) if !is_idle => Blame::Runs(key.1, *core),
             _ => {
                 let is_busy = |core: &CoreId| self.running.values().any(|busy| busy == core);
-                let mut cores = (0..).take(self.known_cores).map(CoreId);
+                let cores = self.ranking.first_core()..;
+                let mut cores = cores.take(self.known_cores).map(CoreId);
                 Blame::Idle(cores.find(|core| !is_busy(core)))
             }
         }

@@ -137,6 +137,8 @@ pub enum Violation {
     /// R5: an instance waited although a core was idle, or ran an instance that it
     /// outranks and could have replaced.
     PassedOver(Wrong),
+    /// R5: an instance was on a core that is not its cluster's.
+    OutsideItsCluster { event: Event },
     /// R5: an instance that keeps its core lost it.
     LostItsCore { event: Event },
 }
@@ -174,7 +176,9 @@ impl Violation {
             | Self::CancelledUncut { .. }
             | Self::FaultBeyondLimit { .. } => Rule::OneLife,
             Self::CoreNotFree { .. } => Rule::OneCore,
-            Self::PassedOver(_) | Self::LostItsCore { .. } => Rule::Dispatch,
+            Self::PassedOver(_) | Self::OutsideItsCluster { .. } | Self::LostItsCore { .. } => {
+                Rule::Dispatch
+            }
         }
     }
 
@@ -201,6 +205,7 @@ impl Violation {
             | Self::CancelledUncut { event }
             | Self::FaultBeyondLimit { event }
             | Self::CoreNotFree { event, .. }
+            | Self::OutsideItsCluster { event }
             | Self::LostItsCore { event } => event.time_ns,
             Self::TooSoon { release_ns, .. } => release_ns,
             Self::NeverReady { since_ns, .. } => since_ns,

@@ -251,6 +251,7 @@ impl Words<'_> {
             Violation::FaultBeyondLimit { .. } => {
                 f.write_str(" although its DAG does not survive that fault")
             }
+            Violation::OutsideItsCluster { .. } => f.write_str(", outside its cluster"),
             Violation::LostItsCore { .. } => {
                 f.write_str(" although it keeps its core until it finishes")
             }
@@ -338,6 +339,7 @@ impl fmt::Display for Words<'_> {
             | Violation::Backwards { event, .. }
             | Violation::CancelledUncut { event }
             | Violation::FaultBeyondLimit { event }
+            | Violation::OutsideItsCluster { event }
             | Violation::LostItsCore { event } => {
                 self.what(&event, f)?;
                 self.why(f)

@@ -75,7 +75,7 @@ use jobs::Jobs;
 use ready_queue::ReadyQueue;
 use vertices::Vertices;
 
-use crate::ids::{CoreId, DagId, Instance, Vertex, to_u32};
+use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
 use crate::policy::SchedulerOptions;
 use crate::task_set::TaskSet;
 
@@ -123,15 +123,43 @@ struct DagState {
 }
 
 impl Scheduler {
-    /// Makes a scheduler with no job released, and allocates all that it will
-    /// ever need. Time begins at 0.
+    /// Makes a scheduler of all DAGs on all cores with no job released, and allocates all
+    /// that it will ever need. Time begins at 0.
     ///
     /// # Panics
     ///
     /// If the options say 0 cores.
     #[must_use]
-    #[inline(never)]
     pub fn new(task_set: Arc<TaskSet>, options: SchedulerOptions) -> Self {
+        Self::serving(task_set, options, None)
+    }
+
+    /// Makes likewise the scheduler of one cluster of the machine that the options describe.
+    /// It counts the cluster's cores from 0. To it, the DAGs of other clusters are ended.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such cluster.
+    #[must_use]
+    pub fn of_cluster(
+        task_set: Arc<TaskSet>,
+        options: SchedulerOptions,
+        cluster: ClusterId,
+    ) -> Self {
+        let cores = task_set.cores_of(cluster, options.cores).len();
+        let options = SchedulerOptions {
+            cores: to_u32(cores),
+            ..options
+        };
+        Self::serving(task_set, options, Some(cluster))
+    }
+
+    #[inline(never)]
+    fn serving(
+        task_set: Arc<TaskSet>,
+        options: SchedulerOptions,
+        cluster: Option<ClusterId>,
+    ) -> Self {
         assert!(
             options.cores > 0,
             "a scheduler for 0 cores; give it at least 1"
@@ -148,8 +176,12 @@ impl Scheduler {
             .map(|dag| {
                 let first_slot = to_u32(slots);
                 slots += dag.slots();
+                let mut jobs = Jobs::new(dag, first_slot);
+                if cluster.is_some_and(|cluster| cluster != dag.cluster()) {
+                    jobs.end_all();
+                }
                 DagState {
-                    jobs: Jobs::new(dag, first_slot),
+                    jobs,
                     statistics: DagStatistics::default(),
                     survived: Survived::new(dag.on_fault()),
                     is_paused: false,

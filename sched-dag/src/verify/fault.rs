@@ -9,6 +9,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::label::{DagLabel, SubtaskLabel};
+use crate::ids::ClusterId;
 
 /// One reason why DAGs cannot be scheduled as described.
 ///
@@ -21,6 +22,18 @@ pub enum Fault {
     NoDags,
     /// There is no core to schedule on.
     NoCores,
+    /// A cluster of 0 cores.
+    ClusterWithoutCores { cluster: ClusterId },
+    /// The clusters have more cores than there are.
+    ClustersBeyondCores { wanted: u64, cores: u32 },
+    /// The cores are divided, and a DAG states no cluster.
+    NoCluster { dag: DagLabel, clusters: usize },
+    /// There is no such cluster. If the cores are not divided, there are 0.
+    UnknownCluster {
+        dag: DagLabel,
+        cluster: ClusterId,
+        clusters: usize,
+    },
     /// More DAGs than a `u32` counts.
     TooManyDags { count: usize },
     /// A DAG without subtasks.
@@ -258,6 +271,10 @@ impl Fault {
         match self {
             Self::NoDags => "no_dags",
             Self::NoCores => "no_cores",
+            Self::ClusterWithoutCores { .. } => "cluster_without_cores",
+            Self::ClustersBeyondCores { .. } => "clusters_beyond_cores",
+            Self::NoCluster { .. } => "no_cluster",
+            Self::UnknownCluster { .. } => "unknown_cluster",
             Self::TooManyDags { .. } => "too_many_dags",
             Self::NoSubtasks { .. } => "no_subtasks",
             Self::TooManySubtasks { .. } => "too_many_subtasks",

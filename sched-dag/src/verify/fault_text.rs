@@ -57,6 +57,10 @@ impl Display for Fault {
             Self::Cycle { .. } | Self::SelfEdge { .. } | Self::EdgeOutOfRange { .. } => {
                 self.fmt_edge(f)
             }
+            Self::ClusterWithoutCores { .. }
+            | Self::ClustersBeyondCores { .. }
+            | Self::NoCluster { .. }
+            | Self::UnknownCluster { .. } => self.fmt_cluster(f),
             Self::NotConnected {
                 dag,
                 parts,

@@ -9,6 +9,7 @@
 //! in subtasks, ports and edges, but for sorting numbers; nothing recurs.
 
 mod attributes;
+mod clusters;
 mod cycles;
 mod fault;
 mod fault_text;
@@ -68,6 +69,7 @@ pub struct Rejected {
 pub fn verify(specs: &[DagSpec], options: &CommitOptions) -> Result<Verified, Rejected> {
     let mut findings = Findings::default();
     attributes::check(specs, options, &mut findings);
+    clusters::check(specs, options, &mut findings);
     names::check(specs, &mut findings);
     states::check(specs, &mut findings);
     let mut topologies = topics::check(specs, options, &mut findings);
@@ -79,7 +81,7 @@ pub fn verify(specs: &[DagSpec], options: &CommitOptions) -> Result<Verified, Re
     let task_set = if findings.has_faults() {
         None
     } else {
-        model::build(specs, shapes, &mut findings)
+        model::build(specs, options, shapes, &mut findings)
     };
     let (mut faults, warnings) = findings.into_parts();
     misspelt::suggest(specs, &mut faults);

@@ -7,6 +7,7 @@ use super::attributes::in_flight;
 use super::fault::Fault;
 use super::findings::Findings;
 use super::label::DagLabel;
+use super::options::CommitOptions;
 use super::shape::Shape;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::sort_by_key;
@@ -24,6 +25,7 @@ use crate::wcets::{WcetSource, graph_hash};
 /// If the specs have a fault that an earlier check finds.
 pub(super) fn build(
     specs: &[DagSpec],
+    options: &CommitOptions,
     shapes: Vec<Shape>,
     findings: &mut Findings,
 ) -> Option<TaskSet> {
@@ -33,7 +35,7 @@ pub(super) fn build(
     }
     let dags = specs.iter().zip(shapes).zip(bases);
     let dags = dags.map(|((spec, shape), base)| build_dag(spec, shape, base));
-    Some(TaskSet::new(dags.collect()))
+    Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
 }
 
 /// Returns for each DAG without priorities the number of its first one:
@@ -132,6 +134,8 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         in_flight: u32::try_from(in_flight(spec)).expect("verified to fit the instance limit"),
         overrun: spec.overrun,
         on_fault: spec.on_fault,
+        cluster: spec.cluster,
+        why_there: None,
         jobs: spec.jobs,
         subtasks: subtasks.collect(),
         sources: without_neighbours(&graph.predecessors),

@@ -4,16 +4,19 @@
 //! default is the paper's: exactly one source and one sink, connected, and one
 //! writer a topic. Every relaxation is a choice that the caller writes down.
 
+use crate::clusters::Clusters;
 use crate::policy::Policy;
 
 /// What the verification is told besides the DAGs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CommitOptions {
     /// How ready instances will be ordered; decides which attributes are needed.
     pub policy: Policy,
     /// The number of cores that the scheduler will serve, at least 1.
     pub cores: u32,
+    /// How these are divided.
+    pub clusters: Clusters,
     /// Which shapes of graph are wanted.
     pub construction: ConstructionPolicy,
     /// The most instances that the jobs in flight of all DAGs may have: the sum
@@ -57,6 +60,7 @@ impl CommitOptions {
         Self {
             policy,
             cores,
+            clusters: Clusters::Undivided,
             construction: ConstructionPolicy::paper(),
             instance_limit: 1 << 20,
         }
@@ -66,6 +70,13 @@ impl CommitOptions {
     #[must_use]
     pub const fn with_construction(mut self, construction: ConstructionPolicy) -> Self {
         self.construction = construction;
+        self
+    }
+
+    /// Returns the same options with the cores divided.
+    #[must_use]
+    pub fn with_clusters(mut self, clusters: Clusters) -> Self {
+        self.clusters = clusters;
         self
     }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 use sched_dag::analysis::{answer, witness};
-use sched_dag::{Policy, Preemption};
+use sched_dag::{ClusterId, Clusters, Policy, Preemption};
 
 use crate::random::{Random, Sample, sample};
 use crate::simulate::spec;
@@ -39,12 +39,19 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     let mut to_alter = Vec::new();
     for seed in 0..=number_from("WITNESS_SETS", 1_000) {
         let mut random = Random::new(seed);
-        let sample = match seed {
+        let mut sample = match seed {
             0 => full_core(),
             _ => sample(&mut random),
         };
-        let options = sched_dag::CommitOptions::new(sample.policy, sample.cores)
+        let mut options = sched_dag::CommitOptions::new(sample.policy, sample.cores)
             .with_construction(sched_dag::ConstructionPolicy::any_graph());
+        let is_divided = seed % 4 == 3 && sample.cores > 1;
+        if is_divided {
+            options = options.with_clusters(Clusters::Of(vec![1, sample.cores - 1]));
+            for (spec, cluster) in sample.specs.iter_mut().zip([0, 1].into_iter().cycle()) {
+                spec.cluster = Some(ClusterId(cluster));
+            }
+        }
         let Ok(verified) = sched_dag::verify(&sample.specs, &options) else {
             continue;
         };
@@ -69,7 +76,8 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
             *count += 1;
             is_new |= *count <= 2;
         }
-        if is_new && to_alter.len() < ALTERED {
+        // What is altered is one witness.
+        if is_new && !is_divided && to_alter.len() < ALTERED {
             to_alter.push(file.clone());
         }
         files.push(file);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sched_dag::virtual_time::{End, VirtualTime};
-use sched_dag::{CommitOptions, ConstructionPolicy, Scheduler, verify};
+use sched_dag::{CommitOptions, ConstructionPolicy, DagId, Scheduler, verify};
 
 use crate::Outcome;
 use crate::record::Record;
@@ -16,7 +16,7 @@ pub(crate) fn replay(set: &Set) -> Result<Outcome, String> {
     if run.run(&mut record) != End::Finished {
         return Err("the run does not finish".to_owned());
     }
-    record.finish(run.scheduler())
+    record.finish(run.scheduler_of(DagId(0)))
 }
 
 pub(crate) fn scheduler(set: &Set) -> Result<Scheduler, String> {

@@ -127,10 +127,10 @@ pub(crate) fn run_failing(
     log.failing = failing.to_vec();
     let mut run = VirtualTime::new(scheduler(specs, options));
     assert_eq!(run.run(&mut log), End::Finished);
-    assert!(run.scheduler().is_finished());
+    assert!(run.is_finished());
     let dags = 0..u32::try_from(specs.len()).expect("few DAGs");
     let statistics = dags
-        .map(|dag| *run.scheduler().statistics(DagId(dag)))
+        .map(|dag| *run.scheduler_of(DagId(dag)).statistics(DagId(dag)))
         .collect();
     (log.lines, statistics)
 }

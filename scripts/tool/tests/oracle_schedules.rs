@@ -3,6 +3,7 @@
 use tool::oracle::schedules::{check, parse};
 
 const PUBLIC: &str = include_str!("../../../tests/oracle/schedules.txt");
+const CLUSTERS: &str = include_str!("../../../tests/oracle/clusters.txt");
 
 /// One core, a chain of two, two jobs that overlap.
 const SMALL: &str = "case small 1 0 1 1
@@ -21,10 +22,12 @@ end
 
 #[test]
 fn all_public_schedules_agree() {
-    let cases = parse(PUBLIC).expect("the file is well formed");
-    assert_eq!(cases.len(), 40);
-    for case in &cases {
-        assert_eq!(check(case), Ok(()), "{}", case.name);
+    for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
+        let cases = parse(text).expect("the file is well formed");
+        assert_eq!(cases.len(), count);
+        for case in &cases {
+            assert_eq!(check(case), Ok(()), "{}", case.name);
+        }
     }
 }
 
@@ -84,6 +87,36 @@ fn malformed_files_are_refused_with_their_line() {
             "case small 1 0 1 2",
             6,
             "expected a `dag` record",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "clusters 1 1\ndag 4 4 0 2 2 1\nin 0",
+            2,
+            "clusters of 1 cores in all, found 2",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "clusters 1 0\ndag 4 4 0 2 2 1\nin 0",
+            2,
+            "at least 1 core for each cluster",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "clusters 1\ndag 4 4 0 2 2 1",
+            4,
+            "expected a `in` record",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "clusters 1\ndag 4 4 0 2 2 1\nin 1",
+            4,
+            "no cluster 1",
+        ),
+        (
+            "dag 4 4 0 2 2 1",
+            "dag 4 4 0 2 2 1\nin 0",
+            3,
+            "expected a `sub` record",
         ),
         ("dag 4 4 0 2 2 1", "dag 0 4 0 2 2 1", 2, "period of 0"),
         ("dag 4 4 0 2 2 1", "dag 4 0 0 2 2 1", 2, "deadline of 0"),

@@ -25,11 +25,12 @@ mod text;
 use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 use core::time::Duration;
 
 use sched_dag::analysis::{self, Reason, Settings, TaskError, Test};
 use sched_dag::wcets::WcetSource;
-use sched_dag::{DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet};
+use sched_dag::{ClusterId, DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet, Why};
 
 use crate::platform::Platform;
 
@@ -64,12 +65,32 @@ use crate::platform::Platform;
 pub struct Answer {
     /// The DAG.
     pub dag: DagLabel,
+    /// Where it runs; `None` if the cores are not divided.
+    pub cluster: Option<Placement>,
     /// What is known.
     pub verdict: Verdict,
     /// What is known of each sink, in the order of registration.
     pub sinks: Vec<SinkAnswer>,
     /// Where the WCET of each subtask is from, in the order of registration.
     pub wcets: Vec<WcetSource>,
+}
+
+/// The cluster of a DAG.
+///
+/// ```
+/// use fass::{ClusterId, Placement};
+///
+/// let placement = Placement { cluster: ClusterId(1), cores: 1..3, why: None };
+/// assert_eq!(placement.to_string(), "in cluster 1, on 2 cores from core 1 on");
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Placement {
+    /// Which it is.
+    pub cluster: ClusterId,
+    /// The numbers of its cores.
+    pub cores: Range<u32>,
+    /// Why the commit has put it there; `None` if the app has.
+    pub why: Option<Why>,
 }
 
 /// What is known at commit about the deadline of one sink.
@@ -277,7 +298,13 @@ impl Answers {
                     Verdict::NotProven(Unproven::new(task_set, dag, reason))
                 }
             };
+            let cluster = task_set.dag(dag).cluster();
             Answer {
+                cluster: task_set.is_divided().then(|| Placement {
+                    cluster,
+                    cores: task_set.cores_of(cluster, settings.cores),
+                    why: task_set.dag(dag).why_there(),
+                }),
                 sinks: sinks(task_set, dag, &answer.sinks_ns[dag.index()]),
                 wcets: (task_set.dag(dag).subtasks().iter())
                     .map(Subtask::wcet_source)

@@ -6,7 +6,8 @@ use core::time::Duration;
 use sched_dag::analysis::{Reason, TaskError};
 use sched_dag::wcets::WcetSource;
 
-use super::{Answer, Unproven, Verdict};
+use super::{Answer, Placement, Unproven, Verdict};
+use crate::commit::count::Count;
 
 /// So many subtasks without WCET are named, and the rest counted.
 const MOST_NAMED: usize = 8;
@@ -22,6 +23,9 @@ impl fmt::Display for Answer {
                 write!(f, "{dag} is not proven to meet its deadlines: {unproven}")
             }
         }?;
+        if let Some(placement) = &self.cluster {
+            write!(f, "; it runs {placement}")?;
+        }
         // What is observed is never called proven.
         let observed = self.wcets.iter().filter_map(|source| match source {
             WcetSource::Observed { margin_percent } => Some(margin_percent),
@@ -37,6 +41,20 @@ impl fmt::Display for Answer {
                 )
             }
         }
+    }
+}
+
+impl fmt::Display for Placement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            cluster,
+            cores,
+            why,
+        } = self;
+        let (count, first) = (Count(cores.len(), "core"), cores.start);
+        let cluster = cluster.0;
+        write!(f, "in cluster {cluster}, on {count} from core {first} on")?;
+        why.map_or(Ok(()), |why| write!(f, ": {why}"))
     }
 }
 

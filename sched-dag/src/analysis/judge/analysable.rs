@@ -8,29 +8,30 @@ use crate::analysis::relation::Relation;
 use crate::analysis::task::{Task, TaskError};
 use crate::task_set::Dag;
 
-/// Returns the DAGs as the analysis sees them, and for each that cannot be
-/// analysed the reason: its own, or that it may have to wait for such a one.
+/// Returns the DAGs at the positions `own` as the analysis sees them, and notes for each that
+/// cannot be analysed the reason: its own, or that it may have to wait for such a one.
 pub(super) fn analysable(
     dags: &[Dag],
+    own: &[usize],
     relation: &Relation,
     settings: &Settings,
-) -> (Vec<Option<Task>>, Vec<Option<Reason>>) {
+    reasons: &mut [Option<Reason>],
+) -> Vec<Option<Task>> {
     let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
-    let mut tasks = Vec::with_capacity(dags.len());
-    let mut reasons = Vec::with_capacity(dags.len());
-    for dag in dags {
+    let mut tasks: Vec<Option<Task>> = dags.iter().map(|_| None).collect();
+    for &dag in own {
         let task = overhead
             .ok_or(TaskError::VolumeOverflow)
-            .and_then(|overhead_ns| Task::from_dag(dag, overhead_ns));
-        reasons.push(match &task {
+            .and_then(|overhead_ns| Task::from_dag(&dags[dag], overhead_ns));
+        reasons[dag] = match &task {
             _ if settings.cores == 0 => Some(Reason::NoCores),
             Ok(_) => None,
             Err(error) => Some(Reason::Unknown(*error)),
-        });
-        tasks.push(task.ok());
+        };
+        tasks[dag] = task.ok();
     }
     let (mut known, mut unknown): (Vec<usize>, Vec<usize>) =
-        (0..dags.len()).partition(|&dag| reasons[dag].is_none());
+        own.iter().partition(|&&dag| reasons[dag].is_none());
     let mut seen = 0;
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
@@ -43,14 +44,14 @@ pub(super) fn analysable(
             !is_delayed
         });
     }
-    (tasks, reasons)
+    tasks
 }
 
-/// Returns the first DAG that cannot be analysed for a reason of its own.
-pub(super) fn first_unknown(reasons: &[Option<Reason>]) -> Option<NotProven> {
+/// Returns the first DAG at the positions `among` that cannot be analysed for a reason of its own.
+pub(super) fn first_unknown(among: &[usize], reasons: &[Option<Reason>]) -> Option<NotProven> {
     let own = |reason: &Reason| !matches!(reason, Reason::DelayedBy { .. });
-    let mut unknown = reasons.iter().enumerate().filter_map(|(dag, reason)| {
-        let reason = reason.filter(own)?;
+    let mut unknown = among.iter().filter_map(|&dag| {
+        let reason = reasons[dag].filter(own)?;
         let dag = dag_id(dag);
         Some(NotProven { dag, reason })
     });

@@ -38,6 +38,7 @@
 mod analysable;
 mod sinks;
 
+use alloc::vec;
 use alloc::vec::Vec;
 
 use analysable::{analysable, first_unknown};
@@ -54,57 +55,82 @@ use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
 use super::set::{Failure, Set, constrained};
 use super::task::Task;
-use crate::ids::{DagId, SubtaskId};
+use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
 use crate::policy::Policy;
 use crate::task_set::{Dag, TaskSet};
 
 /// Bounds the response time of every DAG, as far as a test proves it.
+///
+/// Clusters share no core, so each is a case of its own. A signal from one to another needs
+/// no term: a sporadic DAG counts as if signals came as fast as they may.
 #[must_use]
 pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
     let dags = task_set.dags();
-    with_case(task_set, settings, |case, mut reasons| {
-        let mut bounds: Vec<Option<DagBound>> = dags.iter().map(|_| None).collect();
-        let mut verdict = case.verdict();
-        let sinks_ns = sinks::bounds(case, dags, &mut verdict);
-        let first_failing = first_unknown(&reasons).or(verdict.first_failing);
-        for (position, &dag) in case.members.iter().enumerate() {
-            bounds[dag] = verdict.bounds[position];
-            reasons[dag] = verdict.reasons[position];
-        }
-        Answer {
-            bounds,
-            sinks_ns,
-            reasons,
-            first_failing,
-        }
-    })
+    let unknown = dags.iter().map(|dag| vec![None; dag.sinks().len()]);
+    let mut answer = Answer {
+        bounds: vec![None; dags.len()],
+        sinks_ns: unknown.collect(),
+        reasons: vec![None; dags.len()],
+        first_failing: None,
+    };
+    for cluster in task_set.clusters() {
+        let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
+        let own: Vec<usize> = own.collect();
+        let settings = Settings {
+            cores: to_u32(task_set.cores_of(cluster, settings.cores).len()),
+            ..*settings
+        };
+        let first_failing = &mut answer.first_failing;
+        with_case(
+            dags,
+            &own,
+            &settings,
+            &mut answer.reasons,
+            |case, reasons| {
+                let mut verdict = case.verdict();
+                sinks::bound(case, &mut verdict, &mut answer.sinks_ns);
+                let first = first_unknown(&own, reasons).or(verdict.first_failing);
+                *first_failing = first_failing.or(first);
+                for (position, &dag) in case.members.iter().enumerate() {
+                    answer.bounds[dag] = verdict.bounds[position];
+                    reasons[dag] = verdict.reasons[position];
+                }
+            },
+        );
+    }
+    answer
 }
 
-/// Makes the case of the DAGs that can be analysed, and tells why others cannot be.
-pub(super) fn with_case<T>(
-    task_set: &TaskSet,
+/// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
+/// others of these cannot be. There are no other DAGs on the cores of the settings.
+pub(super) fn with_case(
+    dags: &[Dag],
+    own: &[usize],
     settings: &Settings,
-    work: impl FnOnce(&Case<'_>, Vec<Option<Reason>>) -> T,
-) -> T {
-    let dags = task_set.dags();
-    let relation = Relation::new(dags, settings.policy, settings.preemption);
-    let (tasks, reasons) = analysable(dags, &relation, settings);
-    let members: Vec<usize> = (0..dags.len())
-        .filter(|&dag| reasons[dag].is_none())
-        .collect();
+    reasons: &mut [Option<Reason>],
+    work: impl FnOnce(&Case<'_>, &mut [Option<Reason>]),
+) {
+    let relation = Relation::new(dags, own, settings.policy, settings.preemption);
+    let tasks = analysable(dags, own, &relation, settings, reasons);
+    let can_be = |dag: &usize| reasons[*dag].is_none();
+    let members: Vec<usize> = own.iter().copied().filter(can_be).collect();
     let tasks: Vec<&Task> = members
         .iter()
         .filter_map(|&dag| tasks[dag].as_ref())
         .collect();
-    let case = Case::new(dags, &members, &tasks, relation.among(&members), settings);
-    work(&case, reasons)
+    let is_only_one = own.len() == 1;
+    let relation = relation.among(&members);
+    let case = Case::new(dags, (&members, &tasks), is_only_one, relation, settings);
+    work(&case, reasons);
 }
 
 /// The DAGs that can be analysed, and what follows from their attributes.
 pub(super) struct Case<'a> {
     /// All DAGs of the commit.
     all: &'a [Dag],
+    /// Whether no other DAG is on these cores, one that cannot be analysed either.
+    is_only_one: bool,
     /// Those of this case; elsewhere a DAG is a position in this list.
     pub(super) members: &'a [usize],
     pub(super) tasks: &'a [&'a Task],
@@ -118,8 +144,8 @@ pub(super) struct Case<'a> {
 impl<'a> Case<'a> {
     fn new(
         all: &'a [Dag],
-        members: &'a [usize],
-        tasks: &'a [&'a Task],
+        (members, tasks): (&'a [usize], &'a [&'a Task]),
+        is_only_one: bool,
         relation: Relation,
         settings: &'a Settings,
     ) -> Self {
@@ -129,6 +155,7 @@ impl<'a> Case<'a> {
         });
         let mut case = Self {
             all,
+            is_only_one,
             members,
             tasks,
             settings,
@@ -194,7 +221,7 @@ impl<'a> Case<'a> {
 
     /// Reports whether a DAG has all cores whenever it needs them.
     fn is_alone(&self, dag: usize) -> bool {
-        let blocked = self.relation.preemption != Mixture::All && self.all.len() > 1;
+        let blocked = self.relation.preemption != Mixture::All && !self.is_only_one;
         let mut others = 0..self.members.len();
         !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
     }

@@ -36,13 +36,11 @@ struct Reach {
     volume_ns: u64,
 }
 
-/// Returns the bounds of the sinks of each DAG, in their order, that follow from the bounds
+/// Fills in the bounds of the sinks of each DAG, in their order, that follow from the bounds
 /// of jobs. A DAG of which a sink is not bounded by its own deadline is not proven.
-pub(super) fn bounds(case: &Case<'_>, dags: &[Dag], verdict: &mut Answer) -> Vec<Vec<Option<u64>>> {
+pub(super) fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
-    let unknown = dags.iter().map(|dag| vec![None; dag.sinks().len()]);
-    let mut bounds: Vec<Vec<Option<u64>>> = unknown.collect();
     for (dag, &number) in case.members.iter().enumerate() {
         let model = case.dag(dag);
         let sinks_ns = &mut bounds[number];
@@ -65,7 +63,6 @@ pub(super) fn bounds(case: &Case<'_>, dags: &[Dag], verdict: &mut Answer) -> Vec
         };
         verdict.first_failing.get_or_insert(failing);
     }
-    bounds
 }
 
 fn is_certain(reason: Option<Reason>) -> bool {

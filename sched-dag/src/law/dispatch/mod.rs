@@ -1,7 +1,8 @@
-//! R5 for a journal: the changes that its events are.
+//! R5 for a journal: the changes that its events are. Each cluster is judged for itself.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use super::replay::{stage_after, stage_before};
 use super::sweep::{Change, Key, Ranking, Stage, Sweep, Waits, Wrong};
@@ -11,10 +12,11 @@ use crate::journal::{Event, What};
 use crate::policy::{OnFault, Policy, Preemption, SchedulerOptions};
 use crate::task_set::TaskSet;
 
-/// The model and the options of a run.
+/// The model and the options of a run, and the cores of the cluster in hand.
 struct Model<'a> {
     task_set: &'a TaskSet,
     options: &'a SchedulerOptions,
+    cores: Range<u32>,
     /// When sporadic jobs were due.
     due_ns: BTreeMap<(DagId, u64), u64>,
 }
@@ -44,6 +46,10 @@ impl Ranking for Model<'_> {
         self.options.preemption == Preemption::Disabled
             || dag.subtask(instance.subtask).is_non_preemptive()
     }
+
+    fn first_core(&self) -> u32 {
+        self.cores.start
+    }
 }
 
 /// What a journal shows of R5.
@@ -68,19 +74,45 @@ pub fn judge_dispatch(
     terms: Terms,
     events: impl Iterator<Item = Event> + Clone,
 ) -> Dispatch {
-    let due = events.clone().filter(|event| event.what == What::Due);
-    let model = Model {
-        task_set,
-        options,
-        due_ns: due
-            .map(|event| ((event.dag, event.job), event.time_ns))
-            .collect(),
-    };
     let first_ns = events.clone().next().map_or(0, |event| event.time_ns);
     let end_ns = events.clone().map(|event| event.time_ns).max().unwrap_or(0);
+    let mut all = Dispatch::default();
+    for cluster in task_set.clusters() {
+        let is_of_it = |event: &Event| task_set.dag(event.dag).cluster() == cluster;
+        let events = events.clone().filter(is_of_it);
+        let due = events.clone().filter(|event| event.what == What::Due);
+        let mut model = Model {
+            task_set,
+            options,
+            cores: task_set.cores_of(cluster, options.cores),
+            due_ns: BTreeMap::new(),
+        };
+        for event in due {
+            model.due_ns.insert((event.dag, event.job), event.time_ns);
+        }
+        let Dispatch { violations, waits } = of_cluster(&model, terms, (first_ns, end_ns), events);
+        all.violations.extend(violations);
+        let ready_to_start_ns = waits.ready_to_start_ns;
+        all.waits.ready_to_start_ns.extend(ready_to_start_ns);
+        let longest_owed_ns = &mut all.waits.longest_owed_ns;
+        *longest_owed_ns = waits.longest_owed_ns.max(*longest_owed_ns);
+    }
+    all
+}
+
+/// Judges the events of one cluster's DAGs, in a journal that begins and ends then.
+fn of_cluster(
+    model: &Model<'_>,
+    terms: Terms,
+    (first_ns, end_ns): (u64, u64),
+    events: impl Iterator<Item = Event> + Clone,
+) -> Dispatch {
+    let Model {
+        task_set, cores, ..
+    } = model;
     let (mut known, before) = match terms.is_whole {
-        true => ((0..options.cores).map(CoreId).collect(), Vec::new()),
-        false => before(options.cores, events.clone()),
+        true => (cores.clone().map(CoreId).collect(), Vec::new()),
+        false => before(cores.clone(), events.clone()),
     };
     let known_at_first = known.len();
     let at_first = (0..known_at_first).map(|_| (first_ns, Change::CoreIsKnown));
@@ -105,12 +137,12 @@ pub fn judge_dispatch(
         changes.map(move |change| (latest_ns, change))
     });
     let changes = at_first.chain(before).chain(changes);
-    let (wrong, waits) = Sweep::judge(&model, terms.tolerance_ns, changes, end_ns);
+    let (wrong, waits) = Sweep::judge(model, terms.tolerance_ns, changes, end_ns);
     let mut violations: Vec<Violation> = wrong.into_iter().map(Violation::PassedOver).collect();
     if terms.tolerance_ns == 0 {
-        violations.extend(chosen_wrongly(&model, events.clone()));
+        violations.extend(chosen_wrongly(model, events.clone()));
     }
-    violations.extend(lost_cores(&model, events));
+    violations.extend(wrong_cores(model, events));
     Dispatch { violations, waits }
 }
 
@@ -127,7 +159,10 @@ pub fn dispatch_violations(
 
 /// Returns what must have been the case before the first event: which cores were busy,
 /// or idle with something else's end to come, and what each instance was.
-fn before(cores: u32, events: impl Iterator<Item = Event>) -> (BTreeSet<CoreId>, Vec<Change>) {
+fn before(
+    cores: Range<u32>,
+    events: impl Iterator<Item = Event>,
+) -> (BTreeSet<CoreId>, Vec<Change>) {
     let mut first_of_core: BTreeMap<CoreId, What> = BTreeMap::new();
     let mut first_of_instance: BTreeMap<Instance, Stage> = BTreeMap::new();
     for event in events.filter(|event| event.what != What::Request) {
@@ -140,7 +175,7 @@ fn before(cores: u32, events: impl Iterator<Item = Event>) -> (BTreeSet<CoreId>,
         }
     }
     let is_busy = |what: &What| !matches!(what, What::Start | What::Resume);
-    let busy = (0..cores).map(CoreId);
+    let busy = cores.map(CoreId);
     let busy = busy.filter(|core| first_of_core.get(core).is_some_and(is_busy));
     let stages = first_of_instance.into_iter();
     let stages = stages.filter(|(_, stage)| *stage != Stage::Absent);
@@ -204,11 +239,16 @@ fn chosen_wrongly(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec
     found.map(Violation::PassedOver).collect()
 }
 
-/// Returns what lost a core that it keeps.
-fn lost_cores(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
-    let resumed = events.filter(|event| event.what == What::Resume);
-    let lost = resumed.filter(|event| event.instance().is_some_and(|it| model.keeps_its_core(it)));
-    lost.map(|event| Violation::LostItsCore { event }).collect()
+/// Returns what was on a core of another cluster, or lost a core that it keeps.
+fn wrong_cores(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
+    let found = events.filter_map(|event| {
+        if event.what.is_of_machine() && !model.cores.contains(&event.core.0) {
+            return Some(Violation::OutsideItsCluster { event });
+        }
+        let lost = event.what == What::Resume && model.keeps_its_core(event.instance()?);
+        lost.then_some(Violation::LostItsCore { event })
+    });
+    found.collect()
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Small schedules, right and wrong, as stretches of time on cores.
 
 use super::*;
-use crate::ids::{DagId, SubtaskId};
-use crate::{CommitOptions, DagSpec, Priority, SubtaskSpec, verify};
+use crate::ids::{ClusterId, DagId, SubtaskId};
+use crate::{Clusters, CommitOptions, DagSpec, Priority, SubtaskSpec, verify};
 
 /// DAGs of one subtask each, DAG 0 the most urgent; the last one's subtask
 /// cannot be preempted if `keeps`.
@@ -148,4 +148,36 @@ fn finds_a_core_or_an_instance_in_two_places() {
     let not_free = "at 2 ns, one core: core 0 runs subtask 0 of dag 1 job 0 while it still runs \
                     subtask 0 of dag 0 job 0";
     assert!(one_core.iter().any(|text| text == not_free), "{one_core:?}");
+}
+
+#[test]
+fn r5_holds_within_each_cluster() {
+    let spec = |dag: u32| DagSpec {
+        period_ns: Some(100),
+        relative_deadline_ns: Some(50),
+        jobs: Some(1),
+        cluster: Some(ClusterId(dag / 2)),
+        subtasks: vec![SubtaskSpec {
+            priority: Some(Priority(dag)),
+            ..SubtaskSpec::default()
+        }],
+        ..DagSpec::default()
+    };
+    let specs: Vec<DagSpec> = (0..3).map(spec).collect();
+    let clusters = Clusters::Of(vec![1, 1]);
+    let options = CommitOptions::new(Policy::StaticPriority, 2).with_clusters(clusters);
+    let three = verify(&specs, &options).unwrap().task_set;
+    // DAG 1 waits for core 0, though core 1 is idle and runs a less urgent one.
+    let apart = [(0, 0, 0, 4), (1, 0, 4, 9), (2, 1, 2, 5)];
+    assert_eq!(check(&three, 2, &[0, 0, 2], &apart), nothing_wrong());
+    let idle = [(0, 0, 0, 4), (1, 0, 4, 9), (2, 1, 5, 7)];
+    assert_eq!(
+        check(&three, 2, &[0, 0, 2], &idle),
+        passed_over(2, 2, 3, "core 1 is idle")
+    );
+    let elsewhere = [(0, 0, 0, 4), (1, 1, 0, 5), (2, 1, 5, 7)];
+    let found = check(&three, 2, &[0, 0, 5], &elsewhere);
+    let outside = "at 0 ns, R5 dispatch: subtask 0 of dag 1 job 0 starts on core 1, outside its \
+                   cluster";
+    assert!(found.iter().any(|text| text == outside), "{found:?}");
 }

@@ -61,6 +61,7 @@ pub const CASES: &[Case] = &[
     ("zero_window", values::zero_window),
     ("too_many_instances", values::too_many_instances),
     ("time_overflow", values::time_overflow),
+    ("unknown_cluster", values::unknown_cluster),
     ("activations_differ", shared::activations_differ),
     ("duplicate_state", shared::duplicate_state),
     ("unused_state", shared::unused_state),

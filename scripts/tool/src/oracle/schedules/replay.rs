@@ -1,7 +1,7 @@
 //! Replaying a case through the real scheduler, and comparing.
 
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions};
+use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, SchedulerOptions};
 
 use ::replay::{Case, CaseDag, InstanceTimes, JobTimes};
 
@@ -81,14 +81,14 @@ fn replay(case: &Case) -> Result<Record<'_>, String> {
             .collect(),
         ended: 0,
     };
-    let mut run = VirtualTime::new(Scheduler::new(case.task_set.clone(), options));
+    let mut run = VirtualTime::of_clusters(&case.task_set, options);
     match run.run(&mut record) {
         End::Finished => {}
         End::TimeReached | End::Stopped => return Err("the replay stopped early".to_owned()),
         End::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
     }
     let jobs: usize = case.dags.iter().map(|dag| dag.jobs).sum();
-    if record.ended == jobs && run.scheduler().is_finished() {
+    if record.ended == jobs && run.is_finished() {
         Ok(record)
     } else {
         Err(format!("{} of {jobs} jobs ended", record.ended))

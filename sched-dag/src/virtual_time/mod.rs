@@ -1,4 +1,4 @@
-//! The driver in virtual time: a [`Scheduler`] run without a machine.
+//! The driver in virtual time: a [`Scheduler`] run without a machine, or one for each cluster.
 //!
 //! Time jumps from event to event. What the cores do comes from a
 //! [`Workload`], which is asked once for each instance, at its start, how long
@@ -7,6 +7,9 @@
 //! An instance that executes for no time finishes at the instant of its start,
 //! after the dispatch that started it; another dispatch at the same instant
 //! follows, and so on until nothing happens any more.
+//!
+//! Clusters have one clock: what ends at one instant ends in all of them before anything
+//! starts in one.
 //!
 //! A workload may let an instance fail at the end of its execution time, which
 //! ends its DAG or costs its job. Of what ends at one instant, completions come before
@@ -34,18 +37,20 @@
 //! let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
 //! assert_eq!(run.run(&mut ExecutionTimes(|_instance| 20)), End::Finished);
 //! assert_eq!(run.now_ns(), 240);
-//! assert_eq!(run.scheduler().statistics(DagId(0)).misses, 0);
+//! assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).misses, 0);
 //! ```
+
+mod cluster;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
-use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::ids::{CoreId, DagId, Instance};
-use crate::scheduler::heap::IndexedHeap;
-use crate::scheduler::{Decision, HandOff, Observer, Scheduler};
+use crate::policy::SchedulerOptions;
+use crate::scheduler::{HandOff, Observer, Scheduler};
 use crate::task_set::TaskSet;
+use cluster::Cluster;
 
 /// What instances do and how long it takes them.
 ///
@@ -137,26 +142,13 @@ impl<F: FnMut(Instance) -> u64> Workload for ExecutionTimes<F> {
     }
 }
 
-/// A scheduler in virtual time.
+/// A scheduler in virtual time, or those of all clusters.
 #[derive(Debug)]
 pub struct VirtualTime {
-    scheduler: Scheduler,
-    cores: Cores,
+    clusters: Box<[Cluster]>,
+    now_ns: u64,
     /// What fails at the present instant.
     failing: Vec<(Instance, CoreId)>,
-}
-
-/// What the cores execute, and what is left of it.
-#[derive(Debug)]
-struct Cores {
-    /// When the instance on each busy core finishes if nothing intervenes; at
-    /// one instant the core with the smaller number comes first.
-    finish_times: IndexedHeap<(u64, CoreId)>,
-    /// What each core executes.
-    executing: Box<[Option<Instance>]>,
-    /// What is left of each preempted instance, by its vertex.
-    remaining_ns: Box<[u64]>,
-    task_set: Arc<TaskSet>,
 }
 
 /// Why a run in virtual time has ended.
@@ -180,17 +172,27 @@ impl VirtualTime {
     /// it will need.
     #[must_use]
     pub fn new(scheduler: Scheduler) -> Self {
-        let cores = scheduler.options().cores as usize;
-        let subtasks = scheduler.task_set().vertices();
+        Self::with(Box::from([Cluster::new(scheduler, 0)]))
+    }
+
+    /// Makes one likewise for the clusters of a task set on the machine that the options
+    /// describe; if its cores are not divided, for one scheduler of all.
+    #[must_use]
+    pub fn of_clusters(task_set: &Arc<TaskSet>, options: SchedulerOptions) -> Self {
+        let clusters = task_set.clusters().map(|cluster| {
+            let first = task_set.cores_of(cluster, options.cores).start;
+            let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
+            Cluster::new(scheduler, first)
+        });
+        Self::with(clusters.collect())
+    }
+
+    fn with(clusters: Box<[Cluster]>) -> Self {
+        let cores = clusters.iter().map(|cluster| cluster.cores.executing.len());
         Self {
-            cores: Cores {
-                finish_times: IndexedHeap::new(cores),
-                executing: vec![None; cores].into_boxed_slice(),
-                remaining_ns: vec![0; subtasks].into_boxed_slice(),
-                task_set: Arc::clone(scheduler.task_set()),
-            },
-            scheduler,
-            failing: Vec::with_capacity(cores),
+            failing: Vec::with_capacity(cores.sum()),
+            now_ns: 0,
+            clusters,
         }
     }
 
@@ -206,11 +208,11 @@ impl VirtualTime {
     /// again with a later time.
     pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload) -> End {
         while !workload.stops() {
-            let finish_ns = self.cores.next_finish_ns();
-            let scheduler_ns = self.scheduler.next_event_ns();
-            let signal_ns =
-                (workload.next_signal_ns()).map(|signal_ns| signal_ns.max(self.scheduler.now_ns()));
-            let events = [finish_ns, scheduler_ns, signal_ns];
+            let of_scheduler = |cluster: &Cluster| cluster.scheduler.next_event_ns();
+            let scheduler_ns = self.clusters.iter().filter_map(of_scheduler).min();
+            let signal_ns = workload.next_signal_ns();
+            let signal_ns = signal_ns.map(|signal_ns| signal_ns.max(self.now_ns));
+            let events = [self.next_finish_ns(), scheduler_ns, signal_ns];
             let Some(event_ns) = events.into_iter().flatten().min() else {
                 return End::Finished;
             };
@@ -227,25 +229,44 @@ impl VirtualTime {
     /// Returns the time of the last event, in nanoseconds.
     #[must_use]
     pub const fn now_ns(&self) -> u64 {
-        self.scheduler.now_ns()
+        self.now_ns
     }
 
-    /// Returns the scheduler, for its statistics.
+    /// Returns the scheduler of a DAG, for its statistics.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
     #[must_use]
-    pub const fn scheduler(&self) -> &Scheduler {
-        &self.scheduler
+    pub fn scheduler_of(&self, dag: DagId) -> &Scheduler {
+        &self.clusters[place(&self.clusters, dag)].scheduler
+    }
+
+    /// Reports whether every DAG is over.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        let mut clusters = self.clusters.iter();
+        clusters.all(|cluster| cluster.scheduler.is_finished())
+    }
+
+    fn next_finish_ns(&self) -> Option<u64> {
+        let of_cores = |cluster: &Cluster| cluster.cores.next_finish_ns();
+        self.clusters.iter().filter_map(of_cores).min()
     }
 
     /// Goes through one instant. An instance that cannot finish is the error.
     fn step(&mut self, now_ns: u64, workload: &mut impl Workload) -> Result<(), Instance> {
+        self.now_ns = now_ns;
         workload.instant(now_ns);
         if let Some(done) = self.finish(now_ns, workload) {
             return done;
         }
-        let mut moment = self.scheduler.at(now_ns);
+        let clusters = &mut self.clusters;
         self.failing.sort_unstable();
         for (instance, core) in self.failing.drain(..) {
             workload.failed(instance, core, now_ns);
+            let place = place(clusters, instance.dag);
+            let mut moment = clusters[place].scheduler.at(now_ns);
             if workload.is_replaceable(instance) {
                 moment.fail_replaceable(instance, workload);
             } else {
@@ -253,10 +274,15 @@ impl VirtualTime {
             }
         }
         while let Some(dag) = workload.take_signal(now_ns) {
+            let place = place(clusters, dag);
+            let mut moment = clusters[place].scheduler.at(now_ns);
             moment.signal(dag, workload);
         }
-        for &decision in moment.release_due(workload).dispatch() {
-            self.cores.carry_out(decision, now_ns, workload)?;
+        for Cluster { scheduler, cores } in clusters {
+            let released = scheduler.at(now_ns).release_due(workload);
+            for &decision in released.dispatch() {
+                cores.carry_out(decision, now_ns, workload)?;
+            }
         }
         Ok(())
     }
@@ -272,72 +298,37 @@ impl VirtualTime {
         let is_quiet =
             |workload: &mut _| Workload::next_signal_ns(workload).is_none_or(|ns| ns > now_ns);
         let mut finished = 0;
-        while let Some((instance, core)) = self.cores.take_finished(now_ns) {
-            finished += 1;
-            let is_last = self.cores.next_finish_ns().is_none_or(|ns| ns > now_ns);
-            if workload.fails(instance) {
-                self.failing.push((instance, core));
-                continue;
+        for place in 0..self.clusters.len() {
+            while let Some((instance, core)) = self.clusters[place].cores.take_finished(now_ns) {
+                finished += 1;
+                let is_last = self.next_finish_ns().is_none_or(|ns| ns > now_ns);
+                let Cluster { scheduler, cores } = &mut self.clusters[place];
+                let number = cores.number(core);
+                if workload.fails(instance) {
+                    self.failing.push((instance, number));
+                    continue;
+                }
+                workload.finished(instance, number, now_ns);
+                if finished > 1 || !is_last || !is_quiet(workload) {
+                    scheduler.at(now_ns).complete(instance, workload);
+                    continue;
+                }
+                let vertex = scheduler.vertex(instance);
+                return match scheduler.hand_off(now_ns, core, vertex, workload) {
+                    HandOff::To(_, decision) => Some(cores.carry_out(decision, now_ns, workload)),
+                    HandOff::Idle => Some(Ok(())),
+                    HandOff::Open => None,
+                };
             }
-            workload.finished(instance, core, now_ns);
-            if finished > 1 || !is_last || !is_quiet(workload) {
-                self.scheduler.at(now_ns).complete(instance, workload);
-                continue;
-            }
-            let vertex = self.scheduler.vertex(instance);
-            return match self.scheduler.hand_off(now_ns, core, vertex, workload) {
-                HandOff::To(_, decision) => Some(self.cores.carry_out(decision, now_ns, workload)),
-                HandOff::Idle => Some(Ok(())),
-                HandOff::Open => None,
-            };
         }
         None
     }
 }
 
-impl Cores {
-    fn next_finish_ns(&self) -> Option<u64> {
-        self.finish_times.peek().map(|((at_ns, _), _)| at_ns)
-    }
-
-    /// Takes an instance that finishes at `now_ns` from its core.
-    fn take_finished(&mut self, now_ns: u64) -> Option<(Instance, CoreId)> {
-        let ((_, core), index) = self
-            .finish_times
-            .peek()
-            .filter(|((at_ns, _), _)| *at_ns <= now_ns)?;
-        self.finish_times.remove(index);
-        Some((self.executing[index].take()?, core))
-    }
-
-    /// Carries out a decision. An instance that cannot finish is the error.
-    fn carry_out(
-        &mut self,
-        decision: Decision,
-        now_ns: u64,
-        workload: &mut impl Workload,
-    ) -> Result<(), Instance> {
-        let (core, instance) = (decision.core(), decision.instance());
-        let index = self.task_set.vertex(instance).index();
-        let remaining_ns = match decision {
-            Decision::Preempt { .. } => {
-                let finish_ns = self.finish_times.key(core.index());
-                self.remaining_ns[index] = finish_ns.map_or(now_ns, |(at_ns, _)| at_ns) - now_ns;
-                workload.preempted(instance, core, now_ns);
-                return Ok(());
-            }
-            Decision::Resume { .. } => {
-                workload.resumed(instance, core, now_ns);
-                self.remaining_ns[index]
-            }
-            Decision::Start { .. } => {
-                workload.started(instance, core, now_ns);
-                workload.execute(instance, now_ns)
-            }
-        };
-        let finish_ns = now_ns.checked_add(remaining_ns).ok_or(instance)?;
-        self.finish_times.set(core.index(), (finish_ns, core));
-        self.executing[core.index()] = Some(instance);
-        Ok(())
+/// Returns the place of the cluster that runs a DAG.
+fn place(clusters: &[Cluster], dag: DagId) -> usize {
+    match clusters {
+        [_] => 0,
+        several => several[0].scheduler.task_set().dag(dag).cluster().index(),
     }
 }

@@ -3,10 +3,13 @@
 //! Only the verification makes a [`TaskSet`], so its holder may rely on
 //! acyclic graphs, non-zero periods and deadlines, and indices in range.
 
+mod clusters;
+
 use alloc::boxed::Box;
 use alloc::string::String;
 
-use crate::ids::{DagId, Instance, SubtaskId, Vertex, to_u32};
+use crate::clusters::Why;
+use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
@@ -15,6 +18,8 @@ use crate::wcets::WcetSource;
 #[derive(Clone, Debug, Default)]
 pub struct TaskSet {
     dags: Box<[Dag]>,
+    /// The cores of each cluster; none if they are not divided.
+    clusters: Box<[u32]>,
     /// Each DAG's first vertex.
     first_vertices: Box<[u32]>,
     /// The number of vertices.
@@ -33,6 +38,8 @@ pub struct Dag {
     pub(crate) in_flight: u32,
     pub(crate) overrun: OverrunPolicy,
     pub(crate) on_fault: OnFault,
+    pub(crate) cluster: Option<ClusterId>,
+    pub(crate) why_there: Option<Why>,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
     pub(crate) sources: Box<[SubtaskId]>,
@@ -77,7 +84,7 @@ pub(crate) struct Adjacency {
 
 impl TaskSet {
     /// Counts the subtasks of verified DAGs.
-    pub(crate) fn new(dags: Box<[Dag]>) -> Self {
+    pub(crate) fn new(dags: Box<[Dag]>, clusters: &[u32]) -> Self {
         let mut vertices = 0;
         let firsts = dags.iter().map(|dag| {
             let first = to_u32(vertices);
@@ -88,6 +95,7 @@ impl TaskSet {
             first_vertices: firsts.collect(),
             vertices,
             dags,
+            clusters: clusters.into(),
         }
     }
 

@@ -1,0 +1,271 @@
+//! The commit's own clusters: cores of its own for each DAG that needs several, single cores
+//! for the others.
+//!
+//! This is federated scheduling (see `federated` for the papers). A DAG is *heavy* if a job of
+//! it is more work than one core does by its deadline, or by the next release if that comes
+//! first; it gets a cluster of as many cores as its multi-path bound needs. The others are
+//! *light*: clusters of one core each take them, the densest first, each where the sum of
+//! densities is least (worst fit), so that what room there is, is left on every core. A core
+//! takes light DAGs up to a sum of 1, which is exact for EDF and no proof for static
+//! priorities. Whatever is assigned, the analysis of each cluster has the last word.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+
+use super::answer::Settings;
+use super::multi_path::multi_path;
+use super::ratio::Ratio;
+use super::task::{Task, TaskError};
+use crate::clusters::Why;
+use crate::ids::{ClusterId, DagId, to_u32};
+use crate::order::sort;
+use crate::task_set::TaskSet;
+
+/// A DAG that gets no cores, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotAssigned {
+    /// The DAG.
+    pub dag: DagId,
+    /// Why it gets none.
+    pub reason: Unassigned,
+}
+
+/// Why a DAG gets no cores.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unassigned {
+    /// It states a cluster, and the clusters are not made yet.
+    Stated,
+    /// What it needs is not known.
+    Unknown(TaskError),
+    /// It is heavy, and so many cores that are left are too few, or no number would do.
+    TooHeavy {
+        /// The cores that are left.
+        left: u32,
+    },
+    /// It is light, and no core has room for it.
+    NoRoom {
+        /// The cores that heavy DAGs leave.
+        left: u32,
+    },
+}
+
+/// Divides the cores of the settings among DAGs.
+///
+/// # Errors
+///
+/// The first DAG that gets no cores: heavy ones in the order of the commit, then light ones,
+/// the densest first.
+pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssigned> {
+    let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
+    let overhead_ns = overhead_ns.ok_or(TaskError::VolumeOverflow);
+    let mut tasks = Vec::with_capacity(task_set.dags().len());
+    for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
+        let refused = |reason| NotAssigned { dag, reason };
+        if model.states_cluster() {
+            return Err(refused(Unassigned::Stated));
+        }
+        let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
+        tasks.push(task.map_err(|error| refused(Unassigned::Unknown(error)))?);
+    }
+    let mut assignment = Assignment {
+        sizes: Vec::new(),
+        of_dags: vec![(ClusterId(0), Why::Light); tasks.len()],
+    };
+    let mut left = settings.cores;
+    let mut light = Vec::new();
+    for (dag, task) in tasks.iter().enumerate() {
+        let (volume_ns, within_ns) = density(task);
+        if volume_ns <= within_ns {
+            light.push(dag);
+            continue;
+        }
+        let is_enough = |count: &u32| multi_path(task, *count).is_some_and(|ns| ns <= within_ns);
+        let Some(count) = (1..=left).find(is_enough) else {
+            let (dag, reason) = (DagId(to_u32(dag)), Unassigned::TooHeavy { left });
+            return Err(NotAssigned { dag, reason });
+        };
+        let cluster = ClusterId(to_u32(assignment.sizes.len()));
+        let why = Why::Heavy {
+            volume_ns,
+            within_ns,
+        };
+        assignment.of_dags[dag] = (cluster, why);
+        assignment.sizes.push(count);
+        left -= count;
+    }
+    pack(&tasks, light, left, &mut assignment)?;
+    task_set.divide(&assignment.sizes, &assignment.of_dags);
+    Ok(())
+}
+
+/// Which DAG gets which cores.
+struct Assignment {
+    /// The cores of each cluster.
+    sizes: Vec<u32>,
+    /// The cluster of each DAG, and why it is that.
+    of_dags: Vec<(ClusterId, Why)>,
+}
+
+/// Returns the work of a job, and the time in which one core would have to do it.
+fn density(task: &Task) -> (u64, u64) {
+    let within_ns = task.relative_deadline_ns().min(task.period_ns());
+    (task.volume_ns(), within_ns)
+}
+
+/// Packs light DAGs onto clusters of one core each, at most `left`.
+fn pack(
+    tasks: &[Task],
+    mut light: Vec<usize>,
+    left: u32,
+    assignment: &mut Assignment,
+) -> Result<(), NotAssigned> {
+    let is_denser = |one: usize, other: usize| {
+        let ((volume, within), (volume2, within2)) = (density(&tasks[one]), density(&tasks[other]));
+        let first = u128::from(volume) * u128::from(within2);
+        let second = u128::from(volume2) * u128::from(within);
+        second.cmp(&first).then(one.cmp(&other))
+    };
+    sort(&mut light, &mut { is_denser });
+    let first = assignment.sizes.len();
+    // The densities on each core.
+    let mut loads: Vec<Vec<(u64, u64)>> = Vec::new();
+    for dag in light {
+        if loads.len() < left as usize {
+            loads.push(Vec::new());
+            assignment.sizes.push(1);
+        }
+        let sum = |place: usize| Ratio::sum(loads[place].iter().copied());
+        let is_emptier = |one, other| match (sum(one), sum(other)) {
+            (Some(one), Some(other)) => one.at_most(other.numerator, other.denominator),
+            (one, _) => one.is_some(),
+        };
+        let emptier = |one, other| if is_emptier(one, other) { one } else { other };
+        let place = (0..loads.len()).reduce(emptier);
+        let fits = |place: &usize| {
+            let all = loads[*place].iter().copied().chain([density(&tasks[dag])]);
+            Ratio::sum(all).is_some_and(|sum| sum.at_most(1, 1))
+        };
+        let Some(place) = place.filter(fits) else {
+            let (dag, reason) = (DagId(to_u32(dag)), Unassigned::NoRoom { left });
+            return Err(NotAssigned { dag, reason });
+        };
+        loads[place].push(density(&tasks[dag]));
+        assignment.of_dags[dag].0 = ClusterId(to_u32(first + place));
+    }
+    Ok(())
+}
+
+impl fmt::Display for Unassigned {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stated => f.write_str(
+                "it states a cluster, and the commit is to make them; leave its cluster out",
+            ),
+            Self::Unknown(error) => error.fmt(f),
+            Self::TooHeavy { left } => write!(
+                f,
+                "a job is more work than one core does in time, and {left} are left, which are \
+                 too few; add cores, or relax its deadline"
+            ),
+            Self::NoRoom { left } => write!(
+                f,
+                "heavier DAGs leave {left} cores, none of which has room for it; add cores, or \
+                 lengthen periods"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::Overheads;
+    use crate::task_set::Dag;
+    use crate::{CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskSpec};
+
+    /// A DAG of as many subtasks side by side as there are WCETs, with a deadline.
+    fn parallel(wcets_ns: &[u64], deadline_ns: u64) -> DagSpec {
+        let subtask = |&wcet_ns: &u64| SubtaskSpec {
+            wcet_ns: Some(wcet_ns),
+            ..SubtaskSpec::default()
+        };
+        DagSpec {
+            period_ns: Some(20),
+            relative_deadline_ns: Some(deadline_ns),
+            subtasks: wcets_ns.iter().map(subtask).collect(),
+            ..DagSpec::default()
+        }
+    }
+
+    fn assigned(dags: &[DagSpec], cores: u32) -> Result<TaskSet, NotAssigned> {
+        let options = CommitOptions::new(Policy::Edf, cores)
+            .with_construction(ConstructionPolicy::any_graph());
+        let verified = crate::verify(dags, &options).expect("the DAGs are right");
+        let settings = Settings {
+            policy: Policy::Edf,
+            preemption: Preemption::Enabled,
+            cores,
+            overheads: Overheads::default(),
+        };
+        let mut divided = verified.task_set;
+        assign(&mut divided, &settings)?;
+        let answer = crate::analysis::answer(&divided, &settings);
+        assert!(answer.is_proven(), "{:?}", answer.first_failing);
+        Ok(divided)
+    }
+
+    #[test]
+    fn heavy_dags_get_cores_and_light_ones_the_emptiest() {
+        // The heavy one's four subtasks of 6 fit into 10 side by side only. The others have
+        // densities of 0.5, 0.8, 0.3 and 0.2.
+        let dags = [
+            parallel(&[3, 2], 10),
+            parallel(&[6, 6, 6, 6], 10),
+            parallel(&[8], 10),
+            parallel(&[3], 10),
+            parallel(&[2], 10),
+        ];
+        let found = assigned(&dags, 6).unwrap();
+        assert_eq!(sizes(&found), [4, 1, 1]);
+        let clusters = found.dags().iter().map(|dag| dag.cluster().0);
+        assert_eq!(clusters.collect::<Vec<_>>(), [2, 0, 1, 2, 1]);
+        let heavy = Why::Heavy {
+            volume_ns: 24,
+            within_ns: 10,
+        };
+        let light = Some(Why::Light);
+        let whys = found.dags().iter().map(Dag::why_there);
+        assert_eq!(
+            whys.collect::<Vec<_>>(),
+            [light, Some(heavy), light, light, light]
+        );
+    }
+
+    fn sizes(task_set: &TaskSet) -> Vec<usize> {
+        let cores = |cluster| task_set.cores_of(cluster, 0).len();
+        task_set.clusters().map(cores).collect()
+    }
+
+    #[test]
+    fn a_core_more_than_there_are_light_dags_stays_idle() {
+        let found = assigned(&[parallel(&[8], 10)], 4).unwrap();
+        assert_eq!(sizes(&found), [1]);
+    }
+
+    #[test]
+    fn what_gets_no_cores_is_named() {
+        let refused = |dags: &[DagSpec], cores| {
+            let NotAssigned { dag, reason } = assigned(dags, cores).unwrap_err();
+            (dag.0, reason)
+        };
+        let (heavy, light) = (parallel(&[6, 6, 6, 6], 10), parallel(&[8], 10));
+        let both = [light.clone(), heavy];
+        assert_eq!(refused(&both, 3), (1, Unassigned::TooHeavy { left: 3 }));
+        assert_eq!(refused(&both, 4), (0, Unassigned::NoRoom { left: 0 }));
+        let two = [light.clone(), light];
+        assert_eq!(refused(&two, 1), (1, Unassigned::NoRoom { left: 1 }));
+        let unknown = [parallel(&[0], 10)];
+        assert!(matches!(refused(&unknown, 1), (0, Unassigned::Unknown(_))));
+    }
+}

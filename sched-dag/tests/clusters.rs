@@ -1,0 +1,205 @@
+//! Clusters: each runs as if it were alone on a machine of its own, and is bounded as such.
+//!
+//! More or other sets: `CLUSTERED=100000 CLUSTER_SEED=7 cargo test -p sched-dag --test
+//! clusters`.
+
+#[allow(dead_code, reason = "its own test uses all of it")]
+#[path = "properties/set.rs"]
+mod set;
+mod support;
+
+pub(crate) use support::random;
+
+use std::sync::Arc;
+
+use random::Random;
+use sched_dag::analysis::{self, Overheads, Reason, Settings};
+use sched_dag::virtual_time::{End, VirtualTime};
+use sched_dag::{
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy,
+    Preemption, SchedulerOptions, SubtaskId, TaskSet, verify,
+};
+use set::Set;
+use support::{Log, instance};
+
+fn number(variable: &str, default: u64) -> u64 {
+    let given = std::env::var(variable).ok();
+    given.map_or(default, |text| text.parse().expect("a whole number"))
+}
+
+fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> Arc<TaskSet> {
+    let options = CommitOptions::new(options.policy, options.cores)
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_clusters(clusters);
+    Arc::new(verify(specs, &options).expect("sets are right").task_set)
+}
+
+/// Runs a set, of which DAG k is that of the original with the number `originals[k]`.
+fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[usize]) -> Vec<String> {
+    let subtask = |of: Instance| {
+        let dag = &set.dags[originals[of.dag.index()]];
+        (&dag.subtasks[of.subtask.index()], of.job)
+    };
+    let mut log = Log::new(|of| {
+        let (subtask, job) = subtask(of);
+        subtask.executions_ns[usize::try_from(job).expect("few jobs")]
+    });
+    for (dag, &original) in (0..).zip(originals) {
+        let subtasks = (0..).zip(&set.dags[original].subtasks);
+        let failing = subtasks.filter_map(|(id, subtask)| Some((id, subtask.fails_in?)));
+        let failing = failing.map(|(id, job)| instance(dag, job, id));
+        log.failing.extend(failing);
+    }
+    let options = SchedulerOptions {
+        cores,
+        ..set.options
+    };
+    let mut run = VirtualTime::of_clusters(task_set, options);
+    assert_eq!(run.run(&mut log), End::Finished);
+    assert!(run.is_finished());
+    log.lines
+}
+
+/// Returns an event with the DAG's number in the original, and the core's in its cluster,
+/// which has to be one of these; and the DAG.
+fn named(line: &str, originals: &[usize], first: u32, cores: u32) -> (usize, String) {
+    let mut words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+    let (dag, rest) = match words[2].split_once('.') {
+        Some((dag, rest)) => (dag, format!(".{rest}")),
+        None => (words[2].as_str(), String::new()),
+    };
+    let dag = originals[dag.parse::<usize>().expect("a DAG's number")];
+    words[2] = format!("{dag}{rest}");
+    if words.get(3).is_some_and(|word| word == "on") {
+        let core: u32 = words[4].parse().expect("a core's number");
+        assert!((first..first + cores).contains(&core), "{line}");
+        // Which of them it is may depend on the driver's calls.
+        words.truncate(3);
+    }
+    (dag, words.join(" "))
+}
+
+#[test]
+fn a_cluster_runs_as_if_it_were_alone() {
+    let (count, first_seed) = (number("CLUSTERED", 400), number("CLUSTER_SEED", 1));
+    println!("{count} sets from seed {first_seed} on");
+    for seed in first_seed..first_seed + count {
+        let mut random = Random::new(seed);
+        let mut set = set::draw_failing(&mut random);
+        let sizes: Vec<u32> = (0..random.between(1, 3))
+            .map(|_| u32::try_from(random.between(1, 3)).expect("few cores"))
+            .collect();
+        set.options.cores = sizes.iter().sum();
+        let mut specs = set.specs();
+        let mut of_dags = Vec::new();
+        for spec in &mut specs {
+            let cluster = random.below(sizes.len());
+            of_dags.push(cluster);
+            spec.cluster = Some(ClusterId(u32::try_from(cluster).expect("few clusters")));
+        }
+        let all: Vec<usize> = (0..specs.len()).collect();
+        let divided = commit(&specs, set.options, Clusters::Of(sizes.clone()));
+        let together = events(&set, &divided, set.options.cores, &all);
+        let mut first = 0;
+        for (cluster, &cores) in sizes.iter().enumerate() {
+            let in_it = |dag: &usize| of_dags[*dag] == cluster;
+            let originals: Vec<usize> = all.iter().copied().filter(in_it).collect();
+            let named_together = together.iter().map(|line| {
+                let dag = line.split([' ', '.']).nth(2).expect("a DAG");
+                (dag.parse::<usize>().expect("a DAG's number"), line)
+            });
+            let here: Vec<String> = named_together
+                .filter(|(dag, _)| in_it(dag))
+                .map(|(_, line)| named(line, &all, first, cores).1)
+                .collect();
+            let alone = match originals.is_empty() {
+                true => Vec::new(),
+                false => {
+                    let specs: Vec<DagSpec> = originals
+                        .iter()
+                        .map(|&dag| DagSpec {
+                            cluster: None,
+                            ..specs[dag].clone()
+                        })
+                        .collect();
+                    let task_set = commit(&specs, set.options, Clusters::Undivided);
+                    events(&set, &task_set, cores, &originals)
+                }
+            };
+            let alone = alone.iter().map(|line| named(line, &originals, 0, cores).1);
+            assert_eq!(
+                here,
+                alone.collect::<Vec<_>>(),
+                "seed {seed}, cluster {cluster}"
+            );
+            first += cores;
+        }
+    }
+}
+
+/// Two DAGs of 6 ms each in 10, and one of unknown length.
+fn three() -> [DagSpec; 3] {
+    [(0, Some(6)), (1, Some(6)), (1, None)].map(|(cluster, wcet_ns)| {
+        let mut dag = support::dag(10, 10, 1, &[1], &[]);
+        dag.subtasks[0].wcet_ns = wcet_ns;
+        dag.cluster = Some(ClusterId(cluster));
+        dag
+    })
+}
+
+const EDF: Settings = Settings {
+    policy: Policy::Edf,
+    preemption: Preemption::Enabled,
+    cores: 2,
+    overheads: Overheads {
+        context_switch_ns: 0,
+        dispatch_ns: 0,
+        interrupt_ns: 0,
+    },
+};
+
+const OPTIONS: SchedulerOptions = SchedulerOptions {
+    policy: EDF.policy,
+    preemption: EDF.preemption,
+    cores: EDF.cores,
+};
+
+#[test]
+fn each_cluster_is_analysed_on_its_own_cores() {
+    let one_each = commit(&three()[..2], OPTIONS, Clusters::Of(vec![1, 1]));
+    let answer = analysis::answer(&one_each, &EDF);
+    let bounds = answer.bounds.iter().map(|bound| bound.unwrap().bound_ns);
+    assert_eq!(bounds.collect::<Vec<_>>(), [6, 6]);
+    assert_eq!(answer.sinks_ns, [[Some(6)], [Some(6)]]);
+    // Both on one core: that is too much for it, and the other cluster's core is no help.
+    let mut dags = three();
+    dags[0].cluster = Some(ClusterId(1));
+    let one_for_both = commit(&dags[..2], OPTIONS, Clusters::Of(vec![1, 1]));
+    let answer = analysis::answer(&one_for_both, &EDF);
+    assert!(answer.reasons.contains(&Some(Reason::Overload)));
+}
+
+#[test]
+fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
+    let task_set = commit(&three(), OPTIONS, Clusters::Of(vec![1, 1]));
+    let answer = analysis::answer(&task_set, &EDF);
+    assert_eq!(answer.bounds[0].unwrap().bound_ns, 6);
+    assert_eq!(answer.reasons[1], Some(Reason::DelayedBy { dag: DagId(2) }));
+    let unknown = answer.first_failing.unwrap();
+    assert_eq!(unknown.dag, DagId(2));
+    assert!(matches!(unknown.reason, Reason::Unknown(_)), "{unknown:?}");
+    let witness = analysis::witness(&task_set, &EDF);
+    let begins = |line: &&str| line.starts_with("machine 1 ");
+    assert_eq!(witness.lines().filter(begins).count(), 2, "one for each");
+}
+
+#[test]
+fn an_undivided_machine_is_cluster_0() {
+    let mut dag = support::dag(10, 10, 1, &[1], &[]);
+    dag.cluster = Some(ClusterId(0));
+    let task_set = commit(&[dag], OPTIONS, Clusters::Undivided);
+    assert!(!task_set.is_divided());
+    assert_eq!(task_set.clusters().collect::<Vec<_>>(), [ClusterId(0)]);
+    assert_eq!(task_set.cores_of(ClusterId(0), 2), 0..2);
+    assert_eq!(task_set.dag(DagId(0)).subtask(SubtaskId(0)).priority().0, 1);
+}
