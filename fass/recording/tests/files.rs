@@ -199,6 +199,11 @@ fn what_was_written_wrongly_is_refused_in_spite_of_its_checksum() {
     of_no_dag.channels[1].dag = 2;
     let malformed = Recording::read(&Writer::new(&of_no_dag).finish()).unwrap_err();
     assert_eq!(malformed.expected, "channels of DAGs that the header has");
+    let mut more_than_numbers = header();
+    let channel = more_than_numbers.channels[0].clone();
+    more_than_numbers.channels = vec![channel; usize::from(u16::MAX)];
+    let malformed = Recording::read(&Writer::new(&more_than_numbers).finish()).unwrap_err();
+    assert_eq!(malformed.expected, "fewer than 65,535 DAGs and channels");
 }
 
 #[test]

@@ -254,9 +254,14 @@ fn schemas_are_read_as_they_are_shown() {
     for deep in [
         "[".repeat(1_000_000),
         "u8?".to_owned() + &"?".repeat(1_000_000),
+        "u8".to_owned() + &"?".repeat(16),
+        "[".repeat(14) + "u8" + &"]".repeat(14) + "??",
     ] {
         assert!(Schema::parse(&deep).is_err());
     }
+    let deepest = "u8".to_owned() + &"?".repeat(15);
+    let schema = Schema::parse(&deepest).expect("16 levels");
+    assert_eq!(Schema::from_bytes(&to_bytes(&schema)), Ok(schema));
 }
 
 #[test]

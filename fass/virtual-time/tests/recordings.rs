@@ -8,7 +8,7 @@ use fass::{
     CommitError, Dag, FaultLimit, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag,
     execute_for, finish_create_dags,
 };
-use recording::{Recording, What};
+use recording::{Entry, Recording, What, Writer};
 use virtual_time::{Report, VirtualTime};
 
 const fn ms(ms: u64) -> Duration {
@@ -223,6 +223,45 @@ fn signals_come_when_they_came() {
 }
 
 #[test]
+fn jobs_of_a_sporadic_dag_that_were_skipped_keep_their_numbers() {
+    let build = |from: u64, overrun| {
+        let dag = create_dag();
+        dag.name("burst").in_flight(1).overrun(overrun);
+        dag.record::<u64>("press").record::<u64>("sum");
+        let mut press = from;
+        let source = move || {
+            press += 1;
+            execute_for(ms(if press == 1 { 8 } else { 1 }), Occupation::Hold);
+            (press,)
+        };
+        let signal = dag.register_sporadic_subtask(source, vec!["press"], ms(5), named("press"));
+        let mut sum = 0;
+        let add = move |(press,): (u64,)| {
+            sum += press;
+            (sum,)
+        };
+        dag.register_subtask(add, vec!["press"], vec!["sum"], named("add"));
+        dag.register_sink_subtask(|_: (u64,)| (), vec!["sum"], ms(20), named("sink"));
+        (dag, signal)
+    };
+    let machine = VirtualTime::new();
+    let (dag, signal) = build(0, OverrunPolicy::Skip);
+    finish_create_dags(&[dag]).expect("sound");
+    for time in [0, 5, 10, 20] {
+        machine.raise_at(&signal, ms(time));
+    }
+    machine.run();
+    let recording = machine.recording();
+    let jobs: Vec<u64> = values(&recording).iter().map(|value| value.1).collect();
+    assert_eq!(jobs, [0, 2, 3, 0, 2, 3], "job 1 is skipped");
+    let (dag, _) = build(70, OverrunPolicy::Queue);
+    let (report, again) = replay(&recording, VirtualTime::new(), &[dag]);
+    assert_eq!((report.compared, report.uncompared), (3, 0));
+    assert_eq!(report.divergence, None);
+    assert_eq!(values(&again), values(&recording));
+}
+
+#[test]
 fn a_fault_is_replayed() {
     let build = |from: u32| {
         let dag = create_dag();
@@ -259,23 +298,35 @@ fn a_fault_is_replayed() {
     assert_eq!(values(&again), values(&recording));
 }
 
+/// Returns what the commit says of a recording that it refuses.
+fn refused(recording: &[u8], dags: &[Dag]) -> String {
+    let _machine = VirtualTime::new().replay(recording).expect("whole");
+    let error: CommitError = finish_create_dags(dags).expect_err("it is of something else");
+    error.to_string()
+}
+
 #[test]
 fn a_recording_of_something_else_is_refused() {
     let recording = record(&VirtualTime::new(), &[forked(1)]);
-    let refused = |dag: Dag| -> CommitError {
-        let _machine = VirtualTime::new().replay(&recording).expect("whole");
-        finish_create_dags(&[dag]).expect_err("it is of something else")
-    };
-    let said = refused(cheating()).to_string();
+    let said = refused(&recording, &[cheating()]);
     assert!(
         said.contains("the recording's dag 0 is `forked`, and here it is `cheating`"),
         "{said}"
     );
     let other = cheating();
     other.name("forked");
-    let said = refused(other).to_string();
+    let said = refused(&recording, &[other]);
     assert!(
         said.contains("the recording is of another graph of dag `forked`"),
+        "{said}"
+    );
+    let two = record(
+        &VirtualTime::new(),
+        &[forked(1), overrun(OverrunPolicy::Skip, 0)],
+    );
+    let said = refused(&two, &[forked(1)]);
+    assert!(
+        said.contains("the recording's dag 1 is `slow`, and here there is none"),
         "{said}"
     );
     assert!(
@@ -286,22 +337,72 @@ fn a_recording_of_something_else_is_refused() {
 }
 
 #[test]
-fn what_has_no_room_is_lost_and_the_recording_says_so() {
-    let dag = create_dag();
-    dag.name("large")
-        .jobs(3)
-        .relative_deadline(ms(10))
-        .record::<Vec<u64>>("list");
-    let mut length = 510;
-    let source = move || {
-        length += 1;
-        (vec![7_u64; length],)
+fn what_is_recorded_no_more_is_refused_of_a_source_and_counted_of_others() {
+    let build = |topics: &[&str]| {
+        let dag = create_dag();
+        dag.name("demo").jobs(3);
+        topics.iter().for_each(|topic| _ = dag.record::<u8>(topic));
+        dag.register_periodic_subtask(|| (1_u8,), vec!["in"], ms(10), named("source"));
+        let pass = |(value,): (u8,)| (value,);
+        dag.register_subtask(pass, vec!["in"], vec!["out"], named("pass"));
+        dag.register_sink_subtask(|_: (u8,)| (), vec!["out"], ms(10), named("sink"));
+        dag
     };
-    dag.register_periodic_subtask(source, vec!["list"], ms(10), named("source"));
-    let recording = record(&VirtualTime::new(), &[dag]);
-    let recording = Recording::read(&recording).expect("whole");
+    let recording = record(&VirtualTime::new(), &[build(&["in", "out"])]);
+    for topics in [&["out"][..], &[]] {
+        let said = refused(&recording, &[build(topics)]);
+        assert!(
+            said.contains("topic `in` of a source is in the recording, and is not recorded here"),
+            "{said}"
+        );
+    }
+    let (report, _) = replay(&recording, VirtualTime::new(), &[build(&["in"])]);
+    assert_eq!((report.compared, report.uncompared), (0, 3));
+}
+
+#[test]
+fn a_recorded_signal_to_a_periodic_dag_is_none() {
+    let recorded = record(&VirtualTime::new(), &[forked(1)]);
+    let recorded = Recording::read(&recorded).expect("whole");
+    let mut writer = Writer::new(recorded.header());
+    for entry in recorded.entries() {
+        writer.write(&entry);
+        let (what, value) = (What::Signal, &[][..]);
+        writer.write(&Entry {
+            what,
+            value,
+            ..entry
+        });
+    }
+    let (report, _) = replay(&writer.finish(), VirtualTime::new(), &[forked(2)]);
+    assert_eq!((report.compared, report.divergence), (60, None));
+}
+
+#[test]
+fn what_has_no_room_is_lost_and_the_recording_says_so() {
+    let build = || {
+        let dag = create_dag();
+        dag.name("large")
+            .jobs(3)
+            .relative_deadline(ms(10))
+            .record::<Vec<u64>>("list");
+        let mut length = 510;
+        let source = move || {
+            length += 1;
+            (vec![7_u64; length],)
+        };
+        dag.register_periodic_subtask(source, vec!["list"], ms(10), named("source"));
+        dag
+    };
+    let bytes = record(&VirtualTime::new(), &[build()]);
+    let recording = Recording::read(&bytes).expect("whole");
     // 4 bytes and 511 times 8 fit into 4 KiB.
     assert_eq!((recording.count(), recording.lost()), (3, 2));
+    let said = refused(&bytes, &[build()]);
+    assert!(
+        said.contains("the recording has lost topic `list` of job 1"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -226,6 +226,16 @@ fn what_is_no_recording_and_no_such_table_is_refused_in_one_line() {
             "there is no column `b`; there are a",
         ),
         ("", "--period 1ms", ":1: the table is empty"),
+        (
+            "a\nx\n",
+            "--period 1ms --type [text;257]",
+            ":2: an array of more than 256 columns, [text; 257], is not read from a table",
+        ),
+        (
+            "a\n1\n",
+            "--period 1ms --type [[[[[[u8;64];64];64];64];64];64]",
+            ":2: an array of more than 256 columns",
+        ),
     ] {
         let file = folder.write("table.csv", table.as_bytes());
         let mut words_given = vec![

@@ -1,7 +1,7 @@
 //! Reading a recording, all of which may be wrong.
 
 use super::entry::{Entry, What};
-use super::header::Header;
+use super::header::{Channel, Header};
 use super::{END, ENTRY, HEADER, MAGIC, VERSION};
 use crate::value::crc::Crc;
 use crate::value::decode::{Decoder, Malformed};
@@ -199,12 +199,13 @@ fn checked<'b>(input: &mut Decoder<'b>, crc: &mut Crc) -> Result<Frame<'b>, Malf
 
 /// Makes sure that the parts of a header fit to each other.
 fn check_header(header: &Header) -> Result<(), &'static str> {
-    let dags = header.dags.len();
-    match header
-        .channels
-        .iter()
-        .all(|channel| usize::from(channel.dag) < dags)
-    {
+    let (dags, channels) = (header.dags.len(), &header.channels);
+    // Each has a number of 16 bits, also where both are numbered together.
+    if dags + channels.len() >= usize::from(u16::MAX) {
+        return Err("fewer than 65,535 DAGs and channels");
+    }
+    let is_known = |channel: &Channel| usize::from(channel.dag) < dags;
+    match channels.iter().all(is_known) {
         true => Ok(()),
         false => Err("channels of DAGs that the header has"),
     }

@@ -84,6 +84,12 @@ impl<T: Recordable, const N: usize> Recordable for [T; N] {
     }
 
     fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        const {
+            assert!(
+                T::LEAST_BYTES > 0,
+                "an array of what takes no bytes has no schema; leave it out"
+            );
+        }
         let mut malformed = None;
         let values = [(); N].map(|()| match malformed {
             None => T::decode(input)

@@ -7,6 +7,9 @@ use alloc::vec::Vec;
 /// The deepest that types may be nested.
 pub const MOST_DEPTH: usize = 16;
 
+/// What is expected of a type that is nested more deeply.
+pub(super) const DEEP: &str = "a type that is nested less deeply";
+
 /// What a type looks like. It is shown, and read by [`Schema::parse`], as a type of Rust but
 /// for `T?`, an `Option<T>`, `[T]`, a `Vec<T>`, and `text`, a `String`.
 ///
@@ -108,6 +111,20 @@ impl Schema {
             schema,
         });
         Self::Struct(name.into(), Vec::from(fields))
+    }
+
+    /// Returns how deeply the type is nested.
+    pub(super) fn depth(&self) -> usize {
+        let deepest = |depth: usize, schema: &Self| depth.max(schema.depth());
+        1 + match self {
+            Self::Scalar(_) => 0,
+            Self::Option(inner) | Self::List(inner) | Self::Array(inner, _) => inner.depth(),
+            Self::Tuple(elements) => elements.iter().fold(0, deepest),
+            Self::Struct(_, fields) => {
+                let schemas = fields.iter().map(|field| &field.schema);
+                schemas.fold(0, deepest)
+            }
+        }
     }
 
     /// Returns the fewest bytes that a value takes.

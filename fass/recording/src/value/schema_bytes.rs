@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use super::decode::{Decoder, Malformed};
 use super::encode::Encoder;
 use super::recordable::Recordable;
-use super::schema::{Field, MOST_DEPTH, Scalar, Schema};
+use super::schema::{DEEP, Field, MOST_DEPTH, Scalar, Schema};
 
 /// The numbers of the other kinds of schema; that of a scalar is its place in `Scalar::ALL`.
 const OPTION: u8 = 32;
@@ -20,7 +20,6 @@ const TUPLE: u8 = 35;
 const STRUCT: u8 = 36;
 
 const KIND: &str = "the number of a type";
-const DEEP: &str = "a type that is nested less deeply";
 const WEIGHTLESS: &str = "elements that take bytes";
 
 impl Recordable for Schema {

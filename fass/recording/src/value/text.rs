@@ -5,7 +5,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-use super::schema::{Field, MOST_DEPTH, Scalar, Schema};
+use super::schema::{DEEP, Field, MOST_DEPTH, Scalar, Schema};
 
 impl fmt::Display for Schema {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -51,6 +51,8 @@ impl Schema {
         let mut rest = Rest { text, whole: text };
         let schema = rest.schema(0)?;
         match rest.peek() {
+            // An option follows its type, and so has made deeper what was read.
+            None if schema.depth() > MOST_DEPTH => rest.refuse(DEEP),
             None => Ok(schema),
             Some(_) => rest.refuse("the end"),
         }
@@ -105,7 +107,7 @@ impl<'t> Rest<'t> {
 
     fn schema(&mut self, depth: usize) -> Result<Schema, Refused> {
         if depth == MOST_DEPTH {
-            return self.refuse("a type that is nested less deeply");
+            return self.refuse(DEEP);
         }
         let mut schema = match self.peek() {
             Some('[') => self.sequence(depth)?,
@@ -117,7 +119,7 @@ impl<'t> Rest<'t> {
                 break;
             }
             if depth == MOST_DEPTH {
-                return self.refuse("a type that is nested less deeply");
+                return self.refuse(DEEP);
             }
             schema = Schema::Option(Box::new(schema));
         }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use recording::{Recording, What};
+use replay::shown::visible;
 
 /// Returns the lines.
 pub(super) fn of(recording: &Recording<'_>) -> String {
@@ -29,15 +30,17 @@ pub(super) fn of(recording: &Recording<'_>) -> String {
     let _ = writeln!(
         text,
         "recording of `{}`, {} entries",
-        header.app,
+        visible(&header.app),
         recording.count()
     );
     if let Some((first, last)) = span_ns {
         let _ = writeln!(text, "from {first} ns to {last} ns");
     }
     for (channel, values) in header.channels.iter().zip(values) {
-        let dag = &header.dags[usize::from(channel.dag)].name;
-        let (role, topic, schema) = (channel.role.name(), &channel.topic, &channel.schema);
+        let dag = visible(&header.dags[usize::from(channel.dag)].name);
+        let (role, topic) = (channel.role.name(), visible(&channel.topic));
+        let schema = channel.schema.to_string();
+        let schema = visible(&schema);
         let _ = writeln!(
             text,
             "  {role} `{topic}` of dag `{dag}`: {values} values of {schema}"

@@ -11,7 +11,7 @@ use recording::{
 };
 use replay::shown::quoted;
 
-use super::table_out::spread;
+use super::table_out::{MOST_COLUMNS, spread, spread_width};
 use crate::files;
 use crate::options::Parsed;
 
@@ -188,14 +188,8 @@ fn encode<'c>(
     match schema {
         Schema::Scalar(scalar) => {
             let cell = next();
-            let bytes = scalar_bytes(*scalar, cell.trim());
-            *out = [
-                std::mem::take(out),
-                bytes.ok_or_else(|| {
-                    format!("{} is no value of type {}", quoted(cell), scalar.name())
-                })?,
-            ]
-            .concat();
+            let refused = || format!("{} is no value of type {}", quoted(cell), scalar.name());
+            out.extend(scalar_bytes(*scalar, cell.trim()).ok_or_else(refused)?);
             Ok(())
         }
         Schema::Option(inner) => {
@@ -213,7 +207,12 @@ fn encode<'c>(
         Schema::Tuple(elements) => {
             (elements.iter()).try_for_each(|element| encode(element, next, out))
         }
-        Schema::Array(element, count) => (0..*count).try_for_each(|_| encode(element, next, out)),
+        Schema::Array(element, count) if spread_width(element, *count).is_some() => {
+            (0..*count).try_for_each(|_| encode(element, next, out))
+        }
+        Schema::Array(..) => Err(format!(
+            "an array of more than {MOST_COLUMNS} columns, {schema}, is not read from a table"
+        )),
         Schema::List(_) => Err(format!("a list, {schema}, is not read from a table")),
     }
 }
@@ -244,7 +243,7 @@ fn scalar_bytes(scalar: Scalar, cell: &str) -> Option<Vec<u8>> {
 /// The rows of a table, by RFC 4180.
 struct Rows<'t> {
     text: &'t str,
-    /// The line on which the latest row began, counted from 1.
+    /// The line on which the latest row ended, counted from 1.
     line: usize,
 }
 

@@ -2,8 +2,8 @@
 //! of what else happened.
 //!
 //! A column for each number: structs, tuples and arrays are spread, and the name of a column is
-//! the way to it. What has no fixed number of parts, a list or an option, is JSON in one cell;
-//! an option without a value is an empty cell.
+//! the way to it. What has no fixed number of parts, a list or an option, is JSON in one cell,
+//! and so is a large array; an option without a value is an empty cell.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -12,8 +12,8 @@ use recording::{
     Decoder, Entry, Field, Malformed, Part, Recording, Scalar, Schema, What, write_json,
 };
 
-/// The most elements of an array that become columns.
-const MOST_COLUMNS: u32 = 64;
+/// The most columns that an array becomes.
+pub(super) const MOST_COLUMNS: usize = 256;
 
 /// Returns the tables, with names for their files.
 pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
@@ -106,6 +106,23 @@ fn row(cells: &[String]) -> String {
     line
 }
 
+/// Returns how many columns a type takes.
+fn width(schema: &Schema) -> usize {
+    let sum = |width: usize, schema: &Schema| width.saturating_add(self::width(schema));
+    match schema {
+        Schema::Struct(_, fields) => (fields.iter().map(|field| &field.schema)).fold(0, sum),
+        Schema::Tuple(elements) => elements.iter().fold(0, sum),
+        Schema::Array(element, count) => spread_width(element, *count).unwrap_or(1),
+        Schema::Scalar(_) | Schema::Option(_) | Schema::List(_) => 1,
+    }
+}
+
+/// Returns how many columns an array takes, if it becomes columns.
+pub(super) fn spread_width(element: &Schema, count: u32) -> Option<usize> {
+    let all = width(element).checked_mul(usize::try_from(count).ok()?)?;
+    Some(all).filter(|&all| all <= MOST_COLUMNS)
+}
+
 /// Adds the names of the columns that a type takes.
 pub(super) fn spread(schema: &Schema, name: &str, columns: &mut Vec<String>) {
     let within = |part: &dyn std::fmt::Display| match name {
@@ -123,7 +140,7 @@ pub(super) fn spread(schema: &Schema, name: &str, columns: &mut Vec<String>) {
                 spread(schema, &within(&number), columns);
             }
         }
-        Schema::Array(element, count) if *count <= MOST_COLUMNS => {
+        Schema::Array(element, count) if spread_width(element, *count).is_some() => {
             (0..*count).for_each(|number| spread(element, &within(&number), columns));
         }
         _ => columns.push(name.into()),
@@ -144,7 +161,7 @@ fn fill(
         Schema::Tuple(elements) => {
             (elements.iter()).try_for_each(|element| fill(element, input, all, cells))
         }
-        Schema::Array(element, count) if *count <= MOST_COLUMNS => {
+        Schema::Array(element, count) if spread_width(element, *count).is_some() => {
             (0..*count).try_for_each(|_| fill(element, input, all, cells))
         }
         Schema::Scalar(scalar) => {

@@ -1,0 +1,170 @@
+//! What crosses the edge of a run: written down, or taken from a recording.
+//!
+//! A *replay* does not call sources that are recorded, and takes their values; signals come when
+//! they came. A job that the recording has no values of, and an instance that was cut, is
+//! passed over: its function is not called. What else is recorded is compared.
+
+mod replay;
+
+use std::cell::RefCell;
+
+use fass::{Plan, Recorded};
+use recording::{Channel, DagHeader, Entry, Header, Malformed, What, Writer};
+use sched_dag::journal::{self, Event};
+use sched_dag::law::Record;
+use sched_dag::{DagId, Instance, TaskSet};
+
+pub use replay::Divergence;
+use replay::Replay;
+
+/// The edge of one machine.
+#[derive(Debug, Default)]
+pub(crate) struct Edge {
+    /// What the recordings of this machine say of themselves.
+    header: RefCell<Header>,
+    /// The values so far, in the order in which they were complete.
+    values: RefCell<Vec<Value>>,
+    replay: RefCell<Option<Replay>>,
+}
+
+#[derive(Debug)]
+struct Value {
+    channel: u16,
+    job: u64,
+    at_ns: u64,
+    bytes: Option<Vec<u8>>,
+}
+
+impl Edge {
+    /// Makes the machine replay a recording.
+    pub(crate) fn replay(&self, bytes: &[u8]) -> Result<(), Malformed> {
+        self.replay.replace(Some(Replay::read(bytes)?));
+        Ok(())
+    }
+
+    pub(crate) fn is_replay(&self) -> bool {
+        self.replay.borrow().is_some()
+    }
+
+    /// Takes the recorded topics of a DAG.
+    pub(crate) fn open(&self, dag: DagId, graph: u64, channels: &[Channel]) {
+        let mut header = self.header.borrow_mut();
+        let dags = header.dags.len().max(dag.index() + 1);
+        header.dags.resize(dags, DagHeader::default());
+        header.dags[dag.index()].graph = graph;
+        header.channels.extend_from_slice(channels);
+    }
+
+    /// Takes a plan, which has to fit to what is replayed. Returns the signals of the replay.
+    pub(crate) fn launch(&self, plan: &Plan) -> Result<Vec<(DagId, u64)>, String> {
+        let mut header = self.header.borrow_mut();
+        header.app = "virtual time".into();
+        let dags = plan.task_set.dags();
+        header.dags.resize(dags.len(), DagHeader::default());
+        for (header, dag) in header.dags.iter_mut().zip(dags) {
+            header.name = dag.name().into();
+        }
+        let signals = match self.replay.borrow_mut().as_mut() {
+            Some(replay) => {
+                replay.fit(&header)?;
+                replay.signals.clone()
+            }
+            None => Vec::new(),
+        };
+        let is_sporadic = |dag: DagId| plan.task_set.dag(dag).is_sporadic();
+        Ok((signals.into_iter())
+            .filter(|(dag, _)| is_sporadic(*dag))
+            .collect())
+    }
+
+    /// Takes a value of this run, and compares it with the recorded one.
+    pub(crate) fn record(&self, value: &Recorded<'_>) {
+        if let Some(replay) = self.replay.borrow_mut().as_mut() {
+            replay.compare(&self.header.borrow(), value);
+        }
+        self.values.borrow_mut().push(Value {
+            channel: value.channel,
+            job: value.job,
+            at_ns: value.completed_ns,
+            bytes: value.bytes.map(<[u8]>::to_vec),
+        });
+    }
+
+    /// Lends the recorded value of a channel of the plan.
+    pub(crate) fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        let replay = self.replay.borrow();
+        if let Some(value) = (replay.as_ref()).and_then(|replay| replay.value(channel, job)) {
+            take(value);
+        }
+    }
+
+    /// Reports whether an instance is one whose function is not called.
+    pub(crate) fn passes_over(&self, instance: Instance) -> bool {
+        let replay = self.replay.borrow();
+        replay
+            .as_ref()
+            .is_some_and(|replay| replay.passes_over(instance))
+    }
+
+    /// Returns how many values were compared, how many were not, and the first one that
+    /// differs.
+    pub(crate) fn outcome(&self) -> (u64, u64, Option<Divergence>) {
+        let replay = self.replay.borrow();
+        replay.as_ref().map_or((0, 0, None), Replay::outcome)
+    }
+
+    /// Returns the recording of the run so far.
+    pub(crate) fn recording(
+        &self,
+        task_set: &TaskSet,
+        events: &[Event],
+        record: &Record,
+    ) -> Vec<u8> {
+        let header = self.header.borrow();
+        let mut writer = Writer::new(&header);
+        let release_ns = |dag: u16, job, at_ns| {
+            let of_job = record.job(DagId(dag.into()), job);
+            of_job.and_then(|job| job.release_ns).unwrap_or(at_ns)
+        };
+        let values = self.values.borrow();
+        let values = values.iter().map(|value| {
+            let dag = header.channels[usize::from(value.channel)].dag;
+            Entry {
+                what: value.bytes.as_ref().map_or(What::Lost, |_| What::Value),
+                dag,
+                place: value.channel,
+                job: value.job,
+                release_ns: release_ns(dag, value.job, value.at_ns),
+                at_ns: value.at_ns,
+                value: value.bytes.as_deref().unwrap_or_default(),
+            }
+        });
+        let others = events.iter().filter_map(|event| {
+            let is_sporadic = task_set.dag(event.dag).is_sporadic();
+            let what = match event.what {
+                journal::What::Released if is_sporadic => What::Signal,
+                journal::What::Skipped => What::Skip,
+                journal::What::Cancelled => What::Cut,
+                journal::What::Restarted => What::Restart,
+                _ => return None,
+            };
+            let dag = u16::try_from(event.dag.0).ok()?;
+            Some(Entry {
+                what,
+                dag,
+                place: event
+                    .subtask
+                    .and_then(|subtask| u16::try_from(subtask.0).ok())
+                    .unwrap_or(0),
+                job: event.job,
+                release_ns: release_ns(dag, event.job, event.time_ns),
+                at_ns: event.time_ns,
+                value: &[],
+            })
+        });
+        let mut entries: Vec<Entry<'_>> = values.chain(others).collect();
+        entries.sort_by_key(|entry| entry.at_ns);
+        entries.iter().for_each(|entry| writer.write(entry));
+        writer.finish()
+    }
+}
