@@ -1,12 +1,12 @@
 //! The few ACPI tables that name the processors, a known clock, and the machine's end.
 //!
 //! Root pointer (RSDP) -> RSDT or XSDT -> MADT (processors, I/O APICs) and
-//! FADT (power management timer, [`power`]). Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every
+//! FADT (power management timer, [`power`]), HPET. Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every
 //! table's checksum is verified; what is malformed is as good as absent.
 
 use crate::physical::PhysicalMemory;
-use crate::power::{self, Power};
-use crate::{List, MAX_PROCESSORS};
+use crate::power::{self, Power, Register};
+use crate::{Full, List, MAX_PROCESSORS};
 
 /// The most I/O APICs that are noted.
 pub const MAX_IO_APICS: usize = 8;
@@ -15,15 +15,27 @@ pub const MAX_IO_APICS: usize = 8;
 #[derive(Clone, Copy, Debug)]
 pub struct Platform {
     /// The local APIC ids of the enabled processors, in the table's order.
-    pub apic_ids: List<u8, MAX_PROCESSORS>,
+    pub apic_ids: List<u32, MAX_PROCESSORS>,
     /// The physical address of the local APICs' registers.
     pub local_apic: u64,
     /// The power management timer, if the machine has one.
     pub pm_timer: Option<PmTimer>,
+    /// The physical address of the registers of the high precision event timer, if it has one.
+    pub hpet: Option<u64>,
     /// The physical addresses of the I/O APICs' registers.
     pub io_apics: List<u64, MAX_IO_APICS>,
     /// How it is powered off and reset.
     pub power: Power,
+}
+
+impl Platform {
+    /// Adds a processor, unless the table has named it already, in its other form of an entry.
+    fn add_processor(&mut self, apic_id: u32) -> Result<(), Full> {
+        match self.apic_ids.as_slice().contains(&apic_id) {
+            true => Ok(()),
+            false => self.apic_ids.push(apic_id),
+        }
+    }
 }
 
 /// The 3.579545 MHz counter of ACPI 4.8.2.1.
@@ -65,7 +77,9 @@ const HEADER: u64 = 36;
 ///
 /// [`AcpiError`] says which link of the chain is missing. Without a MADT there is no
 /// telling which processors exist, so that is an error, not an empty list.
-pub fn read(memory: &impl PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, AcpiError> {
+// It is compiled for size where it is, and an image has little room.
+#[inline(never)]
+pub fn read(memory: &dyn PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, AcpiError> {
     let root = rsdp
         .filter(|at| is_root_pointer(memory, *at))
         .or_else(|| {
@@ -83,6 +97,7 @@ pub fn read(memory: &impl PhysicalMemory, rsdp: Option<u64>) -> Result<Platform,
         apic_ids: List::new(0),
         local_apic: 0,
         pm_timer: fadt.and_then(|fadt| pm_timer(memory, fadt)),
+        hpet: (tables.find(memory, *b"HPET")).and_then(|hpet| hpet_registers(memory, hpet)),
         io_apics: List::new(0),
         power: fadt.map_or(Power::default(), |fadt| power::read(memory, fadt)),
     };
@@ -90,7 +105,7 @@ pub fn read(memory: &impl PhysicalMemory, rsdp: Option<u64>) -> Result<Platform,
     Ok(platform)
 }
 
-fn is_root_pointer(memory: &impl PhysicalMemory, address: u64) -> bool {
+fn is_root_pointer(memory: &dyn PhysicalMemory, address: u64) -> bool {
     memory
         .bytes(address, 20)
         .is_some_and(|bytes| bytes.starts_with(b"RSD PTR ") && sums_to_0(bytes))
@@ -101,7 +116,7 @@ fn sums_to_0(bytes: &[u8]) -> bool {
 }
 
 /// Returns the table's length if it is whole and starts with `signature`.
-fn table_length(memory: &impl PhysicalMemory, table: u64, signature: [u8; 4]) -> Option<u64> {
+fn table_length(memory: &dyn PhysicalMemory, table: u64, signature: [u8; 4]) -> Option<u64> {
     let length = memory.u32(table + 4)?;
     let bytes = memory.bytes(table, usize::try_from(length).ok()?)?;
     (bytes.starts_with(&signature) && sums_to_0(bytes)).then_some(u64::from(length))
@@ -115,7 +130,7 @@ struct RootTable {
 }
 
 impl RootTable {
-    fn at(memory: &impl PhysicalMemory, rsdp: u64) -> Option<Self> {
+    fn at(memory: &dyn PhysicalMemory, rsdp: u64) -> Option<Self> {
         let revision = memory.u8(rsdp + 15)?;
         let xsdt = if revision >= 2 {
             memory.u64(rsdp + 24)?
@@ -135,7 +150,7 @@ impl RootTable {
         })
     }
 
-    fn find(&self, memory: &impl PhysicalMemory, signature: [u8; 4]) -> Option<u64> {
+    fn find(&self, memory: &dyn PhysicalMemory, signature: [u8; 4]) -> Option<u64> {
         (HEADER..self.length)
             .step_by(usize::try_from(self.entry_size).ok()?)
             .filter_map(|offset| match self.entry_size {
@@ -147,10 +162,11 @@ impl RootTable {
 }
 
 /// Reads the processors and the local APIC's address (ACPI 5.2.12).
-fn read_madt(memory: &impl PhysicalMemory, madt: u64, platform: &mut Platform) -> Option<()> {
+fn read_madt(memory: &dyn PhysicalMemory, madt: u64, platform: &mut Platform) -> Option<()> {
     const LOCAL_APIC: u8 = 0;
     const IO_APIC: u8 = 1;
     const LOCAL_APIC_ADDRESS_OVERRIDE: u8 = 5;
+    const LOCAL_X2APIC: u8 = 9;
     const ENABLED: u32 = 1;
     let length = u64::from(memory.u32(madt + 4)?);
     platform.local_apic = u64::from(memory.u32(madt + HEADER)?);
@@ -160,7 +176,12 @@ fn read_madt(memory: &impl PhysicalMemory, madt: u64, platform: &mut Platform) -
         let size = memory.u8(entry + 1).filter(|size| *size >= 2)?;
         match memory.u8(entry)? {
             LOCAL_APIC if memory.u32(entry + 4)? & ENABLED != 0 => {
-                platform.apic_ids.push(memory.u8(entry + 3)?).ok()?;
+                platform
+                    .add_processor(u32::from(memory.u8(entry + 3)?))
+                    .ok()?;
+            }
+            LOCAL_X2APIC if memory.u32(entry + 8)? & ENABLED != 0 => {
+                platform.add_processor(memory.u32(entry + 4)?).ok()?;
             }
             IO_APIC => {
                 // One more than there is room for stays as the firmware left it.
@@ -174,8 +195,17 @@ fn read_madt(memory: &impl PhysicalMemory, madt: u64, platform: &mut Platform) -
     (!platform.apic_ids.as_slice().is_empty()).then_some(())
 }
 
+/// Reads where the event timer's registers are (IA-PC HPET specification 1.0a, 3.2.4).
+fn hpet_registers(memory: &dyn PhysicalMemory, hpet: u64) -> Option<u64> {
+    const BASE_ADDRESS: u64 = 40;
+    match power::register(memory, hpet + BASE_ADDRESS)? {
+        Register::Memory(address) => Some(address),
+        Register::Port(_) => None,
+    }
+}
+
 /// Reads where the power management timer is (ACPI 5.2.9).
-fn pm_timer(memory: &impl PhysicalMemory, fadt: u64) -> Option<PmTimer> {
+fn pm_timer(memory: &dyn PhysicalMemory, fadt: u64) -> Option<PmTimer> {
     const PM_TIMER_BLOCK: u64 = 76;
     const FLAGS: u64 = 112;
     const TIMER_IS_32_BITS: u32 = 1 << 8;
@@ -222,11 +252,14 @@ mod tests {
             let mut fadt = [0; 116 - 36];
             fadt[76 - 36..78 - 36].copy_from_slice(&0x608u16.to_le_bytes());
             machine.put_table(0x6000, *b"FACP", &fadt);
+            let mut hpet = [0; 56 - 36];
+            hpet[8..12].copy_from_slice(&0xfed0_0000u32.to_le_bytes());
+            machine.put_table(0x7000, *b"HPET", &hpet);
             if revision >= 2 {
-                let entries = [0x6000u64, 0x5000].map(u64::to_le_bytes).concat();
+                let entries = [0x6000u64, 0x5000, 0x7000].map(u64::to_le_bytes).concat();
                 machine.put_table(0x4000, *b"XSDT", &entries);
             } else {
-                let entries = [0x6000u32, 0x5000].map(u32::to_le_bytes).concat();
+                let entries = [0x6000u32, 0x5000, 0x7000].map(u32::to_le_bytes).concat();
                 machine.put_table(0x4000, *b"RSDT", &entries);
             }
             machine.put_root(revision);
@@ -239,6 +272,7 @@ mod tests {
             table[..4].copy_from_slice(&signature);
             table[4..8].copy_from_slice(&length.to_le_bytes());
             table[36..].copy_from_slice(body);
+            table[9] = 0;
             table[9] = table.iter().fold(0u8, |sum, byte| sum.wrapping_sub(*byte));
         }
 
@@ -262,6 +296,7 @@ mod tests {
             assert_eq!(platform.apic_ids.as_slice(), &[0, 2], "revision {revision}");
             assert_eq!(platform.local_apic, 0xfee0_0000);
             assert_eq!(platform.io_apics.as_slice(), &[0xfec0_0000]);
+            assert_eq!(platform.hpet, Some(0xfed0_0000));
             assert_eq!(
                 platform.pm_timer,
                 Some(PmTimer {
@@ -293,6 +328,20 @@ mod tests {
         let mut machine = Machine::new(0);
         machine.0[0x5010] ^= 1; // spoils the MADT's
         assert_eq!(fault(&machine), AcpiError::NoProcessorTable);
+    }
+
+    #[test]
+    fn finds_processors_with_long_ids_and_each_once() {
+        let mut machine = Machine::new(2);
+        let long = |id: u32, flags: u8| {
+            let id = id.to_le_bytes();
+            [&[9, 16, 0, 0], &id[..], &[flags, 0, 0, 0, 7, 0, 0, 0]].concat()
+        };
+        let short = [0, 8, 1, 1, 1, 0, 0, 0].to_vec();
+        let entries = [vec![0; 8], short, long(1, 1), long(300, 1), long(301, 0)];
+        machine.put_table(0x5000, *b"APIC", &entries.concat());
+        let platform = read(&machine, Some(RSDP)).unwrap();
+        assert_eq!(platform.apic_ids.as_slice(), &[1, 300]);
     }
 
     #[test]

@@ -37,7 +37,7 @@ use physical::PhysicalMemory;
 
 pub use list::{Full, List};
 
-/// The most processors that are told apart: the 8-bit APIC ids, less broadcast.
+/// The most processors that are told apart.
 pub const MAX_PROCESSORS: usize = 255;
 
 /// The most modules that are noted; loaders in use pass one.
@@ -186,11 +186,11 @@ impl BootInfo {
         core::str::from_utf8(self.command_line.as_slice()).map(str::trim)
     }
 
-    /// Reports whether a word stands in the command line. It takes no memory, so it can be
-    /// asked before there is any.
+    /// Returns the value of the word `key=value`, if the command line has it. It takes no
+    /// memory, so it can be asked before there is any.
     #[must_use]
-    pub fn has_word(&self, word: &str) -> bool {
-        let line = self.command_line().unwrap_or_default();
-        line.split_whitespace().any(|each| each == word)
+    pub fn value(&self, key: &str) -> Option<&str> {
+        let mut words = self.command_line().ok()?.split_whitespace();
+        words.find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
     }
 }

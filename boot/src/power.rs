@@ -70,7 +70,7 @@ mod offset {
 }
 
 /// Reads the FADT at `fadt`, whose checksum is right.
-pub(crate) fn read(memory: &impl PhysicalMemory, fadt: u64) -> Power {
+pub(crate) fn read(memory: &dyn PhysicalMemory, fadt: u64) -> Power {
     const HAS_RESET: u32 = 1 << 10;
     const IS_REDUCED: u32 = 1 << 20;
     let length = memory.u32(fadt + 4).map_or(0, u64::from);
@@ -98,7 +98,7 @@ fn small_port(port: u32) -> Option<u16> {
 }
 
 /// Reads a generic address (5.2.3.2) in memory or at a port.
-fn register(memory: &impl PhysicalMemory, at: u64) -> Option<Register> {
+pub(crate) fn register(memory: &dyn PhysicalMemory, at: u64) -> Option<Register> {
     let address = memory.u64(at + 4).filter(|address| *address != 0)?;
     match memory.u8(at)? {
         0 => Some(Register::Memory(address)),
@@ -108,7 +108,7 @@ fn register(memory: &impl PhysicalMemory, at: u64) -> Option<Register> {
 }
 
 /// Returns the two types of sleep that are off, from the DSDT that the FADT names.
-fn sleep_types(memory: &impl PhysicalMemory, fadt: u64, length: u64) -> Option<[u8; 2]> {
+fn sleep_types(memory: &dyn PhysicalMemory, fadt: u64, length: u64) -> Option<[u8; 2]> {
     let has_wide = offset::WIDE_DSDT + 8 <= length;
     let wide = memory.u64(fadt + offset::WIDE_DSDT).filter(|_| has_wide);
     let dsdt = match wide {

@@ -11,6 +11,25 @@ fn two_processors_take_interrupts() {
     assert_eq!(probe.number_at("steps"), Some(4), "{}", probe.text);
 }
 
+/// As a firmware leaves it on a PC with many processors. The rate of the counter that this
+/// processor states lacks the crystal, so another clock has to check it.
+#[test]
+fn two_processors_by_x2apic() {
+    let words = "x2apic=on jobs=2 subtasks=2";
+    let transcript = bochs::succeed("fork-join", words, "corei7_skylake_x", 2);
+    let boot = transcript.of_kind("boot").next().expect("a boot line");
+    assert!(boot.text.contains("\"x2apic\":true"), "{}", boot.text);
+    assert_eq!(boot.text_at("clock"), Some("acpi-pm-timer"));
+    assert_eq!(boot.text_at("clock_check"), Some("hpet"), "{}", boot.text);
+    assert!(
+        boot.text.contains("\"clock_undisputed\":true"),
+        "{}",
+        boot.text
+    );
+    let run = transcript.of_kind("fork_join").next().expect("a result");
+    assert_eq!(run.number_at("joins"), Some(2), "{}", run.text);
+}
+
 #[test]
 fn four_processors() {
     let transcript = bochs::succeed("fork-join", "jobs=2 subtasks=2", "ryzen", 4);

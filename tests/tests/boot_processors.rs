@@ -170,21 +170,76 @@ fn a_machine_without_a_serial_port_runs() {
     assert!(first_ns - ready_ns < 10_000_000, "{ready_ns}, {first_ns}");
 }
 
+/// Here all clocks follow one count, so that all must find the same rate.
+#[test]
+fn time_is_measured_by_the_clock_that_is_asked_for() {
+    for (clock, check) in [
+        ("acpi-pm-timer", "hpet"),
+        ("hpet", "acpi-pm-timer"),
+        ("local-apic-1ghz", "acpi-pm-timer"),
+        ("pit", "acpi-pm-timer"),
+    ] {
+        let guest = Guest::new("fork-join").cores(2).machine(Machine::Q35);
+        let guest = guest.word("jobs=2").word("subtasks=2");
+        let outcome = guest.word(&format!("clock={clock}")).succeed();
+        let boot = outcome.transcript.of_kind("boot").next().expect("a line");
+        assert_eq!(boot.text_at("clock"), Some(clock), "{}", boot.text);
+        assert_eq!(boot.text_at("clock_check"), Some(check), "{}", boot.text);
+        assert!(boot.text.contains("\"clock_undisputed\":true"));
+        for rate in ["counter_khz", "clock_check_khz"] {
+            let khz = boot.number_at(rate).expect("a rate");
+            assert!(khz.abs_diff(1_000_000) < 100, "{}", boot.text);
+        }
+        assert_eq!(boot.number_at("skew_ns"), Some(0), "{}", boot.text);
+    }
+}
+
 /// The board has no ACPI timer, and the processor does not say that it is QEMU's.
 #[test]
-fn a_machine_without_a_clock_of_known_rate_is_refused() {
+fn a_machine_with_no_clock_but_the_first_pcs_runs() {
     let unknown = qemu_with("#max", "max,-hypervisor");
-    let outcome = Guest::new("fork-join")
-        .program(&unknown)
-        .end_in(Status::Failure);
+    let guest = Guest::new("fork-join").cores(2).program(&unknown);
+    let outcome = guest.word("jobs=2").word("subtasks=2").succeed();
     fs::remove_file(&unknown).expect("it is ours");
-    let panic = outcome
-        .transcript
-        .of_kind("panic")
-        .next()
-        .expect("a report");
-    let message = panic.text_at("message").unwrap_or_default();
-    assert!(message.starts_with("no clock of known rate: "), "{message}");
+    let boot = outcome.transcript.of_kind("boot").next().expect("a line");
+    assert_eq!(boot.text_at("clock"), Some("pit"), "{}", boot.text);
+}
+
+/// Boots a guest that must fail before it runs, and returns what it says.
+fn refusal(guest: &Guest) -> String {
+    let outcome = guest.end_in(Status::Failure);
+    let panic = outcome.transcript.of_kind("panic").next();
+    let panic = panic.expect("a report");
+    panic.text_at("message").unwrap_or_default().into()
+}
+
+#[test]
+fn a_machine_without_a_clock_of_known_rate_is_refused() {
+    let changes = [("#max", "max,-hypervisor"), ("#microvm", "microvm,pit=off")];
+    let unknown = qemu_and(&changes, "");
+    let message = refusal(&Guest::new("fork-join").program(&unknown));
+    fs::remove_file(&unknown).expect("it is ours");
+    let expected = "no clock of known rate: any does not count here; ";
+    assert!(message.starts_with(expected), "{message}");
+    let message = refusal(&Guest::new("fork-join").word("clock=hpet"));
+    let expected = "no clock of known rate: hpet does not count here; ";
+    assert!(message.starts_with(expected), "{message}");
+}
+
+/// `boot_in_bochs.rs` has a processor with x2APIC.
+#[test]
+fn x2apic_is_refused_where_the_processor_lacks_it() {
+    let without = qemu_with("#max", "max,-x2apic");
+    let guest = Guest::new("fork-join").cores(2).program(&without);
+    let message = refusal(&guest.clone().word("x2apic=on"));
+    assert!(
+        message.starts_with("the processor has no x2APIC"),
+        "{message}"
+    );
+    let outcome = guest.word("jobs=2").word("subtasks=2").succeed();
+    fs::remove_file(&without).expect("it is ours");
+    let boot = outcome.transcript.of_kind("boot").next().expect("a line");
+    assert!(boot.text.contains("\"x2apic\":false"), "{}", boot.text);
 }
 
 #[test]

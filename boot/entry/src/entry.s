@@ -113,19 +113,29 @@ boot_long_mode:
     ud2
 
 # An application processor, sent here by the trampoline in 32-bit mode with cr3
-# loaded and no stack. It finds its own by its APIC id, as an index into a table
-# of stack tops that is filled before any processor is started.
+# loaded and no stack. It finds its own by its APIC id, in a table that is filled before any
+# processor is started. An id of more than 8 bits is in CPUID leaf 0xb, if there is that.
 .code32
 processor_entry:
     mov ax, 0x10
     mov ds, ax
     mov es, ax
     mov ss, ax
-    mov eax, 1
+    xor eax, eax
+    cpuid
+    cmp eax, 0xb
+    jb 1f
+    mov eax, 0xb
+    xor ecx, ecx
+    cpuid
+    mov ebp, edx
+    test ebx, ebx
+    jnz 2f
+1:  mov eax, 1
     cpuid
     shr ebx, 24
     mov ebp, ebx
-    mov esi, offset processor_long_mode_pointer
+2:  mov esi, offset processor_long_mode_pointer
     jmp enable_long_mode
 
 .code64
@@ -136,8 +146,16 @@ processor_long_mode:
     mov ss, eax
     mov fs, eax
     mov gs, eax
-    lea rax, [rip + {stack_tops}]
-    mov rsp, [rax + rbp * 8]
+    lea rax, [rip + {stacks}]
+    lea rcx, [rax + {stacks_bytes}]
+3:  cmp [rax], rbp
+    je 5f
+    add rax, 16
+    cmp rax, rcx
+    jb 3b
+4:  hlt                             # nobody has started this one
+    jmp 4b
+5:  mov rsp, [rax + 8]
     mov edi, ebp
     xor ebp, ebp
     call {processor_rust_entry}

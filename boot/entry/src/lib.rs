@@ -26,7 +26,8 @@ use boot::{BootInfo, multiboot2, pvh};
 global_asm!(
     include_str!("entry.s"),
     rust_entry = sym rust_entry,
-    stack_tops = sym processors::STACK_TOPS,
+    stacks = sym processors::STACKS,
+    stacks_bytes = const size_of_val(&processors::STACKS),
     processor_rust_entry = sym processors::rust_entry,
 );
 global_asm!(include_str!("trampoline.s"), options(att_syntax));

@@ -10,11 +10,14 @@
 
 use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
+use boot::MAX_PROCESSORS;
+
 /// The entry function: called with the processor's APIC id, never to return.
 pub type Entry = extern "C" fn(apic_id: u32) -> !;
 
-/// For each APIC id the top of its stack, read by `entry.s`.
-pub(crate) static STACK_TOPS: [AtomicU64; 256] = [const { AtomicU64::new(0) }; 256];
+/// The APIC id of each processor, and the top of its stack, read by `entry.s`.
+pub(crate) static STACKS: [[AtomicU64; 2]; MAX_PROCESSORS] =
+    [const { [const { AtomicU64::new(0) }; 2] }; MAX_PROCESSORS];
 
 /// The address of the entry function, 0 before [`prepare`].
 static ENTRY: AtomicUsize = AtomicUsize::new(0);
@@ -54,9 +57,16 @@ pub unsafe fn prepare(root_table: u64, page: u8, entry: Entry) {
     };
 }
 
-/// Gives processor `apic_id` its stack, which grows down from `top`.
-pub fn set_stack(apic_id: u8, top: u64) {
-    STACK_TOPS[usize::from(apic_id)].store(top, Ordering::Release);
+/// Gives processor `apic_id` its stack, which grows down from `top`. Each processor has a
+/// place, and places are taken from 0 on.
+///
+/// # Panics
+///
+/// If `place` is not below [`MAX_PROCESSORS`].
+pub fn set_stack(place: usize, apic_id: u32, top: u64) {
+    let [id, stack] = &STACKS[place];
+    id.store(u64::from(apic_id), Ordering::Release);
+    stack.store(top, Ordering::Release);
 }
 
 /// Continues `entry.s` on an application processor's own stack.

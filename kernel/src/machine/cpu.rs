@@ -95,6 +95,37 @@ pub(crate) fn time_stamp() -> u64 {
     unsafe { core::arch::x86_64::_rdtsc() }
 }
 
+/// Reads the time stamp counter, in ticks, not before what was read from memory so far.
+pub(crate) fn time_stamp_after_reads() -> u64 {
+    // SAFETY: LFENCE only orders; every 64-bit processor has it.
+    unsafe { core::arch::x86_64::_mm_lfence() };
+    time_stamp()
+}
+
+/// Waits until what this core has written is visible to all, before it goes on in any way.
+pub(crate) fn finish_writes() {
+    // SAFETY: the fences only order; every 64-bit processor has them.
+    unsafe { asm!("mfence", "lfence", options(nostack)) };
+}
+
+/// Reports whether local APICs can be reached by model-specific registers.
+pub(crate) fn has_x2apic() -> bool {
+    const X2APIC: u32 = 1 << 21;
+    __cpuid(1).ecx & X2APIC != 0
+}
+
+/// Reads a model-specific register.
+///
+/// # Safety
+///
+/// The processor has the register, and reading it changes nothing.
+pub(crate) unsafe fn read_msr(register: u32) -> u64 {
+    let (low, high): (u64, u64);
+    // SAFETY: the caller vouches for the register.
+    unsafe { asm!("rdmsr", in("ecx") register, out("rax") low, out("rdx") high) };
+    high << 32 | low
+}
+
 /// Writes a model-specific register.
 ///
 /// # Safety
@@ -123,6 +154,17 @@ pub(crate) fn fault_address() -> u64 {
 pub(crate) unsafe fn set_page_table(root: u64) {
     // SAFETY: the caller vouches for the table; the write flushes old entries.
     unsafe { asm!("mov cr3, {}", in(reg) root) };
+}
+
+/// What the processor says of the time stamp counter (CPUID 0x15): the denominator and the
+/// numerator of its ratio to a crystal, and the crystal's rate in Hz; each 0 if it is left out.
+pub(crate) fn counter_ratio() -> [u32; 3] {
+    const LEAF: u32 = 0x15;
+    if __cpuid(0).eax < LEAF {
+        return [0; 3];
+    }
+    let leaf = __cpuid(LEAF);
+    [leaf.eax, leaf.ebx, leaf.ecx]
 }
 
 /// The hypervisor's signature (CPUID 0x4000_0000), if there is one.

@@ -1,13 +1,14 @@
 //! The local APIC: a core's own timer, and interrupts to other cores.
 //!
-//! Used in xAPIC mode, by memory-mapped registers (Intel SDM volume 3, chapter
-//! 11). All local APICs appear at the same address, each core seeing its own.
+//! Each core sees its own, by one of two ways (Intel SDM volume 3, chapter 11): *xAPIC*, by
+//! registers in memory at the same address, with ids of 8 bits; or *x2APIC*, by model-specific
+//! registers, with ids of 32. The firmware leaves a PC with many processors in the latter.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use super::{cpu, vector};
 
-/// The registers' address; set once before any use.
+/// The registers' address, set once before any use; 0 where they are model-specific ones.
 static BASE: AtomicU64 = AtomicU64::new(0);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,33 +32,94 @@ enum Register {
 
 const MASKED: u32 = 1 << 16;
 
-/// Names the address at which the registers are mapped.
+/// The register that has this core's way in its bits (SDM volume 3, 11.4.4 and 11.12.1).
+const WAY: u32 = 0x1b;
+const ENABLED: u64 = 1 << 11;
+const X2APIC: u64 = 1 << 10;
+
+/// Chooses the way for all cores, and takes it on this one, the boot processor: x2APIC if the
+/// firmware has left it on or `wants_x2apic`.
+///
+/// # Panics
+///
+/// If it is wanted, and the processor does not have it.
 ///
 /// # Safety
 ///
 /// `base` is the local APIC's address, mapped uncached and writable.
-pub(crate) unsafe fn set_base(base: u64) {
-    BASE.store(base, Ordering::Release);
+pub(crate) unsafe fn choose(base: u64, wants_x2apic: bool) {
+    assert!(
+        !wants_x2apic || cpu::has_x2apic(),
+        "the processor has no x2APIC; leave the word `x2apic=on` out"
+    );
+    // SAFETY: every 64-bit processor has the register.
+    let is_left_on = unsafe { cpu::read_msr(WAY) } & X2APIC != 0;
+    if !wants_x2apic && !is_left_on {
+        BASE.store(base, Ordering::Release);
+    }
+    take_way();
 }
 
-fn address(register: Register) -> *mut u32 {
-    (BASE.load(Ordering::Relaxed) + register as u64) as *mut u32
+/// Reports whether registers are model-specific ones.
+pub(crate) fn is_x2apic() -> bool {
+    BASE.load(Ordering::Relaxed) == 0
 }
 
+/// Puts this core's local APIC into the way that was chosen.
+fn take_way() {
+    if is_x2apic() {
+        // SAFETY: as in `choose`.
+        let way = unsafe { cpu::read_msr(WAY) };
+        // From off there is no way but over xAPIC (SDM volume 3, 11.12.5).
+        for way in [way | ENABLED, way | ENABLED | X2APIC] {
+            // SAFETY: the processor has x2APIC (`choose`).
+            unsafe { cpu::write_msr(WAY, way) };
+        }
+    }
+}
+
+/// Returns the model-specific register that is `register`.
+const fn specific(register: Register) -> u32 {
+    0x800 + register as u32 / 16
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the upper half of the registers that are read is 0"
+)]
 fn read(register: Register) -> u32 {
-    // SAFETY: the register is one of the mapped local APIC's (`set_base`).
-    unsafe { address(register).read_volatile() }
+    match BASE.load(Ordering::Relaxed) {
+        // SAFETY: in x2APIC mode these are the local APIC's registers, without side effects.
+        0 => unsafe { cpu::read_msr(specific(register)) as u32 },
+        base => read_mapped(base, register),
+    }
 }
 
 fn write(register: Register, value: u32) {
-    // SAFETY: as in `read`; this module alone decides what is written, and no
-    // value makes the local APIC touch memory.
-    unsafe { address(register).write_volatile(value) };
+    match BASE.load(Ordering::Relaxed) {
+        // SAFETY: as in `read`; this module alone decides what is written, and no
+        // value makes the local APIC touch memory.
+        0 => unsafe { cpu::write_msr(specific(register), u64::from(value)) },
+        base => write_mapped(base, register, value),
+    }
+}
+
+fn read_mapped(base: u64, register: Register) -> u32 {
+    let address = (base + register as u64) as *const u32;
+    // SAFETY: the register is one of the mapped local APIC's (`choose`).
+    unsafe { address.read_volatile() }
+}
+
+fn write_mapped(base: u64, register: Register, value: u32) {
+    let address = (base + register as u64) as *mut u32;
+    // SAFETY: as in `write`.
+    unsafe { address.write_volatile(value) };
 }
 
 /// Returns the id of the core that executes this.
-pub(crate) fn id() -> u8 {
-    (read(Register::Id) >> 24).to_le_bytes()[0]
+pub(crate) fn id() -> u32 {
+    let id = read(Register::Id);
+    if is_x2apic() { id } else { id >> 24 }
 }
 
 const SOFTWARE_ENABLE: u32 = 1 << 8;
@@ -80,6 +142,7 @@ const TURN_ON: [(Register, u32); 7] = [
 
 /// Turns on the local APIC of this core, with only its timer unmasked.
 pub(crate) fn enable() {
+    take_way();
     for (register, value) in TURN_ON {
         write(register, value);
     }
@@ -108,18 +171,18 @@ pub(crate) fn timer_count() -> u32 {
 }
 
 /// Sends interrupt `vector` to the core with id `apic_id`.
-pub(crate) fn send(apic_id: u8, vector: u8) {
+pub(crate) fn send(apic_id: u32, vector: u8) {
     command(apic_id, u32::from(vector));
 }
 
 /// Sends the INIT interrupt: the processor waits for its startup interrupt.
-pub(crate) fn send_init(apic_id: u8) {
+pub(crate) fn send_init(apic_id: u32) {
     const INIT_ASSERT: u32 = 0b101 << 8 | 1 << 14;
     command(apic_id, INIT_ASSERT);
 }
 
 /// Sends the startup interrupt: the processor starts at page `vector`.
-pub(crate) fn send_startup(apic_id: u8, vector: u8) {
+pub(crate) fn send_startup(apic_id: u32, vector: u8) {
     const STARTUP: u32 = 0b110 << 8 | 1 << 14;
     command(apic_id, STARTUP | u32::from(vector));
 }
@@ -131,25 +194,42 @@ pub(crate) fn send_stop_to_others() {
 }
 
 /// Sends the non-maskable interrupt to the core with id `apic_id`.
-pub(crate) fn send_non_maskable(apic_id: u8) {
+pub(crate) fn send_non_maskable(apic_id: u32) {
     const NON_MASKABLE: u32 = 0b100 << 8 | 1 << 14;
     command(apic_id, NON_MASKABLE);
 }
 
 /// Writes an interrupt command. The two halves must not be separated by a
-/// handler's command, so interrupts are disabled meanwhile.
-fn command(apic_id: u8, low: u32) {
+/// handler's command, so interrupts are disabled meanwhile. One function for all commands: an
+/// image has little room.
+#[inline(never)]
+fn command(apic_id: u32, low: u32) {
     const PENDING: u32 = 1 << 12;
+    let base = BASE.load(Ordering::Relaxed);
+    if base == 0 {
+        return command_at_once(apic_id, low);
+    }
     let was_set = cpu::clear_interrupt_flag();
     // Delivery takes microseconds at most; the hardware bounds the wait.
-    while read(Register::CommandLow) & PENDING != 0 {
+    while read_mapped(base, Register::CommandLow) & PENDING != 0 {
         cpu::relax();
     }
-    write(Register::CommandHigh, u32::from(apic_id) << 24);
-    write(Register::CommandLow, low);
+    write_mapped(base, Register::CommandHigh, apic_id << 24);
+    write_mapped(base, Register::CommandLow, low);
     if was_set {
         cpu::set_interrupt_flag();
     }
+}
+
+/// Writes an interrupt command in x2APIC mode, where that is one write. All that this core has
+/// written before is made visible to the other first (SDM volume 3, 11.12.3).
+#[cold]
+#[inline(never)]
+fn command_at_once(apic_id: u32, low: u32) {
+    cpu::finish_writes();
+    let command = u64::from(apic_id) << 32 | u64::from(low);
+    // SAFETY: as in `write`.
+    unsafe { cpu::write_msr(specific(Register::CommandLow), command) };
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@
 //! functions that it is to call. Each module states the invariant that its
 //! SAFETY comments cite.
 
+pub(crate) mod agreement;
+pub(crate) mod calibration;
 pub(crate) mod clock;
 pub(crate) mod context;
 pub(crate) mod counted_time;
@@ -16,6 +18,7 @@ pub(crate) mod interrupt;
 pub(crate) mod interrupt_flag;
 pub(crate) mod interrupts_off;
 pub(crate) mod io_apic;
+pub(crate) mod known_clock;
 pub(crate) mod legacy;
 pub(crate) mod local_apic;
 mod meter;

@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::this_core::{self, Core};
-use super::{clock, cpu, interrupt, local_apic};
+use super::{agreement, clock, cpu, interrupt, local_apic};
 
 /// Cores that have arrived in their entry function, the boot processor not
 /// counted.
@@ -15,15 +15,16 @@ const LONGEST_JUMP_NS: u64 = 2_000;
 
 /// Makes the processor that executes this the core with APIC id `apic_id`:
 /// segments, interrupt stacks, interrupt table and local APIC.
-pub(crate) fn become_core(apic_id: u8) -> &'static Core {
+pub(crate) fn become_core(apic_id: u32) -> &'static Core {
     let core = this_core::load(apic_id);
     interrupt::load_table();
     local_apic::enable();
     core
 }
 
-/// Says that the core which executes this has arrived.
-pub(crate) fn arrive() {
+/// Says that the core which executes this, `core`, has arrived, once it has compared its counter.
+pub(crate) fn arrive(core: &Core) {
+    agreement::compare_often(core);
     ARRIVED.fetch_add(1, Ordering::Release);
 }
 
@@ -45,8 +46,8 @@ pub(crate) unsafe fn start_others(
     let others = || this_core::all().iter().skip(1);
     // SAFETY: passed on from the caller.
     unsafe { boot_entry::processors::prepare(root_table, page, entry) };
-    for core in others() {
-        boot_entry::processors::set_stack(core.apic_id(), core.context().stack_top());
+    for (place, core) in others().enumerate() {
+        boot_entry::processors::set_stack(place, core.apic_id(), core.context().stack_top());
     }
     let expected = u32::try_from(others().count()).unwrap_or(u32::MAX);
     if expected == 0 {
@@ -71,7 +72,9 @@ pub(crate) unsafe fn start_others(
 /// Waits `ns`, or until `expected` cores have arrived, and reports the latter.
 fn wait(ns: u64, expected: u32) -> bool {
     let end_ns = clock::now_ns().saturating_add(ns);
+    let core = this_core::get();
     loop {
+        agreement::compare(core);
         let all_here = ARRIVED.load(Ordering::Acquire) >= expected;
         if all_here || clock::now_ns() >= end_ns {
             local_apic::start_timer(0);

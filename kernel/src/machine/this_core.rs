@@ -49,7 +49,7 @@ pub(crate) struct Core {
     handler_stack: u64,
     /// The position among the cores: 0 is the boot processor.
     pub(crate) index: u32,
-    apic_id: u8,
+    apic_id: u32,
     exception_stacks: [u64; 4],
     task_state: AtomicPtr<TaskState>,
     /// The context that runs here.
@@ -71,6 +71,8 @@ pub(crate) struct Core {
     /// The time between two heartbeats of this core, 0 if it has none.
     pub(crate) heartbeat_ns: AtomicU64,
     interrupts_off: Meter,
+    /// By how much the counter has been behind another core's, in ticks.
+    pub(super) behind_ticks: AtomicU64,
     /// What runs here, in two words that the layer above chooses; for reports of panics.
     pub(crate) running: [AtomicU64; 2],
 }
@@ -81,7 +83,7 @@ pub(super) const HANDLER_STACK_OFFSET: usize = core::mem::offset_of!(Core, handl
 static CORES: Once<Box<[Core]>> = Once::new();
 
 /// Creates the cores' data, the boot processor's first.
-pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
+pub(crate) fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
     let cores = cores.zip(0..).map(|((apic_id, stacks), index)| Core {
         this: AtomicU64::new(0),
         handler_stack: stacks.handler,
@@ -101,6 +103,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
         interrupted_ns: AtomicU64::new(0),
         heartbeat_ns: AtomicU64::new(0),
         interrupts_off: Meter::new(),
+        behind_ticks: AtomicU64::new(0),
         running: [const { AtomicU64::new(u64::MAX) }; 2],
     });
     // A second call would come from a second boot, which there is not.
@@ -109,7 +112,7 @@ pub(crate) fn create(cores: impl Iterator<Item = (u8, Stacks)>) {
 
 /// Makes the processor that executes this the core with APIC id `apic_id`: loads its
 /// segments and interrupt stacks.
-pub(super) fn load(apic_id: u8) -> &'static Core {
+pub(super) fn load(apic_id: u32) -> &'static Core {
     const GS_BASE: u32 = 0xc000_0101;
     let core = all()
         .iter()
@@ -280,7 +283,7 @@ impl Core {
     }
 
     /// Returns the id that interrupts are addressed to.
-    pub(crate) const fn apic_id(&self) -> u8 {
+    pub(crate) const fn apic_id(&self) -> u32 {
         self.apic_id
     }
 }

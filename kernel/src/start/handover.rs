@@ -15,11 +15,13 @@ use crate::app::ending::Ending;
 use crate::app::fault_verdict::FaultVerdict;
 use crate::app::machine_handle::Machine;
 use crate::interrupts;
+use crate::machine::calibration::{self, Rate};
+use crate::machine::known_clock::KnownClock;
 use crate::machine::power::{self, End};
 use crate::machine::this_core::{self, Stacks};
 use crate::machine::{
-    clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic, processors, screen,
-    serial,
+    agreement, clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic,
+    processors, screen, serial,
 };
 use crate::memory::{self, OutOfMemory};
 use crate::println;
@@ -31,6 +33,9 @@ use crate::watch::panic;
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
+
+/// The last processor that can be reached without x2APIC; the next id means all of them.
+const LAST_SHORT_ID: u32 = 254;
 
 /// The stack of an interrupt handler, or of an exception's report, in bytes.
 const HANDLER_STACK: u64 = 16 * 1024;
@@ -45,13 +50,13 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     if is_early {
         show_text(info, &screen);
     }
-    for (word, end) in [("end=off", End::Off), ("end=reset", End::Reset)] {
-        if info.has_word(word) {
-            power::set_end(end);
-        }
+    match info.value("end") {
+        Some("off") => power::set_end(End::Off),
+        Some("reset") => power::set_end(End::Reset),
+        _ => {}
     }
     legacy::silence_interrupt_controllers();
-    let probes = info.has_word("probe=on");
+    let probes = info.value("probe") == Some("on");
     interrupt::install(if probes {
         probe::HANDLERS
     } else {
@@ -80,8 +85,14 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     if !is_early {
         show_text(info, &screen);
     }
+    let wants_x2apic = info.value("x2apic") == Some("on");
     // SAFETY: `memory::initialize` mapped one page of registers there.
-    unsafe { local_apic::set_base(platform.local_apic) };
+    unsafe { local_apic::choose(platform.local_apic, wants_x2apic) };
+    let ids = platform.apic_ids.as_slice();
+    assert!(
+        local_apic::is_x2apic() || ids.iter().all(|id| *id <= LAST_SHORT_ID),
+        "a processor's APIC id is above {LAST_SHORT_ID}; give the word `x2apic=on`"
+    );
     // SAFETY: the tables name these registers, and `devices` had them mapped.
     unsafe { power::set_registers(platform.power) };
     for base in platform.io_apics.as_slice() {
@@ -104,10 +115,10 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
 }
 
 /// Returns the addresses of all registers in memory, for their pages to be mapped.
-fn devices(platform: &Platform) -> List<u64, { MAX_IO_APICS + 3 }> {
+fn devices(platform: &Platform) -> List<u64, { MAX_IO_APICS + 4 }> {
     let mut devices = List::new(0);
     let apics = platform.io_apics.as_slice().iter().copied();
-    let own = core::iter::once(platform.local_apic);
+    let own = core::iter::once(platform.local_apic).chain(platform.hpet);
     for address in own.chain(apics).chain(platform.power.addresses()) {
         devices
             .push(address)
@@ -178,11 +189,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
         layout,
         probes,
     } = start;
-    let is_counted = info.has_word("mode=deterministic");
-    let clock = clock::calibrate(info.entry_tsc, platform.pm_timer, is_counted);
-    let clock = clock.unwrap_or_else(|_| {
-        panic!("no clock of known rate: the machine has neither an ACPI timer nor QEMU's APIC")
-    });
+    let rate = measure_time(info, platform);
     let cores = this_core::all().len();
     if cores > 1 {
         start_others(info, layout, cores);
@@ -199,7 +206,15 @@ extern "C" fn start_cores(start: &Start) -> ! {
             .text("app", name)
             .number("cpus", cores as u64)
             .number("memory_kib", layout.total_bytes / 1024)
-            .text("clock", clock)
+            .text("clock", rate.clock)
+            .number("counter_khz", rate.khz)
+            .flag("x2apic", local_apic::is_x2apic())
+            .flag("clock_undisputed", rate.is_undisputed());
+        if let Some((clock, khz)) = rate.check {
+            line.text("clock_check", clock)
+                .number("clock_check_khz", khz);
+        }
+        line.number("skew_ns", agreement::skew_ns())
             .number("ready_ns", clock::now_ns())
             .text("command_line", command_line);
     });
@@ -207,6 +222,21 @@ extern "C" fn start_cores(start: &Start) -> ! {
         probe::run()
     } else {
         run_app(info, *app)
+    })
+}
+
+/// Measures time by a clock of known rate, which the machine must have.
+fn measure_time(info: &BootInfo, platform: &Platform) -> Rate {
+    // SAFETY: the tables name these registers, and `devices` had them mapped.
+    let clocks = unsafe { KnownClock::all(platform) };
+    let is_counted = info.value("mode") == Some("deterministic");
+    let asked = info.value("clock");
+    calibration::calibrate(info.entry_tsc, &clocks, asked, is_counted).unwrap_or_else(|| {
+        panic!(
+            "no clock of known rate: {} does not count here; `clock=` may be acpi-pm-timer, \
+             hpet, local-apic-1ghz (of QEMU) or pit, or left out",
+            asked.unwrap_or("any")
+        )
     })
 }
 
@@ -225,6 +255,12 @@ fn start_others(info: &BootInfo, layout: &memory::Layout, cores: usize) {
         others + 1,
         processors::PATIENCE_NS / 1_000_000_000
     );
+    if let Some(cores) = agreement::disagreement() {
+        panic!(
+            "time stamp counters are behind others:{cores} update the firmware, or give the \
+             machine one processor"
+        );
+    }
 }
 
 fn read_platform(info: &BootInfo) -> Platform {
@@ -235,7 +271,7 @@ fn read_platform(info: &BootInfo) -> Platform {
 }
 
 /// Returns what each core needs, the boot processor's first.
-fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u8, Stacks)> {
+fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u32, Stacks)> {
     let own = local_apic::id();
     let others = platform
         .apic_ids
@@ -243,7 +279,7 @@ fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u8, Stacks
         .iter()
         .copied()
         .filter(move |id| *id != own);
-    let ids: Vec<u8> = core::iter::once(own).chain(others).collect();
+    let ids: Vec<u32> = core::iter::once(own).chain(others).collect();
     ids.into_iter().zip(0..).map(|(id, index)| {
         let stacks = stacks(index == 0);
         (
@@ -264,9 +300,7 @@ fn stacks(is_boot_processor: bool) -> Result<Stacks, OutOfMemory> {
 
 /// Where every other core begins: it works until the machine stops.
 extern "C" fn other_core(apic_id: u32) -> ! {
-    let apic_id = u8::try_from(apic_id).expect("APIC ids have 8 bits");
-    processors::become_core(apic_id);
-    processors::arrive();
+    processors::arrive(processors::become_core(apic_id));
     interrupt::begin_work()
 }
 

@@ -18,6 +18,8 @@
 //! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
 //! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
 //! | `end=halt\|off\|reset` | what the machine does after the verdict, if no host ends it; it holds from the start on | `halt` |
+//! | `clock=acpi-pm-timer\|hpet\|local-apic-1ghz\|pit` | by which clock time is measured at the start | the first of them that counts |
+//! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left them so, they stay | `off` |
 
 use alloc::format;
 
@@ -75,6 +77,9 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     }
     // What is right was taken at the start, so that a panic ends likewise.
     options.choice("end", &[("halt", ()), ("off", ()), ("reset", ())])?;
+    // So was this, and what is wrong has been refused.
+    options.text("clock");
+    options.choice("x2apic", &[("off", ()), ("on", ())])?;
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;
     let events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
