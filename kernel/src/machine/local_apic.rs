@@ -83,25 +83,39 @@ const fn specific(register: Register) -> u32 {
     0x800 + register as u32 / 16
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the upper half of the registers that are read is 0"
-)]
 fn read(register: Register) -> u32 {
     match BASE.load(Ordering::Relaxed) {
-        // SAFETY: in x2APIC mode these are the local APIC's registers, without side effects.
-        0 => unsafe { cpu::read_msr(specific(register)) as u32 },
+        0 => read_specific(specific(register)),
         base => read_mapped(base, register),
     }
 }
 
 fn write(register: Register, value: u32) {
     match BASE.load(Ordering::Relaxed) {
-        // SAFETY: as in `read`; this module alone decides what is written, and no
-        // value makes the local APIC touch memory.
-        0 => unsafe { cpu::write_msr(specific(register), u64::from(value)) },
+        0 => write_specific(specific(register), value),
         base => write_mapped(base, register, value),
     }
+}
+
+/// Apart, so that the usual way keeps its registers.
+#[cold]
+#[inline(never)]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the upper half of the registers that are read is 0"
+)]
+fn read_specific(register: u32) -> u32 {
+    // SAFETY: in x2APIC mode these are the local APIC's registers, without side effects.
+    unsafe { cpu::read_msr(register) as u32 }
+}
+
+/// Apart, as `read_specific` is.
+#[cold]
+#[inline(never)]
+fn write_specific(register: u32, value: u32) {
+    // SAFETY: as in `read_specific`; this module alone decides what is written, and no
+    // value makes the local APIC touch memory.
+    unsafe { cpu::write_msr(register, u64::from(value)) };
 }
 
 fn read_mapped(base: u64, register: Register) -> u32 {
@@ -112,7 +126,7 @@ fn read_mapped(base: u64, register: Register) -> u32 {
 
 fn write_mapped(base: u64, register: Register, value: u32) {
     let address = (base + register as u64) as *mut u32;
-    // SAFETY: as in `write`.
+    // SAFETY: as in `write_specific`.
     unsafe { address.write_volatile(value) };
 }
 
@@ -228,7 +242,7 @@ fn command(apic_id: u32, low: u32) {
 fn command_at_once(apic_id: u32, low: u32) {
     cpu::finish_writes();
     let command = u64::from(apic_id) << 32 | u64::from(low);
-    // SAFETY: as in `write`.
+    // SAFETY: as in `write_specific`.
     unsafe { cpu::write_msr(specific(Register::CommandLow), command) };
 }
 

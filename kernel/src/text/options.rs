@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 16] = [
+const KERNELS: [&str; 18] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -30,6 +30,8 @@ const KERNELS: [&str; 16] = [
     "mode",
     "probe",
     "end",
+    "clock",
+    "x2apic",
 ];
 
 /// The command line, with a note of which words have been taken.
@@ -182,15 +184,24 @@ impl<'a> Options<'a> {
     ///
     /// See [`Options`].
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<T, UsageError> {
+        let name = |place: usize| choices.get(place).map(|(name, _)| *name);
+        Ok(choices[self.chosen(key, &name)?].1)
+    }
+
+    /// Returns the place of the name that is the value of `key`, or the first. One function
+    /// for all kinds of choices: an image has little room.
+    #[inline(never)]
+    fn chosen<'n>(
+        &self,
+        key: &str,
+        name: &dyn Fn(usize) -> Option<&'n str>,
+    ) -> Result<usize, UsageError> {
         let Some(value) = self.text(key) else {
-            return Ok(choices[0].1);
+            return Ok(0);
         };
-        let found = choices
-            .iter()
-            .find(|(name, _)| *name == value)
-            .map(|(_, choice)| *choice);
-        found.ok_or_else(|| {
-            let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+        let names = || (0..).map_while(name);
+        names().position(|name| name == value).ok_or_else(|| {
+            let names: Vec<_> = names().collect();
             UsageError(format!("`{key}={value}`: allowed are {}", names.join(", ")))
         })
     }
@@ -275,7 +286,7 @@ mod tests {
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
              budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, measure, \
-             idle, console, status, mode, probe, end"
+             idle, console, status, mode, probe, end, clock, x2apic"
         );
     }
 
