@@ -1,14 +1,16 @@
 //! What was recorded in one run is computed again in others.
 
+mod wrong;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use fass::{
-    CommitError, Dag, FaultLimit, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag,
-    execute_for, finish_create_dags,
+    Dag, FaultLimit, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag, execute_for,
+    finish_create_dags,
 };
-use recording::{Entry, Recording, What, Writer};
+use recording::{Recording, What};
 use virtual_time::{Report, VirtualTime};
 
 const fn ms(ms: u64) -> Duration {
@@ -296,133 +298,4 @@ fn a_fault_is_replayed() {
     assert_eq!((report.panics.len(), report.panics[0].instance.job), (1, 2));
     assert_eq!((report.compared, report.divergence), (7, None));
     assert_eq!(values(&again), values(&recording));
-}
-
-/// Returns what the commit says of a recording that it refuses.
-fn refused(recording: &[u8], dags: &[Dag]) -> String {
-    let _machine = VirtualTime::new().replay(recording).expect("whole");
-    let error: CommitError = finish_create_dags(dags).expect_err("it is of something else");
-    error.to_string()
-}
-
-#[test]
-fn a_recording_of_something_else_is_refused() {
-    let recording = record(&VirtualTime::new(), &[forked(1)]);
-    let said = refused(&recording, &[cheating()]);
-    assert!(
-        said.contains("the recording's dag 0 is `forked`, and here it is `cheating`"),
-        "{said}"
-    );
-    let other = cheating();
-    other.name("forked");
-    let said = refused(&recording, &[other]);
-    assert!(
-        said.contains("the recording is of another graph of dag `forked`"),
-        "{said}"
-    );
-    let two = record(
-        &VirtualTime::new(),
-        &[forked(1), overrun(OverrunPolicy::Skip, 0)],
-    );
-    let said = refused(&two, &[forked(1)]);
-    assert!(
-        said.contains("the recording's dag 1 is `slow`, and here there is none"),
-        "{said}"
-    );
-    assert!(
-        VirtualTime::new()
-            .replay(&recording[..recording.len() - 1])
-            .is_err()
-    );
-}
-
-#[test]
-fn what_is_recorded_no_more_is_refused_of_a_source_and_counted_of_others() {
-    let build = |topics: &[&str]| {
-        let dag = create_dag();
-        dag.name("demo").jobs(3);
-        topics.iter().for_each(|topic| _ = dag.record::<u8>(topic));
-        dag.register_periodic_subtask(|| (1_u8,), vec!["in"], ms(10), named("source"));
-        let pass = |(value,): (u8,)| (value,);
-        dag.register_subtask(pass, vec!["in"], vec!["out"], named("pass"));
-        dag.register_sink_subtask(|_: (u8,)| (), vec!["out"], ms(10), named("sink"));
-        dag
-    };
-    let recording = record(&VirtualTime::new(), &[build(&["in", "out"])]);
-    for topics in [&["out"][..], &[]] {
-        let said = refused(&recording, &[build(topics)]);
-        assert!(
-            said.contains("topic `in` of a source is in the recording, and is not recorded here"),
-            "{said}"
-        );
-    }
-    let (report, _) = replay(&recording, VirtualTime::new(), &[build(&["in"])]);
-    assert_eq!((report.compared, report.uncompared), (0, 3));
-}
-
-#[test]
-fn a_recorded_signal_to_a_periodic_dag_is_none() {
-    let recorded = record(&VirtualTime::new(), &[forked(1)]);
-    let recorded = Recording::read(&recorded).expect("whole");
-    let mut writer = Writer::new(recorded.header());
-    for entry in recorded.entries() {
-        writer.write(&entry);
-        let (what, value) = (What::Signal, &[][..]);
-        writer.write(&Entry {
-            what,
-            value,
-            ..entry
-        });
-    }
-    let (report, _) = replay(&writer.finish(), VirtualTime::new(), &[forked(2)]);
-    assert_eq!((report.compared, report.divergence), (60, None));
-}
-
-#[test]
-fn what_has_no_room_is_lost_and_the_recording_says_so() {
-    let build = || {
-        let dag = create_dag();
-        dag.name("large")
-            .jobs(3)
-            .relative_deadline(ms(10))
-            .record::<Vec<u64>>("list");
-        let mut length = 510;
-        let source = move || {
-            length += 1;
-            (vec![7_u64; length],)
-        };
-        dag.register_periodic_subtask(source, vec!["list"], ms(10), named("source"));
-        dag
-    };
-    let bytes = record(&VirtualTime::new(), &[build()]);
-    let recording = Recording::read(&bytes).expect("whole");
-    // 4 bytes and 511 times 8 fit into 4 KiB.
-    assert_eq!((recording.count(), recording.lost()), (3, 2));
-    let said = refused(&bytes, &[build()]);
-    assert!(
-        said.contains("the recording has lost topic `list` of job 1"),
-        "{said}"
-    );
-}
-
-#[test]
-fn a_source_that_is_recorded_in_part_is_named() {
-    let build = || {
-        let dag = create_dag();
-        dag.name("half").jobs(1).record::<u8>("a");
-        dag.register_periodic_subtask(|| (1_u8, 2_u8), vec!["a", "b"], ms(10), named("source"));
-        dag.register_sink_subtask(|_: (u8, u8)| (), vec!["a", "b"], ms(10), named("sink"));
-        dag
-    };
-    let recording = record(&VirtualTime::new(), &[build()]);
-    let machine = VirtualTime::new().replay(&recording).expect("whole");
-    finish_create_dags(&[build()]).expect("sound");
-    let said = machine
-        .try_run()
-        .expect_err("`b` cannot be replayed")
-        .to_string();
-    assert!(
-        said.contains("topic `b` is not recorded, and another one of the source is"),
-        "{said}"
-    );
 }
