@@ -131,10 +131,12 @@ impl VirtualTime {
     }
 
     /// Divides the cores into clusters of so many each, from core 0 on. Each schedules its own
-    /// DAGs; all have one clock. See [`fass::Dag::cluster`].
+    /// DAGs; all have one clock. See [`fass::Dag::cluster`]. Of this and
+    /// [`assign_clusters`](Self::assign_clusters) the last call counts.
     #[must_use = "the machine itself is returned"]
     pub fn clusters(self, sizes: &[u32]) -> Self {
         self.machine.clusters.replace(Clusters::Of(sizes.to_vec()));
+        self.machine.assigns.set(false);
         self
     }
 
@@ -142,6 +144,7 @@ impl VirtualTime {
     /// others share clusters of one core each. All subtasks need WCETs. See [`fass::Placement`].
     #[must_use = "the machine itself is returned"]
     pub fn assign_clusters(self) -> Self {
+        self.machine.clusters.replace(Clusters::Undivided);
         self.machine.assigns.set(true);
         self
     }

@@ -186,3 +186,26 @@ fn a_commit_that_divides_the_cores_takes_no_cluster_from_a_dag() {
          cluster out"
     );
 }
+
+#[test]
+fn of_two_ways_to_divide_the_cores_the_last_counts() {
+    let machine = VirtualTime::new().clusters(&[1]).assign_clusters();
+    let dag = busy("calm", 0, 6, 1);
+    let stated = finish_create_dags(&[dag]).unwrap_err();
+    assert_eq!(stated.faults()[0].code(), "not_assigned");
+    drop(machine);
+    let _machine = VirtualTime::new().assign_clusters().clusters(&[1]);
+    let commit = finish_create_dags(&[busy("calm", 0, 6, 1)]).unwrap();
+    let place = commit.answers()[0].cluster.as_ref().unwrap();
+    assert_eq!(place.why, None);
+}
+
+#[test]
+fn a_cluster_that_there_is_not_is_refused_with_the_last_one() {
+    let _machine = VirtualTime::new().cores(2).clusters(&[1, 1]);
+    let error = finish_create_dags(&[busy("calm", 2, 6, 1)]).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "dag `calm` is in cluster 2, and there is none; state one up to cluster 1"
+    );
+}

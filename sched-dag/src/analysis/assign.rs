@@ -6,12 +6,13 @@
 //! first; it gets a cluster of as many cores as its multi-path bound needs. The others are
 //! *light*: clusters of one core each take them, the densest first, each where the sum of
 //! densities is least (worst fit), so that what room there is, is left on every core. A core
-//! takes light DAGs up to a sum of 1, which is exact for EDF and no proof for static
+//! takes light DAGs up to a sum of 1, which is enough for EDF and no proof for static
 //! priorities. Whatever is assigned, the analysis of each cluster has the last word.
 
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
+use core::time::Duration;
 
 use super::answer::Settings;
 use super::multi_path::multi_path;
@@ -38,7 +39,14 @@ pub enum Unassigned {
     Stated,
     /// What it needs is not known.
     Unknown(TaskError),
-    /// It is heavy, and so many cores that are left are too few, or no number would do.
+    /// A path of it takes longer than a job has, on any number of cores.
+    TooLong {
+        /// The longest path, overheads included.
+        length_ns: u64,
+        /// By when it is to be done.
+        within_ns: u64,
+    },
+    /// It is heavy, and the cores that are left are too few.
     TooHeavy {
         /// The cores that are left.
         left: u32,
@@ -79,6 +87,15 @@ pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssi
         if volume_ns <= within_ns {
             light.push(dag);
             continue;
+        }
+        let length_ns = task.length_ns();
+        if length_ns > within_ns {
+            let reason = Unassigned::TooLong {
+                length_ns,
+                within_ns,
+            };
+            let dag = DagId(to_u32(dag));
+            return Err(NotAssigned { dag, reason });
         }
         let is_enough = |count: &u32| multi_path(task, *count).is_some_and(|ns| ns <= within_ns);
         let Some(count) = (1..=left).find(is_enough) else {
@@ -163,15 +180,25 @@ impl fmt::Display for Unassigned {
                 "it states a cluster, and the commit is to make them; leave its cluster out",
             ),
             Self::Unknown(error) => error.fmt(f),
+            Self::TooLong {
+                length_ns,
+                within_ns,
+            } => write!(
+                f,
+                "its longest path takes {:?}, and a job has {:?} until its deadline or the next \
+                 release; shorten the path, or lengthen both",
+                Duration::from_nanos(*length_ns),
+                Duration::from_nanos(*within_ns)
+            ),
             Self::TooHeavy { left } => write!(
                 f,
-                "a job is more work than one core does in time, and {left} are left, which are \
-                 too few; add cores, or relax its deadline"
+                "a job is more work than one core does in time, and too few cores are left: \
+                 {left}; add cores, or lengthen its deadline and period"
             ),
             Self::NoRoom { left } => write!(
                 f,
-                "heavier DAGs leave {left} cores, none of which has room for it; add cores, or \
-                 lengthen periods"
+                "no core has room for it, of those that heavy DAGs leave: {left}; add cores, or \
+                 lengthen deadlines and periods"
             ),
         }
     }
@@ -265,6 +292,12 @@ mod tests {
         assert_eq!(refused(&both, 4), (0, Unassigned::NoRoom { left: 0 }));
         let two = [light.clone(), light];
         assert_eq!(refused(&two, 1), (1, Unassigned::NoRoom { left: 1 }));
+        // Neither cores nor a later deadline help what is longer than its period.
+        let too_long = Unassigned::TooLong {
+            length_ns: 21,
+            within_ns: 20,
+        };
+        assert_eq!(refused(&[parallel(&[21], 30)], 8), (0, too_long));
         let unknown = [parallel(&[0], 10)];
         assert!(matches!(refused(&unknown, 1), (0, Unassigned::Unknown(_))));
     }

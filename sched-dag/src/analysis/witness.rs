@@ -7,6 +7,7 @@
 //!
 //! ```text
 //! machine CORES POLICY OVERHEAD_NS            static, edf, or edf-sinks: jobs of several deadlines
+//! cluster CLUSTER CLUSTERS                    only of divided cores: which it is, of how many
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
 //! edge FROM TO
@@ -55,14 +56,17 @@ use crate::task_set::{Dag, TaskSet};
 pub fn witness(task_set: &TaskSet, settings: &Settings) -> String {
     let parts = task_set.clusters().map(|cluster| {
         let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
-        whole(&task_set.part(cluster), &Settings { cores, ..*settings })
+        let place = task_set.is_divided().then_some(cluster);
+        let place = place.map(|cluster| (cluster.0, task_set.clusters().count()));
+        let settings = Settings { cores, ..*settings };
+        whole(&task_set.part(cluster), place, &settings)
     });
     parts.collect()
 }
 
-fn whole(dags: &[Dag], settings: &Settings) -> String {
+fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> String {
     let mut text = Text(String::new());
-    text.statement(dags, settings);
+    text.statement(dags, place, settings);
     text.hash("hash");
     let all: Vec<usize> = (0..dags.len()).collect();
     let mut reasons = alloc::vec![None; dags.len()];
@@ -110,7 +114,7 @@ impl Text {
         self.0.push('\n');
     }
 
-    fn statement(&mut self, dags: &[Dag], settings: &Settings) {
+    fn statement(&mut self, dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) {
         let has_sink_deadlines = dags
             .iter()
             .any(|dag| dag.least_deadline_ns() != dag.relative_deadline_ns());
@@ -122,6 +126,9 @@ impl Text {
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let (cores, overhead_ns) = (settings.cores, overhead_ns.unwrap_or(u64::MAX));
         self.line(format_args!("machine {cores} {policy} {overhead_ns}"));
+        if let Some((cluster, clusters)) = place {
+            self.line(format_args!("cluster {cluster} {clusters}"));
+        }
         for (id, dag) in dags.iter().enumerate() {
             let ids = || (0..).map(crate::ids::SubtaskId).take(dag.subtasks().len());
             let edges: usize = ids().map(|from| dag.successors(from).len()).sum();

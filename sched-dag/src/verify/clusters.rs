@@ -60,22 +60,29 @@ impl Fault {
                 f,
                 "the clusters have {wanted} cores, and the machine has {cores}; give them fewer"
             ),
-            Self::NoCluster { dag, clusters } => write!(
-                f,
-                "{dag} is in no cluster, and there are {clusters}; state one"
-            ),
+            Self::NoCluster { dag, clusters } => {
+                write!(f, "{dag} is in no cluster, and the cores are divided; ")?;
+                state_one(*clusters, f)
+            }
             Self::UnknownCluster {
                 dag,
                 cluster,
                 clusters,
             } => {
                 write!(f, "{dag} is in cluster {}, and ", cluster.0)?;
-                match clusters {
-                    0 => f.write_str("this machine's cores are not divided; leave its cluster out"),
-                    _ => write!(f, "there are {clusters}, counted from 0; state one"),
+                if *clusters == 0 {
+                    return f
+                        .write_str("this machine's cores are not divided; leave its cluster out");
                 }
+                f.write_str("there is none; ")?;
+                state_one(*clusters, f)
             }
             _ => f.write_str(self.code()),
         }
     }
+}
+
+/// Writes which clusters can be stated, of so many.
+fn state_one(clusters: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "state one up to cluster {}", clusters.saturating_sub(1))
 }

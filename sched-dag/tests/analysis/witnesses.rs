@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use sched_dag::analysis::{answer, witness};
 use sched_dag::{ClusterId, Clusters, Policy, Preemption};
@@ -15,11 +15,15 @@ use crate::{number_from, settings};
 /// How many witnesses get each of their numbers altered, of those that add something.
 const ALTERED: usize = 12;
 
-fn run(script: &str, files: &[String]) -> String {
+fn output(script: &str, files: &[String]) -> Output {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts");
     let mut command = Command::new("python3");
     let output = command.arg(path.join(script)).args(files).output();
-    let output = output.expect("python3 checks witnesses; install it");
+    output.expect("python3 checks witnesses; install it")
+}
+
+fn run(script: &str, files: &[String]) -> String {
+    let output = output(script, files);
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     let complaint = String::from_utf8_lossy(&output.stderr);
     assert!(
@@ -91,6 +95,34 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     println!("{}", run("alter-witness", &to_alter).trim());
     assert!(by_test.len() >= 8, "some test was never used: {by_test:?}");
     fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_witness_that_lacks_a_cluster_is_refused() {
+    let sample = full_core();
+    let mut specs = sample.specs;
+    for (spec, cluster) in specs.iter_mut().zip(0..) {
+        spec.cluster = Some(ClusterId(cluster));
+    }
+    let options = sched_dag::CommitOptions::new(sample.policy, 2)
+        .with_construction(sched_dag::ConstructionPolicy::any_graph())
+        .with_clusters(Clusters::Of(vec![1, 1]));
+    let task_set = sched_dag::verify(&specs, &options).unwrap().task_set;
+    let text = witness(&task_set, &settings((sample.policy, sample.preemption), 2));
+    let second = text.rfind("machine ").unwrap();
+    let (first, second) = text.split_at(second);
+    let path = std::env::temp_dir().join(format!("witness-{}", std::process::id()));
+    let is_accepted = |parts: &[&str]| {
+        fs::write(&path, parts.concat()).unwrap();
+        let file = path.to_string_lossy().into_owned();
+        output("check-witness", &[file]).status.success()
+    };
+    assert!(is_accepted(&[first, second]));
+    let wrong: [&[&str]; 4] = [&[first], &[second], &[second, first], &[first, first]];
+    for parts in wrong {
+        assert!(!is_accepted(parts), "{parts:?}");
+    }
+    fs::remove_file(&path).unwrap();
 }
 
 /// Two DAGs that nearly use up one core, which only the utilisation proves.

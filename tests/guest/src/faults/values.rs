@@ -155,13 +155,13 @@ pub(super) fn time_overflow() -> Vec<Dag> {
     vec![dag]
 }
 
-/// No number of cores helps a subtask that takes longer than a period.
 pub(super) fn unknown_cluster() -> Vec<Dag> {
     let dag = sound("lidar", "points");
     dag.cluster(1);
     vec![dag]
 }
 
+/// No number of cores helps a subtask that takes longer than a period.
 pub(super) fn not_proven() -> Vec<Dag> {
     let dag = named("lidar");
     dag.demand_proof();

@@ -46,15 +46,13 @@ pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<
     for group in by_cores.chunk_by(|(a, _), (b, _)| a.cores == b.cores) {
         let mut waiting = group;
         while let Some((first, _)) = waiting.first() {
-            // What cannot be told in nanoseconds would end the whole boot.
-            if let Err(reason) = build(first, settings.scale(), &Epoch::default(), None) {
+            // What the guest cannot run would end the whole boot.
+            if let Err(reason) = runs_there(first, settings) {
                 judged.push(verdict(first, Err(reason)));
                 waiting = &waiting[1..];
                 continue;
             }
-            let fits = |(case, _): &&(&Case, &str)| {
-                build(case, settings.scale(), &Epoch::default(), None).is_ok()
-            };
+            let fits = |(case, _): &&(&Case, &str)| runs_there(case, settings).is_ok();
             let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
             let outcome = boot_with(&image.path, &waiting[..count], settings)?;
             let before = judged.len();
@@ -65,6 +63,15 @@ pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<
     }
     progress.end();
     Ok(judged)
+}
+
+/// Returns why a case is not for the guest: its times are none in nanoseconds, or its cores
+/// are divided.
+pub(super) fn runs_there(case: &Case, settings: &Settings) -> Result<(), String> {
+    if case.clusters.sizes().len() > 1 {
+        return Err("the kernel does not divide its cores; leave `--in-kernel` out".into());
+    }
+    build(case, settings.scale(), &Epoch::default(), None).map(drop)
 }
 
 fn verdict(case: &Case, outcome: Result<super::Deviation, String>) -> Judged {
