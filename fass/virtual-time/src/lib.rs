@@ -131,12 +131,10 @@ impl VirtualTime {
     }
 
     /// Divides the cores into clusters of so many each, from core 0 on. Each schedules its own
-    /// DAGs; all have one clock. See [`fass::Dag::cluster`]. Of this and
-    /// [`assign_clusters`](Self::assign_clusters) the last call counts.
+    /// DAGs; all have one clock. See [`fass::Dag::cluster`].
     #[must_use = "the machine itself is returned"]
     pub fn clusters(self, sizes: &[u32]) -> Self {
-        self.machine.clusters.replace(Clusters::Of(sizes.to_vec()));
-        self.machine.assigns.set(false);
+        self.machine.divide(Clusters::Of(sizes.to_vec()), false);
         self
     }
 
@@ -144,8 +142,7 @@ impl VirtualTime {
     /// others share clusters of one core each. All subtasks need WCETs. See [`fass::Placement`].
     #[must_use = "the machine itself is returned"]
     pub fn assign_clusters(self) -> Self {
-        self.machine.clusters.replace(Clusters::Undivided);
-        self.machine.assigns.set(true);
+        self.machine.divide(Clusters::Undivided, true);
         self
     }
 

@@ -73,6 +73,12 @@ pub(crate) fn make_current() -> Rc<Machine> {
 }
 
 impl Machine {
+    /// Sets how the cores are divided, or that the commit does it: the last call counts.
+    pub(crate) fn divide(&self, clusters: Clusters, by_commit: bool) {
+        self.clusters.replace(clusters);
+        self.assigns.set(by_commit);
+    }
+
     /// Notes a signal of a plan; one of another plan does nothing.
     pub(crate) fn raise_at(&self, time_ns: u64, (plan, dag): (u64, DagId)) {
         if self.plan.get() == Some(plan) {
