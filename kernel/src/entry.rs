@@ -1,6 +1,6 @@
 //! What only the image itself can define: its entry, allocator, panic handler
 //! and the few functions that compiled code calls without being asked, which are
-//! [`boot::memory_functions`].
+//! [`mod@boot::memory_functions`].
 //!
 //! The [`entry!`](crate::entry) macro defines them in the app's binary, not in
 //! this library, so that host programs that use the library keep their own.

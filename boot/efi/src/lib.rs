@@ -2,7 +2,7 @@
 //! it that only look at bytes.
 //!
 //! The *application* (`main.rs`) is a PE file that the firmware starts. The host tool makes
-//! it, and puts the image, the words and the module into it as sections ([`file`]). The
+//! it, and puts the image, the words and the module into it as sections ([`mod@file`]). The
 //! application lays the image out where it belongs, tells it what GRUB would tell ([`list`]),
 //! leaves the firmware and enters the image where GRUB would. So the image knows nothing of
 //! UEFI.

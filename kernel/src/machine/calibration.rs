@@ -4,8 +4,9 @@
 //! counter's rate that is compared: each may be wrong on some board, and a wrong clock makes
 //! all times wrong in silence.
 
+use super::clock::{self, Elapsed};
 use super::known_clock::KnownClock;
-use super::{clock, cpu, local_apic};
+use super::{cpu, local_apic};
 
 /// How long the rates are measured: so long that what a reading takes, some microseconds
 /// where the host gives it, spoils less than a 10,000th.
@@ -51,7 +52,7 @@ pub(crate) fn calibrate(
     };
     let may_be = |clock: &&KnownClock| asked.is_none_or(|name| name == clock.name);
     let mut candidates = clocks.iter().flatten().filter(may_be);
-    let (clock, judge, elapsed) = candidates.find_map(|clock| {
+    let (clock, judge, (elapsed, judge_ns)) = candidates.find_map(|clock| {
         let mut others = clocks.iter().flatten().filter(|it| it.name != clock.name);
         let judge = others.find(|other| other.judges);
         Some((
@@ -62,7 +63,7 @@ pub(crate) fn calibrate(
     })?;
     clock::set_rates(base, &elapsed);
     let khz = |ns: u64| elapsed.counter * 1_000_000 / ns.max(1);
-    let measured = judge.map(|judge| (judge.name, khz(elapsed.judge_ns)));
+    let measured = judge.map(|judge| (judge.name, khz(judge_ns)));
     let stated = || Some(("cpuid", stated_khz(cpu::counter_ratio())?));
     Some(Rate {
         clock: clock.name,
@@ -77,14 +78,6 @@ fn stated_khz([denominator, numerator, crystal_hz]: [u32; 3]) -> Option<u64> {
     let hz = u64::from(crystal_hz) * u64::from(numerator);
     let khz = (hz / 1000).checked_div(u64::from(denominator));
     khz.filter(|khz| *khz > 0)
-}
-
-/// What each clock advanced by during the measurement.
-pub(super) struct Elapsed {
-    pub(super) ns: u64,
-    pub(super) counter: u64,
-    pub(super) apic: u64,
-    judge_ns: u64,
 }
 
 /// All clocks, read as one.
@@ -118,9 +111,9 @@ impl<'c> Stopwatch<'c> {
         }
     }
 
-    /// Measures for so long, and stops the local APIC's timer; nothing comes of it if the
-    /// clock stands still.
-    fn measure(mut self, long_ns: u64) -> Option<Elapsed> {
+    /// Measures for so long, and stops the local APIC's timer. Returns with what has elapsed
+    /// that by the other clock, in nanoseconds; nothing if the clock stands still.
+    fn measure(mut self, long_ns: u64) -> Option<(Elapsed, u64)> {
         let start = self.read_all()?;
         while self.clock.ns(self.ticks - start.ticks) < long_ns {
             self.advance();
@@ -128,14 +121,15 @@ impl<'c> Stopwatch<'c> {
         }
         let end = self.read_all()?;
         local_apic::start_timer(0);
-        Some(Elapsed {
+        let elapsed = Elapsed {
             ns: self.clock.ns(end.ticks - start.ticks),
             counter: end.counter.wrapping_sub(start.counter),
             apic: u64::from(start.apic.wrapping_sub(end.apic)),
-            judge_ns: self.judge.map_or(0, |judge| {
-                judge.ns(u64::from(end.judge.wrapping_sub(start.judge) & judge.mask))
-            }),
-        })
+        };
+        let judge_ns = self.judge.map_or(0, |judge| {
+            judge.ns(u64::from(end.judge.wrapping_sub(start.judge) & judge.mask))
+        });
+        Some((elapsed, judge_ns))
     }
 
     /// Looks at the clock, and reports whether it has moved. To be called before it comes

@@ -8,7 +8,6 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use super::calibration::Elapsed;
 use super::cpu;
 
 /// The counter's value at time 0.
@@ -51,6 +50,13 @@ fn scale(value: u64, factor: u64) -> u64 {
     {
         (product >> 32) as u64
     }
+}
+
+/// What each clock advanced by in the same time.
+pub(super) struct Elapsed {
+    pub(super) ns: u64,
+    pub(super) counter: u64,
+    pub(super) apic: u64,
 }
 
 /// Sets the rates, with time 0 at counter value `base`, from what each clock advanced by.
