@@ -1,8 +1,8 @@
 //! The subcommand `recording`: what is in a recording, and other formats of it.
 //!
 //! A recording is the file of what entered a run; the crate `recording` has its format. It is
-//! shown as a table, written as tables of comma-separated values ([`table_out`]) and as an MCAP
-//! file ([`mcap`]), and made of a table ([`table_in`]).
+//! shown as a table, written as tables of comma-separated values (`table_out`) and as an MCAP
+//! file (`mcap`), and made of a table (`table_in`).
 
 pub mod mcap;
 mod mcap_schema;
