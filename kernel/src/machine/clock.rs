@@ -3,8 +3,9 @@
 //! The rates of the counter and of the local APIC's timer are measured at boot
 //! ([`calibration`](super::calibration)).
 //!
-//! Assumed, not checked: the counters of all cores agree and their rate is
-//! constant, as on every processor with an invariant counter and under QEMU.
+//! The counters of all cores are compared as these start ([`agreement`](super::agreement)).
+//! Assumed, not checked: their rate is constant, as on every processor with an invariant
+//! counter and under QEMU.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
