@@ -49,3 +49,14 @@ fn a_file_reaches_the_app_on_both_boards() {
         }
     }
 }
+
+#[test]
+fn an_app_that_takes_no_file_is_warned_of() {
+    let file = system::new_log("module").expect("a folder for logs");
+    fs::write(&file, "a recording").expect("a file in it");
+    let few = || Guest::new("fork-join").word("jobs=1");
+    let said = |outcome: Outcome| outcome.serial.contains("warning: the app takes no file");
+    assert!(said(few().module(&file).succeed()));
+    assert!(!said(few().succeed()));
+    let _ = fs::remove_file(&file);
+}

@@ -38,6 +38,8 @@
 //! - Reading any bytes gives a value or the offset of what is wrong. It does not panic, recurses
 //!   to a depth that the type fixes, and allocates at most [`MOST_GROWTH`] times the bytes that
 //!   it is given, for each level of that depth. Bytes that are accepted are those that the value would be written as.
+//! - Reading a file takes a time that its length bounds: a type in it has at most
+//!   [`MOST_WEIGHTLESS`] parts that take no bytes, so no value has many more parts than bytes.
 //!
 //! # What is not
 //!
@@ -63,6 +65,6 @@ pub use value::crc::Crc;
 pub use value::decode::{Decoder, Malformed};
 pub use value::encode::{Encoder, Full};
 pub use value::recordable::{MOST_GROWTH, Recordable, to_bytes};
-pub use value::schema::{Field, MOST_DEPTH, Scalar, Schema};
+pub use value::schema::{Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema};
 pub use value::shown::{Shown, write_json};
 pub use value::walk::Part;

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use recording::{
-    Channel, DagHeader, Entry, Header, MAGIC, Malformed, Recordable, Recording, Role, What, Writer,
-    to_bytes,
+    Channel, DagHeader, Entry, Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable, Recording,
+    Role, Schema, What, Writer, to_bytes,
 };
 
 fn header() -> Header {
@@ -220,4 +220,35 @@ fn foreign_and_newer_files_are_told() {
     let mut more = recording();
     more.push(0);
     assert!(said(&more).ends_with("expected the end of the file"));
+}
+
+/// Returns a recording of few bytes whose values would have very many parts.
+fn of_weightless_parts(parts: usize) -> Vec<u8> {
+    let mut header = header();
+    header.channels.truncate(1);
+    header.channels[0].schema = Schema::Tuple(vec![Schema::Tuple(Vec::new()); parts]);
+    let mut writer = Writer::new(&header);
+    for job in 0..100 {
+        writer.write(&Entry {
+            what: What::Value,
+            dag: 0,
+            place: 0,
+            job,
+            release_ns: 0,
+            at_ns: 0,
+            value: &[],
+        });
+    }
+    writer.finish()
+}
+
+#[test]
+fn a_type_with_too_many_parts_that_take_no_bytes_is_refused() {
+    let most = MOST_WEIGHTLESS - 1; // the tuple itself takes none either
+    assert!(Recording::read(&of_weightless_parts(most)).is_ok());
+    let malformed = Recording::read(&of_weightless_parts(most + 1)).unwrap_err();
+    let expected = "a type with at most 64 parts that take no bytes";
+    assert_eq!(malformed.expected, expected);
+    let text = format!("({})", "(), ".repeat(most + 1));
+    assert_eq!(Schema::parse(&text).unwrap_err().1, expected);
 }

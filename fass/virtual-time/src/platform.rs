@@ -190,10 +190,11 @@ impl Platform for HostPlatform {
     }
 
     fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel]) {
-        expect_current()
-            .surroundings
-            .edge
-            .open(dag, graph, channels);
+        let machine = expect_current();
+        // Those of a second plan, which will be refused, are not this run's.
+        if !machine.has_launched.get() {
+            machine.surroundings.edge.open(dag, graph, channels);
+        }
     }
 
     fn record(&self, value: &Recorded<'_>) {

@@ -96,11 +96,13 @@ impl Session {
                 subtask: self.subtask_label(instance),
                 job: instance.job,
                 message,
-                report: Box::new(self.report(&machine.edge)),
+                report: Box::new(self.report(&machine.edge, false)),
             });
         }
         match end {
-            End::Finished | End::TimeReached | End::Stopped => Ok(self.report(&machine.edge)),
+            End::Finished | End::TimeReached | End::Stopped => {
+                Ok(self.report(&machine.edge, end == End::Finished))
+            }
             End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
                 dag: self.dag_label(instance.dag),
                 subtask: self.subtask_label(instance),
@@ -138,11 +140,11 @@ impl Session {
     /// Returns the recording of the run so far.
     pub(crate) fn recording(&self, edge: &Edge) -> Vec<u8> {
         let events = &self.recording.journal.events;
-        edge.recording(&self.task_set, events, &self.report(edge).record())
+        edge.recording(&self.task_set, events, &self.report(edge, false).record())
     }
 
-    fn report(&self, edge: &Edge) -> Report {
-        let (compared, uncompared, divergence) = edge.outcome();
+    fn report(&self, edge: &Edge, is_over: bool) -> Report {
+        let (compared, uncompared, divergence) = edge.outcome(is_over);
         let dags = (0..).map(DagId).zip(self.task_set.dags());
         let sink_misses = |(dag, model): (DagId, &Dag)| {
             let sinks = model.sinks().iter();

@@ -46,6 +46,8 @@ use crate::watch::background::{Background, Wishes, session};
 pub struct Machine {
     pub(crate) options: Options<'static>,
     pub(crate) module: Option<&'static [u8]>,
+    /// Whether the app has asked for that.
+    pub(crate) has_asked: Cell<bool>,
     /// Whether each run's trace is printed after it.
     pub(crate) dumps_trace: bool,
     /// Whether each run's statistics are printed after it.
@@ -87,7 +89,8 @@ impl Machine {
 
     /// Returns the file that the loader left in memory (`qemu -initrd FILE`), if
     /// there is one. It is not copied: memory and the boot's time are the same
-    /// for files of any size.
+    /// for files of any size. If there is one and the app never asks for it, the
+    /// kernel says so at the end.
     ///
     /// ```no_run
     /// fn size(machine: &kernel::Machine) -> usize {
@@ -95,7 +98,8 @@ impl Machine {
     /// }
     /// ```
     #[must_use]
-    pub const fn module(&self) -> Option<&'static [u8]> {
+    pub fn module(&self) -> Option<&'static [u8]> {
+        self.has_asked.set(true);
         self.module
     }
 

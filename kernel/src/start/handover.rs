@@ -328,6 +328,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
     let machine = Machine {
         options,
         module,
+        has_asked: Cell::new(false),
         dumps_trace: settings.dump,
         dumps_times: settings.dumps_times,
         wishes: settings.wishes,
@@ -337,6 +338,9 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         bound_verdict: BoundVerdict::new(settings.judges_bounds),
     };
     let result = app(&machine);
+    if result.is_ok() && module.is_some() && !machine.has_asked.get() {
+        println!("warning: the app takes no file, and has not looked at the one it was given");
+    }
     let result = machine.fault_verdict.judge(result);
     machine.bound_verdict.judge(result)
 }

@@ -225,6 +225,21 @@ fn what_is_no_recording_and_no_such_table_is_refused_in_one_line() {
             "--period 1ms --ignore b",
             "there is no column `b`; there are a",
         ),
+        (
+            "a,b,a\n1,2,3\n",
+            "--period 1ms",
+            ":1: there are two columns `a`; rename one, or --ignore both",
+        ),
+        (
+            "job,a,job\n1,2,3\n",
+            "--period 1ms",
+            ":1: there are two columns `job`",
+        ),
+        (
+            "job,a\n1,2\n0,2\n1,3\n",
+            "--period 1ms",
+            ":4: job 1 stands in line 2 already; number them apart",
+        ),
         ("", "--period 1ms", ":1: the table is empty"),
         (
             "a\nx\n",

@@ -7,6 +7,13 @@ use alloc::vec::Vec;
 /// The deepest that types may be nested.
 pub const MOST_DEPTH: usize = 16;
 
+/// The most parts of a type that may take no bytes. So a value has no more than so many parts for
+/// each of its bytes, and reading it takes a time that its length bounds.
+pub const MOST_WEIGHTLESS: usize = 64;
+
+/// What is expected of a type that has more.
+pub(super) const WEIGHTLESS: &str = "a type with at most 64 parts that take no bytes";
+
 /// What is expected of a type that is nested more deeply.
 pub(super) const DEEP: &str = "a type that is nested less deeply";
 
@@ -125,6 +132,23 @@ impl Schema {
                 schemas.fold(0, deepest)
             }
         }
+    }
+
+    /// Returns how many parts of the type take no bytes.
+    pub(super) fn weightless(&self) -> usize {
+        let sum = |parts: usize, schema: &Self| parts.saturating_add(schema.weightless());
+        usize::from(self.least_bytes() == 0)
+            + match self {
+                Self::Scalar(_) => 0,
+                Self::Option(inner) | Self::List(inner) | Self::Array(inner, _) => {
+                    inner.weightless()
+                }
+                Self::Tuple(elements) => elements.iter().fold(0, sum),
+                Self::Struct(_, fields) => {
+                    let schemas = fields.iter().map(|field| &field.schema);
+                    schemas.fold(0, sum)
+                }
+            }
     }
 
     /// Returns the fewest bytes that a value takes.

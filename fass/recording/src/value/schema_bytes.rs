@@ -1,7 +1,8 @@
 //! Schemas as bytes, for they stand in recordings.
 //!
-//! They are read as values are, trusting nothing: the depth is bounded, and no list or array
-//! has elements that take no bytes, of which a few bytes could promise any number.
+//! They are read as values are, trusting nothing: the depth is bounded, and so are the
+//! parts that take no bytes; no list or array has such elements, of which a few bytes could
+//! promise any number.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -10,7 +11,7 @@ use alloc::vec::Vec;
 use super::decode::{Decoder, Malformed};
 use super::encode::Encoder;
 use super::recordable::Recordable;
-use super::schema::{DEEP, Field, MOST_DEPTH, Scalar, Schema};
+use super::schema::{self, DEEP, Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema};
 
 /// The numbers of the other kinds of schema; that of a scalar is its place in `Scalar::ALL`.
 const OPTION: u8 = 32;
@@ -69,7 +70,12 @@ impl Recordable for Schema {
     }
 
     fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        Self::decode_at(input, 0)
+        let malformed = input.expected(schema::WEIGHTLESS);
+        let schema = Self::decode_at(input, 0)?;
+        match schema.weightless() <= MOST_WEIGHTLESS {
+            true => Ok(schema),
+            false => Err(malformed),
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-use super::schema::{DEEP, Field, MOST_DEPTH, Scalar, Schema};
+use super::schema::{DEEP, Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema, WEIGHTLESS};
 
 impl fmt::Display for Schema {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -53,6 +53,7 @@ impl Schema {
         match rest.peek() {
             // An option follows its type, and so has made deeper what was read.
             None if schema.depth() > MOST_DEPTH => rest.refuse(DEEP),
+            None if schema.weightless() > MOST_WEIGHTLESS => rest.refuse(WEIGHTLESS),
             None => Ok(schema),
             Some(_) => rest.refuse("the end"),
         }

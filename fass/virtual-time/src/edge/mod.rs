@@ -107,10 +107,11 @@ impl Edge {
     }
 
     /// Returns how many values were compared, how many were not, and the first one that
-    /// differs.
-    pub(crate) fn outcome(&self) -> (u64, u64, Option<Divergence>) {
-        let replay = self.replay.borrow();
-        replay.as_ref().map_or((0, 0, None), Replay::outcome)
+    /// differs; if the run is over, also one that it has not computed.
+    pub(crate) fn outcome(&self, is_over: bool) -> (u64, u64, Option<Divergence>) {
+        let (replay, header) = (self.replay.borrow(), self.header.borrow());
+        let outcome = |replay: &Replay| replay.outcome(&header, is_over);
+        replay.as_ref().map_or((0, 0, None), outcome)
     }
 
     /// Returns the recording of the run so far.

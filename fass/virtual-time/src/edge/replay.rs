@@ -24,11 +24,13 @@ pub(super) struct Replay {
     channels: Vec<Option<u16>>,
     /// How many recorded values this run can be compared with.
     to_compare: u64,
-    compared: u64,
+    /// The channels and jobs of this run whose values were compared.
+    compared: BTreeSet<(u16, u64)>,
     divergence: Option<Divergence>,
 }
 
-/// The first value of a replay that is not the recorded one.
+/// The first value of a replay that is not the recorded one, or, if all that were computed are,
+/// the first recorded one that was not computed.
 ///
 /// See [`VirtualTime::replay`](crate::VirtualTime::replay).
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,8 +43,8 @@ pub struct Divergence {
     pub job: u64,
     /// The recorded value, as JSON.
     pub recorded: String,
-    /// The value of this run, as JSON.
-    pub computed: String,
+    /// The value of this run, as JSON; none if the run is over and has computed none.
+    pub computed: Option<String>,
 }
 
 impl fmt::Display for Divergence {
@@ -56,8 +58,9 @@ impl fmt::Display for Divergence {
         } = self;
         write!(
             f,
-            "topic `{topic}` of dag `{dag}` diverges in job {job}: {recorded} is recorded, and \
-             {computed} is computed; does a function share something behind the scheduler's back?"
+            "topic `{topic}` of dag `{dag}` diverges in job {job}: {recorded} is recorded, and {} is \
+             computed; does a function share something behind the scheduler's back?",
+            computed.as_deref().unwrap_or("nothing")
         )
     }
 }
@@ -105,7 +108,7 @@ impl Replay {
             lost,
             channels: Vec::new(),
             to_compare,
-            compared: 0,
+            compared: BTreeSet::new(),
             divergence: None,
         })
     }
@@ -210,29 +213,55 @@ impl Replay {
             return;
         };
         if recorded != bytes && self.divergence.is_none() {
-            let shown = |bytes| {
-                Shown {
-                    schema: &channel.schema,
-                    bytes,
-                }
-                .to_string()
-            };
-            self.divergence = Some(Divergence {
-                dag: own.dags[usize::from(channel.dag)].name.clone(),
-                topic: channel.topic.clone(),
-                job: value.job,
-                recorded: shown(recorded),
-                computed: shown(bytes),
-            });
+            let divergence = divergence(own, channel, value.job, recorded, Some(bytes));
+            self.divergence = Some(divergence);
         }
-        self.compared += 1;
+        self.compared.insert((value.channel, value.job));
     }
 
     /// Returns how many values were compared, how many were not, and the first one that
-    /// differs.
-    pub(super) fn outcome(&self) -> (u64, u64, Option<Divergence>) {
-        let uncompared = self.to_compare - self.compared;
-        (self.compared, uncompared, self.divergence.clone())
+    /// differs; if the run is over, also one that it has not computed.
+    pub(super) fn outcome(&self, own: &Header, is_over: bool) -> (u64, u64, Option<Divergence>) {
+        let compared = self.compared.len() as u64;
+        let missing = || is_over.then(|| self.missing(own)).flatten();
+        let divergence = self.divergence.clone().or_else(missing);
+        (compared, self.to_compare - compared, divergence)
+    }
+
+    /// Returns the recorded value of the earliest job that this run has not computed.
+    fn missing(&self, own: &Header) -> Option<Divergence> {
+        let of_run = (0_u16..).zip(&self.channels).zip(&own.channels);
+        let all = of_run
+            .filter(|(_, channel)| channel.role == Role::Result)
+            .filter_map(|((number, recorded), channel)| Some((number, (*recorded)?, channel)))
+            .flat_map(|(number, place, channel)| {
+                let values = self.values.range((place, 0)..=(place, u64::MAX));
+                let missing = move |&(&(_, job), _): &(&(u16, u64), &Vec<u8>)| {
+                    !self.compared.contains(&(number, job))
+                };
+                (values.filter(missing)).map(move |((_, job), value)| (*job, channel, value))
+            });
+        let (job, channel, value) = all.min_by_key(|(job, ..)| *job)?;
+        Some(divergence(own, channel, job, value, None))
+    }
+}
+
+/// Describes a value that differs.
+fn divergence(
+    own: &Header,
+    channel: &Channel,
+    job: u64,
+    recorded: &[u8],
+    computed: Option<&[u8]>,
+) -> Divergence {
+    let schema = &channel.schema;
+    let shown = |bytes| Shown { schema, bytes }.to_string();
+    Divergence {
+        dag: own.dags[usize::from(channel.dag)].name.clone(),
+        topic: channel.topic.clone(),
+        job,
+        recorded: shown(recorded),
+        computed: computed.map(shown),
     }
 }
 

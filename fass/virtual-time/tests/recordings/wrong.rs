@@ -1,7 +1,7 @@
 //! Recordings that are of something else, have lost something, or say what cannot be.
 
 use fass::{CommitError, Dag, OverrunPolicy, create_dag, finish_create_dags};
-use recording::{Entry, Recording, What, Writer};
+use recording::{Entry, Recording, Role, What, Writer};
 use virtual_time::VirtualTime;
 
 use super::{cheating, forked, ms, named, overrun, record, replay};
@@ -133,4 +133,40 @@ fn a_source_that_is_recorded_in_part_is_named() {
         said.contains("topic `b` is not recorded, and another one of the source is"),
         "{said}"
     );
+}
+
+#[test]
+fn a_recorded_value_that_is_not_computed_is_a_divergence() {
+    let recorded = record(&VirtualTime::new(), &[forked(1)]);
+    let recorded = Recording::read(&recorded).expect("whole");
+    let mut writer = Writer::new(recorded.header());
+    for entry in recorded.entries() {
+        // Of the last job results only, which no replay computes, as no source returns anything.
+        let channel = &recorded.header().channels[usize::from(entry.place)];
+        if entry.job != 19 || channel.role == Role::Result {
+            writer.write(&entry);
+        }
+    }
+    let bytes = writer.finish();
+    let (report, _) = replay(&bytes, VirtualTime::new(), &[forked(2)]);
+    let divergence = report.divergence.expect("one is not computed");
+    assert_eq!((&*divergence.topic, divergence.job), ("left", 19));
+    let said = divergence.to_string();
+    assert!(
+        said.contains("is recorded, and nothing is computed"),
+        "{said}"
+    );
+
+    // Before its end a run may still compute it.
+    let machine = VirtualTime::new().replay(&bytes).expect("whole");
+    finish_create_dags(&[forked(2)]).expect("sound");
+    assert_eq!(machine.run_for(ms(60)).divergence, None);
+}
+
+#[test]
+fn a_second_commit_that_is_refused_leaves_the_recording_as_it_is() {
+    let machine = VirtualTime::new();
+    let recording = record(&machine, &[forked(1)]);
+    finish_create_dags(&[overrun(OverrunPolicy::Skip, 0), cheating()]).expect_err("a second plan");
+    assert_eq!(machine.recording(), recording);
 }

@@ -3,6 +3,7 @@
 //! The columns `job`, `release_ns` and `at_ns`, if they are there, say what their names say.
 //! The others, in their order, are the numbers and texts that the type is made of.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use dag_file::time::parse_ns;
@@ -33,6 +34,11 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         )
     })?;
     let columns = Columns::new(&titles, options)?;
+    if let Some(title) = twice(&titles, options) {
+        let title = quoted(title);
+        let why = format!("there are two columns {title}; rename one, or --ignore both");
+        return Err(at(1, why));
+    }
     let period_ns = match options.text("period").map(parse_ns) {
         Some(Err(why)) => return Err(format!("`--period`: {why}")),
         Some(Ok(period_ns)) => Some(period_ns),
@@ -59,6 +65,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         }],
     });
     let mut row = 0;
+    let mut lines_of_jobs = BTreeMap::new();
     while let Some(cells) = rows.next() {
         let cells = cells.map_err(refuse)?;
         let line = rows.line;
@@ -80,6 +87,10 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
             }),
         };
         let job = number(columns.job, row)?;
+        if let Some(before) = lines_of_jobs.insert(job, line) {
+            let why = format!("job {job} stands in line {before} already; number them apart");
+            return Err(at(line, why));
+        }
         let release_ns = job.saturating_mul(period_ns.unwrap_or(0));
         let release_ns = number(columns.release_ns, release_ns)?;
         let mut value = Vec::new();
@@ -116,9 +127,7 @@ struct Columns {
 
 impl Columns {
     fn new(titles: &[String], options: &Parsed) -> Result<Self, String> {
-        let ignored: Vec<&str> = options
-            .text("ignore")
-            .map_or(Vec::new(), |all| all.split(',').collect());
+        let ignored = ignored(options);
         let unknown = ignored
             .iter()
             .find(|name| !titles.iter().any(|title| title == *name));
@@ -150,6 +159,19 @@ impl Columns {
         }
         Ok(columns)
     }
+}
+
+/// Returns the names of the columns that are no part of the values.
+fn ignored(options: &Parsed) -> Vec<&str> {
+    let all = options.text("ignore");
+    all.map_or(Vec::new(), |all| all.split(',').collect())
+}
+
+/// Returns a name that two columns have, unless they are left out.
+fn twice<'t>(titles: &'t [String], options: &Parsed) -> Option<&'t str> {
+    let (ignored, mut seen) = (ignored(options), BTreeSet::new());
+    let mut used = (titles.iter().map(String::as_str)).filter(|title| !ignored.contains(title));
+    used.find(|title| !seen.insert(*title))
 }
 
 /// Returns the type of the values, which has to fit the columns.
