@@ -32,17 +32,17 @@
 //! 3. **After commit nothing allocates**: from a job's release to its completion
 //!    all memory is there already.
 //! 4. **A core without work halts**, and is woken by the core that has some.
-//! 5. **`unsafe` is in `machine`, `memory` and the entry** (`entry`, `start`) alone,
+//! 5. **`unsafe` is in the executive's `machine` and `memory`, and in `entry` and `start`** alone,
 //!    each block with the invariant that it relies on.
 //! 6. **Apps are not trusted**: what they say is verified at commit.
 //!
 //! # Rooms, from top to bottom
 //!
-//! `entry` and `start` bring an image up, `app` is what an app sees of the kernel,
-//! `interrupts` what a core's timer and wake-ups do. `watch` looks in on a run, [`report`] tells
-//! of it afterwards, and `run` executes it. `text` serves input and output, with [`console`],
-//! [`json`] and [`options`]; `memory` and `machine` (processor, interrupts, time) know nothing of
-//! what is above. `docs/architecture.md` has the table that the tests hold this to.
+//! `entry` and `start` bring an image up, `app` is what an app sees of the kernel. `watch` looks
+//! in on a run, and [`report`] tells of it afterwards. What executes jobs is below, in a crate of
+//! its own, `executive`: cores, interrupts, memory, the drivers of the scheduler, and input and
+//! output ([`console`], [`json`], [`options`]). `docs/architecture.md` has the table that the
+//! tests hold this to.
 
 #![cfg_attr(not(test), no_std)]
 
@@ -52,15 +52,8 @@ mod app;
 #[allow(unsafe_code, reason = "the symbols that an image must define")]
 #[doc(hidden)]
 pub mod entry;
-mod interrupts;
-#[allow(unsafe_code, reason = "registers, ports, interrupts, page tables")]
-mod machine;
-#[allow(unsafe_code, reason = "the allocator hands out raw memory")]
-mod memory;
 pub mod report;
-mod run;
 mod start;
-mod text;
 mod watch;
 
 #[doc(hidden)]
@@ -70,9 +63,27 @@ pub use app::ending::Ending;
 pub use app::event::Event;
 pub use app::lock::Lock;
 pub use app::machine_handle::{Machine, Resources};
-pub use memory::heap::KernelHeap;
+pub use executive::memory::heap::KernelHeap;
+pub use executive::{print, println};
 pub use report::run::Run;
-pub use text::{console, json, options};
+
+/// Text on the serial line, which [`print!`] and [`println!`] write.
+pub mod console {
+    #[doc(inline)]
+    pub use executive::console::write;
+}
+
+/// Machine lines: lines of JSON on the serial line, for programs that read it.
+pub mod json {
+    #[doc(inline)]
+    pub use executive::text::json::{Object, emit, line, quoted};
+}
+
+/// The words of the command line.
+pub mod options {
+    #[doc(inline)]
+    pub use executive::text::options::{Options, UsageError};
+}
 
 /// Returns the number of timer interrupts that all cores have taken since boot.
 ///
@@ -83,7 +94,7 @@ pub use text::{console, json, options};
 /// ```
 #[must_use]
 pub fn timer_interrupts() -> u64 {
-    interrupts::timer_interrupts()
+    executive::interrupts::timer_interrupts()
 }
 
 /// The README's app, compiled.

@@ -270,7 +270,7 @@ fn every_text_is_one_line_and_ends_in_a_remedy() {
 fn every_reason_of_a_platform_is_listed() {
     let documented = table("| text | platform |").expect("the page");
     let sources = sources(&[
-        "kernel/src/run/execution/mod.rs",
+        "kernel/executive/src/run/execution/mod.rs",
         "fass/virtual-time/src/platform.rs",
         "fass/native/src/platform.rs",
         "fass/linux/src/platform.rs",

@@ -19,7 +19,7 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 use super::ending::Ending;
 use crate::report::Ns;
 use crate::report::run::Run;
-use crate::text::json;
+use executive::text::json;
 
 /// What is known of bounds in the runs so far.
 #[derive(Debug)]

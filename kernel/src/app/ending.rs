@@ -6,7 +6,7 @@ use alloc::string::String;
 
 use fass::CommitError;
 
-use crate::text::options::UsageError;
+use executive::text::options::UsageError;
 
 /// Why an app ends other than by success.
 ///

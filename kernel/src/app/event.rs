@@ -25,9 +25,9 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, interrupt_flag, this_core, turns};
-use crate::text::console;
+use executive::machine::timer::{self, Alarm};
+use executive::machine::{clock, interrupt_flag, this_core, turns};
+use executive::text::console;
 
 /// Something that cores wait for.
 ///

@@ -11,7 +11,7 @@
 //! A fault in a section ends the holder's DAG, as anywhere, and the lock is lost with
 //! it: the data may be half changed. An instance that waits for it, or takes it later, panics.
 
-use crate::machine::section::{Guarded, Refusal};
+use executive::machine::section::{Guarded, Refusal};
 
 /// Data that one instance at a time may use.
 ///

@@ -14,16 +14,16 @@ use super::bound_verdict::BoundVerdict;
 use super::ending::Ending;
 use super::fault_verdict::FaultVerdict;
 use super::wcet_notes;
-use crate::machine;
-use crate::machine::interrupts_off;
-use crate::memory::heap;
 use crate::report::run::Run;
 use crate::report::{self, Ns};
-use crate::run::platform::KERNEL;
-use crate::run::{contexts, execution, heartbeat, worker};
-use crate::text::options::Options;
-use crate::text::{console, json};
 use crate::watch::background::{Background, Wishes, session};
+use executive::machine;
+use executive::machine::interrupts_off;
+use executive::memory::heap;
+use executive::run::platform::KERNEL;
+use executive::run::{contexts, execution, heartbeat, worker};
+use executive::text::options::Options;
+use executive::text::{console, json};
 
 /// The machine, lent to the app's function for the time of the run.
 ///

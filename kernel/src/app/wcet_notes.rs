@@ -10,8 +10,8 @@ use sched_dag::{DagId, Instance, SubtaskId};
 
 use crate::report::Ns;
 use crate::report::run::Run;
-use crate::run::platform::KERNEL;
-use crate::text::json;
+use executive::run::platform::KERNEL;
+use executive::text::json;
 
 /// Names the subtasks of a run whose calls took longer than they may.
 pub(crate) fn note(run: &Run) {

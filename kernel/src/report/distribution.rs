@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use sched_dag::law::Histogram;
 
-use crate::text::json::Object;
+use executive::text::json::Object;
 
 /// The samples of one quantity, in nanoseconds.
 ///

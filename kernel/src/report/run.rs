@@ -6,7 +6,7 @@ use core::cell::OnceCell;
 use sched_dag::law::{Record, Tally, Violation};
 use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
 
-use crate::run::execution::{Execution, Snapshot};
+use executive::run::execution::{Execution, Snapshot};
 
 /// A run that has ended: its model, its times and its counts.
 ///

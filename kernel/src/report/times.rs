@@ -6,7 +6,7 @@ use sched_dag::law::Histogram;
 use sched_dag::{DagId, Instance, SubtaskId};
 
 use super::run::Run;
-use crate::text::json::{self, Object};
+use executive::text::json::{self, Object};
 
 /// Prints the statistics of a run: a line for each DAG, for each subtask, and for each of
 /// several sinks.

@@ -6,8 +6,8 @@ use sched_dag::journal::Event;
 use sched_dag::{Dag, SubtaskId};
 
 use super::run::Run;
-use crate::run::execution;
-use crate::text::{graph, json};
+use executive::run::execution;
+use executive::text::{graph, json};
 
 /// The most events on one line.
 const EVENTS_A_LINE: usize = 32;

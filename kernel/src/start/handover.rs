@@ -14,22 +14,22 @@ use crate::app::bound_verdict::BoundVerdict;
 use crate::app::ending::Ending;
 use crate::app::fault_verdict::FaultVerdict;
 use crate::app::machine_handle::Machine;
-use crate::interrupts;
-use crate::machine::calibration::{self, Rate};
-use crate::machine::known_clock::KnownClock;
-use crate::machine::power::{self, End};
-use crate::machine::this_core::{self, Stacks};
-use crate::machine::{
+use crate::println;
+use crate::watch::{self, panic};
+use executive::interrupts;
+use executive::machine::calibration::{self, Rate};
+use executive::machine::known_clock::KnownClock;
+use executive::machine::power::{self, End};
+use executive::machine::this_core::{self, Stacks};
+use executive::machine::{
     agreement, clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic,
     processors, screen, serial,
 };
-use crate::memory::{self, OutOfMemory};
-use crate::println;
-use crate::run::platform::KERNEL;
-use crate::run::{contexts, heartbeat, worker};
-use crate::text::options::Options;
-use crate::text::{console, json};
-use crate::watch::panic;
+use executive::memory::{self, OutOfMemory};
+use executive::run::platform::KERNEL;
+use executive::run::{contexts, heartbeat, worker};
+use executive::text::options::Options;
+use executive::text::{console, json};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -63,6 +63,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         interrupt::Handlers {
             timer: interrupts::timer_interrupt,
             wake: interrupts::wake_interrupt,
+            beat: watch::beat,
             exception: panic::exception,
             work: worker::work,
             release: contexts::give_back,
@@ -305,7 +306,7 @@ extern "C" fn other_core(apic_id: u32) -> ! {
 }
 
 fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
-    let usage = |message: &str| Ending::Usage(crate::text::options::UsageError::new(message));
+    let usage = |message: &str| Ending::Usage(executive::text::options::UsageError::new(message));
     if info.is_command_line_cut {
         return Err(usage(&format!(
             "the command line is longer than {} bytes and was cut; give fewer words",

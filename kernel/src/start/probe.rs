@@ -15,18 +15,19 @@ use alloc::format;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use crate::app::ending::Ending;
-use crate::machine::context::Parked;
-use crate::machine::interrupt::{Handlers, Interrupted};
-use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, interrupt_flag, local_apic, this_core, vector};
-use crate::run::contexts;
-use crate::text::json;
 use crate::watch::panic;
+use executive::machine::context::Parked;
+use executive::machine::interrupt::{Handlers, Interrupted};
+use executive::machine::timer::{self, Alarm};
+use executive::machine::{clock, cpu, interrupt_flag, local_apic, this_core, vector};
+use executive::run::contexts;
+use executive::text::json;
 
 /// What the machine layer calls in place of the scheduler's handlers.
 pub(crate) const HANDLERS: Handlers = Handlers {
     timer: pass_token_on,
     wake: take_token,
+    beat: |_, _| {},
     exception: panic::exception,
     work: rest,
     release: contexts::give_back,

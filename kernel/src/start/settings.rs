@@ -25,12 +25,12 @@ use alloc::format;
 
 use fass::{Overheads, Policy, Preemption};
 
-use crate::machine::{counted_time, interrupts_off, turns};
-use crate::run::platform::KERNEL;
-use crate::run::worker;
-use crate::text::graph;
-use crate::text::options::{Options, UsageError};
 use crate::watch::background::{Echo, Wishes};
+use executive::machine::{counted_time, interrupts_off, turns};
+use executive::run::platform::KERNEL;
+use executive::run::worker;
+use executive::text::graph;
+use executive::text::options::{Options, UsageError};
 
 const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
 

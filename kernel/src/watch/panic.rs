@@ -9,16 +9,16 @@ use core::fmt::{self, Display};
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use crate::machine::context::Registers;
-use crate::machine::fault::Exception;
-use crate::machine::interrupt::Interrupted;
-use crate::machine::{cpu, exit, interrupt_flag, non_maskable, this_core};
 use crate::report;
-use crate::run::containment;
-use crate::run::execution;
-use crate::text::console::{write_in_emergency, write_line_in_emergency};
-use crate::text::excerpt::Excerpt;
-use crate::text::json;
+use executive::machine::context::Registers;
+use executive::machine::fault::Exception;
+use executive::machine::interrupt::Interrupted;
+use executive::machine::{cpu, exit, interrupt_flag, non_maskable, this_core};
+use executive::run::containment;
+use executive::run::execution;
+use executive::text::console::{write_in_emergency, write_line_in_emergency};
+use executive::text::excerpt::Excerpt;
+use executive::text::json;
 
 /// The most recent events of this core that a report shows.
 const EVENTS_SHOWN: usize = 16;

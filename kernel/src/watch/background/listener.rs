@@ -9,8 +9,8 @@
 
 use sched_dag::DagId;
 
-use crate::machine::serial;
-use crate::run::execution;
+use executive::machine::serial;
+use executive::run::execution;
 
 /// The most bytes that are taken at a time: the port may not end to have some.
 const MOST_BYTES: usize = 256;

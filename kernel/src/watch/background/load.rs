@@ -5,8 +5,8 @@
 
 use sched_dag::journal::{Event, What};
 
-use crate::machine::this_core;
-use crate::run::execution;
+use executive::machine::this_core;
+use executive::run::execution;
 
 /// How many events are copied under the lock at a time.
 const AT_ONCE: usize = 64;

@@ -27,10 +27,10 @@ pub(crate) mod watchdog;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use crate::machine::clock;
-use crate::machine::spinlock::SpinLock;
-use crate::run::heartbeat;
-use crate::text::console;
+use executive::machine::clock;
+use executive::machine::spinlock::SpinLock;
+use executive::run::heartbeat;
+use executive::text::console;
 use listener::Listener;
 use progress::Progress;
 use sched_dag::DagId;

@@ -5,8 +5,8 @@
 //! event leaves time for it. Where events come without a gap it would never be over:
 //! then it is printed all the same, and may cost a release those microseconds.
 
-use crate::machine::clock;
-use crate::run::execution;
+use executive::machine::clock;
+use executive::run::execution;
 
 /// The time that a line takes, with room.
 const TIME_TO_PRINT_NS: u64 = 100_000;

@@ -1,8 +1,8 @@
 //! Progress lines, one for each twentieth of the jobs.
 
 use super::patience::Patience;
-use crate::run::execution;
-use crate::text::json;
+use executive::run::execution;
+use executive::text::json;
 
 /// How far a run has come.
 #[derive(Debug)]

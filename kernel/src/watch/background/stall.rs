@@ -12,11 +12,11 @@
 
 use sched_dag::Instance;
 
-use crate::machine::clock;
-use crate::machine::spinlock::SpinLock;
-use crate::machine::this_core;
-use crate::run::execution;
-use crate::text::{console, json};
+use executive::machine::clock;
+use executive::machine::spinlock::SpinLock;
+use executive::machine::this_core;
+use executive::run::execution;
+use executive::text::{console, json};
 
 /// The time between two looks. Heartbeats may come more often.
 pub(super) const LOOK_NS: u64 = 250_000_000;

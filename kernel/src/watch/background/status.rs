@@ -9,9 +9,9 @@ use sched_dag::DagId;
 
 use super::load;
 use super::patience::Patience;
-use crate::machine::clock;
-use crate::run::execution;
-use crate::text::json;
+use executive::machine::clock;
+use executive::run::execution;
+use executive::text::json;
 
 /// How many events are read where time is short.
 const FEW_EVENTS: u64 = 128;

@@ -12,10 +12,10 @@
 
 use core::sync::atomic::Ordering;
 
-use crate::machine::non_maskable;
-use crate::machine::this_core::{self, Core};
-use crate::run::execution;
-use crate::run::heartbeat::SECOND_NS;
+use executive::machine::non_maskable;
+use executive::machine::this_core::{self, Core};
+use executive::run::execution;
+use executive::run::heartbeat::SECOND_NS;
 
 /// After this time without an interrupt a core is sent one. Core 0 gets its own.
 const QUIET_NS: u64 = 1_500_000_000;

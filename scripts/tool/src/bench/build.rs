@@ -32,7 +32,11 @@ const ROWS: [(&str, Option<&str>, &str); 5] = [
     ("a clone, the tool", None, "--profile tool -p tool"),
     ("a clone, the image", None, IMAGE),
     ("the app changed", Some("apps/fork-join/src/main.rs"), IMAGE),
-    ("the kernel changed", Some("kernel/src/lib.rs"), IMAGE),
+    (
+        "the kernel changed",
+        Some("kernel/executive/src/lib.rs"),
+        IMAGE,
+    ),
     ("sched-dag changed", Some("sched-dag/src/lib.rs"), IMAGE),
 ];
 

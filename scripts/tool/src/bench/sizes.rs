@@ -126,13 +126,13 @@ mod tests {
         let inlined = vec![
             library.clone(),
             frame("ROOT/sched-dag/src/order.rs:7"),
-            frame("ROOT/kernel/src/run/worker.rs:4"),
+            frame("ROOT/kernel/executive/src/run/worker.rs:4"),
         ];
-        let of_room = vec![frame("ROOT/kernel/src/run/execution/step.rs:4")];
+        let of_room = vec![frame("ROOT/kernel/executive/src/run/execution/step.rs:4")];
         let frames = Frames::from([(10, inlined), (13, vec![library]), (20, of_room)]);
         let found = parts(&[10, 13, 20, 100, 104], &frames);
         let expected = [
-            ("kernel: run", 1),
+            ("kernel/executive: run", 1),
             (LIBRARY, 7 + 4 + 1),
             ("sched-dag: order", 3),
         ];

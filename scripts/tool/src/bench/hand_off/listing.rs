@@ -48,8 +48,11 @@ const STEPS: [(&str, &[&str]); 11] = [
             "machine/context.rs",
         ],
     ),
-    ("execution: the rest", &["kernel/src/run/execution/"]),
-    ("worker's loop", &["kernel/src/run/worker.rs"]),
+    (
+        "execution: the rest",
+        &["kernel/executive/src/run/execution/"],
+    ),
+    ("worker's loop", &["kernel/executive/src/run/worker.rs"]),
     ("the app's function", &["apps/"]),
 ];
 
@@ -225,8 +228,8 @@ mod tests {
         };
         let inlined = [
             "/rustc/x/core/src/ptr.rs:1",
-            "/w/kernel/src/machine/spinlock.rs:3",
-            "/w/kernel/src/run/worker.rs:4",
+            "/w/kernel/executive/src/machine/spinlock.rs:3",
+            "/w/kernel/executive/src/run/worker.rs:4",
         ];
         assert_eq!(step(&inlined.map(frame)), "the lock");
         assert_eq!(step(&[]), "elsewhere");

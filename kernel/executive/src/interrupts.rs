@@ -1,0 +1,51 @@
+//! What the interrupts of a core do: its timer's, and another core's wake-up.
+
+use core::sync::atomic::Ordering;
+
+use crate::machine::interrupt::{self, Interrupted};
+use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, section, this_core};
+use crate::run::{containment, execution, heartbeat};
+
+/// Handles this core's timer interrupt.
+pub fn timer_interrupt(interrupted: &mut Interrupted) {
+    let core = this_core::get();
+    core.timer_interrupts.fetch_add(1, Ordering::Relaxed);
+    let now_ns = clock::now_ns();
+    core.interrupted_ns.store(now_ns, Ordering::Relaxed);
+    // The instance that holds the core watches the clock: waking it is enough.
+    timer::take_due(Alarm::Hold, now_ns);
+    if timer::take_due(Alarm::Heartbeat, now_ns) {
+        heartbeat::beat(core, now_ns);
+        interrupt::look_in(core, now_ns);
+    }
+    if timer::take_due(Alarm::Schedule, now_ns) {
+        execution::interrupt(interrupted, now_ns, true);
+    }
+    if timer::take_due(Alarm::Budget, now_ns) {
+        containment::end_overrun(interrupted, now_ns);
+    }
+    if section::has_put_off(core) {
+        execution::interrupt(interrupted, now_ns, false);
+    }
+    timer::arm_earliest();
+}
+
+/// Handles another core's wake-up: there is work, an earlier event to wait for,
+/// or another heartbeat.
+pub fn wake_interrupt(interrupted: &mut Interrupted) {
+    let core = this_core::get();
+    let now_ns = clock::now_ns();
+    core.interrupted_ns.store(now_ns, Ordering::Relaxed);
+    if core.index == 0 {
+        execution::arm_next_event();
+    }
+    heartbeat::keep_beating(core);
+    execution::interrupt(interrupted, now_ns, false);
+}
+
+/// Returns the timer interrupts that all cores have taken since boot.
+pub fn timer_interrupts() -> u64 {
+    let counts = this_core::all().iter().map(|core| &core.timer_interrupts);
+    counts.map(|count| count.load(Ordering::Relaxed)).sum()
+}

@@ -1,0 +1,73 @@
+//! Time: nanoseconds since the kernel's entry, from the time stamp counter.
+//!
+//! The rates of the counter and of the local APIC's timer are measured at boot
+//! ([`calibration`](super::calibration)).
+//!
+//! The counters of all cores are compared as these start ([`agreement`](super::agreement)).
+//! Assumed, not checked: their rate is constant, as on every processor with an invariant
+//! counter and under QEMU.
+
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use super::cpu;
+
+/// The counter's value at time 0.
+static BASE: AtomicU64 = AtomicU64::new(0);
+/// Nanoseconds per counter tick, in 2^-32.
+static NS_PER_TICK: AtomicU64 = AtomicU64::new(0);
+/// Local APIC timer ticks per nanosecond, in 2^-32.
+static APIC_TICKS_PER_NS: AtomicU64 = AtomicU64::new(0);
+
+/// Returns the time in nanoseconds since the kernel's entry.
+pub fn now_ns() -> u64 {
+    let ticks = cpu::time_stamp().wrapping_sub(BASE.load(Ordering::Relaxed));
+    ticks_to_ns(ticks)
+}
+
+/// Converts nanoseconds to ticks of the local APIC's timer, at least 1; longer
+/// times than it can count give its longest.
+pub fn apic_ticks(ns: u64) -> u32 {
+    /// Three days, which no timer of 32 bits can count.
+    const LONGEST_NS: u64 = 1 << 48;
+    let ticks = scale(
+        ns.min(LONGEST_NS),
+        APIC_TICKS_PER_NS.load(Ordering::Relaxed),
+    );
+    u32::try_from(ticks).unwrap_or(u32::MAX).max(1)
+}
+
+/// Converts ticks of the time stamp counter to nanoseconds.
+pub fn ticks_to_ns(ticks: u64) -> u64 {
+    scale(ticks, NS_PER_TICK.load(Ordering::Relaxed))
+}
+
+/// Multiplies by a factor in 2^-32. Right for 584 years.
+fn scale(value: u64, factor: u64) -> u64 {
+    let product = u128::from(value) * u128::from(factor);
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "reading the clock is on every path: no check for what cannot be"
+    )]
+    {
+        (product >> 32) as u64
+    }
+}
+
+/// What each clock advanced by in the same time.
+pub(super) struct Elapsed {
+    pub(super) ns: u64,
+    pub(super) counter: u64,
+    pub(super) apic: u64,
+}
+
+/// Sets the rates, with time 0 at counter value `base`, from what each clock advanced by.
+pub(super) fn set_rates(base: u64, elapsed: &Elapsed) {
+    BASE.store(base, Ordering::Relaxed);
+    NS_PER_TICK.store(in_2_32(elapsed.ns, elapsed.counter), Ordering::Relaxed);
+    APIC_TICKS_PER_NS.store(in_2_32(elapsed.apic, elapsed.ns), Ordering::Relaxed);
+}
+
+fn in_2_32(numerator: u64, denominator: u64) -> u64 {
+    u64::try_from((u128::from(numerator) << 32) / u128::from(denominator.max(1)))
+        .unwrap_or(u64::MAX)
+}

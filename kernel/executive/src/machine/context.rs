@@ -1,0 +1,311 @@
+//! Computations with stacks of their own, and the way from one to another.
+//!
+//! A *context* is a computation with a stack. On each core one context runs.
+//! While it does, the processor's interrupt stack 1 points to the end of its
+//! save area, so an interrupt saves it right there (see `interrupt.s`), and a
+//! handler may then let the core go on with another context instead.
+//!
+//! **Context invariant**: a context's save area and stack belong to the core on
+//! which it runs, or, while it runs nowhere, to the holder of its one
+//! [`Parked`]. So there is never more than one place that touches them.
+
+use core::cell::UnsafeCell;
+use core::fmt;
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+
+use alloc::boxed::Box;
+
+/// The general registers as `interrupt.s` and the processor push them.
+#[derive(Debug, Default)]
+#[repr(C)]
+#[expect(missing_docs, reason = "the processor's own names")]
+pub struct Registers {
+    pub r15: u64,
+    pub r14: u64,
+    pub r13: u64,
+    pub r12: u64,
+    pub r11: u64,
+    pub r10: u64,
+    pub r9: u64,
+    pub r8: u64,
+    pub rbp: u64,
+    pub rdi: u64,
+    pub rsi: u64,
+    pub rdx: u64,
+    pub rcx: u64,
+    pub rbx: u64,
+    pub rax: u64,
+    pub vector: u64,
+    pub error_code: u64,
+    pub rip: u64,
+    pub cs: u64,
+    pub rflags: u64,
+    pub rsp: u64,
+    pub ss: u64,
+}
+
+impl Registers {
+    const INTERRUPTS_ENABLED: u64 = 1 << 9;
+
+    /// Reports whether interrupts were enabled where these were pushed.
+    pub(super) const fn are_interrupts_enabled(&self) -> bool {
+        self.rflags & Self::INTERRUPTS_ENABLED != 0
+    }
+}
+
+impl fmt::Display for Registers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = [
+            [
+                ("rax", self.rax),
+                ("rbx", self.rbx),
+                ("rcx", self.rcx),
+                ("rdx", self.rdx),
+            ],
+            [
+                ("rsi", self.rsi),
+                ("rdi", self.rdi),
+                ("rbp", self.rbp),
+                ("rsp", self.rsp),
+            ],
+            [
+                ("r8", self.r8),
+                ("r9", self.r9),
+                ("r10", self.r10),
+                ("r11", self.r11),
+            ],
+            [
+                ("r12", self.r12),
+                ("r13", self.r13),
+                ("r14", self.r14),
+                ("r15", self.r15),
+            ],
+            [
+                ("rip", self.rip),
+                ("flags", self.rflags),
+                ("vec", self.vector),
+                ("err", self.error_code),
+            ],
+        ];
+        for row in rows {
+            for (name, value) in row {
+                write!(f, "  {name:>5} {value:016x}")?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
+/// Vector state (x87 and SSE), then registers.
+#[derive(Debug)]
+#[repr(C, align(64))]
+struct SaveArea {
+    vector_state: [u8; 512],
+    registers: Registers,
+}
+
+const _: () = {
+    // `interrupt.s` relies on each of these.
+    assert!(size_of::<Registers>() == 22 * 8);
+    assert!(core::mem::offset_of!(SaveArea, registers) == 512);
+    assert!((512 + size_of::<Registers>()).is_multiple_of(16));
+};
+
+/// A computation with a stack of its own.
+#[derive(Debug)]
+pub struct Context {
+    save_area: UnsafeCell<SaveArea>,
+    stack_top: u64,
+    stack_bytes: u64,
+    is_background: bool,
+    /// When it was last suspended, and for how long it has been in all before.
+    suspended_at_ns: AtomicU64,
+    suspended_ns: AtomicU64,
+    /// When the execution of what it runs reaches its budget, if it is not
+    /// suspended any more until then.
+    budget_end_ns: AtomicU64,
+    /// Whether what it runs has been found at fault.
+    is_at_fault: AtomicBool,
+    sections: Sections,
+}
+
+/// What a context notes of the sections that it is in; see [`section`](super::section).
+#[derive(Debug)]
+pub(super) struct Sections {
+    /// How many there are, one in the other.
+    pub(super) depth: AtomicU32,
+    /// When a preemption was put off first; 0 if none was.
+    pub(super) put_off_ns: AtomicU64,
+}
+
+impl Sections {
+    const fn new() -> Self {
+        Self {
+            depth: AtomicU32::new(0),
+            put_off_ns: AtomicU64::new(0),
+        }
+    }
+}
+
+// SAFETY: everything but the save area is constant or atomic, and the save area
+// has one user at a time (context invariant).
+unsafe impl Sync for Context {}
+
+impl Context {
+    /// Returns the address where the processor's interrupt frame has to end.
+    pub(super) fn frame_end(&self) -> u64 {
+        self.registers() as u64 + size_of::<Registers>() as u64
+    }
+
+    /// Returns where `interrupt.s` keeps this context's registers.
+    pub(super) fn registers(&self) -> *mut Registers {
+        self.save_area.get().wrapping_byte_add(512).cast()
+    }
+
+    /// Returns the upper end of the context's stack.
+    pub const fn stack_top(&self) -> u64 {
+        self.stack_top
+    }
+
+    /// Returns the size of the context's stack if `address` lies in it, or in the guard
+    /// page below.
+    pub(super) fn stack_bytes_at(&self, address: u64) -> Option<u64> {
+        let below = self.stack_top.checked_sub(address)?;
+        (below <= self.stack_bytes + super::paging::PAGE).then_some(self.stack_bytes)
+    }
+
+    /// Reports whether this is what its core does when nothing is assigned to it.
+    pub const fn is_background(&self) -> bool {
+        self.is_background
+    }
+
+    /// Sets the time at which the budget of what the context runs ends.
+    pub fn set_budget_end(&self, end_ns: u64) {
+        self.budget_end_ns.store(end_ns, Ordering::Relaxed);
+    }
+
+    /// Returns when the budget ends of what the context runs.
+    pub fn budget_end_ns(&self) -> u64 {
+        self.budget_end_ns.load(Ordering::Relaxed)
+    }
+
+    /// Notes that what the context runs is at fault, and reports whether that was
+    /// known.
+    pub fn note_fault(&self) -> bool {
+        self.is_at_fault.swap(true, Ordering::Relaxed)
+    }
+
+    /// Reports whether what the context runs has been found at fault.
+    pub(super) fn is_at_fault(&self) -> bool {
+        self.is_at_fault.load(Ordering::Relaxed)
+    }
+
+    /// Returns what the context notes of its sections.
+    pub(super) const fn sections(&self) -> &Sections {
+        &self.sections
+    }
+
+    /// Notes that the context has waited for `ns` without executing.
+    pub(super) fn note_waited(&self, ns: u64) {
+        self.suspended_ns.fetch_add(ns, Ordering::Relaxed);
+        self.set_budget_end(self.budget_end_ns().saturating_add(ns));
+    }
+
+    /// Returns for how long the context has been suspended since it was made.
+    pub fn suspended_ns(&self) -> u64 {
+        self.suspended_ns.load(Ordering::Relaxed)
+    }
+}
+
+/// A context that does not run. Its owner may have it run.
+#[derive(Debug)]
+pub struct Parked(&'static Context);
+
+impl Parked {
+    /// Makes a context with the stack of `stack_bytes` that grows down from `stack_top`,
+    /// which must be a multiple of 16. It has nothing to do yet.
+    pub fn new(stack_top: u64, stack_bytes: u64, is_background: bool) -> Self {
+        /// The state after FNINIT, and MXCSR's state after reset (Intel SDM 1,
+        /// 8.1.5 and 10.2.3): every exception masked, full precision.
+        const CONTROL: [(usize, [u8; 2]); 2] = [(0, [0x7f, 0x03]), (24, [0x80, 0x1f])];
+        let mut vector_state = [0; 512];
+        for (offset, value) in CONTROL {
+            vector_state[offset..offset + 2].copy_from_slice(&value);
+        }
+        let save_area = SaveArea {
+            vector_state,
+            registers: Registers::default(),
+        };
+        Self(Box::leak(Box::new(Context {
+            save_area: UnsafeCell::new(save_area),
+            stack_top,
+            stack_bytes,
+            is_background,
+            suspended_at_ns: AtomicU64::new(0),
+            suspended_ns: AtomicU64::new(0),
+            budget_end_ns: AtomicU64::new(u64::MAX),
+            is_at_fault: AtomicBool::new(false),
+            sections: Sections::new(),
+        })))
+    }
+
+    /// Has the context begin anew with `entry`, on an empty stack, when it next runs.
+    /// All that it did before is forgotten.
+    pub fn restart(&mut self, entry: extern "C" fn() -> !) {
+        self.0.set_budget_end(u64::MAX);
+        // SAFETY: `&mut self` is the one holder of a context that does not run
+        // (context invariant).
+        let registers = unsafe { &mut *self.0.registers() };
+        // What a function finds in the others means nothing to it.
+        registers.rbp = 0;
+        registers.rip = entry as *const () as u64;
+        registers.cs = u64::from(super::descriptors::CODE);
+        registers.rflags = Registers::INTERRUPTS_ENABLED;
+        // As after a call: a function expects the stack to be 8 off.
+        registers.rsp = self.0.stack_top - 8;
+        registers.ss = 0;
+    }
+
+    /// Notes that the context is suspended from `now_ns` on.
+    pub fn note_suspended(&self, now_ns: u64) {
+        self.0.suspended_at_ns.store(now_ns, Ordering::Relaxed);
+    }
+
+    /// Notes that the context goes on at `now_ns`.
+    pub fn note_resumed(&self, now_ns: u64) {
+        let since_ns = now_ns.saturating_sub(self.0.suspended_at_ns.load(Ordering::Relaxed));
+        self.0.note_waited(since_ns);
+    }
+
+    /// Returns when the budget ends of what the context runs.
+    pub fn budget_end_ns(&self) -> u64 {
+        self.0.budget_end_ns()
+    }
+
+    /// Returns where `interrupt.s` keeps the context's registers.
+    pub(super) fn registers(&self) -> *mut Registers {
+        self.0.registers()
+    }
+
+    /// Reports whether this is what its core does when nothing is assigned to it.
+    pub const fn is_background(&self) -> bool {
+        self.0.is_background()
+    }
+
+    /// Gives the context up to a core that is to run it.
+    pub(super) const fn into_context(self) -> &'static Context {
+        self.0
+    }
+
+    /// Takes a context that has just stopped running.
+    ///
+    /// # Safety
+    ///
+    /// The context ran on this core and runs no more, or will not run any
+    /// further than to the switch that the caller is about to make; no other
+    /// `Parked` of it exists.
+    pub(super) const unsafe fn from_context(context: &'static Context) -> Self {
+        Self(context)
+    }
+}

@@ -1,0 +1,104 @@
+//! Time that QEMU counts, made to repeat to the nanosecond.
+//!
+//! With `-icount shift=0,sleep=off` an instruction takes a nanosecond, and when
+//! all cores halt QEMU advances the clock to the next timer's end. That jump is
+//! made by another thread of QEMU's than the one that executes instructions: its
+//! main loop (`main_loop_wait` calls `icount_start_warp_timer`), which is also
+//! awake for no reason after each timer that has fired. It takes the halt of the
+//! last core for real as soon as `hlt` has set its flag, but the instructions up to
+//! and including `hlt` are counted only when the core's turn has ended
+//! (`icount_process_data`). If the main loop looks in between, it jumps to the
+//! timer's end, and those few instructions are added on top of it: the interrupt
+//! comes some 9 ns late. Which of the two is first depends on the host, some
+//! 1 halt in 100,000 goes the other way, and everything that follows is shifted.
+//!
+//! What is late by less than [`GRACE_NS`] can be made equally late: a timer's
+//! interrupt, before it does or looks at anything, waits until exactly that long
+//! after its time ([`settle`]). As a loop has a length, it could not wait for a
+//! nanosecond; it executes as many `nop`s as nanoseconds are left. And a core reads
+//! the counter right before it halts ([`count_before_halt`]), which makes QEMU count
+//! what it has executed so far, so that no more than a few instructions are at stake.
+//!
+//! The jump does more than move the clock. It tells every core's emulation to leave its
+//! next turn (`qemu_timer_notify_cb`, `rr_kick_vcpu_thread`). As a rule all cores have
+//! been passed by then, and QEMU goes on with the first. But if the main loop is so
+//! early that the halted cores behind the last one are still being passed
+//! (`rr_cpu_thread_fn`), it goes on right there, and other cores than usual have that
+//! mark left when the timer's core gets its turn. The mark matters if another timer ends
+//! in the next few microseconds: QEMU then looks for due timers before a marked core's
+//! turn, but within an unmarked one's, which has no instruction left for it and is lost
+//! (`icount_prepare_for_run`). So the order of turns would depend on the host. A core
+//! whose timer has fired therefore passes its turn once, by a `pause`; when it is its
+//! turn again all cores have been passed, and no mark is left ([`settle`]).
+//!
+//! All this is off unless [`enable`] is called, and of no use where an instruction
+//! does not take a nanosecond. Where a timer's interrupt waits for its turn because
+//! other cores compute, not all cores had halted, and the clock has not jumped: nothing
+//! is done then. What it cannot hide: of two cores whose timers end at the same time, or
+//! within some 100 ns, the one is first with which QEMU goes on, and that is the host's
+//! choice in the rare cases above. So no several cores should wait for one time.
+
+use core::arch::asm;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use super::{clock, cpu};
+
+/// How long after its time a timer's interrupt goes on. Until [`settle`] has read the
+/// clock again it is some 90 instructions, from [`count_before_halt`] to the halt less than 10.
+const GRACE_NS: u64 = 128;
+
+static IS_ENABLED: AtomicBool = AtomicBool::new(false);
+
+/// Makes timers' interrupts settle from now on.
+pub fn enable() {
+    IS_ENABLED.store(true, Ordering::Relaxed);
+}
+
+/// Returns [`GRACE_NS`] after `at_ns`, the time for which this core's timer was
+/// armed; at once if that is past, or if the timer is early. All other cores have
+/// a turn before.
+#[inline]
+pub(super) fn settle(at_ns: u64) {
+    if !IS_ENABLED.load(Ordering::Relaxed) {
+        return;
+    }
+    let Some(late_ns) = clock::now_ns().checked_sub(at_ns) else {
+        return;
+    };
+    if late_ns < GRACE_NS {
+        cpu::relax();
+        let late_ns = clock::now_ns() - at_ns;
+        execute_nops(GRACE_NS.saturating_sub(late_ns));
+    }
+}
+
+/// Begins the last few instructions before a halt.
+#[inline]
+pub(super) fn count_before_halt() {
+    if IS_ENABLED.load(Ordering::Relaxed) {
+        let _ = cpu::time_stamp();
+    }
+}
+
+/// Executes that many instructions, at most [`GRACE_NS`], and always the same few
+/// besides.
+fn execute_nops(count: u64) {
+    let count = count.min(GRACE_NS);
+    // SAFETY: the jump goes to one of the `nop`s, of one byte each, or to the end,
+    // since `count` is not larger than their number; no memory is touched.
+    unsafe {
+        asm!(
+            "lea {target}, [rip + 2f]",
+            "sub {target}, {count}",
+            "jmp {target}",
+            ".rept {most}",
+            "nop",
+            ".endr",
+            "2:",
+            target = out(reg) _,
+            count = in(reg) count,
+            most = const GRACE_NS,
+            options(nomem, nostack),
+        );
+    }
+}

@@ -1,0 +1,181 @@
+//! The processor's own instructions: interrupt flag, halt, registers, identity.
+//!
+//! Each function is one instruction (or the few that belong together) with a
+//! safe signature where no use of it can break memory safety.
+
+use core::arch::asm;
+use core::arch::x86_64::__cpuid;
+
+/// Clears the interrupt flag and reports whether it was set. Where the time for which
+/// interrupts stay disabled is to be measured, [`interrupt_flag`](super::interrupt_flag)
+/// does so.
+pub(super) fn clear_interrupt_flag() -> bool {
+    let flags: u64;
+    // SAFETY: reads the flags through the stack and clears the interrupt flag,
+    // which delays interrupts and changes no memory that Rust knows of.
+    unsafe { asm!("pushfq", "pop {}", "cli", out(reg) flags) };
+    flags & (1 << 9) != 0
+}
+
+/// Clears the interrupt flag where it is known to be set.
+pub(super) fn clear_set_interrupt_flag() {
+    // SAFETY: clearing the interrupt flag delays interrupts and changes no memory.
+    unsafe { asm!("cli") };
+}
+
+/// Sets the interrupt flag.
+pub(super) fn set_interrupt_flag() {
+    // SAFETY: handlers keep all registers of what they interrupt and touch only
+    // data behind locks or atomics, so an interrupt may come anywhere.
+    unsafe { asm!("sti") };
+}
+
+/// Sets the interrupt flag and halts until an interrupt has been handled. As `sti` takes
+/// effect only after the next instruction, none can slip in between.
+pub(super) fn set_interrupt_flag_and_halt() {
+    // SAFETY: as for `set_interrupt_flag`; halting changes no state.
+    unsafe { asm!("sti", "hlt") };
+}
+
+/// Touches the stack where what comes next will not reach beyond: if it is too short for
+/// that, it overflows here and not there.
+pub fn probe_stack() {
+    // SAFETY: reads a byte below the stack, which is the stack's own or its guard page's.
+    unsafe { asm!("test byte ptr [rsp - {}], 0", const STACK_FOR_A_SECTION, options(nostack)) };
+}
+
+/// More than any section under a lock takes, in bytes; less than a page.
+const STACK_FOR_A_SECTION: usize = 2048;
+
+/// Continues on another stack, for good.
+///
+/// # Safety
+///
+/// `top` is the upper end of a mapped stack that nobody else uses, a multiple
+/// of 16.
+pub unsafe fn continue_on_stack<T>(top: u64, argument: &T, function: extern "C" fn(&T) -> !) -> ! {
+    // SAFETY: the caller vouches for the stack. The old one is never returned
+    // to, so what the argument borrows from it stays as it is. `call` aligns
+    // the stack as a function expects it.
+    unsafe {
+        asm!(
+            "mov rsp, {top}", "xor ebp, ebp", "call {function}", "ud2",
+            top = in(reg) top,
+            function = in(reg) function,
+            in("rdi") core::ptr::from_ref(argument),
+            options(noreturn),
+        )
+    }
+}
+
+/// Stops this processor for good.
+pub fn halt_forever() -> ! {
+    loop {
+        // SAFETY: with interrupts disabled nothing runs here again, so no
+        // invariant of interrupted code can be observed.
+        unsafe { asm!("cli", "hlt") };
+    }
+}
+
+/// Tells the processor that this is a waiting loop.
+///
+/// Under QEMU's instruction counting it also passes the turn to the next
+/// processor, so a waiting loop without it would starve the others.
+pub fn relax() {
+    core::hint::spin_loop();
+}
+
+/// Reads the time stamp counter, in ticks.
+pub fn time_stamp() -> u64 {
+    // SAFETY: RDTSC only writes two registers; every 64-bit processor has it.
+    unsafe { core::arch::x86_64::_rdtsc() }
+}
+
+/// Reads the time stamp counter, in ticks, not before what was read from memory so far.
+pub fn time_stamp_after_reads() -> u64 {
+    // SAFETY: LFENCE only orders; every 64-bit processor has it.
+    unsafe { core::arch::x86_64::_mm_lfence() };
+    time_stamp()
+}
+
+/// Waits until what this core has written is visible to all, before it goes on in any way.
+pub fn finish_writes() {
+    // SAFETY: the fences only order; every 64-bit processor has them.
+    unsafe { asm!("mfence", "lfence", options(nostack)) };
+}
+
+/// Reports whether local APICs can be reached by model-specific registers.
+pub fn has_x2apic() -> bool {
+    const X2APIC: u32 = 1 << 21;
+    __cpuid(1).ecx & X2APIC != 0
+}
+
+/// Reads a model-specific register.
+///
+/// # Safety
+///
+/// The processor has the register, and reading it changes nothing.
+pub unsafe fn read_msr(register: u32) -> u64 {
+    let (low, high): (u64, u64);
+    // SAFETY: the caller vouches for the register.
+    unsafe { asm!("rdmsr", in("ecx") register, out("rax") low, out("rdx") high) };
+    high << 32 | low
+}
+
+/// Writes a model-specific register.
+///
+/// # Safety
+///
+/// The processor has the register, and the value is right for it.
+pub unsafe fn write_msr(register: u32, value: u64) {
+    let (low, high) = (value & 0xffff_ffff, value >> 32);
+    // SAFETY: the caller vouches for register and value.
+    unsafe { asm!("wrmsr", in("ecx") register, in("rax") low, in("rdx") high) };
+}
+
+/// Reads the address whose access caused the last page fault.
+pub fn fault_address() -> u64 {
+    let address: u64;
+    // SAFETY: reading CR2 changes nothing.
+    unsafe { asm!("mov {}, cr2", out(reg) address, options(nomem, nostack)) };
+    address
+}
+
+/// Switches to the page table at physical address `root`.
+///
+/// # Safety
+///
+/// `root` maps the image, the current stack and all memory in use to where they
+/// are now.
+pub unsafe fn set_page_table(root: u64) {
+    // SAFETY: the caller vouches for the table; the write flushes old entries.
+    unsafe { asm!("mov cr3, {}", in(reg) root) };
+}
+
+/// What the processor says of the time stamp counter (CPUID 0x15): the denominator and the
+/// numerator of its ratio to a crystal, and the crystal's rate in Hz; each 0 if it is left out.
+pub fn counter_ratio() -> [u32; 3] {
+    const LEAF: u32 = 0x15;
+    if __cpuid(0).eax < LEAF {
+        return [0; 3];
+    }
+    let leaf = __cpuid(LEAF);
+    [leaf.eax, leaf.ebx, leaf.ecx]
+}
+
+/// The hypervisor's signature (CPUID 0x4000_0000), if there is one.
+pub fn hypervisor() -> Option<[u8; 12]> {
+    const HYPERVISOR_PRESENT: u32 = 1 << 31;
+    if __cpuid(1).ecx & HYPERVISOR_PRESENT == 0 {
+        return None;
+    }
+    let leaf = __cpuid(0x4000_0000);
+    let mut signature = [0; 12];
+    for (place, register) in signature
+        .chunks_exact_mut(4)
+        .zip([leaf.ebx, leaf.ecx, leaf.edx])
+    {
+        place.copy_from_slice(&register.to_le_bytes());
+    }
+    Some(signature)
+}

@@ -1,0 +1,157 @@
+//! From an interrupt's vector to the function that handles it.
+//!
+//! The machine layer knows nothing of scheduling: the start of the kernel [`install`]s
+//! the functions to call. They run with interrupts disabled, on the core's
+//! handler stack, and may use locks but must not wait for anything else.
+
+use core::arch::global_asm;
+use core::panic::Location;
+
+use super::context::{Parked, Registers};
+use super::fault::{self, Exception};
+use super::once::Once;
+use super::this_core::Core;
+use super::{
+    cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core, timer,
+    turns, vector,
+};
+
+global_asm!(
+    include_str!("interrupt.s"),
+    handle_interrupt = sym handle_interrupt,
+    handle_exception = sym handle_exception,
+    handler_stack = const this_core::HANDLER_STACK_OFFSET,
+);
+
+unsafe extern "C" {
+    safe static interrupt_stubs: u8;
+}
+
+/// What the machine layer calls.
+#[derive(Debug)]
+pub struct Handlers {
+    /// The local timer has fired.
+    pub timer: fn(&mut Interrupted),
+    /// Another core asked for attention.
+    pub wake: fn(&mut Interrupted),
+    /// The core's heartbeat, with the time: looks in on the run.
+    pub beat: fn(&Core, u64),
+    /// The code that was running cannot go on. If the handler returns, it has
+    /// exchanged the context.
+    pub exception: fn(&Exception<'_>, &mut Interrupted),
+    /// What a context that begins anew does; it returns, with interrupts
+    /// disabled, the context to leave it for.
+    pub work: fn() -> Parked,
+    /// Takes a context that this core has no use for.
+    pub release: fn(Parked),
+}
+
+/// The proof of being in a handler: the context that was running is saved.
+#[derive(Debug)]
+pub struct Interrupted(());
+
+impl Interrupted {
+    /// Returns the address of the instruction that was interrupted.
+    pub fn instruction(&self) -> u64 {
+        let registers = this_core::get().context().registers();
+        // SAFETY: an `Interrupted` exists in handlers only, where the context of
+        // this core is saved and does not change.
+        unsafe { (*registers).rip }
+    }
+
+    /// Has this core go on with `next` when the handler returns, and returns
+    /// the context that was interrupted.
+    pub fn exchange(&mut self, next: Parked) -> Parked {
+        // SAFETY: an `Interrupted` exists in handlers only.
+        unsafe { this_core::exchange_context(next) }
+    }
+}
+
+static HANDLERS: Once<Handlers> = Once::new();
+
+/// Names the functions that handle interrupts. The first call counts.
+pub fn install(handlers: Handlers) {
+    // A second call would come from a second boot, which there is not.
+    let _ = HANDLERS.set(handlers);
+}
+
+/// Loads the interrupt table for this core.
+pub fn load_table() {
+    descriptors::load_interrupts(core::ptr::from_ref(&interrupt_stubs) as u64);
+}
+
+/// Handles one interrupt and returns the registers to resume.
+extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
+    interrupts_off::begin(Location::caller());
+    turns::begin_urgent();
+    // SAFETY: `interrupt.s` passes the registers of the context that this core
+    // was running, which are this core's (context invariant).
+    let vector = unsafe { (*registers).vector };
+    match (u8::try_from(vector), HANDLERS.get()) {
+        (Ok(vector::TIMER), Some(handlers)) => {
+            timer::settle();
+            local_apic::acknowledge();
+            (handlers.timer)(&mut Interrupted(()));
+        }
+        (Ok(vector::WAKE), Some(handlers)) => {
+            local_apic::acknowledge();
+            (handlers.wake)(&mut Interrupted(()));
+        }
+        (Ok(vector::SPURIOUS), _) => {}
+        _ => local_apic::acknowledge(),
+    }
+    interrupts_off::end();
+    turns::end_interrupt();
+    this_core::get().context().registers()
+}
+
+/// Handles one exception and returns the registers to resume.
+extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
+    // SAFETY: `interrupt.s` passes the registers it pushed to the exception's
+    // own stack, where nobody else looks.
+    let pushed = unsafe { &*registers };
+    let is_message = pushed.vector == fault::NON_MASKABLE;
+    let is_stopped = is_message && non_maskable::is_stopping();
+    let Some(handlers) = HANDLERS.get().filter(|_| !is_stopped) else {
+        cpu::halt_forever();
+    };
+    let mut exception = Exception::new(pushed);
+    if is_message && non_maskable::is_accusation() {
+        if pushed.are_interrupts_enabled() {
+            // The host has not let this core run. It takes its interrupts now. The
+            // registers lie there as in a save area, below them the vector state.
+            return registers;
+        }
+        exception.name = "interrupts disabled for seconds";
+    }
+    (handlers.exception)(&exception, &mut Interrupted(()));
+    this_core::get().context().registers()
+}
+
+/// Has the kernel look in on the run. In a heartbeat of this core.
+pub fn look_in(core: &Core, now_ns: u64) {
+    if let Some(handlers) = HANDLERS.get() {
+        (handlers.beat)(core, now_ns);
+    }
+}
+
+/// Begins a core's first context.
+pub fn begin_work() -> ! {
+    work()
+}
+
+/// Where every context begins anew.
+pub extern "C" fn work() -> ! {
+    let handlers = HANDLERS
+        .get()
+        .expect("handlers are installed before any context begins");
+    let next = (handlers.work)();
+    interrupt_flag::disable();
+    if let Some(spare) = this_core::take_spare_context() {
+        (handlers.release)(spare);
+    }
+    // SAFETY: 1. This function begins a context, and interrupts are disabled.
+    // 2. `work` has returned, so nothing of it is left on the stack.
+    // 3. The spare context was taken just now.
+    unsafe { this_core::leave_context(next) }
+}

@@ -1,0 +1,47 @@
+//! Disabling and enabling interrupts, with the time in between measured on request.
+
+use core::panic::Location;
+
+use super::{counted_time, cpu, interrupts_off};
+
+/// Disables interrupts on this processor and reports whether they were enabled.
+#[track_caller]
+pub fn disable() -> bool {
+    let were_enabled = cpu::clear_interrupt_flag();
+    if were_enabled {
+        interrupts_off::begin(Location::caller());
+    }
+    were_enabled
+}
+
+/// Disables interrupts where they are known to be enabled.
+#[track_caller]
+pub fn disable_enabled() {
+    cpu::clear_set_interrupt_flag();
+    interrupts_off::begin(Location::caller());
+}
+
+/// Reports whether interrupts are enabled on this processor.
+pub fn are_enabled() -> bool {
+    let were_enabled = disable();
+    if were_enabled {
+        enable();
+    }
+    were_enabled
+}
+
+/// Enables interrupts on this processor.
+pub fn enable() {
+    interrupts_off::end();
+    cpu::set_interrupt_flag();
+}
+
+/// Enables interrupts and halts until one has been handled; leaves them enabled.
+///
+/// To be called with interrupts disabled: then no interrupt that the caller has checked
+/// for can leave the processor halted with work to do.
+pub fn enable_and_halt() {
+    interrupts_off::end();
+    counted_time::count_before_halt();
+    cpu::set_interrupt_flag_and_halt();
+}

@@ -1,0 +1,75 @@
+//! How long interrupts stay disabled at a stretch.
+//!
+//! While they are, no decision of the scheduler can take effect on that core, so
+//! the longest such section bounds what every latency includes. It is measured
+//! on request (`measure=interrupts`): the two readings of the clock cost more
+//! than many of the sections that they measure.
+//!
+//! A section begins where code or an interrupt disables interrupts and ends
+//! where they are enabled again; it may lead through several contexts.
+
+use core::panic::Location;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use super::{cpu, this_core};
+
+static ENABLED: AtomicBool = AtomicBool::new(false);
+
+/// Begins to measure, once all cores are up.
+pub fn enable() {
+    ENABLED.store(true, Ordering::Relaxed);
+}
+
+/// Notes that interrupts have just been disabled here, at `place`.
+pub(super) fn begin(place: &'static Location<'static>) {
+    if ENABLED.load(Ordering::Relaxed) {
+        measure_from(place);
+    }
+}
+
+/// Notes that interrupts are about to be enabled.
+pub(super) fn end() {
+    if ENABLED.load(Ordering::Relaxed) {
+        measure_to_here();
+    }
+}
+
+// Not a part of each place that disables interrupts: few runs measure, and an image has
+// many such places and little room.
+
+#[cold]
+#[inline(never)]
+fn measure_from(place: &'static Location<'static>) {
+    let meter = this_core::get().meter();
+    meter
+        .began_at
+        .store(core::ptr::from_ref(place).cast_mut(), Ordering::Relaxed);
+    meter.began.store(cpu::time_stamp(), Ordering::Relaxed);
+}
+
+#[cold]
+#[inline(never)]
+fn measure_to_here() {
+    let meter = this_core::get().meter();
+    let began = meter.began.swap(0, Ordering::Relaxed);
+    let ticks = cpu::time_stamp().saturating_sub(began);
+    if began != 0 && ticks > meter.longest.load(Ordering::Relaxed) {
+        meter.longest.store(ticks, Ordering::Relaxed);
+        meter
+            .longest_at
+            .store(meter.began_at.load(Ordering::Relaxed), Ordering::Relaxed);
+    }
+}
+
+/// Returns the longest section of all cores so far, in ticks of the time stamp
+/// counter, and where it began; and starts over.
+pub fn take_longest() -> Option<(u64, &'static Location<'static>)> {
+    let sections = this_core::all().iter().map(|core| {
+        let meter = core.meter();
+        let place = meter.longest_at.load(Ordering::Relaxed);
+        (meter.longest.swap(0, Ordering::Relaxed), place)
+    });
+    let (ticks, place) = sections.max_by_key(|(ticks, _)| *ticks)?;
+    // SAFETY: a pointer that is not null comes from a `&'static` in `begin`.
+    Some((ticks, unsafe { place.as_ref() }?))
+}

@@ -1,0 +1,39 @@
+//! The machine layer: everything that is particular to x86_64 and a PC.
+//!
+//! With `memory` and the `entry!` macro it is the only part of the kernel that
+//! contains `unsafe`. It names nothing above it: its users pass it the
+//! functions that it is to call. Each module states the invariant that its
+//! SAFETY comments cite.
+
+pub mod agreement;
+pub mod calibration;
+pub mod clock;
+pub mod context;
+pub mod counted_time;
+pub mod cpu;
+pub(crate) mod descriptors;
+pub mod exit;
+pub mod fault;
+pub mod interrupt;
+pub mod interrupt_flag;
+pub mod interrupts_off;
+pub mod io_apic;
+pub mod known_clock;
+pub mod legacy;
+pub mod local_apic;
+mod meter;
+pub mod non_maskable;
+pub(crate) mod once;
+pub(crate) mod paging;
+pub(crate) mod port;
+pub mod power;
+pub mod processors;
+pub mod screen;
+pub mod section;
+pub mod serial;
+pub mod spinlock;
+pub mod this_core;
+pub mod timer;
+pub mod turns;
+pub mod vector;
+mod wake;

@@ -1,0 +1,111 @@
+//! The machine's end where no host ends it: powered off, reset, or just halted.
+
+use core::sync::atomic::{AtomicU8, Ordering};
+
+use boot::power::{Off, Power, Register};
+
+use super::once::Once;
+use super::port;
+
+/// What to do after the verdict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Stay as it is, with all cores halted.
+    Halt = 0,
+    /// Power the machine off.
+    Off = 1,
+    /// Start it anew.
+    Reset = 2,
+}
+
+static END: AtomicU8 = AtomicU8::new(End::Halt as u8);
+static POWER: Once<Power> = Once::new();
+
+/// Settles what is done after the verdict.
+pub fn set_end(end: End) {
+    END.store(end as u8, Ordering::Release);
+}
+
+/// Names the registers to do it by.
+///
+/// # Safety
+///
+/// They are what the machine's ACPI tables say; those in memory are mapped uncached and
+/// writable at their addresses.
+pub unsafe fn set_registers(power: Power) {
+    // They are found once.
+    let _ = POWER.set(power);
+}
+
+/// Does what was settled. Returns where that is to halt, or nothing has come of it.
+pub fn end() {
+    let end = END.load(Ordering::Acquire);
+    let power = POWER.get().copied().unwrap_or_default();
+    if end == End::Off as u8
+        && let Some(off) = power.off
+    {
+        power_off(off);
+    }
+    if end == End::Reset as u8 {
+        reset(power);
+    }
+}
+
+fn power_off(off: Off) {
+    const TYPE_BIT: u32 = 10;
+    const SLEEP: u16 = 1 << 13;
+    /// The bit of the first control register that says that it is ours.
+    const ENABLED: u16 = 1;
+    /// Each takes a microsecond; firmware takes far less than a second.
+    const MOST_POLLS: u32 = 1_000_000;
+    match off {
+        Off::Sleep(register, kind) => write(register, kind << 2 | 1 << 5),
+        Off::Control { registers, enable } => {
+            let [first, _] = registers;
+            if let (Some((command, value)), Some((control, _))) = (enable, first)
+                && read_control(control) & ENABLED == 0
+            {
+                write(Register::Port(command), value);
+                let enabled = |_: &u32| read_control(control) & ENABLED != 0;
+                let _ = (0..MOST_POLLS).find(enabled);
+            }
+            for (control, kind) in registers.into_iter().flatten() {
+                let kept = read_control(control) & !(0b111 << TYPE_BIT | SLEEP);
+                write_control(control, kept | u16::from(kind) << TYPE_BIT | SLEEP);
+            }
+        }
+    }
+}
+
+/// Resets the machine as ACPI says, or else as PCs were always reset.
+fn reset(power: Power) {
+    if let Some((register, value)) = power.reset {
+        write(register, value);
+    }
+    // The chip set's register: a full reset, which begins as the second bit is set.
+    write(Register::Port(0xcf9), 0x02);
+    write(Register::Port(0xcf9), 0x06);
+    // The keyboard controller's line to the processor.
+    write(Register::Port(0x64), 0xfe);
+}
+
+fn write(register: Register, value: u8) {
+    match register {
+        // SAFETY: the register ends the machine, by the tables or by what PCs agree on, and
+        // all that this kernel guarantees ends with it.
+        Register::Port(port) => unsafe { port::write_u8(port, value) },
+        // SAFETY: as above; it is mapped (`set_registers`).
+        Register::Memory(address) => unsafe { (address as *mut u8).write_volatile(value) },
+    }
+}
+
+fn read_control(control: u16) -> u16 {
+    // SAFETY: by the tables the port is a power management control register, and reading
+    // it changes nothing.
+    unsafe { port::read_u16(control) }
+}
+
+fn write_control(control: u16, value: u16) {
+    // SAFETY: as in `write`.
+    unsafe { port::write_u16(control, value) };
+}

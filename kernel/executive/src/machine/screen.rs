@@ -1,0 +1,76 @@
+//! Text on the screen that the loader has left, if it has.
+//!
+//! What goes to the serial port is put here, too. That writes a byte into a table; drawing is
+//! another step, a cell at a time, which costs about what a byte costs at the serial port,
+//! and is left to those who send such bytes.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use boot::Framebuffer;
+use boot::screen::{Grid, Screen};
+
+use super::once::Once;
+
+static GRID: Grid = Grid::new();
+static SCREEN: Once<Screen> = Once::new();
+/// Whether a core draws.
+static IS_DRAWING: AtomicBool = AtomicBool::new(false);
+
+/// Blanks a screen, and shows from now on what is put.
+///
+/// # Safety
+///
+/// 1. Its memory is mapped as it is, now and for good, and nobody else uses it.
+/// 2. A row's pixels fit into the pitch.
+#[inline(never)]
+pub unsafe fn initialize(buffer: Framebuffer) {
+    // SAFETY: conditions 1 and 2.
+    let screen = unsafe { Screen::new(buffer) };
+    screen.blank();
+    if screen.columns > 0 && screen.rows > 0 {
+        let _ = SCREEN.set(screen);
+    }
+}
+
+/// Puts a byte of text into the table, if there is a screen.
+#[inline(never)]
+pub fn put(byte: u8) {
+    if let Some(screen) = SCREEN.get() {
+        GRID.put(byte, screen.columns, screen.rows);
+    }
+}
+
+/// Reports whether there is something to be drawn.
+pub fn is_behind() -> bool {
+    GRID.has_open()
+}
+
+/// Takes a cell that is to be drawn by [`draw`], unless another core draws.
+#[inline(never)]
+pub fn take_cell() -> Option<(usize, u8)> {
+    if IS_DRAWING.swap(true, Ordering::Acquire) {
+        return None;
+    }
+    let cell = GRID.take_open();
+    if cell.is_none() {
+        IS_DRAWING.store(false, Ordering::Release);
+    }
+    cell
+}
+
+/// Draws a cell that was taken.
+#[inline(never)]
+pub fn draw((cell, letter): (usize, u8)) {
+    if let Some(screen) = SCREEN.get() {
+        screen.draw(cell, letter);
+    }
+    IS_DRAWING.store(false, Ordering::Release);
+}
+
+/// Draws all that is put, as the only core that runs.
+#[inline(never)]
+pub fn draw_all() {
+    while let Some(cell) = GRID.take_open() {
+        draw(cell);
+    }
+}

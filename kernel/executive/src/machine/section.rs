@@ -1,0 +1,131 @@
+//! Sections of apps' code that one core at a time executes, and that are not preempted.
+//!
+//! Unlike a [`SpinLock`](super::spinlock::SpinLock), this can be given to code that is
+//! not trusted. Interrupts stay enabled in a section, so what happens there is the
+//! app's: a fault is contained, a budget ends it. Only preemption is put off until the
+//! section ends, as a holder that were preempted would block every core that wants the
+//! lock. It is put off for [`LONGEST_NS`] at most: the section of a holder that never
+//! returns delays other instances for that time, and no longer.
+//!
+//! **Holder invariant**: `holder` is null, or the context that alone touches `data`. It
+//! remains so for good if that context is ended in its section.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicPtr, Ordering};
+
+use super::context::{Context, Sections};
+use super::this_core::{self, Core};
+use super::timer::{self, Alarm};
+use super::{cpu, interrupt_flag, local_apic, vector};
+
+/// For how long a section may put off its core's preemption.
+const LONGEST_NS: u64 = 1_000_000;
+
+/// Data that one context at a time may use.
+#[derive(Debug)]
+pub struct Guarded<T> {
+    holder: AtomicPtr<Context>,
+    data: UnsafeCell<T>,
+}
+
+// SAFETY: by the holder invariant one context at a time reaches the data, so sharing
+// this moves the data between cores, for which `T: Send` suffices.
+unsafe impl<T: Send> Sync for Guarded<T> {}
+
+/// Why the data cannot be had, now or ever.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// The caller is in a section of it.
+    HeldByCaller,
+    /// A fault has ended its holder.
+    HolderEnded,
+}
+
+impl<T> Guarded<T> {
+    /// Guards `data`.
+    pub const fn new(data: T) -> Self {
+        Self {
+            holder: AtomicPtr::new(core::ptr::null_mut()),
+            data: UnsafeCell::new(data),
+        }
+    }
+
+    /// Waits for the data and lends it to `section`.
+    pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> Result<R, Refusal> {
+        let own = loop {
+            let own = enter();
+            let place = core::ptr::from_ref(own).cast_mut();
+            let free = core::ptr::null_mut();
+            let (acquire, relaxed) = (Ordering::Acquire, Ordering::Relaxed);
+            let Err(holder) = (self.holder).compare_exchange(free, place, acquire, relaxed) else {
+                break own;
+            };
+            leave(own);
+            if holder == place {
+                return Err(Refusal::HeldByCaller);
+            }
+            // SAFETY: contexts are never freed, and all that changes in one outside its
+            // save area is atomic.
+            if unsafe { &*holder }.is_at_fault() {
+                return Err(Refusal::HolderEnded);
+            }
+            cpu::relax();
+        };
+        // SAFETY: this context is the holder, and no section of it is open (that was
+        // refused), so this is the only reference (holder invariant).
+        let result = section(unsafe { &mut *self.data.get() });
+        self.holder.store(core::ptr::null_mut(), Ordering::Release);
+        leave(own);
+        Ok(result)
+    }
+}
+
+/// Keeps the caller from being preempted, for [`LONGEST_NS`] at most.
+fn enter() -> &'static Context {
+    let were_enabled = interrupt_flag::disable();
+    let own = this_core::get().context();
+    own.sections().depth.fetch_add(1, Ordering::Relaxed);
+    if were_enabled {
+        interrupt_flag::enable();
+    }
+    own
+}
+
+/// Ends what `enter` has begun, and does what was put off.
+fn leave(own: &Context) {
+    let Sections { depth, put_off_ns } = own.sections();
+    if depth.fetch_sub(1, Ordering::Relaxed) == 1 && put_off_ns.swap(0, Ordering::Relaxed) != 0 {
+        let were_enabled = interrupt_flag::disable();
+        local_apic::send(this_core::get().apic_id(), vector::WAKE);
+        if were_enabled {
+            interrupt_flag::enable();
+        }
+    }
+}
+
+/// Puts off the preemption of what runs on this core, `core`, if it is in a section.
+/// Reports whether it is put off. In an interrupt handler.
+pub fn puts_off(core: &Core, now_ns: u64) -> bool {
+    let Sections { depth, put_off_ns } = core.context().sections();
+    if depth.load(Ordering::Relaxed) == 0 {
+        return false;
+    }
+    let first_ns = match put_off_ns.load(Ordering::Relaxed) {
+        0 => {
+            put_off_ns.store(now_ns.max(1), Ordering::Relaxed);
+            now_ns
+        }
+        first_ns => first_ns,
+    };
+    let end_ns = first_ns.saturating_add(LONGEST_NS);
+    if now_ns < end_ns {
+        // Any alarm whose handler looks at the clock again will do.
+        timer::set_no_later(core, Alarm::Budget, end_ns);
+    }
+    now_ns < end_ns
+}
+
+/// Reports whether a preemption on this core has been put off. In an interrupt handler.
+pub fn has_put_off(core: &Core) -> bool {
+    core.context().sections().put_off_ns.load(Ordering::Relaxed) != 0
+}

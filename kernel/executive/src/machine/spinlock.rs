@@ -1,0 +1,136 @@
+//! A lock for data that interrupt handlers share with everything else.
+//!
+//! The holder runs with interrupts disabled on its core: a handler that wants
+//! the lock could otherwise wait for the very code that it interrupted. So a
+//! lock is held for a bounded, short time and never across an app's function.
+//!
+//! Tickets make it fair: with m cores a core waits for at most m - 1 others.
+
+use core::cell::UnsafeCell;
+use core::ops::{Deref, DerefMut};
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use super::{cpu, interrupt_flag};
+
+/// Data that one core at a time may use, with interrupts disabled.
+///
+/// **Ticket invariant**: exactly one ticket equals `serving`; its holder alone
+/// touches `data`, from taking the ticket's turn until it serves the next.
+#[derive(Debug)]
+pub struct SpinLock<T> {
+    next: AtomicU32,
+    serving: AtomicU32,
+    data: UnsafeCell<T>,
+}
+
+// SAFETY: by the ticket invariant one core at a time reaches the data, so
+// sharing the lock moves the data between cores, for which `T: Send` suffices.
+unsafe impl<T: Send> Sync for SpinLock<T> {}
+
+/// Access to the data of a [`SpinLock`] until dropped.
+#[derive(Debug)]
+pub struct SpinLockGuard<'a, T> {
+    lock: &'a SpinLock<T>,
+    interrupts_were_enabled: bool,
+    /// The interrupt flag is the core's: the guard must be dropped where it was made.
+    _not_send: core::marker::PhantomData<*const ()>,
+}
+
+impl<T> SpinLock<T> {
+    /// Creates an unlocked lock.
+    pub const fn new(data: T) -> Self {
+        Self {
+            next: AtomicU32::new(0),
+            serving: AtomicU32::new(0),
+            data: UnsafeCell::new(data),
+        }
+    }
+
+    /// Waits until the data is free and takes it.
+    ///
+    /// Must not be called by its holder: that waits forever.
+    #[track_caller]
+    pub fn lock(&self) -> SpinLockGuard<'_, T> {
+        // An app that has used up its stack falls here, where it still can fall alone.
+        cpu::probe_stack();
+        let interrupts_were_enabled = interrupt_flag::disable();
+        let mut guard = self.lock_uninterrupted();
+        guard.interrupts_were_enabled = interrupts_were_enabled;
+        guard
+    }
+
+    /// Like [`lock`](Self::lock), where interrupts are disabled, and leaves them so.
+    pub fn lock_uninterrupted(&self) -> SpinLockGuard<'_, T> {
+        let ticket = self.next.fetch_add(1, Ordering::Relaxed);
+        while self.serving.load(Ordering::Acquire) != ticket {
+            cpu::relax();
+        }
+        self.guard(false)
+    }
+
+    /// Takes the data if it is free.
+    #[track_caller]
+    pub fn try_lock(&self) -> Option<SpinLockGuard<'_, T>> {
+        let interrupts_were_enabled = interrupt_flag::disable();
+        let serving = self.serving.load(Ordering::Acquire);
+        let taken = self
+            .next
+            .compare_exchange(
+                serving,
+                serving.wrapping_add(1),
+                Ordering::Relaxed,
+                Ordering::Relaxed,
+            )
+            .is_ok();
+        if taken {
+            return Some(self.guard(interrupts_were_enabled));
+        }
+        if interrupts_were_enabled {
+            interrupt_flag::enable();
+        }
+        None
+    }
+
+    /// Returns how often the data has been taken, modulo 2^32: the tickets that
+    /// were given out.
+    pub fn acquisitions(&self) -> u32 {
+        self.next.load(Ordering::Relaxed)
+    }
+
+    const fn guard(&self, interrupts_were_enabled: bool) -> SpinLockGuard<'_, T> {
+        SpinLockGuard {
+            lock: self,
+            interrupts_were_enabled,
+            _not_send: core::marker::PhantomData,
+        }
+    }
+}
+
+impl<T> Deref for SpinLockGuard<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: the guard holds the served ticket (ticket invariant).
+        unsafe { &*self.lock.data.get() }
+    }
+}
+
+impl<T> DerefMut for SpinLockGuard<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        // SAFETY: the guard holds the served ticket (ticket invariant), and
+        // `&mut self` makes this the only reference from it.
+        unsafe { &mut *self.lock.data.get() }
+    }
+}
+
+impl<T> Drop for SpinLockGuard<'_, T> {
+    fn drop(&mut self) {
+        let serving = self.lock.serving.load(Ordering::Relaxed);
+        self.lock
+            .serving
+            .store(serving.wrapping_add(1), Ordering::Release);
+        if self.interrupts_were_enabled {
+            interrupt_flag::enable();
+        }
+    }
+}

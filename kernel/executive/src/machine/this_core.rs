@@ -1,0 +1,289 @@
+//! Each core's own data, found through the gs segment.
+//!
+//! **Own-core invariant**: the gs base of a started core points to its [`Core`],
+//! which is never freed. Other cores may look at a [`Core`] too, through
+//! [`get`]: everything that changes in it is atomic.
+
+use core::arch::asm;
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, Ordering};
+
+use alloc::boxed::Box;
+
+use super::context::{Context, Parked, Registers};
+use super::cpu;
+use super::descriptors::{self, TaskState};
+use super::meter::Meter;
+use super::once::Once;
+
+/// What a core needs to begin: the tops of stacks, each with a guard page below,
+/// and the context that it runs first.
+#[derive(Debug)]
+pub struct Stacks {
+    /// What the core does first.
+    pub first_context: Parked,
+    /// Runs interrupt handlers.
+    pub handler: u64,
+    /// Run exceptions: ordinary, double fault, non-maskable, machine check.
+    pub exceptions: [u64; 4],
+}
+
+/// A core's part in the turns of those that compute ([`turns`](super::turns)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Part {
+    /// It takes no part.
+    None,
+    /// It waits for its first turn.
+    Fresh,
+    /// It has the turn.
+    Computes,
+    /// It waits for its next turn.
+    Waits,
+}
+
+/// One core's own data, on cache lines of its own.
+#[derive(Debug)]
+#[repr(C, align(128))]
+pub struct Core {
+    this: AtomicU64,
+    handler_stack: u64,
+    /// The position among the cores: 0 is the boot processor.
+    pub index: u32,
+    apic_id: u32,
+    exception_stacks: [u64; 4],
+    task_state: AtomicPtr<TaskState>,
+    /// The context that runs here.
+    context: AtomicPtr<Context>,
+    /// A context that ran here last and has nothing more to do, or null.
+    spare: AtomicPtr<Context>,
+    /// Another core has assigned work to this one.
+    pub wake: AtomicBool,
+    /// This core watches `wake`: it needs no interrupt to see it.
+    pub(super) watches: AtomicBool,
+    /// Its [`Part`] in the turns.
+    part: AtomicU8,
+    /// The times at which this core's timer shall fire, each `u64::MAX` if never.
+    pub alarms: [AtomicU64; 4],
+    /// The number of timer interrupts taken.
+    pub timer_interrupts: AtomicU64,
+    /// When this core took its last interrupt, by its timer or from another core.
+    pub interrupted_ns: AtomicU64,
+    /// The time between two heartbeats of this core, 0 if it has none.
+    pub heartbeat_ns: AtomicU64,
+    interrupts_off: Meter,
+    /// By how much the counter has been behind another core's, in ticks.
+    pub(super) behind_ticks: AtomicU64,
+    /// What runs here, in two words that the layer above chooses; for reports of panics.
+    pub running: [AtomicU64; 2],
+}
+
+/// Where `interrupt.s` finds the handler stack.
+pub(super) const HANDLER_STACK_OFFSET: usize = core::mem::offset_of!(Core, handler_stack);
+
+static CORES: Once<Box<[Core]>> = Once::new();
+
+/// Creates the cores' data, the boot processor's first.
+pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
+    let cores = cores.zip(0..).map(|((apic_id, stacks), index)| Core {
+        this: AtomicU64::new(0),
+        handler_stack: stacks.handler,
+        index,
+        apic_id,
+        exception_stacks: stacks.exceptions,
+        task_state: AtomicPtr::new(core::ptr::null_mut()),
+        context: AtomicPtr::new(
+            core::ptr::from_ref(stacks.first_context.into_context()).cast_mut(),
+        ),
+        spare: AtomicPtr::new(core::ptr::null_mut()),
+        wake: AtomicBool::new(false),
+        watches: AtomicBool::new(false),
+        part: AtomicU8::new(Part::None as u8),
+        alarms: [const { AtomicU64::new(u64::MAX) }; 4],
+        timer_interrupts: AtomicU64::new(0),
+        interrupted_ns: AtomicU64::new(0),
+        heartbeat_ns: AtomicU64::new(0),
+        interrupts_off: Meter::new(),
+        behind_ticks: AtomicU64::new(0),
+        running: [const { AtomicU64::new(u64::MAX) }; 2],
+    });
+    // A second call would come from a second boot, which there is not.
+    let _ = CORES.set(cores.collect());
+}
+
+/// Makes the processor that executes this the core with APIC id `apic_id`: loads its
+/// segments and interrupt stacks.
+pub(super) fn load(apic_id: u32) -> &'static Core {
+    const GS_BASE: u32 = 0xc000_0101;
+    let core = all()
+        .iter()
+        .find(|core| core.apic_id == apic_id)
+        .expect("only processors that ACPI names are started");
+    let [exception, double_fault, non_maskable, machine_check] = core.exception_stacks;
+    let context = core.context().frame_end();
+    let tops = [
+        context,
+        exception,
+        double_fault,
+        non_maskable,
+        machine_check,
+    ];
+    let task_state = Box::leak(Box::new(TaskState::new(tops)));
+    core.task_state.store(task_state, Ordering::Relaxed);
+    descriptors::load_segments(core.task_state.load(Ordering::Relaxed));
+    let address = core::ptr::from_ref(core) as u64;
+    core.this.store(address, Ordering::Relaxed);
+    // SAFETY: every 64-bit processor has the register; the value establishes
+    // the own-core invariant.
+    unsafe { cpu::write_msr(GS_BASE, address) };
+    core
+}
+
+/// Returns the data of the core that executes this.
+///
+/// The answer stays right only while the caller cannot move to another core:
+/// with interrupts disabled, or in code that is not preempted.
+pub fn get() -> &'static Core {
+    let address: u64;
+    // SAFETY: reads the first field of the core's data (own-core invariant).
+    unsafe { asm!("mov {}, gs:[0]", out(reg) address, options(nostack, readonly, pure)) };
+    // SAFETY: the field holds the address of the data itself, which lives
+    // forever and changes only by atomics (own-core invariant).
+    unsafe { &*(address as *const Core) }
+}
+
+/// Reports whether [`get`] may be called: the cores' data exists.
+pub fn is_ready() -> bool {
+    CORES.get().is_some()
+}
+
+/// Reports whether something runs on the core that executes this, in the sense of
+/// [`Core::note_running`]. Interrupts are disabled.
+pub fn runs_something() -> bool {
+    is_ready() && get().running[0].load(Ordering::Relaxed) != u64::MAX
+}
+
+/// Returns all cores, in the order of their index.
+pub fn all() -> &'static [Core] {
+    CORES.get().map_or(&[], |cores| cores)
+}
+
+unsafe extern "C" {
+    /// Resumes the context with these registers (`interrupt.s`).
+    fn resume_context(registers: *mut Registers) -> !;
+}
+
+/// Has this core go on with `next` when the current interrupt's handler
+/// returns, and returns the context that was interrupted.
+///
+/// # Safety
+///
+/// The caller is a handler of an interrupt; or of an exception, then what it
+/// returns must not be resumed.
+pub(super) unsafe fn exchange_context(next: Parked) -> Parked {
+    let last = get().run_next(next);
+    // SAFETY: the context runs no more: `interrupt.s` now resumes `next`.
+    unsafe { Parked::from_context(last) }
+}
+
+/// Leaves the context that runs where it is, for good, for `next`. Its stack is
+/// never used again, so all that lies on it stays valid.
+pub fn abandon_context(next: Parked) -> ! {
+    cpu::clear_interrupt_flag();
+    let registers = next.registers();
+    get().run_next(next);
+    // SAFETY: the registers are those of a context that does not run and that
+    // this core has made its own; interrupts are disabled.
+    unsafe { resume_context(registers) }
+}
+
+/// Leaves the context that runs, for good, for `next`. What was left becomes
+/// this core's spare context.
+///
+/// # Safety
+///
+/// 1. The caller runs on a context's own stack, with interrupts disabled.
+/// 2. Nothing that lives on that stack is used any more.
+/// 3. This core's spare context has been taken by [`take_spare_context`].
+pub(super) unsafe fn leave_context(next: Parked) -> ! {
+    let core = get();
+    let registers = next.registers();
+    let last = core.run_next(next);
+    core.spare
+        .store(core::ptr::from_ref(last).cast_mut(), Ordering::Relaxed);
+    // SAFETY: the registers are those of a context that does not run and that
+    // this core has made its own; interrupts are disabled (condition 1).
+    unsafe { resume_context(registers) }
+}
+
+/// Takes the context that was left here last, to be restarted or to be given
+/// away. Interrupts are disabled.
+pub fn take_spare_context() -> Option<Parked> {
+    let spare = get().spare.swap(core::ptr::null_mut(), Ordering::Relaxed);
+    // SAFETY: a pointer that is not null comes from `leave_context`.
+    let spare = unsafe { spare.as_ref() }?;
+    // SAFETY: this core has left the context for another one: it executes this
+    // on another stack. The swap makes sure that it is taken once.
+    Some(unsafe { Parked::from_context(spare) })
+}
+
+impl Core {
+    /// Returns the core's part in the turns.
+    pub(super) fn part(&self) -> Part {
+        const FRESH: u8 = Part::Fresh as u8;
+        const COMPUTES: u8 = Part::Computes as u8;
+        const WAITS: u8 = Part::Waits as u8;
+        match self.part.load(Ordering::Relaxed) {
+            FRESH => Part::Fresh,
+            COMPUTES => Part::Computes,
+            WAITS => Part::Waits,
+            _ => Part::None,
+        }
+    }
+
+    /// Notes the core's part in the turns.
+    pub(super) fn set_part(&self, part: Part) {
+        self.part.store(part as u8, Ordering::Relaxed);
+    }
+
+    /// Returns the context that runs on this core.
+    pub fn context(&self) -> &'static Context {
+        // SAFETY: the pointer comes from a `&'static Context` (`create`, `run_next`).
+        unsafe { &*self.context.load(Ordering::Relaxed) }
+    }
+
+    /// Notes that this core runs `next` from the coming switch on, and returns
+    /// the context that it has run.
+    fn run_next(&self, next: Parked) -> &'static Context {
+        let last = self.context();
+        let next = next.into_context();
+        self.context
+            .store(core::ptr::from_ref(next).cast_mut(), Ordering::Relaxed);
+        let task_state = self.task_state.load(Ordering::Relaxed);
+        // SAFETY: callers run on this core with interrupts disabled, and are
+        // about to switch to `next`.
+        unsafe { descriptors::set_context_stack(task_state, next.frame_end()) };
+        last
+    }
+
+    /// Reports whether this core keeps a spare context.
+    pub fn has_spare(&self) -> bool {
+        !self.spare.load(Ordering::Relaxed).is_null()
+    }
+
+    /// Notes what runs here, as two numbers.
+    pub fn note_running(&self, fields: [u64; 2]) {
+        for (place, field) in self.running.iter().zip(fields) {
+            place.store(field, Ordering::Relaxed);
+        }
+    }
+
+    /// Returns what this core has measured of its sections without interrupts.
+    pub(super) const fn meter(&self) -> &Meter {
+        &self.interrupts_off
+    }
+
+    /// Returns the id that interrupts are addressed to.
+    pub const fn apic_id(&self) -> u32 {
+        self.apic_id
+    }
+}

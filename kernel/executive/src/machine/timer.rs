@@ -1,0 +1,88 @@
+//! Each core's alarms, all on its one hardware timer.
+//!
+//! An *alarm* is a time at which the core shall be interrupted, for one of a
+//! few fixed purposes. The hardware timer is armed for the earliest. It may
+//! fire a little early or late: what is due is decided by the clock alone.
+
+use core::sync::atomic::Ordering;
+
+use super::this_core::{self, Core};
+use super::{clock, counted_time, interrupt_flag, local_apic};
+
+/// What an alarm is for; each core has one of each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Alarm {
+    /// The scheduler's next event.
+    Schedule = 0,
+    /// The end of a subtask's hold of its core, or of the core's turn ([`turns`](super::turns)).
+    Hold = 1,
+    /// The end of the running instance's budget.
+    Budget = 3,
+    /// A sign of life, so that no core ever halts without an end in sight.
+    Heartbeat = 2,
+}
+
+/// Sets this core's alarm to time `at_ns`, or to never if `u64::MAX`.
+pub fn set(alarm: Alarm, at_ns: u64) {
+    let were_enabled = interrupt_flag::disable();
+    let core = this_core::get();
+    // Writing the timer costs a virtual machine an exit: only if there is need.
+    if core.alarms[alarm as usize].swap(at_ns, Ordering::Relaxed) != at_ns {
+        arm(core);
+    }
+    if were_enabled {
+        interrupt_flag::enable();
+    }
+}
+
+/// Makes sure that the alarm of this core, `core`, is not later than `at_ns`. It may be
+/// earlier: for an alarm whose handler looks at the clock again, that costs an
+/// interrupt now and then instead of a write of the timer each time.
+pub fn set_no_later(core: &Core, alarm: Alarm, at_ns: u64) {
+    if core.alarms[alarm as usize].load(Ordering::Relaxed) > at_ns {
+        set(alarm, at_ns);
+    }
+}
+
+/// Takes an alarm that is due at `now_ns`: reports whether it was, and if so
+/// sets it to never. To be followed by [`arm_earliest`].
+pub fn take_due(alarm: Alarm, now_ns: u64) -> bool {
+    let slot = &this_core::get().alarms[alarm as usize];
+    let due = slot.load(Ordering::Relaxed) <= now_ns;
+    if due {
+        slot.store(u64::MAX, Ordering::Relaxed);
+    }
+    due
+}
+
+/// Reports whether this core's alarm is set.
+pub fn is_set(alarm: Alarm) -> bool {
+    this_core::get().alarms[alarm as usize].load(Ordering::Relaxed) != u64::MAX
+}
+
+/// Arms this core's timer for its earliest alarm. Interrupts are disabled.
+pub fn arm_earliest() {
+    arm(this_core::get());
+}
+
+/// Begins a timer's interrupt: removes from its time what depends on the host, see
+/// [`counted_time`].
+pub(super) fn settle() {
+    counted_time::settle(earliest_ns(this_core::get()));
+}
+
+fn arm(core: &Core) {
+    match earliest_ns(core) {
+        u64::MAX => local_apic::start_timer(0),
+        at_ns => {
+            let remaining_ns = at_ns.saturating_sub(clock::now_ns());
+            local_apic::start_timer(clock::apic_ticks(remaining_ns));
+        }
+    }
+}
+
+/// Returns the time of the core's earliest alarm, `u64::MAX` if it has none.
+fn earliest_ns(core: &Core) -> u64 {
+    let times = core.alarms.iter().map(|at| at.load(Ordering::Relaxed));
+    times.min().unwrap_or(u64::MAX)
+}

@@ -1,0 +1,270 @@
+//! Turns of computing cores, where instructions are counted.
+//!
+//! With `-icount` QEMU executes one core at a time, and a core's *visit* lasts until the
+//! next timer of any core ends, or until the core halts, executes a `pause`, interrupts
+//! another core or arms the timer that is the next to end. A function that computes does
+//! nothing of that. For as long as no timer ends, all others wait: those that compute,
+//! those that have been woken, and those whose own timer has ended. And where a timer's end
+//! cuts a visit short, QEMU 7.2 may pass over the core behind it
+//! ([`counted_time`](super::counted_time)), so timers alone give nobody a fair share.
+//!
+//! So the cores that compute take *turns*, by a rule of the kernel's own:
+//!
+//! - At most one core has the turn. It ends after [`TURN_NS`], by the core's own timer.
+//! - A core without it waits for it, in the interrupt's handler or before it calls a
+//!   function: it executes a `pause` whenever it is visited. An interrupt does not wait:
+//!   the core handles it at once, and goes on waiting.
+//! - A core that has just got something to compute is *fresh*, and goes before those that
+//!   have had a turn. If others are fresh, too, its first turn is a short one
+//!   ([`FIRST_TURN_NS`]): what takes no longer need not wait for what does.
+//! - No turn begins while any core handles an interrupt or wakes others.
+//! - A core that has the turn and takes no interrupts keeps it for some milliseconds only.
+//!
+//! What follows: at any time all cores but one are soon through with a visit, and that one
+//! is after [`TURN_NS`] at the latest. Then all are visited before the next turn begins. So
+//! an interrupt, and the start of an instance, wait for little more than a turn, or two,
+//! however many cores compute; and each of n that compute gets an n-th of the clock.
+//!
+//! The time for which an instance waits for its turn does not count as its execution: it
+//! uses up no budget. It does pass on the clock, for all.
+//!
+//! A core that halts for an instance or watches the clock (`occupation`, `Event::wait`)
+//! takes no part. All this is off unless [`enable`] is called: real cores compute at the
+//! same time, and a core that is alone need not share. The statics here need no order
+//! among each other: instructions of one core at a time are executed.
+
+use core::panic::Location;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use super::this_core::{self, Core, Part};
+use super::timer::{self, Alarm};
+use super::{clock, cpu, interrupt_flag, interrupts_off, local_apic, vector};
+
+/// How long a turn is. Its end costs some 250 instructions.
+const TURN_NS: u64 = 8_000;
+
+/// How long the first turn of a fresh core is, if others are fresh, too.
+const FIRST_TURN_NS: u64 = 2_000;
+
+/// How often a core that waits looks for the turn before it takes it from a core that
+/// has it and does not pass it: one that takes no interrupts. Some milliseconds.
+const MOST_LOOKS: u32 = 100_000;
+
+static IS_ENABLED: AtomicBool = AtomicBool::new(false);
+
+/// No core.
+const NONE: u32 = u32::MAX;
+
+/// The core that has the turn.
+static HAS_TURN: AtomicU32 = AtomicU32::new(NONE);
+
+/// The core that has it next, if that waits and none is fresh.
+static NEXT: AtomicU32 = AtomicU32::new(NONE);
+
+/// How many cores are fresh.
+static FRESH: AtomicU32 = AtomicU32::new(0);
+
+/// How many cores handle an interrupt, or wake others.
+static URGENT: AtomicU32 = AtomicU32::new(0);
+
+/// Makes cores take turns from now on, if there are several.
+pub fn enable() {
+    IS_ENABLED.store(this_core::all().len() > 1, Ordering::Relaxed);
+}
+
+fn is_enabled() -> bool {
+    IS_ENABLED.load(Ordering::Relaxed)
+}
+
+/// Notes that this core does what no turn may come before.
+#[inline]
+pub fn begin_urgent() {
+    if is_enabled() {
+        URGENT.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Notes that it has done it.
+#[inline]
+pub fn end_urgent() {
+    if is_enabled() {
+        URGENT.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Makes this core fresh unless it takes part already: it goes on with an instance.
+/// Interrupts are disabled.
+#[inline]
+pub fn join(core: &Core) {
+    if is_enabled() && core.part() == Part::None {
+        set_part(core, Part::Fresh);
+    }
+}
+
+/// Ends this core's part: it has nothing to compute. Its alarm is left as it is.
+/// Interrupts are disabled.
+#[inline]
+pub fn leave(core: &Core) {
+    if is_enabled() {
+        set_part(core, Part::None);
+    }
+}
+
+/// Like [`leave`], and sees to it that the core is not interrupted for a turn's end.
+#[inline]
+pub fn rest(core: &Core) {
+    if is_enabled() && core.part() != Part::None {
+        set_part(core, Part::None);
+        timer::set(Alarm::Hold, u64::MAX);
+    }
+}
+
+/// Returns when the instance may compute, on any core: waits for a turn, and handles the
+/// interrupts that come meanwhile. Interrupts are disabled before and after.
+#[inline]
+pub fn enter() {
+    if is_enabled() && !this_core::get().context().is_background() {
+        enter_in_turn();
+    }
+}
+
+#[cold]
+fn enter_in_turn() {
+    loop {
+        let core = this_core::get();
+        join(core);
+        if core.part() == Part::Computes {
+            return;
+        }
+        interrupts_off::end();
+        let has_turn = wait(core);
+        interrupts_off::begin(Location::caller());
+        if has_turn {
+            return;
+        }
+        interrupt_flag::enable();
+        cpu::relax();
+        interrupt_flag::disable();
+    }
+}
+
+/// Like [`enter`], for an instance that this core goes on with outside any interrupt: as
+/// soon as interrupts are enabled, it waits for its turn as after one.
+#[inline]
+pub fn enter_by_interrupt(core: &Core) {
+    if is_enabled() && core.part() == Part::Fresh {
+        local_apic::send(core.apic_id(), vector::WAKE);
+    }
+}
+
+/// Like [`leave`], for an instance that watches the clock. Interrupts are enabled.
+pub fn stand_back() {
+    if is_enabled() {
+        interrupt_flag::disable_enabled();
+        leave(this_core::get());
+        interrupt_flag::enable();
+    }
+}
+
+/// Like [`enter`], for that instance afterwards.
+pub fn come_back() {
+    if is_enabled() {
+        interrupt_flag::disable_enabled();
+        enter();
+        interrupt_flag::enable();
+    }
+}
+
+/// Ends an interrupt: if this core has to wait for its turn, waits, for that or for
+/// another interrupt.
+#[inline]
+pub(super) fn end_interrupt() {
+    if is_enabled() {
+        end_interrupt_in_turn();
+    }
+}
+
+#[cold]
+fn end_interrupt_in_turn() {
+    URGENT.fetch_sub(1, Ordering::Relaxed);
+    let core = this_core::get();
+    match core.part() {
+        Part::None => return,
+        Part::Computes if timer::is_set(Alarm::Hold) => return,
+        Part::Computes => pass(core),
+        Part::Fresh | Part::Waits => {}
+    }
+    wait(core);
+}
+
+/// Ends this core's turn.
+fn pass(core: &Core) {
+    let (before, from_here) = this_core::all().split_at(core.index as usize);
+    let mut others = from_here.iter().skip(1).chain(before);
+    let next = others.find(|other| other.part() == Part::Waits);
+    NEXT.store(next.map_or(NONE, |next| next.index), Ordering::Relaxed);
+    set_part(core, Part::Waits);
+}
+
+/// Waits until this core has the turn, or until an interrupt is pending. Reports whether
+/// it has the turn.
+fn wait(core: &Core) -> bool {
+    let since_ns = clock::now_ns();
+    let mut looks = 0;
+    let has_turn = loop {
+        // One visit for all others, before anything begins.
+        cpu::relax();
+        looks += 1;
+        if let Some(length_ns) = begin(core, looks > MOST_LOOKS) {
+            set_part(core, Part::Computes);
+            timer::set(Alarm::Hold, clock::now_ns().saturating_add(length_ns));
+            break true;
+        }
+        if local_apic::is_interrupt_pending() {
+            break false;
+        }
+    };
+    core.context().note_waited(clock::now_ns() - since_ns);
+    has_turn
+}
+
+/// Begins this core's turn, if it may, or if it `takes_over` that of another. Returns how
+/// long it is.
+fn begin(core: &Core, takes_over: bool) -> Option<u64> {
+    let holder = HAS_TURN.load(Ordering::Relaxed);
+    if (holder != NONE && !takes_over) || URGENT.load(Ordering::Relaxed) != 0 {
+        return None;
+    }
+    let length_ns = length_of_turn(core)?;
+    let (mine, order) = (core.index, Ordering::Relaxed);
+    let begun = HAS_TURN.compare_exchange(holder, mine, order, order);
+    begun.is_ok().then_some(length_ns)
+}
+
+/// Returns how long this core's turn is, if it has the next one.
+fn length_of_turn(core: &Core) -> Option<u64> {
+    let fresh = FRESH.load(Ordering::Relaxed);
+    let next = this_core::all().get(NEXT.load(Ordering::Relaxed) as usize);
+    let is_next = next.is_none_or(|next| next.index == core.index || next.part() != Part::Waits);
+    match core.part() {
+        Part::Fresh if fresh > 1 => Some(FIRST_TURN_NS),
+        Part::Fresh => Some(TURN_NS),
+        _ => (fresh == 0 && is_next).then_some(TURN_NS),
+    }
+}
+
+#[cold]
+fn set_part(core: &Core, part: Part) {
+    let before = core.part();
+    if before == Part::Computes && part != Part::Computes {
+        // Unless the turn has been taken over.
+        let (mine, order) = (core.index, Ordering::Relaxed);
+        let _ = HAS_TURN.compare_exchange(mine, NONE, order, order);
+    }
+    match (before == Part::Fresh, part == Part::Fresh) {
+        (false, true) => FRESH.fetch_add(1, Ordering::Relaxed),
+        (true, false) => FRESH.fetch_sub(1, Ordering::Relaxed),
+        _ => 0,
+    };
+    core.set_part(part);
+}

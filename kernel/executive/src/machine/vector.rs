@@ -1,0 +1,8 @@
+//! The interrupt vectors in use.
+
+/// The local timer.
+pub const TIMER: u8 = 0x40;
+/// Another core has work for this one.
+pub const WAKE: u8 = 0x41;
+/// The local APIC withdrew an interrupt; needs no acknowledgement.
+pub const SPURIOUS: u8 = 0xff;

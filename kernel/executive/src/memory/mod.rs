@@ -1,0 +1,284 @@
+//! Memory: frames, the address space, stacks and the heap.
+//!
+//! Virtual and physical addresses are the same, with two exceptions. Stacks live in
+//! a window of their own, so that each can have an absent guard page below it
+//! that catches an overflow at once; so does the loader's module, which may lie in page 0.
+
+pub(crate) mod frames;
+pub mod heap;
+mod tlsf;
+
+use core::ops::Range;
+
+use boot::{MemoryRegion, Module};
+
+use crate::machine::paging::{Access, MapError, PAGE, PageTable};
+use crate::machine::spinlock::SpinLock;
+use frames::{FRAME, Frames, less};
+
+/// Where stacks live: 512 GiB, beyond any physical address of ordinary PCs.
+const STACK_WINDOW: u64 = 1 << 39;
+
+/// Where the module is: its physical address beyond this one.
+pub const MODULE_WINDOW: u64 = 1 << 40;
+
+/// There is not enough memory for what was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutOfMemory;
+
+impl From<MapError> for OutOfMemory {
+    fn from(_: MapError) -> Self {
+        Self
+    }
+}
+
+/// The physical memory and the address space over it.
+#[derive(Debug)]
+struct Memory {
+    frames: Frames,
+    table: PageTable,
+    next_stack: u64,
+}
+
+static MEMORY: SpinLock<Option<Memory>> = SpinLock::new(None);
+
+/// What [`initialize`] found and built.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    /// The page table's root, to be loaded by every core.
+    pub root_table: u64,
+    /// The bytes of usable memory.
+    pub total_bytes: u64,
+}
+
+/// Builds the address space and the heap, and switches to it.
+///
+/// # Safety
+///
+/// 1. The boot page table is in use, and `map` is the machine's memory map.
+/// 2. It is called once, by the boot processor, before anything is allocated.
+/// 3. `module`, if any, [lies in memory](lies_in_memory) by that map.
+/// 4. At `devices` there are registers, and `screen`, whole pages, is a screen.
+pub unsafe fn initialize(
+    map: &[MemoryRegion],
+    module: Option<Module>,
+    devices: &[u64],
+    screen: Range<u64>,
+) -> Result<Layout, OutOfMemory> {
+    let mut frames = Frames::new(map, &[boot_entry::image::whole(), pages_of(module)]);
+    let total_bytes = frames.total_bytes();
+    let heap = frames.take_heap().ok_or(OutOfMemory)?;
+    let mut new_frame = || take_zeroed(&mut frames);
+    // SAFETY: frames are unused and zeroed (`take_zeroed`), in memory that the
+    // boot table maps (condition 1) and `map_all` maps too.
+    let mut table = unsafe { PageTable::new(&mut new_frame) }?;
+    map_all(&mut table, map, pages_of(module), &mut new_frame)?;
+    map_devices(&mut table, map, devices, &mut new_frame)?;
+    table.map(screen.clone(), screen.start, Access::Device, &mut new_frame)?;
+    let root_table = table.root();
+    // SAFETY: image, data (so the boot stack) and all usable memory are mapped
+    // to where they were.
+    unsafe { crate::machine::cpu::set_page_table(root_table) };
+    // SAFETY: the range was taken from the frames and is mapped as data; by
+    // condition 2 the heap has no memory yet.
+    unsafe { heap::add_memory(heap) };
+    *MEMORY.lock() = Some(Memory {
+        frames,
+        table,
+        next_stack: STACK_WINDOW,
+    });
+    Ok(Layout {
+        root_table,
+        total_bytes,
+    })
+}
+
+/// Returns the whole pages that a module lies in, which nobody else gets.
+fn pages_of(module: Option<Module>) -> Range<u64> {
+    module.map_or(0..0, |module| {
+        module.start / PAGE * PAGE..module.end.next_multiple_of(PAGE)
+    })
+}
+
+/// Returns the number of the page that processors are to start at: the highest one of
+/// usable memory that they can reach from real mode, and that no module lies in.
+pub fn trampoline_page(map: &[MemoryRegion], modules: &[Module]) -> Option<u8> {
+    /// Here a PC's firmware and adapters begin, even where the map says otherwise.
+    const END: u64 = 640 << 10;
+    let is_free = |page: &Range<u64>| {
+        let lies = |region: &MemoryRegion| {
+            region.usable && region.start <= page.start && page.end <= region.end
+        };
+        let is_hit = |module: &Module| module.start < page.end && page.start < module.end;
+        map.iter().any(lies) && !modules.iter().any(is_hit)
+    };
+    let pages = (1..END / PAGE).map(|number| number * PAGE..(number + 1) * PAGE);
+    let page = pages.rev().find(is_free)?;
+    u8::try_from(page.start / PAGE).ok()
+}
+
+/// Reports whether a module lies in one range of usable memory, apart from the image.
+pub fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range<u64>) -> bool {
+    let fits = |region: &MemoryRegion| {
+        region.usable && region.start <= module.start && module.end <= region.end
+    };
+    // The module's last page is the module's alone, so it has to be whole.
+    let Some(end) = module.end.checked_next_multiple_of(PAGE) else {
+        return false;
+    };
+    module.start < module.end
+        && (end <= image.start || module.start / PAGE * PAGE >= image.end)
+        && map.iter().any(fits)
+}
+
+/// Maps the image with its rights, the module as constant in its window, all other usable
+/// memory as data.
+fn map_all(
+    table: &mut PageTable,
+    map: &[MemoryRegion],
+    module: Range<u64>,
+    new_frame: &mut dyn FnMut() -> Option<u64>,
+) -> Result<(), OutOfMemory> {
+    let image = boot_entry::image::whole();
+    let sections = [
+        (boot_entry::image::rodata(), Access::Constant),
+        (boot_entry::image::text(), Access::Code),
+        (boot_entry::image::data(), Access::Data),
+    ];
+    for (range, access) in sections {
+        table.map(range.clone(), range.start, access, new_frame)?;
+    }
+    let shown = MODULE_WINDOW + module.start..MODULE_WINDOW + module.end;
+    table.map(shown, module.start, Access::Constant, new_frame)?;
+    for region in map.iter().filter(|region| region.usable) {
+        // Page 0 stays absent, so that a null pointer faults.
+        let start = region.start.max(PAGE).next_multiple_of(PAGE);
+        let end = region.end / PAGE * PAGE;
+        for part in less(start..end, &[image.clone(), module.clone()]) {
+            table.map(part.clone(), part.start, Access::Data, new_frame)?;
+        }
+    }
+    Ok(())
+}
+
+/// Maps the pages in which devices have registers at these addresses, each once.
+fn map_devices(
+    table: &mut PageTable,
+    map: &[MemoryRegion],
+    devices: &[u64],
+    new_frame: &mut dyn FnMut() -> Option<u64>,
+) -> Result<(), OutOfMemory> {
+    let page = |address: &u64| address / PAGE * PAGE;
+    for (index, start) in devices.iter().map(page).enumerate() {
+        let is_memory = |region: &MemoryRegion| {
+            region.usable && region.start < start + PAGE && start < region.end
+        };
+        let is_mapped = devices[..index].iter().any(|before| page(before) == start);
+        // A firmware that puts a device into memory is mistaken in one of the two.
+        if !is_mapped && !map.iter().any(is_memory) {
+            table.map(start..start + PAGE, start, Access::Device, new_frame)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns the whole pages that a screen in `range` takes, unless a firmware is mistaken that
+/// puts it into memory, or into what is used for something else.
+#[inline(never)]
+pub fn pages_of_screen(range: Range<u64>, map: &[MemoryRegion]) -> Option<Range<u64>> {
+    let pages = range.start / PAGE * PAGE..range.end.checked_next_multiple_of(PAGE)?;
+    let is_hit = |region: &MemoryRegion| {
+        region.usable && region.start < pages.end && pages.start < region.end
+    };
+    (pages.end <= STACK_WINDOW && !map.iter().any(is_hit)).then_some(pages)
+}
+
+fn take_zeroed(frames: &mut Frames) -> Option<u64> {
+    let frame = frames.take(1)?;
+    let bytes = usize::try_from(FRAME).ok()?;
+    // SAFETY: the frame was just taken, so nobody uses it; usable memory is
+    // identity-mapped and writable under the boot table and under ours.
+    unsafe { core::ptr::write_bytes(frame as *mut u8, 0, bytes) };
+    Some(frame)
+}
+
+/// Creates a stack of at least `bytes` with a guard page below it and returns
+/// its top, which is a multiple of 4096.
+pub fn new_stack(bytes: u64) -> Result<u64, OutOfMemory> {
+    let mut memory = MEMORY.lock();
+    let Memory {
+        frames,
+        table,
+        next_stack,
+    } = memory.as_mut().ok_or(OutOfMemory)?;
+    let pages = bytes.div_ceil(PAGE);
+    let physical = frames.take(pages).ok_or(OutOfMemory)?;
+    let stack: Range<u64> = *next_stack + PAGE..*next_stack + PAGE + pages * PAGE;
+    table.map(stack.clone(), physical, Access::Data, &mut || {
+        take_zeroed(frames)
+    })?;
+    *next_stack = stack.end;
+    Ok(stack.end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIB: u64 = 1 << 20;
+
+    #[test]
+    fn processors_start_at_the_highest_low_page_that_is_free() {
+        let region = |start, end, usable| MemoryRegion { start, end, usable };
+        let module = |start, end| Module { start, end };
+        let ordinary = [
+            region(0, 0x9_fc00, true),
+            region(0x9_fc00, MIB, false),
+            region(MIB, 8 * MIB, true),
+        ];
+        let page = |modules: &[Module]| trampoline_page(&ordinary, modules);
+        assert_eq!(page(&[]), Some(0x9e), "a whole page");
+        assert_eq!(page(&[module(4 * MIB, 5 * MIB)]), Some(0x9e));
+        assert_eq!(page(&[module(0x1_4000, 0x9_e001)]), Some(0x13));
+        let two = [module(0x9_e800, 0x9_e900), module(0x9_d000, 0x9_d001)];
+        assert_eq!(page(&two), Some(0x9c));
+        assert_eq!(page(&[module(0x1000, 0x9_fc00)]), None, "page 0 is none");
+        let high = [region(0, MIB, true)];
+        assert_eq!(trampoline_page(&high, &[]), Some(0x9f), "below 640 KiB");
+        assert_eq!(trampoline_page(&[region(MIB, 8 * MIB, true)], &[]), None);
+    }
+
+    #[test]
+    fn believes_a_module_only_where_memory_is_free() {
+        let region = |start, end, usable| MemoryRegion { start, end, usable };
+        let map = [
+            region(0, 640 << 10, true),
+            region(MIB, 8 * MIB, true),
+            region(8 * MIB, 9 * MIB, false),
+            region(9 * MIB, u64::MAX, true),
+        ];
+        let image = 2 * MIB..3 * MIB;
+        let lies = |start, end| lies_in_memory(Module { start, end }, &map, &image);
+        assert!(lies(4 * MIB, 5 * MIB));
+        assert!(lies(MIB, 2 * MIB));
+        assert!(lies(8 * MIB - 1, 8 * MIB));
+        assert!(
+            lies(64 << 10, 65 << 10),
+            "below the first MiB, as GRUB does"
+        );
+        assert!(lies(0, 8192), "in page 0, as GRUB does under UEFI");
+        assert!(!lies(639 << 10, 641 << 10), "into the firmware's");
+        assert!(!lies(MIB, 2 * MIB + 1), "into the image");
+        assert!(!lies(3 * MIB - 1, 4 * MIB), "out of the image");
+        assert!(!lies(8 * MIB - 1, 8 * MIB + 1), "into reserved memory");
+        assert!(!lies(4 * MIB, 4 * MIB), "empty");
+        assert!(!lies(u64::MAX - 1, u64::MAX), "at the end of all addresses");
+        assert_eq!(
+            pages_of(Some(Module {
+                start: 5000,
+                end: 8193
+            })),
+            4096..12288
+        );
+    }
+}

@@ -1,0 +1,237 @@
+//! A heap whose every operation takes bounded time: two-level segregated fit.
+//!
+//! The algorithm is that of M. Masmano, I. Ripoll, A. Crespo and J. Real,
+//! "TLSF: a new dynamic memory allocator for real-time systems", ECRTS 2004,
+//! doi [10.1109/EMRTS.2004.1311009](https://doi.org/10.1109/EMRTS.2004.1311009).
+//!
+//! # Words
+//!
+//! - A *region* is a piece of memory given to the allocator for good.
+//! - A *block* is a part of a region: a 16-byte header, then its *payload*,
+//!   which a caller holds while the block is *used*. Block sizes count the
+//!   header and are multiples of the *granule*, 16 bytes.
+//! - A *class* is a range of block sizes. Each has a list of its *free* blocks;
+//!   two levels of bitmaps say which lists have any (`free_lists.rs`).
+//! - The *end marker* is a header with no payload that closes a region.
+//!
+//! # Invariants
+//!
+//! The safety comments of this module cite these by name.
+//!
+//! - **Ownership**: from [`Tlsf::add_region`] on, the allocator alone reads and
+//!   writes a region, through pointers derived from the region's own, except
+//!   for the payloads of used blocks, which belong to their callers.
+//! - **Tiling**: blocks fill a region without gaps, up to its end marker. A
+//!   block's header is initialised; its size leads to the header after it, and
+//!   that one's `previous` leads back. A `Block` value names a
+//!   block of the tiling; after a merge the absorbed block's value is not used.
+//! - **Listing**: a block is marked free exactly while it is in the list of its
+//!   class; then its links are initialised and name blocks of that list.
+//!
+//! # What it guarantees
+//!
+//! - Allocating, deallocating and resizing run without loops: they take a few
+//!   bit scans and a constant number of block splits and merges, whatever the
+//!   history and the number of blocks.
+//! - Two free blocks are never neighbours: freed memory merges at once.
+//! - Fit is good, not best: the block taken comes from the first nonempty class
+//!   whose *every* block is large enough. A request can hence fail although a
+//!   free block less than 1/32 larger than it is left over.
+//!
+//! # What it does not
+//!
+//! - It does not lock: `&mut self` is the caller's proof of exclusion.
+//! - It does not clear memory, neither when handing it out nor on return.
+//! - It does not join neighbouring regions, nor give a region back.
+//! - It does not detect wrong use in release builds; debug builds catch a
+//!   second free and a wrong size where the header still tells.
+
+mod block;
+mod class;
+mod free_lists;
+pub(crate) mod usage;
+
+#[cfg(test)]
+mod tests;
+
+use core::alloc::Layout;
+use core::ptr::NonNull;
+
+use block::{Block, GRANULE, HEADER_SIZE, MIN_BLOCK_SIZE};
+use class::{SIZE_LIMIT, block_size_for};
+use free_lists::FreeLists;
+
+use usage::Usage;
+
+/// An allocator over any number of memory regions.
+#[derive(Debug)]
+pub(crate) struct Tlsf {
+    free: FreeLists,
+    usage: Usage,
+}
+
+// SAFETY: by Ownership no one else reaches the memory behind the pointers of the
+// lists, and nothing in it belongs to a core: it may move with the allocator.
+unsafe impl Send for Tlsf {}
+
+impl Tlsf {
+    /// Creates an allocator without memory: every allocation fails until
+    /// [`add_region`](Self::add_region).
+    #[must_use]
+    pub(crate) const fn new() -> Self {
+        Self {
+            free: FreeLists::new(),
+            usage: Usage::new(),
+        }
+    }
+
+    /// Adds the `length` bytes from `start` on to the heap.
+    ///
+    /// Both ends are aligned inwards to 16 bytes. A region that then has less
+    /// than 48 bytes is ignored, and what exceeds 1 TiB is left alone; the
+    /// growth of [`Usage::capacity_bytes`] tells what was taken.
+    ///
+    /// # Safety
+    ///
+    /// 1. The region is valid for reads and writes through `start`, all of it,
+    ///    as long as the allocator or any of its allocations is in use.
+    /// 2. Nothing else uses the region from now on.
+    pub(crate) unsafe fn add_region(&mut self, start: NonNull<u8>, length: usize) {
+        let skipped = start.addr().get().wrapping_neg() % GRANULE;
+        let aligned_length = length.saturating_sub(skipped) / GRANULE * GRANULE;
+        let size = aligned_length
+            .saturating_sub(HEADER_SIZE)
+            .min(SIZE_LIMIT - GRANULE);
+        if size < MIN_BLOCK_SIZE {
+            return;
+        }
+        // SAFETY: `skipped < length`, so this stays within the region (1).
+        let first = unsafe { start.byte_add(skipped) };
+        // SAFETY: `first` is aligned, and the block with its end marker is within
+        // the region; with (1) and (2) this establishes Ownership.
+        let block = unsafe { Block::create_region(first, size) };
+        self.usage.capacity_bytes += size;
+        self.free.insert(block);
+    }
+
+    /// Returns memory for `layout`, or `None` when no class that is sure to fit
+    /// has a free block.
+    ///
+    /// Every alignment is served. One above 16 bytes needs, while searching, a
+    /// block larger by the alignment and 16 bytes; what is not used of it
+    /// returns to the heap at once. A size of zero takes a smallest block.
+    pub(crate) fn allocate(&mut self, layout: Layout) -> Option<NonNull<u8>> {
+        let needed = block_size_for(layout.size())?;
+        let slack = if layout.align() > GRANULE {
+            layout.align() + GRANULE
+        } else {
+            0
+        };
+        let found = self.free.take(needed.checked_add(slack)?)?;
+        let block = self.trim_front(found, layout.align());
+        self.trim_back(block, needed);
+        self.usage.count_allocation(block.size());
+        Some(block.payload())
+    }
+
+    /// Takes memory back, and merges it with its free neighbours.
+    ///
+    /// # Safety
+    ///
+    /// 1. `payload` came from [`allocate`](Self::allocate) of this allocator, and
+    ///    was not deallocated since.
+    /// 2. `layout` is the one it was allocated with, with the size of the last
+    ///    successful [`reallocate_in_place`](Self::reallocate_in_place).
+    /// 3. Nothing uses the memory any more.
+    pub(crate) unsafe fn deallocate(&mut self, payload: NonNull<u8>, layout: Layout) {
+        // SAFETY: by (1) it is the payload of a used block of the tiling.
+        let block = unsafe { Block::of_payload(payload) };
+        debug_assert!(!block.is_free(), "{payload:p} is deallocated twice");
+        debug_assert!(
+            layout.size() <= block.size() - HEADER_SIZE,
+            "{payload:p} is deallocated with a larger size than it was allocated with"
+        );
+        self.usage.count_deallocation(block.size());
+        self.release(block);
+    }
+
+    /// Resizes an allocation where it is, and tells whether that was possible.
+    ///
+    /// Shrinking always is; growing is when the memory after it is free and
+    /// suffices. Contents up to the smaller size are kept. Counts neither as an
+    /// allocation nor as a deallocation.
+    ///
+    /// # Safety
+    ///
+    /// 1. `payload` came from [`allocate`](Self::allocate) of this allocator, and
+    ///    was not deallocated since.
+    /// 2. When shrinking, nothing uses the memory beyond `new_size` any more.
+    pub(crate) unsafe fn reallocate_in_place(
+        &mut self,
+        payload: NonNull<u8>,
+        new_size: usize,
+    ) -> bool {
+        let Some(needed) = block_size_for(new_size) else {
+            return false;
+        };
+        // SAFETY: by (1) it is the payload of a used block of the tiling.
+        let block = unsafe { Block::of_payload(payload) };
+        let size_before = block.size();
+        if needed > size_before {
+            let next = block.next();
+            if !next.is_free() || size_before + next.size() < needed {
+                return false;
+            }
+            self.free.remove(next);
+            block.absorb(next);
+        }
+        self.trim_back(block, needed);
+        self.usage.count_resize(size_before, block.size());
+        true
+    }
+
+    /// Tells how much memory is in use.
+    #[must_use]
+    pub(crate) const fn usage(&self) -> Usage {
+        self.usage
+    }
+
+    /// Returns the part of `block` from its first payload address on that has
+    /// the alignment, and frees the part before, if any.
+    fn trim_front(&mut self, block: Block, align: usize) -> Block {
+        let misalignment = block.payload().addr().get().wrapping_neg() % align;
+        let gap = match misalignment {
+            0 => return block,
+            // Too short to be a block itself: go one alignment step further.
+            short if short < MIN_BLOCK_SIZE => short + align,
+            enough => enough,
+        };
+        let aligned = block.split(gap);
+        self.release(block);
+        aligned
+    }
+
+    /// Frees what `block` has beyond `needed` bytes, if that makes a block.
+    fn trim_back(&mut self, block: Block, needed: usize) {
+        if block.size() - needed >= MIN_BLOCK_SIZE {
+            let rest = block.split(needed);
+            self.release(rest);
+        }
+    }
+
+    /// Merges a used block with its free neighbours and lists the result.
+    fn release(&mut self, block: Block) {
+        let mut merged = block;
+        if let Some(previous) = block.previous().filter(|block| block.is_free()) {
+            self.free.remove(previous);
+            previous.absorb(block);
+            merged = previous;
+        }
+        let next = merged.next();
+        if next.is_free() {
+            self.free.remove(next);
+            merged.absorb(next);
+        }
+        self.free.insert(merged);
+    }
+}

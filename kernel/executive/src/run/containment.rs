@@ -1,0 +1,189 @@
+//! Faults of apps, kept from harming anyone else.
+//!
+//! A subtask that panics, causes an exception or exceeds its budget ends its DAG:
+//! what it may have left half done can belong to that DAG alone. If that DAG survives
+//! the fault, it costs the job only. The fault is reported with DAG, subtask, job,
+//! core, cause and place, the context that it happened in is never used again, and all
+//! other DAGs go on.
+//!
+//! What a fault pins, until the machine is reset: the context's stack, the body that was
+//! on it with the function and what that owns, and locks and states that it held. For
+//! each fault that is survived the commit has taken another stack and another body.
+//!
+//! That is possible because code that may be at fault is told apart by the
+//! interrupt flag: apps run with interrupts enabled, while code that holds a
+//! lock of the kernel's, or handles an interrupt, has them disabled. A fault there, or
+//! outside any subtask, is the kernel's and ends the run (see `panic`).
+
+use core::fmt::{self, Display};
+use core::panic::PanicInfo;
+use core::time::Duration;
+
+use sched_dag::Instance;
+
+use super::execution::Cost;
+use super::{contexts, execution};
+use crate::machine::fault::Exception;
+use crate::machine::interrupt::Interrupted;
+use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, interrupt_flag, this_core};
+use crate::text::excerpt::Excerpt;
+use crate::text::json;
+
+/// How much of a panic's message is shown, and of a name, in bytes. With these a
+/// report's machine line stays together, see `console`.
+const MESSAGE_BYTES: usize = 400;
+const NAME_BYTES: usize = 60;
+
+/// What happened, as the report says it.
+struct Fault<'a> {
+    cause: &'a str,
+    message: &'a dyn Display,
+    place: &'a dyn Display,
+    address: Option<u64>,
+}
+
+/// Ends the instance that panics, if it is a subtask's; else returns.
+pub fn end_panicked(info: &PanicInfo<'_>) {
+    if !this_core::is_ready() || !interrupt_flag::are_enabled() {
+        return;
+    }
+    interrupt_flag::disable();
+    let core = this_core::get();
+    let context = core.context();
+    let Some(instance) = execution::running(core) else {
+        interrupt_flag::enable();
+        return;
+    };
+    interrupt_flag::enable();
+    // The message is made into text before any lock is taken, as that is the
+    // app's code once more. A panic in it comes here a second time. There may be no
+    // memory left, so none is taken from here on.
+    let message: Excerpt<MESSAGE_BYTES> = match context.note_fault() {
+        false => Excerpt::of(info.message()),
+        true => Excerpt::of("it panicked again while its message was made"),
+    };
+    report(
+        instance,
+        &Fault {
+            cause: "panic",
+            message: &message,
+            place: &place_of(info),
+            address: None,
+        },
+    );
+    interrupt_flag::disable();
+    execution::fail(clock::now_ns());
+    contexts::lose();
+    this_core::abandon_context(contexts::begin())
+}
+
+/// Ends the instance that caused an exception, if it is a subtask's, and reports
+/// whether it was.
+pub fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupted) -> bool {
+    if !exception.is_of_interruptible_code() || !this_core::is_ready() {
+        return false;
+    }
+    let core = this_core::get();
+    let Some(instance) = execution::running(core) else {
+        return false;
+    };
+    let rip = exception.registers.rip;
+    report(
+        instance,
+        &Fault {
+            cause: exception.name,
+            message: exception,
+            place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
+            address: exception.address,
+        },
+    );
+    end_interrupted(interrupted, clock::now_ns());
+    true
+}
+
+/// Ends this core's instance if its budget is used up.
+pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
+    let core = this_core::get();
+    let context = core.context();
+    let Some(instance) = execution::running(core) else {
+        return;
+    };
+    // The alarm may have been set for an instance before this one.
+    if context.budget_end_ns() > now_ns {
+        timer::set(Alarm::Budget, context.budget_end_ns());
+        return;
+    }
+    let budget = Duration::from_nanos(execution::budget_ns(instance));
+    let rip = interrupted.instruction();
+    report(
+        instance,
+        &Fault {
+            cause: "budget overrun",
+            message: &format_args!("executed for more than its budget of {budget:?}"),
+            place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
+            address: None,
+        },
+    );
+    end_interrupted(interrupted, now_ns);
+}
+
+/// Ends this core's instance, whose context a handler has interrupted.
+fn end_interrupted(interrupted: &mut Interrupted, now_ns: u64) {
+    // From here on the locks that it holds are lost.
+    this_core::get().context().note_fault();
+    execution::fail(now_ns);
+    contexts::lose();
+    // The context is leaked: what lies on its stack stays valid forever.
+    let _ = interrupted.exchange(contexts::begin());
+}
+
+/// Returns where a panic was raised, as `file:line:column`.
+pub fn place_of(info: &PanicInfo<'_>) -> impl Display {
+    let place = info.location();
+    fmt::from_fn(move |f| match place {
+        Some(place) => write!(f, "{}:{}:{}", place.file(), place.line(), place.column()),
+        None => f.write_str("an unknown place"),
+    })
+}
+
+fn report(instance: Instance, fault: &Fault<'_>) {
+    let Fault {
+        cause,
+        message,
+        place,
+        address,
+    } = fault;
+    let core = this_core::get().index;
+    // No lock is held by code that has interrupts enabled.
+    let task_set = execution::task_set();
+    let dag = task_set.as_ref().map(|model| model.dag(instance.dag));
+    let subtask = dag.map(|dag| dag.subtask(instance.subtask));
+    let dag = Excerpt::<NAME_BYTES>::of(dag.map_or("", |dag| dag.name()));
+    let subtask = Excerpt::<NAME_BYTES>::of(subtask.map_or("", |subtask| subtask.name()));
+    let (cost, consequence) = match execution::cost_of_fault(instance) {
+        Cost::Dag => ("dag", "the DAG is ended"),
+        Cost::Job => ("job", "the job is lost, and the subtask is made anew"),
+        Cost::Degraded => ("degraded", "the job is lost, and the subtask falls back"),
+    };
+    crate::println!(
+        "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \
+         at {place}; {consequence}",
+        instance.job
+    );
+    json::report("fault", |line| {
+        line.text("cause", cause)
+            .number("dag", instance.dag.0)
+            .text("dag_name", &dag)
+            .number("subtask", instance.subtask.0)
+            .text("subtask_name", &subtask)
+            .number("job", instance.job)
+            .text("cost", cost)
+            .number("cpu", core)
+            .text("place", place)
+            .text("message", message);
+        if let Some(address) = address {
+            line.text("address", format_args!("{address:#x}"));
+        }
+    });
+}

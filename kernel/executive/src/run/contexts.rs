@@ -1,0 +1,104 @@
+//! The stock of contexts that instances run in.
+//!
+//! A preempted instance keeps its context, stack and all. At any time a core
+//! runs one context and keeps at most one to spare, and each subtask has at most
+//! one suspended instance: so twice the cores and once the subtasks are enough. A
+//! fault abandons one, after which the subtask needs none, unless the fault is survived:
+//! so there is one more for each such fault that there may be. That many are made at
+//! a commit, never later. Contexts are never freed;
+//! the next commit uses them again.
+
+use alloc::vec::Vec;
+
+use crate::machine::context::Parked;
+use crate::machine::spinlock::SpinLock;
+use crate::machine::{interrupt, this_core};
+use crate::memory::{self, OutOfMemory};
+
+/// The stack of each context, in bytes.
+pub const STACK_BYTES: u64 = 64 * 1024;
+
+/// The stack of the context that runs the app's main function, in bytes. That evaluates
+/// whole runs, also in builds without optimization.
+const MAIN_STACK_BYTES: u64 = 256 * 1024;
+
+#[derive(Debug)]
+struct Stock {
+    free: Vec<Parked>,
+    /// How many there are, free or not.
+    total: usize,
+}
+
+static STOCK: SpinLock<Stock> = SpinLock::new(Stock {
+    free: Vec::new(),
+    total: 0,
+});
+
+/// Makes a context with a stack of its own.
+pub fn create(is_background: bool) -> Result<Parked, OutOfMemory> {
+    let bytes = match is_background {
+        true => MAIN_STACK_BYTES,
+        false => STACK_BYTES,
+    };
+    Ok(Parked::new(memory::new_stack(bytes)?, bytes, is_background))
+}
+
+/// Makes sure that there are `total` contexts in the stock or in use from it.
+pub fn provide(total: usize) -> Result<(), OutOfMemory> {
+    let existing = STOCK.lock().total;
+    let missing = total.saturating_sub(existing);
+    if missing == 0 {
+        return Ok(());
+    }
+    // Room for all that can ever be free, so that giving back never allocates.
+    let mut grown = Vec::with_capacity(total.max(existing));
+    for _ in 0..missing {
+        grown.push(create(false)?);
+    }
+    let mut stock = STOCK.lock();
+    grown.append(&mut stock.free);
+    // The old vector is freed after the lock: the heap has a lock of its own.
+    let old = core::mem::replace(&mut stock.free, grown);
+    stock.total += missing;
+    drop(stock);
+    drop(old);
+    Ok(())
+}
+
+/// Takes a context out of the stock. Interrupts are disabled.
+///
+/// # Panics
+///
+/// If there is none, which [`provide`]'s rule excludes.
+fn take() -> Parked {
+    STOCK
+        .lock_uninterrupted()
+        .free
+        .pop()
+        .expect("contexts are provided at commit")
+}
+
+/// Makes a context that works, in place of one that is suspended or lost.
+/// Interrupts are disabled.
+pub fn begin() -> Parked {
+    let mut context = this_core::take_spare_context().unwrap_or_else(take);
+    context.restart(interrupt::work);
+    context
+}
+
+/// Puts a context that has nothing to do back into the stock.
+pub fn give_back(context: Parked) {
+    STOCK.lock().free.push(context);
+}
+
+/// Returns how many contexts there are in all for instances, and how many of
+/// them are in the stock.
+pub fn count() -> (usize, usize) {
+    let stock = STOCK.lock();
+    (stock.total, stock.free.len())
+}
+
+/// Counts a context as lost: it was abandoned with what it ran.
+pub fn lose() {
+    STOCK.lock().total -= 1;
+}

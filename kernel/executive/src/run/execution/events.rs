@@ -1,0 +1,125 @@
+//! What happens on a core, reported by that core: it finds work, starts it,
+//! completes it, is interrupted, or ends it because of a fault.
+//!
+//! Each of these takes the one lock once, makes a step of the scheduler where
+//! there is something to decide, and wakes the other cores after the lock is
+//! free again.
+
+use alloc::boxed::Box;
+
+use sched_dag::CoreId;
+use sched_dag::journal::{Subject, What};
+
+use super::core_set::CoreSet;
+use super::runner::Runner;
+use super::status::note_running;
+use super::step::Ended;
+use super::time::{instance_time_ns, since_epoch};
+use super::{EXECUTION, Event, Work};
+use crate::machine::interrupt::Interrupted;
+use crate::machine::this_core::Core;
+use crate::machine::{clock, section, this_core, turns};
+
+/// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
+pub fn find_work() -> Work {
+    let core = this_core::get();
+    let mut place = EXECUTION.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return Work::Rest;
+    };
+    let work = execution.find_work(core);
+    drop(place);
+    take_turns(core, work)
+}
+
+/// Leaves the turns to others if this core does not compute.
+fn take_turns(core: &Core, work: Work) -> Work {
+    match &work {
+        Work::Run(_) => {}
+        Work::Continue(context) if !context.is_background() => {}
+        Work::Continue(_) | Work::Rest => turns::rest(core),
+    }
+    work
+}
+
+/// Reports that this core has run its instance, and finds what it is to do
+/// next. Interrupts are disabled.
+pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
+    let core = this_core::get();
+    let here = CoreId(core.index);
+    let mut place = EXECUTION.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return Work::Rest;
+    };
+    let vertex = finished.vertex;
+    if finished.body.has_effects() {
+        execution.signals.take(&mut finished.body, finish_ns);
+    }
+    execution
+        .watcher
+        .note_finish(finished, instance_time_ns(finish_ns));
+    let mut woken = None;
+    if execution.may_hand_off && execution.signals.are_none() {
+        match execution.hand_off(core, vertex) {
+            Ended::HandedOff(successor) => return Work::Run(successor),
+            Ended::Open => woken = Some(execution.step(finish_ns, Event::Time)),
+            Ended::WithNews => woken = Some(execution.announce()),
+            Ended::Quiet => {}
+        }
+    } else {
+        execution.watcher.settle(here);
+        let instance = execution.scheduler.instance_of(vertex);
+        woken = Some(execution.step(finish_ns, Event::Completed(instance)));
+    }
+    let work = execution.find_work(core);
+    drop(place);
+    if let Some(woken) = woken {
+        woken.wake();
+    }
+    take_turns(core, work)
+}
+
+/// Ends this core's instance because of a fault, and with it its DAG or its job. The
+/// context that ran it must not be resumed. Interrupts are disabled.
+pub fn fail(now_ns: u64) {
+    let mut place = EXECUTION.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return;
+    };
+    let core = this_core::get();
+    let Some(vertex) = execution.watcher.placement.lose(core.index as usize) else {
+        return;
+    };
+    let instance = execution.scheduler.instance_of(vertex);
+    // Not when the interrupt came: a step may have left events since then.
+    let ended_ns = since_epoch(clock::now_ns());
+    let here = CoreId(core.index);
+    execution
+        .watcher
+        .journal
+        .write(here, What::Ended, ended_ns, Subject::of(instance));
+    note_running(core, None);
+    let woken = execution.step(now_ns, Event::Failed(instance));
+    drop(place);
+    woken.wake();
+}
+
+/// Makes a step of the scheduler if `is_event`, and follows its decisions on this
+/// core. In an interrupt handler.
+pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
+    let mut place = EXECUTION.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return;
+    };
+    let mut woken = CoreSet::default();
+    if is_event {
+        woken = execution.step(now_ns, Event::Time);
+    }
+    if !section::puts_off(this_core::get(), now_ns)
+        && let Some(waiting) = execution.follow(interrupted, now_ns)
+    {
+        woken.insert(waiting.0);
+    }
+    drop(place);
+    woken.wake();
+}

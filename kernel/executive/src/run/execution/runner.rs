@@ -1,0 +1,102 @@
+//! What runs the instances of one subtask.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use fass::Body;
+use sched_dag::journal::Subject;
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
+
+/// A subtask's body, and what running an instance of it takes.
+///
+/// There is one for each subtask, as a subtask has one started instance at a time
+/// (R2). It is boxed: between its place and the core that runs it moves a pointer.
+pub struct Runner {
+    pub(super) body: Body,
+    pub(super) vertex: Vertex,
+    /// The time that an instance may execute for, `u64::MAX` if there is no limit.
+    pub(super) budget_ns: u64,
+    /// The instance that it runs, or ran last.
+    pub(super) instance: Instance,
+    /// The part of [`subject`](Self::subject) that is the same for all.
+    ids: u64,
+}
+
+impl Runner {
+    /// Makes the runner of a subtask, given any instance of it.
+    pub(super) fn new(body: Body, vertex: Vertex, any: Instance, budget_ns: u64) -> Self {
+        Self {
+            body,
+            vertex,
+            budget_ns,
+            instance: any,
+            ids: Subject::of(any).ids,
+        }
+    }
+
+    /// Calls the subtask's function for the instance.
+    pub fn run(&mut self) {
+        self.body.run(self.instance.job);
+    }
+
+    /// Returns the instance as events are recorded of it.
+    #[inline]
+    pub(super) const fn subject(&self) -> Subject {
+        Subject {
+            ids: self.ids,
+            job: self.instance.job,
+        }
+    }
+}
+
+/// Makes a runner for each body, by vertex.
+pub(super) fn runners(
+    task_set: &TaskSet,
+    bodies: Vec<Vec<Body>>,
+    budget_factor: u64,
+) -> impl Iterator<Item = Box<Runner>> {
+    let of_subtasks = by_subtask(bodies);
+    of_subtasks.map(move |(any, body)| runner(task_set, any, body, budget_factor))
+}
+
+/// What takes the places of runners that faults have lost, by vertex, the next one last.
+#[allow(clippy::vec_box, reason = "at the fault nothing may be boxed any more")]
+pub(super) type Others = Box<[Vec<Box<Runner>>]>;
+
+/// Makes a runner for each body that takes the place of another one, by vertex.
+pub(super) fn others(
+    task_set: &TaskSet,
+    bodies: Vec<Vec<Vec<Body>>>,
+    budget_factor: u64,
+) -> Others {
+    let of_subtask = |(any, bodies): (Instance, Vec<Body>)| {
+        let bodies = bodies.into_iter();
+        let runners = bodies.map(|body| runner(task_set, any, body, budget_factor));
+        runners.collect()
+    };
+    by_subtask(bodies).map(of_subtask).collect()
+}
+
+/// Returns what there is of each subtask, with any instance of that.
+fn by_subtask<T>(of_dags: Vec<Vec<T>>) -> impl Iterator<Item = (Instance, T)> {
+    let of_dags = (0..).map(DagId).zip(of_dags);
+    of_dags.flat_map(|(dag, of_dag)| {
+        let of_subtasks = (0..).map(SubtaskId).zip(of_dag);
+        of_subtasks.map(move |(subtask, of)| {
+            (
+                Instance {
+                    dag,
+                    job: 0,
+                    subtask,
+                },
+                of,
+            )
+        })
+    })
+}
+
+fn runner(task_set: &TaskSet, any: Instance, body: Body, budget_factor: u64) -> Box<Runner> {
+    let model = task_set.dag(any.dag).subtask(any.subtask);
+    let budget_ns = model.most_execution_ns(budget_factor);
+    Box::new(Runner::new(body, task_set.vertex(any), any, budget_ns))
+}

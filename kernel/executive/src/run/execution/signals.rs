@@ -1,0 +1,120 @@
+//! Signals to sporadic DAGs, and what else completions do beyond their DAG.
+//!
+//! A completing instance's latest values show, and its signals are taken, under the
+//! lock and before the scheduler's step; the step passes them on right after the
+//! completion. A signal from outside makes a step of its own.
+
+use alloc::vec::Vec;
+
+use fass::{Body, Plan};
+use sched_dag::{DagId, Moment, Observer};
+
+use super::{EXECUTION, Event, Execution, status};
+use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, interrupt_flag, this_core};
+
+/// The signals of a run that are on their way to its scheduler.
+pub(super) struct Signals {
+    /// The number of the plan that runs.
+    plan: u64,
+    /// Whether the run has begun, so that there is time.
+    has_begun: bool,
+    /// The DAGs, each once; there is room for all.
+    raised: Vec<DagId>,
+    /// By DAG, the one that gets a signal when a fault ends it.
+    after_fault: Vec<Option<DagId>>,
+}
+
+impl Signals {
+    pub(super) fn new(plan: &Plan) -> Self {
+        Self {
+            plan: plan.number,
+            has_begun: false,
+            raised: Vec::with_capacity(plan.bodies.len()),
+            after_fault: plan.after_fault.clone(),
+        }
+    }
+
+    /// Returns the DAG that gets a signal when a fault ends another.
+    pub(super) fn after_fault(&self, ended: DagId) -> Option<DagId> {
+        self.after_fault.get(ended.index()).copied().flatten()
+    }
+
+    /// Publishes what the body has prepared, and takes its signals. Apart, as most
+    /// bodies never have any.
+    #[inline(never)]
+    pub(super) fn take(&mut self, body: &mut Body, completed_ns: u64) {
+        body.complete(completed_ns, &mut |dag| self.keep(dag));
+    }
+
+    /// Keeps a signal until the next step.
+    fn keep(&mut self, dag: DagId) {
+        if !self.raised.contains(&dag) {
+            self.raised.push(dag);
+        }
+    }
+
+    /// Reports whether none is on its way.
+    pub(super) const fn are_none(&self) -> bool {
+        self.raised.is_empty()
+    }
+
+    /// Passes the signals taken on.
+    pub(super) fn send(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
+        for dag in self.raised.drain(..) {
+            moment.signal(dag, observer);
+        }
+    }
+}
+
+impl Execution {
+    /// Begins to pass signals on, those from before at time 0.
+    pub(super) fn begin_signals(&mut self) {
+        self.signals.has_begun = true;
+        let mut moment = self.scheduler.at(0);
+        self.signals.send(&mut moment, &mut self.watcher);
+    }
+}
+
+/// Takes a signal from outside all instances to a DAG of the plan with a number. One
+/// that comes between the commit and the run counts as of time 0.
+///
+/// # Panics
+///
+/// If an instance does so.
+#[track_caller]
+pub fn raise(plan: u64, dag: DagId) {
+    let were_enabled = interrupt_flag::disable();
+    let is_instance = status::running(this_core::get()).is_some();
+    if !is_instance {
+        raise_here(plan, dag);
+    }
+    if were_enabled {
+        interrupt_flag::enable();
+    }
+    assert!(
+        !is_instance,
+        "a subtask raises a signal that it was not registered with; register it by \
+         `dag.using(signal.raising())`"
+    );
+}
+
+/// Takes a signal from outside. Interrupts are disabled.
+fn raise_here(plan: u64, dag: DagId) {
+    let mut place = EXECUTION.lock();
+    let Some(execution) = place.as_mut() else {
+        return;
+    };
+    if execution.signals.plan != plan {
+        return;
+    }
+    if !execution.signals.has_begun {
+        execution.signals.keep(dag);
+        return;
+    }
+    let woken = execution.step(clock::now_ns(), Event::Signalled(dag));
+    drop(place);
+    woken.wake();
+    // The step may want this core, too, which follows at its next interrupt.
+    timer::set(Alarm::Schedule, clock::now_ns());
+}

@@ -1,0 +1,115 @@
+//! What the rest of the kernel may ask about the run.
+
+use core::sync::atomic::Ordering;
+
+use sched_dag::journal::Subject;
+use sched_dag::{Instance, Journal};
+
+use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS};
+use crate::machine::this_core::Core;
+
+/// Stands where the ids of an instance do, for none.
+const NOTHING: u64 = u64::MAX;
+
+/// Reports whether all jobs of the run have ended.
+pub fn is_finished() -> bool {
+    FINISHED.load(Ordering::Acquire)
+}
+
+/// Returns how many jobs have ended in this run, of DAGs with a limit of jobs.
+pub fn jobs_ended() -> u64 {
+    JOBS_ENDED.load(Ordering::Relaxed)
+}
+
+/// Returns how often the scheduler's lock has been taken since boot, modulo 2^32.
+pub fn lock_acquisitions() -> u32 {
+    EXECUTION.acquisitions()
+}
+
+/// Returns when core 0's timer shall next step the scheduler.
+pub fn next_event_ns() -> u64 {
+    NEXT_EVENT_NS.load(Ordering::Acquire)
+}
+
+/// Calls `with` with the names of an instance's DAG and subtask, if they can be
+/// had without waiting.
+pub fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
+    let place = EXECUTION.try_lock();
+    let Some(execution) = place.as_ref().and_then(|execution| execution.as_ref()) else {
+        return;
+    };
+    let dag = execution.task_set().dags().get(instance.dag.index());
+    let subtask = dag.and_then(|dag| dag.subtasks().get(instance.subtask.index()));
+    if let (Some(dag), Some(subtask)) = (dag, subtask) {
+        with(dag.name(), subtask.name());
+    }
+}
+
+/// Returns the instance that a core runs, without the lock.
+pub fn running(core: &Core) -> Option<Instance> {
+    let [ids, job] = core
+        .running
+        .each_ref()
+        .map(|field| field.load(Ordering::Relaxed));
+    (ids != NOTHING).then(|| Subject { ids, job }.instance())
+}
+
+/// Notes which instance a core runs, for [`running`].
+pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
+    let (ids, job) = subject.map_or((NOTHING, 0), |subject| (subject.ids, subject.job));
+    core.note_running([ids, job]);
+}
+
+/// Returns how long an instance may execute for, `u64::MAX` if there is no limit.
+pub fn budget_ns(instance: Instance) -> u64 {
+    let place = EXECUTION.lock();
+    place.as_ref().map_or(u64::MAX, |execution| {
+        let dag = execution.task_set().dag(instance.dag);
+        let subtask = dag.subtask(instance.subtask);
+        subtask.most_execution_ns(execution.budget_factor)
+    })
+}
+
+/// What a fault costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// The DAG is ended.
+    Dag,
+    /// The job is lost, and the subtask goes on with a function that was made anew.
+    Job,
+    /// The job is lost, and the subtask goes on with the function to fall back on.
+    Degraded,
+}
+
+/// Returns what a fault of an instance costs if it comes now. Of two faults of a DAG at
+/// one moment, either may take what is left to be survived; the journal tells.
+pub fn cost_of_fault(instance: Instance) -> Cost {
+    let place = EXECUTION.lock();
+    let Some(execution) = place.as_ref() else {
+        return Cost::Dag;
+    };
+    let vertex = execution.task_set().vertex(instance);
+    let is_survived = execution.scheduler.survives(instance.dag, instance.job);
+    match execution.watcher.other(vertex).filter(|_| is_survived) {
+        None => Cost::Dag,
+        Some(other) if other.body.is_fallback() => Cost::Degraded,
+        Some(_) => Cost::Job,
+    }
+}
+
+/// Looks at the journal of the run, or changes what it records, if a run goes on. To
+/// be done shortly: nothing is completed meanwhile.
+pub fn with_journal<R>(look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+    let mut place = EXECUTION.lock();
+    place
+        .as_mut()
+        .map(|execution| look(&mut execution.watcher.journal))
+}
+
+/// Looks at the journal of the run, if there is one and nobody is at work on it.
+pub fn try_journal<R>(look: impl FnOnce(&Journal) -> R) -> Option<R> {
+    let place = EXECUTION.try_lock()?;
+    place
+        .as_ref()
+        .map(|execution| look(&execution.watcher.journal))
+}

@@ -1,0 +1,262 @@
+//! The one printer of machine lines: one JSON object a line, `{` in column 0.
+//!
+//! `docs/serial-protocol.md` lists the kinds. An object is described by a
+//! closure that names its fields, so printing one allocates nothing.
+//!
+//! A run is judged by some of the kinds (`KERNELS`). Those are the kernel's to print:
+//! it `report`s, apps [`emit`].
+
+use core::fmt::{self, Display, Formatter};
+
+use super::console;
+
+/// Writes the fields of one object.
+///
+/// ```no_run
+/// let line = kernel::json::line("run", |line| {
+///     line.number("jobs", 3_u64)
+///         .flag("proven", true)
+///         .text("dag", "vision")
+///         .object("response_ns", |object| {
+///             object.number("max", 20_u64);
+///         })
+///         .list("cores", [0, 1].iter());
+/// });
+/// assert_eq!(
+///     line.to_string(),
+///     r#"{"kind":"run","jobs":3,"proven":true,"dag":"vision","response_ns":{"max":20},"cores":[0,1]}"#
+/// );
+/// ```
+#[expect(missing_debug_implementations, reason = "a `Formatter` has none")]
+pub struct Object<'a, 'f> {
+    out: &'a mut Formatter<'f>,
+    first: bool,
+    result: fmt::Result,
+}
+
+impl Object<'_, '_> {
+    /// Writes a field with a whole number.
+    ///
+    /// See [`Object`].
+    pub fn number(&mut self, name: &str, value: impl Into<u64>) -> &mut Self {
+        self.whole(name, value.into())
+    }
+
+    /// Writes a field with a truth value.
+    ///
+    /// See [`Object`].
+    pub fn flag(&mut self, name: &str, value: bool) -> &mut Self {
+        self.shown(name, &value)
+    }
+
+    /// Writes a field with text.
+    ///
+    /// See [`Object`].
+    pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
+        self.quoted(name, &value)
+    }
+
+    /// Writes a field with an object.
+    ///
+    /// See [`Object`].
+    pub fn object(&mut self, name: &str, fields: impl Fn(&mut Object<'_, '_>)) -> &mut Self {
+        self.shown(name, &Fields(&fields))
+    }
+
+    /// Writes a field with a list of values, each of which is JSON already.
+    ///
+    /// See [`Object`].
+    pub fn list(
+        &mut self,
+        name: &str,
+        mut values: impl Iterator<Item = impl Display>,
+    ) -> &mut Self {
+        self.each(name, &mut |show| {
+            let value = values.next()?;
+            show(&value);
+            Some(())
+        })
+    }
+
+    // One function for all callers each: lines are not written in haste, and an image has
+    // little room.
+
+    #[inline(never)]
+    fn whole(&mut self, name: &str, value: u64) -> &mut Self {
+        self.shown(name, &value)
+    }
+
+    #[inline(never)]
+    fn quoted(&mut self, name: &str, value: &dyn Display) -> &mut Self {
+        self.shown(name, &quoted(value))
+    }
+
+    /// Writes a list; `next` shows a value, while there is one.
+    #[inline(never)]
+    fn each(&mut self, name: &str, next: &mut dyn FnMut(Show<'_>) -> Option<()>) -> &mut Self {
+        self.shown(name, &"[");
+        let mut separator = "";
+        let mut show = |value: &dyn Display| {
+            self.result = self
+                .result
+                .and_then(|()| write!(self.out, "{separator}{value}"));
+            separator = ",";
+        };
+        while next(&mut show).is_some() {}
+        self.result = self.result.and_then(|()| self.out.write_str("]"));
+        self
+    }
+
+    /// Writes a field whose value is JSON already.
+    #[inline(never)]
+    fn shown(&mut self, name: &str, value: &dyn Display) -> &mut Self {
+        let separator = if self.first { "" } else { "," };
+        self.first = false;
+        self.result = self
+            .result
+            .and_then(|()| write!(self.out, "{separator}{}:{value}", quoted(name)));
+        self
+    }
+}
+
+/// Writes a value of a list.
+type Show<'s> = &'s mut dyn FnMut(&dyn Display);
+
+/// An object as text.
+struct Fields<'a>(&'a dyn Fn(&mut Object<'_, '_>));
+
+impl Display for Fields<'_> {
+    #[inline(never)]
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        out.write_str("{")?;
+        let mut object = Object {
+            out,
+            first: true,
+            result: Ok(()),
+        };
+        (self.0)(&mut object);
+        object.result?;
+        out.write_str("}")
+    }
+}
+
+/// Returns text as a JSON string.
+///
+/// ```no_run
+/// assert_eq!(kernel::json::quoted("say \"so\"").to_string(), r#""say \"so\"""#);
+/// ```
+pub fn quoted(value: impl Display) -> impl Display {
+    fmt::from_fn(move |out| {
+        out.write_str("\"")?;
+        fmt::Write::write_fmt(&mut Escaped(out), format_args!("{value}"))?;
+        out.write_str("\"")
+    })
+}
+
+/// Text inside the quotes of a JSON string (RFC 8259, section 7).
+struct Escaped<'a, 'f>(&'a mut Formatter<'f>);
+
+impl fmt::Write for Escaped<'_, '_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        text.chars().try_for_each(|character| match character {
+            '"' => self.0.write_str("\\\""),
+            '\\' => self.0.write_str("\\\\"),
+            '\n' => self.0.write_str("\\n"),
+            control if control < ' ' => write!(self.0, "\\u{:04x}", u32::from(control)),
+            other => self.0.write_char(other),
+        })
+    }
+}
+
+/// Returns a machine line of kind `kind`, without the line's end.
+///
+/// See [`Object`].
+pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
+    fmt::from_fn(move |out| {
+        let whole = |object: &mut Object<'_, '_>| fields(object.quoted("kind", &kind));
+        Fields(&whole).fmt(out)
+    })
+}
+
+/// The kinds by which a run is judged.
+const KERNELS: [&str; 7] = [
+    "boot",
+    "commit_fault",
+    "exception",
+    "fault",
+    "panic",
+    "stalled",
+    "verdict",
+];
+
+/// Prints a machine line of kind `kind`.
+///
+/// # Panics
+///
+/// If the kind is the kernel's: `boot`, `commit_fault`, `exception`, `fault`, `panic`,
+/// `stalled` or `verdict`.
+///
+/// ```no_run
+/// kernel::json::emit("run", |line| {
+///     line.number("jobs", 3_u64);
+/// });
+/// ```
+#[track_caller]
+pub fn emit(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
+    assert!(
+        !KERNELS.contains(&kind),
+        "a machine line of kind `{kind}` is the kernel's to print; choose another kind"
+    );
+    console::write_line(false, &line(kind, fields));
+}
+
+/// Prints a machine line of the kernel's own, of any kind.
+pub fn report(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
+    console::write_line(true, &line(kind, fields));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writes_fields_in_order_and_nests() {
+        let line = line("fork_join", |object| {
+            object.number("jobs", 7u64).object("latency_ns", |latency| {
+                latency.number("min", 1u32).number("max", 2u32);
+            });
+        });
+        let expected = r#"{"kind":"fork_join","jobs":7,"latency_ns":{"min":1,"max":2}}"#;
+        assert_eq!(line.to_string(), expected);
+    }
+
+    #[test]
+    fn writes_lists() {
+        let line = line("trace", |object| {
+            object
+                .list("events", ["[1,2]", "[3]"].iter())
+                .list("none", [0; 0].iter());
+        });
+        assert_eq!(
+            line.to_string(),
+            r#"{"kind":"trace","events":[[1,2],[3]],"none":[]}"#
+        );
+    }
+
+    #[test]
+    #[should_panic = "a machine line of kind `verdict` is the kernel's to print"]
+    fn refuses_an_app_what_the_run_is_judged_by() {
+        emit("verdict", |_| ());
+    }
+
+    #[test]
+    fn escapes_what_json_cannot_hold() {
+        let line = line("panic", |object| {
+            object.text("message", "a \"b\"\\\n\u{1}é");
+        });
+        assert_eq!(
+            line.to_string(),
+            r#"{"kind":"panic","message":"a \"b\"\\\n\u0001é"}"#
+        );
+    }
+}

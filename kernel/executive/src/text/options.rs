@@ -1,0 +1,316 @@
+//! The words of the kernel's command line: `key=value`, separated by spaces.
+//!
+//! The kernel takes the words that it knows and leaves the rest to the app,
+//! which states for each of its words what is allowed. A word that nobody takes
+//! is an error: a misspelt option must not run with the default.
+
+use core::cell::Cell;
+use core::fmt;
+use core::ops::RangeInclusive;
+
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// The kernel's own words, which every app has: `settings` takes them.
+const KERNELS: [&str; 18] = [
+    "policy",
+    "preemption",
+    "budget_factor",
+    "overheads_ns",
+    "wcets",
+    "trace",
+    "trace_events",
+    "times",
+    "graph",
+    "measure",
+    "idle",
+    "console",
+    "status",
+    "mode",
+    "probe",
+    "end",
+    "clock",
+    "x2apic",
+];
+
+/// The command line, with a note of which words have been taken.
+///
+/// ```no_run
+/// use kernel::options::Options;
+///
+/// let options = Options::parse("jobs=20 occupy=spin sizes=1,2")?;
+/// assert_eq!(options.number("jobs", 1..=100, 50)?, 20);
+/// assert_eq!(options.number("seed", 0..=9, 1)?, 1); // not given: the default
+/// assert_eq!(options.numbers("sizes", 1..=4, &[1])?, [1, 2]);
+/// assert!(options.choice("occupy", &[("hold", false), ("spin", true)])?);
+/// options.finish(&["jobs", "seed", "sizes", "occupy"])?; // nothing is left over
+/// # Ok::<(), kernel::options::UsageError>(())
+/// ```
+#[derive(Debug)]
+pub struct Options<'a> {
+    words: Vec<Word<'a>>,
+}
+
+#[derive(Debug)]
+struct Word<'a> {
+    key: &'a str,
+    value: &'a str,
+    taken: Cell<bool>,
+}
+
+/// A word of the command line is wrong: which one, and what is allowed.
+///
+/// See [`Options::finish`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UsageError(String);
+
+impl UsageError {
+    /// States what is wrong: the word, and what is allowed.
+    ///
+    /// ```no_run
+    /// use kernel::options::UsageError;
+    ///
+    /// let error = UsageError::new("`rate=3`: only even rates are possible");
+    /// assert!(error.to_string().contains("rate=3"));
+    /// ```
+    #[must_use]
+    pub fn new(message: impl Into<String>) -> Self {
+        Self(message.into())
+    }
+}
+
+impl fmt::Display for UsageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl core::error::Error for UsageError {}
+
+impl<'a> Options<'a> {
+    /// Splits a command line into words.
+    ///
+    /// # Errors
+    ///
+    /// If a word is not of the form `key=value`, or a key occurs twice.
+    ///
+    /// See [`Options`].
+    pub fn parse(line: &'a str) -> Result<Self, UsageError> {
+        let mut words = Vec::<Word<'a>>::new();
+        for word in line.split_whitespace() {
+            let Some((key, value)) = word.split_once('=') else {
+                return Err(UsageError(format!("`{word}` is not of the form key=value")));
+            };
+            if words.iter().any(|earlier| earlier.key == key) {
+                return Err(UsageError(format!("`{key}` is given twice; give it once")));
+            }
+            words.push(Word {
+                key,
+                value,
+                taken: Cell::new(false),
+            });
+        }
+        Ok(Self { words })
+    }
+
+    /// Takes the value of `key` as it is, if the key is given.
+    ///
+    /// ```no_run
+    /// let options = kernel::options::Options::parse("map=town").unwrap();
+    /// assert_eq!(options.text("map"), Some("town"));
+    /// assert_eq!(options.text("seed"), None);
+    /// ```
+    pub fn text(&self, key: &str) -> Option<&'a str> {
+        let word = self.words.iter().find(|word| word.key == key)?;
+        word.taken.set(true);
+        Some(word.value)
+    }
+
+    /// Takes the value of `key` as a whole number, or `default`.
+    ///
+    /// # Errors
+    ///
+    /// If the value is not a whole number within `allowed`.
+    ///
+    /// ```no_run
+    /// let options = kernel::options::Options::parse("jobs=0").unwrap();
+    /// let error = options.number("jobs", 1..=100, 50).unwrap_err();
+    /// assert_eq!(error.to_string(), "`jobs=0`: allowed are whole numbers from 1 to 100");
+    /// ```
+    pub fn number(
+        &self,
+        key: &str,
+        allowed: RangeInclusive<u64>,
+        default: u64,
+    ) -> Result<u64, UsageError> {
+        self.text(key)
+            .map_or(Ok(default), |value| parse_number(key, value, &allowed))
+    }
+
+    /// Takes the value of `key` as whole numbers separated by commas, or `default`.
+    ///
+    /// # Errors
+    ///
+    /// If one of them is not a whole number within `allowed`.
+    ///
+    /// See [`Options`].
+    pub fn numbers(
+        &self,
+        key: &str,
+        allowed: RangeInclusive<u64>,
+        default: &[u64],
+    ) -> Result<Vec<u64>, UsageError> {
+        self.text(key).map_or_else(
+            || Ok(default.to_vec()),
+            |value| {
+                value
+                    .split(',')
+                    .map(|item| parse_number(key, item, &allowed))
+                    .collect()
+            },
+        )
+    }
+
+    /// Takes the value of `key` as one of the names in `choices`, or the first.
+    ///
+    /// # Errors
+    ///
+    /// If the value is not one of them.
+    ///
+    /// # Panics
+    ///
+    /// If there are no choices.
+    ///
+    /// See [`Options`].
+    pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<T, UsageError> {
+        let name = |place: usize| choices.get(place).map(|(name, _)| *name);
+        Ok(choices[self.chosen(key, &name)?].1)
+    }
+
+    /// Returns the place of the name that is the value of `key`, or the first. One function
+    /// for all kinds of choices: an image has little room.
+    #[inline(never)]
+    fn chosen<'n>(
+        &self,
+        key: &str,
+        name: &dyn Fn(usize) -> Option<&'n str>,
+    ) -> Result<usize, UsageError> {
+        let Some(value) = self.text(key) else {
+            return Ok(0);
+        };
+        let names = || (0..).map_while(name);
+        names().position(|name| name == value).ok_or_else(|| {
+            let names: Vec<_> = names().collect();
+            UsageError(format!("`{key}={value}`: allowed are {}", names.join(", ")))
+        })
+    }
+
+    /// Checks that every word has been taken; `known` are the app's keys.
+    ///
+    /// # Errors
+    ///
+    /// If one has not: it names the word and the keys that there are.
+    ///
+    /// ```no_run
+    /// let options = kernel::options::Options::parse("sed=3").unwrap();
+    /// let _ = options.number("seed", 0..=9, 1);
+    /// let error = options.finish(&["seed"]).unwrap_err();
+    /// assert!(error.to_string().starts_with("`sed` is no option; there are seed, "));
+    /// ```
+    pub fn finish(&self, known: &[&str]) -> Result<(), UsageError> {
+        let Some(word) = self.words.iter().find(|word| !word.taken.get()) else {
+            return Ok(());
+        };
+        let (own, kernels) = (known.join(", "), KERNELS.join(", "));
+        Err(UsageError(format!(
+            "`{}` is no option; there are {own}, and for every app {kernels}",
+            word.key
+        )))
+    }
+}
+
+fn parse_number(key: &str, value: &str, allowed: &RangeInclusive<u64>) -> Result<u64, UsageError> {
+    whole_number(value)
+        .filter(|number| allowed.contains(number))
+        .ok_or_else(|| {
+            let (low, high) = (allowed.start(), allowed.end());
+            UsageError(format!(
+                "`{key}={value}`: allowed are whole numbers from {low} to {high}"
+            ))
+        })
+}
+
+/// Reads a whole number: digits alone, without the sign that `parse` would take.
+pub fn whole_number(text: &str) -> Option<u64> {
+    let is_whole = text.bytes().all(|byte| byte.is_ascii_digit());
+    is_whole.then(|| text.parse().ok()).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message<T: fmt::Debug>(result: Result<T, UsageError>) -> String {
+        result.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn takes_words_and_falls_back_to_defaults() {
+        let options = Options::parse("jobs=20  policy=edf subtasks=2,4").unwrap();
+        assert_eq!(options.number("jobs", 1..=100, 5), Ok(20));
+        assert_eq!(options.number("seed", 0..=9, 5), Ok(5));
+        assert_eq!(
+            options.choice("policy", &[("static", 1), ("edf", 2)]),
+            Ok(2)
+        );
+        assert_eq!(options.choice("occupy", &[("hold", 1), ("spin", 2)]), Ok(1));
+        assert_eq!(options.numbers("subtasks", 1..=16, &[6]), Ok(vec![2, 4]));
+        assert_eq!(options.finish(&["jobs"]), Ok(()));
+    }
+
+    #[test]
+    fn names_the_word_and_what_is_allowed() {
+        let options = Options::parse("jobs=0 policy=lifo sed=1 subtasks=2,x").unwrap();
+        let wrong = message(options.number("jobs", 1..=100, 5));
+        assert_eq!(wrong, "`jobs=0`: allowed are whole numbers from 1 to 100");
+        let wrong = message(options.choice("policy", &[("static", 1), ("edf", 2)]));
+        assert_eq!(wrong, "`policy=lifo`: allowed are static, edf");
+        let wrong = message(options.numbers("subtasks", 1..=16, &[]));
+        assert_eq!(
+            wrong,
+            "`subtasks=x`: allowed are whole numbers from 1 to 16"
+        );
+        let wrong = message(options.finish(&["jobs", "seed"]));
+        assert_eq!(
+            wrong,
+            "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
+             budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, measure, \
+             idle, console, status, mode, probe, end, clock, x2apic"
+        );
+    }
+
+    #[test]
+    fn a_number_has_digits_alone() {
+        for (text, number) in [("5", Some(5)), ("007", Some(7)), ("+5", None), ("-5", None)] {
+            assert_eq!(whole_number(text), number, "{text}");
+        }
+        for text in ["", " 5", "5 ", "1e3", "0x5", "18446744073709551616"] {
+            assert_eq!(whole_number(text), None, "{text}");
+        }
+        let options = Options::parse("jobs=+5").unwrap();
+        assert!(options.number("jobs", 1..=9, 5).is_err());
+    }
+
+    #[test]
+    fn refuses_lines_that_are_not_words() {
+        assert_eq!(
+            message(Options::parse("jobs")),
+            "`jobs` is not of the form key=value"
+        );
+        assert_eq!(
+            message(Options::parse("a=1 a=2")),
+            "`a` is given twice; give it once"
+        );
+    }
+}
