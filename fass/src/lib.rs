@@ -69,6 +69,7 @@
 //! - What functions share otherwise is stated and typed: a [`State`] within a DAG, a
 //!   [`Latest`] value between DAGs, a [`Signal`] that releases one. The commit turns
 //!   it into precedence, bounded staleness, or a minimum distance of releases.
+//! - What comes from outside and goes there while DAGs run passes a [`Wire`].
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
 //!   locked read-modify-write; states and latest values do one or two a use. (What
 //!   functions and their messages' `clone` do is theirs.)
@@ -110,6 +111,8 @@ pub use api::state::{Read, State, StateValue, Update};
 pub use api::untyped::Untyped;
 pub use api::uses::{ResettableUses, Uses};
 pub use api::using::Using;
+pub use api::wire::uses::{Packet, Received, Receiving, Sender, Sending};
+pub use api::wire::{Wire, WireCounts, WireOptions};
 pub use commit::answer::{Answer, Placement, SinkAnswer, Unproven, Verdict};
 pub use commit::error::CommitError;
 pub use commit::fault::Fault;
@@ -123,7 +126,9 @@ pub use run::plan::{Body, Plan};
 pub use run::record::Recorded;
 pub use run::staleness::Staleness;
 pub use run::topic::{Ports, Publisher, Subscriber};
+
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
+pub use run::wire::incoming::Framing;
 pub use sched_dag::analysis::{Overheads, Reason, Test};
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{

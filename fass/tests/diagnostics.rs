@@ -88,7 +88,7 @@ const CASES: &[Case] = &[
         says: &[
             "`State<u32>` is nothing that a subtask uses",
             "should be a use, or a tuple of up to 8 uses",
-            "uses are `state.update()`, `state.read()`, `latest.sample()` and `signal.raising()`",
+            "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`",
         ],
     },
     Case {

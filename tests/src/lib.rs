@@ -16,6 +16,11 @@ pub use guest::Guest;
 #[doc = include_str!("../../docs/guide.md")]
 mod guide_examples {}
 
+/// As above, of the page about bytes in and out.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/wires.md")]
+mod wire_examples {}
+
 /// As above, of the page for those who have a ROS 2 graph.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/from-ros-2.md")]

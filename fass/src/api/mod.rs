@@ -12,3 +12,4 @@ pub(crate) mod state;
 pub(crate) mod untyped;
 pub(crate) mod uses;
 pub(crate) mod using;
+pub(crate) mod wire;

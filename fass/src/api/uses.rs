@@ -3,8 +3,8 @@
 //! Values of the same job come along edges, as arguments. What comes from elsewhere
 //! is stated with [`Dag::using`]: a [`State`](crate::State) that subtasks of the DAG
 //! share, the [latest value](crate::Latest) of a topic of any DAG, a
-//! [signal](crate::Signal) that the subtask may raise. The function then gets what
-//! it uses as its *first* argument, in front of the inputs:
+//! [signal](crate::Signal) that the subtask may raise, a [wire](crate::Wire) for bytes. The
+//! function then gets what it uses as its *first* argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
 //! |---|---|---|
@@ -12,6 +12,8 @@
 //! | [`State::read`](crate::State::read) | `&T` | precedence |
 //! | [`Latest::sample`](crate::Latest::sample) | `Option<Sample<T>>` | bounded staleness |
 //! | [`Signal::raising`](crate::Signal::raising) | `Raiser` | sporadic release |
+//! | [`Wire::receiving`](crate::Wire::receiving) | `Received<T>` | input |
+//! | [`Wire::sending`](crate::Wire::sending) | `Sender` | output |
 //!
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
@@ -44,7 +46,7 @@ pub(crate) mod sealed {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is nothing that a subtask uses",
     label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()` and `signal.raising()`"
+    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `wire.receiving(decode)` and `wire.sending()`"
 )]
 pub trait Uses: sealed::Sealed {
     /// What the function gets.
@@ -63,6 +65,12 @@ pub trait Uses: sealed::Sealed {
     /// Notes that a subtask uses it.
     #[doc(hidden)]
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held;
+
+    /// Notes that the subtask is the source of this DAG, which is sporadic.
+    #[doc(hidden)]
+    fn begins(held: &Self::Held, dag: &Dag) {
+        let _ = (held, dag);
+    }
 
     /// Begins the use at the start of an instance.
     #[doc(hidden)]
@@ -118,6 +126,11 @@ macro_rules! implement_tuple {
             fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
                 let ($($use_,)*) = self;
                 ($($use_.hold(dag, subtask),)*)
+            }
+
+            fn begins(held: &Self::Held, dag: &Dag) {
+                let ($($use_,)*) = held;
+                $($Use::begins($use_, dag);)*
             }
 
             fn enter(held: &mut Self::Held) -> Self::Guard<'_> {

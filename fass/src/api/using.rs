@@ -109,6 +109,7 @@ impl<'d, U: Uses> Using<'d, U> {
         Ret: VecToPubs,
     {
         let (dag, mut held) = self.hold();
+        U::begins(&held, dag);
         let f = move || f(U::borrow(&mut U::enter(&mut held)));
         dag.register_sporadic_subtask(f, output_topics, min_inter_arrival, attributes)
     }

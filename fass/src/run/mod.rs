@@ -20,3 +20,4 @@ pub(crate) mod subtask;
 pub(crate) mod topic;
 pub(crate) mod tuple;
 pub(crate) mod untyped;
+pub(crate) mod wire;

@@ -1,12 +1,11 @@
 //! Runs DAGs built with `fass` on the host, in virtual time.
 //!
-//! For our purposes *virtual time* is a clock that jumps from one event to the
-//! next (other words are in `docs/glossary.md`). The real functions run, with real values on real topics, under the very
-//! scheduler that the kernel uses; only the passing of time is made up: a
+//! For our purposes *virtual time* is a clock that jumps from one event to the next (other
+//! words are in `docs/glossary.md`). The real functions run, with real values on real topics,
+//! under the very scheduler that the kernel uses; only the passing of time is made up: a
 //! function takes no time except where it says so with `fass::execute_for`, or
-//! [`VirtualTime::silent`] does. A
-//! second of a DAG's life takes about a millisecond, and every run of the same
-//! DAGs gives the same events at the same nanosecond.
+//! [`VirtualTime::silent`] does. A second of a DAG's life takes about a millisecond, and
+//! every run of the same DAGs gives the same events at the same nanosecond.
 //!
 //! It is the place to test an app: build the DAGs with the app's own code,
 //! commit them, [`run`](VirtualTime::run), and look into the [`Report`].
@@ -40,6 +39,7 @@ mod report;
 mod session;
 mod silent;
 mod surroundings;
+mod wires;
 
 use std::rc::Rc;
 use std::time::Duration;

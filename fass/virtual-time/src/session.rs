@@ -297,6 +297,7 @@ impl Workload for Runner<'_> {
             let machine = self.machine;
             let raise = &mut |dag| machine.signal_at(now_ns, dag);
             self.body(instance).complete(now_ns, raise);
+            machine.wires.collect();
         }
         self.recording.journal.on_core(What::Finish, instance, core);
     }

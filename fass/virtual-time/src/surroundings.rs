@@ -7,6 +7,7 @@ use sched_dag::DagId;
 
 use crate::edge::Edge;
 use crate::silent::Silent;
+use crate::wires::Wires;
 
 /// The time, the signals to come, and what is to become of a panic.
 #[derive(Debug, Default)]
@@ -15,6 +16,8 @@ pub(crate) struct Surroundings {
     pub(crate) silent: Cell<Silent>,
     /// What is recorded and replayed.
     pub(crate) edge: Edge,
+    /// Bytes on their way in and out.
+    pub(crate) wires: Wires,
     /// Whether a panic of a function ends its DAG only.
     pub(crate) contains_panics: Cell<bool>,
     /// The time that functions are told: the start of the instance and what it
@@ -44,15 +47,26 @@ impl Surroundings {
         signals.insert((time_ns, place), dag);
     }
 
-    /// Returns the time of the next signal.
+    /// Returns the time of the next signal, or of bytes that may raise one.
     pub(crate) fn next_signal_ns(&self) -> Option<u64> {
+        let signal_ns = self.raised_ns();
+        let times = [signal_ns, self.wires.next_ns()];
+        times.into_iter().flatten().min()
+    }
+
+    fn raised_ns(&self) -> Option<u64> {
         let signals = self.signals.borrow();
         signals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
     }
 
     /// Takes the next signal that is due by `now_ns`.
     pub(crate) fn take_signal(&self, now_ns: u64) -> Option<DagId> {
-        self.next_signal_ns().filter(|&at_ns| at_ns <= now_ns)?;
+        while let Some(raised) = self.wires.arrive(now_ns) {
+            raised
+                .into_iter()
+                .for_each(|dag| self.signal_at(now_ns, dag));
+        }
+        self.raised_ns().filter(|&at_ns| at_ns <= now_ns)?;
         self.signals.borrow_mut().pop_first().map(|(_, dag)| dag)
     }
 }

@@ -1,0 +1,279 @@
+//! Wires: how bytes come in and go out while DAGs run.
+//!
+//! For our purposes a *wire* is a way for bytes between a device, such as a serial port, and
+//! the functions of an app; a *packet* is those of them that belong together. One subtask
+//! receives on a wire, and one sends on it. Which device it is the platform is told, not the
+//! DAG: so the same functions run on the machine and, with bytes that a test gives, in virtual
+//! time.
+//!
+//! # What is guaranteed
+//!
+//! - An instance of the receiver is given the packets that were whole by its start and that no
+//!   earlier one has taken: those since the last job, with the time at which each was whole. If
+//!   the receiver is the source of a sporadic DAG, each packet raises its signal.
+//! - What an instance sends goes when it is complete (R3), all of it or nothing, in the order
+//!   of jobs. Of an instance that fails nothing goes.
+//! - Nobody waits: not the device for the receiver, nor the sender for the device. What finds
+//!   no room is lost, as a whole packet, or all that an instance has sent, and the newest: what
+//!   was there stays. What is lost is counted ([`Wire::counts`]).
+//! - The decoder runs in the receiver's instance. If it panics, that is contained as if
+//!   the function had.
+//!
+//! # What is not
+//!
+//! - A job of a sporadic DAG may find no packet, if one came while the job before was about to
+//!   start and was taken by that.
+//! - How soon a byte that was sent leaves the device is the platform's.
+
+pub(crate) mod uses;
+
+use alloc::string::String;
+use alloc::sync::Arc;
+use core::fmt;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use sched_dag::DagId;
+
+use super::signal::Signal;
+use crate::run::cell::SetOnce;
+use crate::run::wire::incoming::{Framing, Incoming};
+use crate::run::wire::outgoing::Outgoing;
+use uses::{Receiving, Sending};
+
+/// A way for bytes in and out of a run. Clones are handles of the same wire.
+///
+/// # Examples
+///
+/// A DAG that answers each number with its square:
+///
+/// ```
+/// use core::fmt::Write;
+/// use core::time::Duration;
+/// use fass::{Received, Sender, SubtaskAttributes, Wire, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// fn number(line: &[u8]) -> Option<u32> {
+///     str::from_utf8(line).ok()?.parse().ok() // `None`: malformed
+/// }
+///
+/// let wire = Wire::new("numbers");
+/// let ms = Duration::from_millis;
+/// let dag = create_dag();
+/// dag.jobs(2);
+/// dag.using(wire.receiving(number)).register_periodic_subtask(
+///     |numbers: Received<'_, u32>| (numbers.map(|number| number.value).collect::<Vec<_>>(),),
+///     vec!["numbers"],
+///     ms(10),
+///     SubtaskAttributes::named("receive"),
+/// );
+/// dag.using(wire.sending()).register_sink_subtask(
+///     |mut wire: Sender<'_>, (numbers,): (Vec<u32>,)| {
+///         for number in numbers {
+///             writeln!(wire, "{}", number * number).unwrap();
+///         }
+///     },
+///     vec!["numbers"],
+///     ms(10),
+///     SubtaskAttributes::named("answer"),
+/// );
+///
+/// let machine = VirtualTime::new().connect(&wire);
+/// finish_create_dags(&[dag]).unwrap();
+/// machine.arrive_at(&wire, ms(3), b"7\nseven\n8\n");
+/// machine.run();
+/// assert_eq!(machine.sent(&wire), b"49\n64\n");
+/// assert_eq!(wire.counts().malformed, 1);
+/// ```
+#[derive(Clone)]
+pub struct Wire {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    name: String,
+    incoming: Incoming,
+    outgoing: Arc<Outgoing>,
+    is_received: AtomicBool,
+    is_sent_on: AtomicBool,
+    /// What its packets raise, if a sporadic DAG begins with them.
+    signal: SetOnce<Signal>,
+}
+
+/// What an app says about a wire.
+///
+/// ```
+/// use fass::{Framing, Wire, WireOptions};
+///
+/// let gps = Wire::with("gps", WireOptions { longest_bytes: 82, ..WireOptions::default() });
+/// let framing = Framing::Until(0); // as COBS has it
+/// let motor = Wire::with("motor", WireOptions { framing, ..WireOptions::default() });
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WireOptions {
+    /// Where packets end: lines, unless stated.
+    pub framing: Framing,
+    /// How many bytes a packet has at most, a carriage return before a line feed included: 256
+    /// unless stated. (Those of [`Framing::Fixed`] have what that says.)
+    pub longest_bytes: usize,
+    /// For how many bytes there is room on the way in, and for as many on the way out: 4096
+    /// unless stated, and rounded up to a power of two. On the way in each packet takes 12 bytes
+    /// besides its own.
+    pub room_bytes: usize,
+}
+
+impl Default for WireOptions {
+    fn default() -> Self {
+        Self {
+            framing: Framing::Lines,
+            longest_bytes: 256,
+            room_bytes: 4096,
+        }
+    }
+}
+
+/// What has happened on a wire. Packets are counted when they are whole, bytes without what
+/// the framing adds.
+///
+/// See [`Wire`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WireCounts {
+    /// Packets that came, and found room.
+    pub packets: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Packets that came and found none.
+    pub lost_packets: u64,
+    /// Their bytes.
+    pub lost_bytes: u64,
+    /// Packets that were too long, or that the decoder refused; the latter found room.
+    pub malformed: u64,
+    /// Bytes that complete instances have sent.
+    pub sent_bytes: u64,
+    /// Bytes that they have sent and that found no room.
+    pub unsent_bytes: u64,
+}
+
+impl Wire {
+    /// Makes a wire whose packets are lines, with a name for reports.
+    ///
+    /// See [`Wire`].
+    #[must_use]
+    pub fn new(name: &str) -> Self {
+        Self::with(name, WireOptions::default())
+    }
+
+    /// Makes a wire with a name for reports.
+    ///
+    /// See [`WireOptions`].
+    #[must_use]
+    pub fn with(name: &str, options: WireOptions) -> Self {
+        Self {
+            shared: Arc::new(Shared {
+                name: name.into(),
+                incoming: Incoming::new(options.framing, options.longest_bytes, options.room_bytes),
+                outgoing: Arc::new(Outgoing::new(options.room_bytes)),
+                is_received: AtomicBool::new(false),
+                is_sent_on: AtomicBool::new(false),
+                signal: SetOnce::new(),
+            }),
+        }
+    }
+
+    /// Returns the use of the subtask that receives: `decode` says what a packet means, or
+    /// `None` if it is malformed, which is counted.
+    ///
+    /// See [`Wire`].
+    ///
+    /// # Panics
+    ///
+    /// If another subtask receives on the wire.
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    #[track_caller]
+    pub fn receiving<T>(&self, decode: fn(&[u8]) -> Option<T>) -> Receiving<T> {
+        self.claim(&self.shared.is_received, "receives");
+        Receiving {
+            wire: self.clone(),
+            decode,
+        }
+    }
+
+    /// Returns the use of the subtask that sends.
+    ///
+    /// See [`Wire`].
+    ///
+    /// # Panics
+    ///
+    /// If another subtask sends on the wire.
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    #[track_caller]
+    pub fn sending(&self) -> Sending {
+        self.claim(&self.shared.is_sent_on, "sends");
+        Sending(self.clone())
+    }
+
+    #[track_caller]
+    fn claim(&self, is_taken: &AtomicBool, does: &str) {
+        assert!(
+            !is_taken.swap(true, Ordering::Relaxed),
+            "another subtask {does} on wire `{}`; let that one do it, or make another wire",
+            self.name()
+        );
+    }
+
+    /// Returns the wire's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.shared.name
+    }
+
+    /// Returns what has happened on the wire so far.
+    ///
+    /// See [`Wire`].
+    #[must_use]
+    pub fn counts(&self) -> WireCounts {
+        let Shared {
+            incoming, outgoing, ..
+        } = &*self.shared;
+        WireCounts {
+            packets: incoming.packets.get(),
+            bytes: incoming.bytes.get(),
+            lost_packets: incoming.lost.get(),
+            lost_bytes: incoming.lost_bytes.get(),
+            malformed: incoming.too_long.get() + incoming.refused.get(),
+            sent_bytes: outgoing.sent.get(),
+            unsent_bytes: outgoing.lost.get(),
+        }
+    }
+
+    /// Takes bytes that have arrived at `now_ns`, on the clock of [`crate::now_ns`]. Returns
+    /// what [`Platform::raise`](crate::Platform::raise) is to be told, if a packet is whole
+    /// and a sporadic DAG receives it.
+    ///
+    /// For platforms, which have one place that calls this. It may be an interrupt handler.
+    pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
+        let is_whole = self.shared.incoming.arrive(bytes, now_ns);
+        let signal = self.shared.signal.get().filter(|_| is_whole)?;
+        signal.target()
+    }
+
+    /// Takes the next byte that is to go, if there is one.
+    ///
+    /// For platforms, which have one place that calls this.
+    #[must_use]
+    pub fn depart(&self) -> Option<u8> {
+        self.shared.outgoing.take()
+    }
+}
+
+impl PartialEq for Wire {
+    /// Reports whether both are handles of one wire.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.shared, &other.shared)
+    }
+}
+
+impl fmt::Debug for Wire {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Wire").field(&self.name()).finish()
+    }
+}

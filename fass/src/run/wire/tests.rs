@@ -1,0 +1,107 @@
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use super::incoming::{Framing, Incoming};
+use super::outgoing::{Departure, Outgoing};
+use crate::run::effect::Effect;
+
+/// Takes all packets that are there, as text.
+fn packets(incoming: &Incoming) -> Vec<String> {
+    let (mark, mut buffer) = (incoming.mark(), incoming.buffer());
+    let mut packets = Vec::new();
+    while let Some((bytes, _)) = incoming.take(mark, &mut buffer) {
+        packets.push(String::from_utf8_lossy(bytes).to_string());
+    }
+    packets
+}
+
+/// Lets bytes arrive one by one, and takes the packets after each.
+fn framed(framing: Framing, bytes: &[u8]) -> Vec<String> {
+    let incoming = Incoming::new(framing, 5, 64);
+    let mut all = Vec::new();
+    for byte in bytes {
+        let is_whole = incoming.arrive(&[*byte], 7);
+        let new = packets(&incoming);
+        assert_eq!(is_whole, !new.is_empty());
+        all.extend(new);
+    }
+    all
+}
+
+#[test]
+fn each_framing_finds_the_packets_and_too_long_ones_are_none() {
+    let lines = b"one\r\n\n\r\ntoo long\ntwo\nfive5\r\nrest";
+    assert_eq!(framed(Framing::Lines, lines), ["one", "two"]);
+    assert_eq!(
+        framed(Framing::Until(0), b"\0a\r\0\0sixsix\0b\0"),
+        ["a\r", "b"]
+    );
+    assert_eq!(framed(Framing::Fixed(3), b"abcdefgh"), ["abc", "def"]);
+    let counted = b"\0\x02ab\0\0\0\x01c\0\x06longer\0\x01d";
+    assert_eq!(framed(Framing::LengthFirst, counted), ["ab", "c", "d"]);
+    assert_eq!(framed(Framing::Chunks, b"abc"), ["a", "b", "c"]);
+}
+
+#[test]
+fn a_packet_without_room_is_lost_as_a_whole_and_those_before_it_stay() {
+    let incoming = Incoming::new(Framing::Lines, 20, 64);
+    // 12 bytes stand before each, so there is room for three of 8.
+    assert!(incoming.arrive(b"packet 1\npacket 2\npacket 3\npacket 4\n", 7));
+    assert!(!incoming.arrive(b"packet 5\n", 7));
+    assert_eq!(packets(&incoming), ["packet 1", "packet 2", "packet 3"]);
+    assert_eq!((incoming.lost.get(), incoming.lost_bytes.get()), (2, 16));
+    assert_eq!((incoming.packets.get(), incoming.bytes.get()), (3, 24));
+    assert!(incoming.arrive(b"packet 6\n", 7));
+    assert_eq!(packets(&incoming), ["packet 6"]);
+}
+
+#[test]
+fn packets_go_round_the_ring_with_their_times() {
+    let incoming = Incoming::new(Framing::Chunks, 20, 64);
+    let mut buffer = incoming.buffer();
+    for round in 0..1_000_u64 {
+        let bytes = round.to_string();
+        assert!(incoming.arrive(bytes.as_bytes(), round));
+        let taken = incoming.take(incoming.mark(), &mut buffer);
+        assert_eq!(taken, Some((bytes.as_bytes(), round)));
+    }
+    assert_eq!(incoming.lost.get(), 0);
+}
+
+#[test]
+fn what_comes_after_the_mark_waits() {
+    let incoming = Incoming::new(Framing::Lines, 20, 64);
+    incoming.arrive(b"one\n", 7);
+    let (mark, mut buffer) = (incoming.mark(), incoming.buffer());
+    incoming.arrive(b"two\n", 8);
+    assert_eq!(incoming.take(mark, &mut buffer), Some((&b"one"[..], 7)));
+    assert_eq!(incoming.take(mark, &mut buffer), None);
+    assert_eq!(packets(&incoming), ["two"]);
+}
+
+#[test]
+fn bytes_go_at_the_completion_and_whole_or_not_at_all() {
+    let outgoing = Arc::new(Outgoing::new(16));
+    let mut departure = Departure(Arc::clone(&outgoing));
+    let mut complete = || departure.happen(0, &mut |_| ());
+    let gone = || core::iter::from_fn(|| outgoing.take()).collect::<Vec<u8>>();
+    outgoing.stage(b"abc");
+    outgoing.stage(b"def");
+    assert!(gone().is_empty());
+    complete();
+    assert_eq!(gone(), b"abcdef");
+
+    outgoing.stage(b"never complete");
+    outgoing.begin();
+    outgoing.stage(b"twelve bytes");
+    complete();
+    outgoing.stage(b"ab");
+    outgoing.stage(b"too much");
+    outgoing.stage(b"c");
+    complete();
+    assert_eq!(gone(), b"twelve bytes");
+    assert_eq!((outgoing.sent.get(), outgoing.lost.get()), (18, 11));
+    complete();
+    assert!(gone().is_empty());
+}
