@@ -143,7 +143,8 @@ pub trait Platform: Sync {
         let _ = (dag, graph, channels);
     }
 
-    /// Takes a value of a recorded topic, at the completion of its writer; without a
+    /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had
+    /// sampled of one, at the end of that instance; without a
     /// definition it is forgotten. Must not wait.
     fn record(&self, value: &Recorded<'_>) {
         let _ = value;

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use recording::{
-    Channel, DagHeader, Entry, Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable, Recording,
-    Role, Schema, What, Writer, to_bytes,
+    Channel, Crc, DagHeader, Entry, Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable,
+    Recording, Role, Schema, VERSION, What, Writer, to_bytes,
 };
 
 fn header() -> Header {
@@ -212,10 +212,10 @@ fn foreign_and_newer_files_are_told() {
     let foreign = "at byte 0: expected the mark of a recording, 0x89 and `FASSREC`";
     assert_eq!(said(b""), foreign);
     assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
-    let newer = [&MAGIC[..], &[2, 0]].concat();
+    let newer = [&MAGIC[..], &[3, 0]].concat();
     assert_eq!(
         said(&newer),
-        "at byte 8: expected version 1 of recordings, which is the one that is read"
+        "at byte 8: expected version 1 or 2 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);
@@ -251,4 +251,33 @@ fn a_type_with_too_many_parts_that_take_no_bytes_is_refused() {
     assert_eq!(malformed.expected, expected);
     let text = format!("({})", "(), ".repeat(most + 1));
     assert_eq!(Schema::parse(&text).unwrap_err().1, expected);
+}
+
+/// Returns a recording as another version would have written it: with that number, and the
+/// checksums that follow from it.
+fn of_version(version: u16, bytes: &[u8]) -> Vec<u8> {
+    let mut other = [&bytes[..8], &version.to_le_bytes()].concat();
+    let mut crc = Crc::new();
+    crc.update(&other);
+    let mut rest = &bytes[10..];
+    while !rest.is_empty() {
+        let length = rest[1..5].try_into().expect("4 bytes");
+        let length = usize::try_from(u32::from_le_bytes(length)).expect("32 bits");
+        let (frame, after) = rest.split_at(5 + length);
+        crc.update(frame);
+        other.extend(frame);
+        other.extend(crc.value().to_le_bytes());
+        rest = &after[4..];
+    }
+    other
+}
+
+#[test]
+fn a_recording_of_the_version_before_is_read_and_one_of_the_next_is_not() {
+    let bytes = recording();
+    assert_eq!(of_version(VERSION, &bytes), bytes);
+    let before = of_version(1, &bytes);
+    let before = Recording::read(&before).unwrap();
+    assert_eq!((before.count(), before.lost()), (20, 1));
+    assert!(Recording::read(&of_version(VERSION + 1, &bytes)).is_err());
 }

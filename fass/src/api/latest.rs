@@ -168,8 +168,9 @@ impl<T: Message + Sync> Uses for Sampling<T> {
     }
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let sampler = self.shared.sampler();
-        dag.draft.borrow_mut().samples.push((subtask, self.shared));
+        let (sampler, number) = self.shared.sampler();
+        let mut draft = dag.draft.borrow_mut();
+        draft.samples.push((subtask, self.shared, number));
         sampler
     }
 

@@ -21,7 +21,8 @@ impl Dag {
     ///
     /// What a source writes is what a replay takes in place of calling it; so of a DAG that shall
     /// be replayed all topics of its sources are recorded. What another subtask writes is what a
-    /// replay compares. A topic that is recorded counts as read. The type must be the
+    /// replay compares. What subtasks sample of the topic is recorded, too, and given to them in
+    /// a replay. A topic that is recorded counts as read. The type must be the
     /// writer's, which the commit checks; a [`Unique`](crate::Unique) cannot be recorded.
     ///
     /// A value is written down when its function has returned, into a buffer that is made at the

@@ -14,8 +14,9 @@ use crate::run::signal::Target;
 pub(super) fn others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
     let draft = dag.draft.borrow();
     let samples = draft.samples.iter();
-    let not_there = samples.filter(|(_, latest)| staleness::writer_of(dags, &**latest).is_none());
-    let latest = not_there.map(|(subtask, latest)| Fault::LatestNotCommitted {
+    let not_there =
+        samples.filter(|(_, latest, _)| staleness::writer_of(dags, &**latest).is_none());
+    let latest = not_there.map(|(subtask, latest, _)| Fault::LatestNotCommitted {
         dag: label.clone(),
         subtask: staleness::label_of(dag, *subtask),
         topic: latest.topic().into(),

@@ -26,7 +26,7 @@ use crate::run::staleness::Staleness;
 pub(crate) fn of_all(dags: &[Dag], task_set: &TaskSet, answers: &[Answer]) -> Vec<Staleness> {
     let mut found = Vec::new();
     for (dag, reader) in dags.iter().zip(answers) {
-        for (subtask, latest) in &dag.draft.borrow().samples {
+        for (subtask, latest, _) in &dag.draft.borrow().samples {
             let Some(writer) = writer_of(dags, &**latest) else {
                 continue;
             };

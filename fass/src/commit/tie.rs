@@ -3,6 +3,7 @@
 //! Edges get their rings, functions become bodies, signals learn their DAG, and
 //! latest values get their writers. All has been verified, so nothing can fail.
 
+use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -10,8 +11,10 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use sched_dag::{DagId, DagSpec, OnFault, SubtaskSpec, TaskSet};
 
 use super::answer::Answers;
+use super::staleness::writer_of;
 use crate::api::dag::Dag;
 use crate::run::plan::{Body, Plan};
+use crate::run::record::{AnyRecorded, Sampled};
 use crate::run::staleness::Staleness;
 use crate::run::subtask::MakeBody;
 use crate::run::topic::Wiring;
@@ -27,10 +30,15 @@ pub(crate) fn tie(
     staleness: Vec<Staleness>,
 ) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
+    let recorded = dags
+        .iter()
+        .map(|dag| core::mem::take(&mut dag.draft.borrow_mut().recorded));
+    let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
+    let any = recorded.iter().flatten().next();
     let mut channels = 0;
     let (bodies, others) = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
         .map(|((id, dag), verified)| {
-            let (spec, make_bodies, latest, effects, resets, recorded) = {
+            let (spec, make_bodies, latest, effects, resets) = {
                 let mut draft = dag.draft.borrow_mut();
                 draft.is_committed = true;
                 let name = draft.spec.name.clone();
@@ -45,14 +53,14 @@ pub(crate) fn tie(
                 let effects = core::mem::take(&mut draft.effects);
                 let make_bodies = core::mem::take(&mut draft.make_bodies);
                 let resets = core::mem::take(&mut draft.resets);
-                let recorded = core::mem::take(&mut draft.recorded);
                 let latest = draft.latest.clone();
-                (spec, make_bodies, latest, effects, resets, recorded)
+                (spec, make_bodies, latest, effects, resets)
             };
-            if let Some(any) = recorded.first() {
-                any.open_all(&recorded, id, &spec, channels);
-                channels += recorded.len();
-            }
+            let of_dag = &recorded[id.index()];
+            let lines = any.map(|any| {
+                let samples = samples(dags, dag, &recorded);
+                any.open_all(of_dag, &samples, (id, &spec), &mut channels)
+            });
             let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
             let faults = match verified.on_fault() {
                 OnFault::EndDag => 0,
@@ -61,8 +69,8 @@ pub(crate) fn tie(
             resets.into_iter().for_each(|provide| provide.1(faults));
             let mut wiring = Wiring::new(&spec, &latest, slots, faults);
             let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
-                let any = recorded.first();
-                any.and_then(|any| any.source(&recorded, &spec, &mut wiring, subtask))
+                let any = of_dag.first();
+                any.and_then(|any| any.source(of_dag, &spec, &mut wiring, subtask))
                     .unwrap_or_else(|| make_body(&mut wiring, subtask))
             };
             let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
@@ -83,6 +91,9 @@ pub(crate) fn tie(
                     }
                 }
             }
+            if let (Some(any), Some(lines)) = (any, lines) {
+                any.attach(lines, &mut bodies);
+            }
             (bodies, others)
         })
         .unzip();
@@ -97,4 +108,23 @@ pub(crate) fn tie(
         after_fault: dags.iter().map(handler).collect(),
         staleness,
     }
+}
+
+/// Returns what a DAG's subtasks sample of recorded topics.
+fn samples(dags: &[Dag], dag: &Dag, recorded: &[Vec<Rc<dyn AnyRecorded>>]) -> Vec<Sampled> {
+    let draft = dag.draft.borrow();
+    let samples = draft
+        .samples
+        .iter()
+        .filter_map(|(subtask, latest, sampler)| {
+            let writer = writer_of(dags, &**latest)?;
+            let mut topics = recorded[writer].iter();
+            Some(Sampled {
+                subtask: *subtask,
+                latest: Rc::clone(latest),
+                sampler: *sampler,
+                of: Rc::clone(topics.find(|topic| topic.topic() == latest.topic())?),
+            })
+        });
+    samples.collect()
 }

@@ -50,8 +50,9 @@ pub(crate) struct Draft {
     pub(crate) latest: Vec<Rc<dyn AnyLatest>>,
     /// The topics that are recorded; they stand in `latest`, too.
     pub(crate) recorded: Vec<Rc<dyn AnyRecorded>>,
-    /// The latest values that subtasks sample, of whatever DAG.
-    pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>)>,
+    /// The latest values that subtasks sample, of whatever DAG, and the number that the subtask
+    /// has there.
+    pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>, usize)>,
     /// The signals that subtasks may raise, of whatever DAG.
     pub(crate) raises: Vec<(usize, Arc<Target>)>,
     /// What completions of subtasks do beyond the DAG, latest values apart.

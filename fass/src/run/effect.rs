@@ -15,4 +15,7 @@ pub(crate) trait Effect: Send {
     /// Publishes it if it was prepared since the last time. `raise` takes the
     /// DAG that gets a signal.
     fn happen(&mut self, completed_ns: u64, raise: &mut dyn FnMut(DagId));
+
+    /// Does what is to be done for an instance that has failed.
+    fn fail(&mut self, _failed_ns: u64) {}
 }

@@ -14,6 +14,7 @@ pub(crate) mod plan;
 pub(crate) mod record;
 pub(crate) mod replaceable;
 pub(crate) mod reset;
+pub(crate) mod sample;
 pub(crate) mod signal;
 pub(crate) mod staleness;
 pub(crate) mod subtask;

@@ -172,6 +172,29 @@ impl Body {
         }
     }
 
+    /// Gives the platform what an instance had sampled, if that is recorded, although it
+    /// failed; else nobody could compute its fault again.
+    ///
+    /// ```
+    /// fn failed(body: &mut fass::Body) {
+    ///     body.failed(fass::now_ns());
+    /// }
+    /// ```
+    pub fn failed(&mut self, failed_ns: u64) {
+        for effect in &mut self.effects {
+            effect.fail(failed_ns);
+        }
+    }
+
+    /// Puts something around the subtask.
+    pub(crate) fn wrapped(
+        mut self,
+        wrap: impl FnOnce(Box<dyn Subtask>) -> Box<dyn Subtask>,
+    ) -> Self {
+        self.subtask = wrap(self.subtask);
+        self
+    }
+
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
     /// platform to which a clock is dear need not read it for the others.
     ///

@@ -20,9 +20,10 @@ use sched_dag::{DagId, DagSpec, TopicPort};
 
 use super::cell::Shared;
 use super::effect::Effect;
-use super::latest::{AnyLatest, Stage};
+use super::latest::{AnyLatest, SharedLatest, Stage};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
+use super::sample::{self, SampleLine};
 use super::topic::{Ports, Publisher, Wiring};
 
 /// The least room for a value.
@@ -85,13 +86,57 @@ pub(crate) trait AnyRecorded {
     /// Returns what sends recorded values, in the place of the writer's next output port.
     fn replayed(&self, ports: &mut Ports<'_>) -> Box<dyn Replayed>;
 
-    /// Numbers all recorded topics of a DAG, and tells the platform.
-    fn open_all(&self, all: &[Rc<dyn AnyRecorded>], dag: DagId, spec: &DagSpec, first: usize) {
-        let channels = (first..).zip(all);
-        let channels: Vec<Channel> = channels
-            .map(|(number, topic)| channel(&**topic, number, dag, spec))
+    /// Sets a probe for samples of the topic, and returns the type of the samples, and the
+    /// probe's line; none if the latest value is of another type.
+    fn probe(&self, latest: &dyn AnyLatest, sampler: usize) -> Option<(Schema, Arc<SampleLine>)>;
+
+    /// Numbers all recorded topics of a DAG, and what its subtasks sample of such topics, and
+    /// tells the platform. Returns the lines of the samples, with their subtasks.
+    fn open_all(
+        &self,
+        all: &[Rc<dyn AnyRecorded>],
+        samples: &[Sampled],
+        (dag, spec): (DagId, &DagSpec),
+        next: &mut usize,
+    ) -> Vec<(usize, Arc<SampleLine>)> {
+        let number = || {
+            *next += 1;
+            narrow(*next - 1)
+        };
+        let numbers = core::iter::repeat_with(number);
+        let mut channels: Vec<Channel> = (all.iter().zip(numbers))
+            .map(|(topic, number)| channel(&**topic, number, dag, spec))
             .collect();
-        (self.edge().open)(dag, graph_hash(spec), &channels);
+        let mut lines = Vec::new();
+        for Sampled {
+            subtask,
+            latest,
+            sampler,
+            of,
+        } in samples
+        {
+            if let Some((schema, line)) = of.probe(&**latest, *sampler) {
+                line.set_number(narrow(*next));
+                *next += 1;
+                lines.push((*subtask, line));
+                channels.push(Channel {
+                    dag: narrow(dag.index()),
+                    subtask: narrow(*subtask),
+                    role: Role::Sample,
+                    topic: latest.topic().into(),
+                    schema,
+                });
+            }
+        }
+        if !channels.is_empty() {
+            (self.edge().open)(dag, graph_hash(spec), &channels);
+        }
+        lines
+    }
+
+    /// Lets the bodies of sampling subtasks tell their lines which job they run.
+    fn attach(&self, lines: Vec<(usize, Arc<SampleLine>)>, bodies: &mut Vec<Body>) {
+        sample::attach(lines, bodies);
     }
 
     /// Returns the body of a source in a replay, if there is one and the source is recorded.
@@ -120,9 +165,22 @@ pub(crate) trait AnyRecorded {
     }
 }
 
+/// A latest value of a recorded topic, as a subtask samples it.
+pub(crate) struct Sampled {
+    pub(crate) subtask: usize,
+    pub(crate) latest: Rc<dyn AnyLatest>,
+    /// The number that the subtask has at the latest value.
+    pub(crate) sampler: usize,
+    /// The topic.
+    pub(crate) of: Rc<dyn AnyRecorded>,
+}
+
+fn narrow(number: usize) -> u16 {
+    u16::try_from(number).unwrap_or(u16::MAX)
+}
+
 /// Numbers a recorded topic.
-fn channel(topic: &dyn AnyRecorded, number: usize, dag: DagId, spec: &DagSpec) -> Channel {
-    let narrow = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
+fn channel(topic: &dyn AnyRecorded, number: u16, dag: DagId, spec: &DagSpec) -> Channel {
     let mut subtasks = spec.subtasks.iter().enumerate();
     let writer = subtasks.find(|(_, subtask)| {
         let mut outputs = subtask.outputs.iter();
@@ -137,8 +195,13 @@ fn channel(topic: &dyn AnyRecorded, number: usize, dag: DagId, spec: &DagSpec) -
         subtask: narrow(writer.map_or(0, |(number, _)| number)),
         role,
         topic: topic.topic().into(),
-        schema: topic.open(narrow(number)),
+        schema: topic.open(number),
     }
+}
+
+/// Returns the room for a value.
+pub(super) fn room_of<T: Recordable>() -> usize {
+    ROOM.max(2 * T::LEAST_BYTES)
 }
 
 /// What sends recorded values to a topic.
@@ -162,7 +225,7 @@ struct Room {
 
 impl<T: Recordable> RecordedTopic<T> {
     pub(crate) fn new(topic: &str, edge: &'static Edge) -> Self {
-        let room = ROOM.max(2 * T::LEAST_BYTES);
+        let room = room_of::<T>();
         Self {
             topic: topic.into(),
             line: Arc::new(Line {
@@ -200,6 +263,10 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
     fn effects(&self) -> Vec<Box<dyn Effect>> {
         Vec::from([Box::new(Tap(Arc::clone(&self.line))) as Box<dyn Effect>])
     }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
 }
 
 impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
@@ -221,6 +288,11 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
             publisher: ports.publisher::<T>(),
             line: Arc::clone(&self.line),
         })
+    }
+
+    fn probe(&self, latest: &dyn AnyLatest, sampler: usize) -> Option<(Schema, Arc<SampleLine>)> {
+        let shared = latest.as_any().downcast_ref::<SharedLatest<T>>()?;
+        Some(sample::probe(shared, sampler, self.line.edge))
     }
 }
 

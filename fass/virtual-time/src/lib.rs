@@ -280,14 +280,14 @@ impl VirtualTime {
     }
 
     /// Replays a recording: what [`Dag::record`](fass::Dag::record) says of sources is taken
-    /// from it in place of calling them, jobs of which it has no values are passed over, and
-    /// signals come when they came, from nowhere else. To be called before the commit, which
+    /// from it in place of calling them, and so are samples and times; jobs of which it has no
+    /// values are passed over, and signals come when they came, from nowhere else. To be called before the commit, which
     /// is refused if the recording is of another graph or of other types, has a source that is
     /// not recorded now, or has lost a source's value.
     ///
     /// What other subtasks write to recorded topics is compared: [`Report::compared`] says how
-    /// many values were, [`Report::uncompared`] how many not, as jobs of the replay were skipped or
-    /// the topic is recorded no more, and [`Report::divergence`] which is the first that differs.
+    /// many values were, [`Report::uncompared`] how many not, as the run is not
+    /// over or the topic is recorded no more, and [`Report::divergence`] which is the first that differs.
     ///
     /// # Errors
     ///

@@ -161,7 +161,9 @@ impl Platform for HostPlatform {
     }
 
     fn now_ns(&self) -> u64 {
-        expect_current().surroundings.now_ns.get()
+        let machine = expect_current();
+        let surroundings = &machine.surroundings;
+        surroundings.edge.answer_ns(surroundings.now_ns.get())
     }
 
     fn execute_for(&self, duration: Duration, _how: Occupation) {
@@ -209,7 +211,7 @@ impl Platform for HostPlatform {
         expect_current().surroundings.edge.lend(channel, job, take);
     }
 
-    fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
+    fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
         let Some(machine) = current() else {
             return Err(LaunchError::new(
                 "this thread has no `VirtualTime`; make one on the thread that commits",
@@ -222,7 +224,10 @@ impl Platform for HostPlatform {
             ));
         }
         let surroundings = &machine.surroundings;
-        let signals = surroundings.edge.launch(&plan).map_err(LaunchError::new)?;
+        let signals = surroundings
+            .edge
+            .launch(&mut plan)
+            .map_err(LaunchError::new)?;
         for (dag, time_ns) in signals {
             surroundings.signal_of_replay_at(time_ns, dag);
         }

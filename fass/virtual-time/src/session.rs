@@ -210,6 +210,25 @@ impl Runner<'_> {
     fn body(&mut self, instance: Instance) -> &mut Body {
         &mut self.bodies[instance.dag.index()][instance.subtask.index()]
     }
+
+    /// Notes the next recorded signal of a DAG, if there is one.
+    fn signal_next(&self, dag: DagId) {
+        let machine = self.machine;
+        if let Some(time_ns) = machine.edge.next_signal_ns(dag) {
+            let time_ns = time_ns.max(self.recording.journal.now_ns);
+            machine.signal_of_replay_at(time_ns, dag);
+        }
+    }
+
+    /// Puts another body into the place of one that a fault has ended, if there is one.
+    fn replace(&mut self, instance: Instance) {
+        let others = &mut self.others[instance.dag.index()][instance.subtask.index()];
+        if let Some(mut next) = others.pop() {
+            next.take_over();
+            self.recording.degraded[instance.dag.index()] |= next.is_fallback();
+            *self.body(instance) = next;
+        }
+    }
 }
 
 impl Workload for Runner<'_> {
@@ -224,10 +243,12 @@ impl Workload for Runner<'_> {
         }
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
+        machine.edge.begin(instance);
         let body = self.body(instance);
         // Unwind safety: a body that panicked is never run again, and the
         // machine's cells hold plain numbers.
         let result = catch_unwind(AssertUnwindSafe(|| body.run(instance.job)));
+        machine.edge.end(instance, now_ns);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
         if executed_ns == 0 && result.is_ok() {
             let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
@@ -240,11 +261,17 @@ impl Workload for Runner<'_> {
                 .to_owned();
             let panic = PanicRecord { instance, message };
             if !machine.contains_panics.get() {
+                self.body(instance).failed(now_ns);
                 self.panic = Some(panic);
                 self.recording.journal.close();
                 return 0;
             }
             self.recording.panics.push(panic);
+            self.body(instance).failed(now_ns);
+            if machine.edge.is_replayed(instance.dag) {
+                // What it cuts is recorded, and is passed over.
+                self.replace(instance);
+            }
         }
         self.recording.executed_ns.insert(instance, executed_ns);
         executed_ns
@@ -252,7 +279,8 @@ impl Workload for Runner<'_> {
 
     fn fails(&mut self, instance: Instance) -> bool {
         let mut panics = self.recording.panics.iter();
-        panics.any(|panic| panic.instance == instance)
+        !self.machine.edge.is_replayed(instance.dag)
+            && panics.any(|panic| panic.instance == instance)
     }
 
     fn is_replaceable(&mut self, instance: Instance) -> bool {
@@ -310,6 +338,7 @@ impl Workload for Runner<'_> {
 impl Observer for Runner<'_> {
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
         self.recording.journal.released(dag, job, release_ns);
+        self.signal_next(dag);
     }
 
     fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
@@ -318,6 +347,7 @@ impl Observer for Runner<'_> {
 
     fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
         self.recording.journal.skipped(dag, job, release_ns);
+        self.signal_next(dag);
     }
 
     fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
@@ -339,12 +369,7 @@ impl Observer for Runner<'_> {
 
     fn restarted(&mut self, instance: Instance) {
         self.recording.journal.restarted(instance);
-        let others = &mut self.others[instance.dag.index()][instance.subtask.index()];
-        if let Some(mut next) = others.pop() {
-            next.take_over();
-            self.recording.degraded[instance.dag.index()] |= next.is_fallback();
-            *self.body(instance) = next;
-        }
+        self.replace(instance);
     }
 
     fn ended(&mut self, dag: DagId) {

@@ -83,6 +83,12 @@ pub(crate) struct Adjacency {
 }
 
 impl TaskSet {
+    /// Lets the due releases of a DAG queue, whatever it has stated. So a replay loses no job,
+    /// however long functions take there.
+    pub fn queue_overruns(&mut self, dag: DagId) {
+        self.dags[dag.index()].overrun = OverrunPolicy::Queue;
+    }
+
     /// Counts the subtasks of verified DAGs.
     pub(crate) fn new(dags: Box<[Dag]>, clusters: &[u32]) -> Self {
         let mut vertices = 0;

@@ -1,5 +1,7 @@
 //! What happened, one after the other.
 
+use alloc::vec::Vec;
+
 use crate::file::header::Header;
 use crate::value::decode::{Decoder, Malformed};
 use crate::value::encode::Encoder;
@@ -23,7 +25,7 @@ pub struct Entry<'v> {
     /// When it happened: for values, when the instance was complete that wrote or sampled
     /// them.
     pub at_ns: u64,
-    /// The value's bytes, where it is one.
+    /// The value's bytes, where it has one.
     pub value: &'v [u8],
 }
 
@@ -46,16 +48,20 @@ pub enum What {
     Restart,
     /// The value of a channel is not in the recording, for there was no room.
     Lost,
+    /// The instance of a subtask asked for the time: the value is a `Vec<u64>` of the answers,
+    /// in nanoseconds. Since version 2 of the format.
+    Clock,
 }
 
 impl What {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 7] = [
         Self::Value,
         Self::Signal,
         Self::Skip,
         Self::Cut,
         Self::Restart,
         Self::Lost,
+        Self::Clock,
     ];
 
     /// Returns the word for it.
@@ -70,6 +76,7 @@ impl What {
             Self::Cut => "cut",
             Self::Restart => "restart",
             Self::Lost => "lost",
+            Self::Clock => "clock",
         }
     }
 }
@@ -85,7 +92,7 @@ impl<'v> Entry<'v> {
 
     pub(super) fn decode(payload: &'v [u8]) -> Result<Self, Malformed> {
         let mut input = Decoder::new(payload);
-        let malformed = input.expected("what happened, a number from 0 to 5");
+        let malformed = input.expected("what happened, a number from 0 to 6");
         let number = usize::from(u8::decode(&mut input)?);
         let what = *What::ALL.get(number).ok_or(malformed)?;
         let (dag, place, job, release_ns, at_ns) = Recordable::decode(&mut input)?;
@@ -122,6 +129,7 @@ impl<'v> Entry<'v> {
                     _ => Ok(()),
                 }
             }
+            What::Clock => Vec::<u64>::schema().walk(&mut rest, &mut |_| ()),
             What::Signal | What::Skip | What::Cut | What::Restart => Ok(()),
         };
         checked

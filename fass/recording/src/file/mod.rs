@@ -9,6 +9,8 @@
 //! out. So a frame that is altered, left out, doubled or moved is found, and so is a cut at a
 //! frame's end, by the missing frame of the end.
 
+use core::ops::RangeInclusive;
+
 pub(crate) mod entry;
 pub(crate) mod header;
 pub(crate) mod read;
@@ -19,8 +21,12 @@ pub(crate) mod write;
 /// found, which would alter the rest.
 pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 
-/// The version of the format that is written and read, of values included.
-pub const VERSION: u16 = 1;
+/// The version of the format that is written, of values included. The one before, which is read,
+/// too, has no entries of [`What::Clock`](crate::What::Clock).
+pub const VERSION: u16 = 2;
+
+/// The versions that are read.
+const READ: RangeInclusive<u16> = 1..=VERSION;
 
 /// The kinds of frames.
 const HEADER: u8 = 1;

@@ -2,7 +2,7 @@
 
 use super::entry::{Entry, What};
 use super::header::{Channel, Header};
-use super::{END, ENTRY, HEADER, MAGIC, VERSION};
+use super::{END, ENTRY, HEADER, MAGIC, READ};
 use crate::value::crc::Crc;
 use crate::value::decode::{Decoder, Malformed};
 use crate::value::recordable::Recordable;
@@ -51,8 +51,9 @@ impl<'b> Recording<'b> {
         if input.take(MAGIC.len(), mark)? != MAGIC {
             return Err(Decoder::new(bytes).expected(mark));
         }
-        let malformed = input.expected("version 1 of recordings, which is the one that is read");
-        if u16::from_le_bytes(input.array(malformed.expected)?) != VERSION {
+        let malformed =
+            input.expected("version 1 or 2 of recordings, which are those that are read");
+        if !READ.contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
             return Err(malformed);
         }
         let mut crc = Crc::new();

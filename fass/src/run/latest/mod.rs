@@ -15,7 +15,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use sched_dag::{DagId, TopicPort};
 
-use super::cell::{Looking, Shared};
+use super::cell::{Looking, SetOnce, Shared};
 use super::effect::Effect;
 use super::message::{Message, MessageType};
 
@@ -34,11 +34,18 @@ impl<T> SharedLatest<T> {
         }
     }
 
-    /// Adds a sampling subtask and returns its reading end.
-    pub(crate) fn sampler(&self) -> Sampler<T> {
+    /// Adds a sampling subtask and returns its reading end, and its number.
+    pub(crate) fn sampler(&self) -> (Sampler<T>, usize) {
         let triple = Arc::new(Triple::new());
-        self.triples.borrow_mut().push(Arc::clone(&triple));
-        Sampler { triple, front: 2 }
+        let mut triples = self.triples.borrow_mut();
+        triples.push(Arc::clone(&triple));
+        (Sampler { triple, front: 2 }, triples.len() - 1)
+    }
+
+    /// Sets what looks at each sample of a sampling subtask.
+    pub(crate) fn set_probe(&self, sampler: usize, probe: Box<dyn Probe<T>>) {
+        // The commit, which comes once, does so for each sampler once.
+        let _ = self.triples.borrow()[sampler].probe.set(probe);
     }
 }
 
@@ -57,6 +64,9 @@ pub(crate) trait AnyLatest {
 
     /// Returns what the writer's completion does.
     fn effects(&self) -> Vec<Box<dyn Effect>>;
+
+    /// Returns itself, by its type.
+    fn as_any(&self) -> &dyn Any;
 }
 
 impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
@@ -86,6 +96,10 @@ impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
             .map(|triple| -> Box<dyn Effect> { Box::new(Arc::clone(triple)) })
             .collect()
     }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
 }
 
 /// Where a writer puts what shall show at its completion.
@@ -98,6 +112,16 @@ pub(crate) trait Stage<T>: Send + Sync {
     }
 }
 
+/// What looks at the samples of one subtask, or gives them in a replay.
+pub(crate) trait Probe<T>: Send + Sync {
+    /// Puts into the reader's slot what the instance found when it was recorded, and reports
+    /// whether that is known.
+    fn replay(&self, slot: &mut Option<Entry<T>>) -> bool;
+
+    /// Looks at what the instance finds.
+    fn look_at(&self, sample: Option<&Entry<T>>);
+}
+
 /// The slots of one sampling subtask.
 struct Triple<T> {
     slots: [Shared<Option<Entry<T>>>; 3],
@@ -107,6 +131,8 @@ struct Triple<T> {
     back: AtomicU8,
     /// Whether the writer's slot has a value that shall show at its completion.
     staged: AtomicBool,
+    /// Looks at what the reader finds, if the topic is recorded.
+    probe: SetOnce<Box<dyn Probe<T>>>,
 }
 
 /// A value, the job that it is of, and when its writer was complete.
@@ -126,7 +152,15 @@ impl<T> Triple<T> {
             back: AtomicU8::new(0),
             middle: AtomicU8::new(1),
             staged: AtomicBool::new(false),
+            probe: SetOnce::new(),
         }
+    }
+
+    /// Lets a replay fill the reader's slot, and reports whether it did.
+    #[cold]
+    fn is_replayed(&self, front: u8, probe: &dyn Probe<T>) -> bool {
+        let slot = self.slots[usize::from(front)].change();
+        slot.is_some_and(|mut slot| probe.replay(&mut slot))
     }
 
     /// Changes the writer's slot.
@@ -184,13 +218,19 @@ impl<T> Sampler<T> {
     /// Takes the slot of the latest complete instance, for the time of the guard.
     pub(crate) fn look(&mut self) -> Looked<'_, T> {
         let Self { triple, front } = self;
-        if triple.middle.load(Ordering::Relaxed) & FRESH != 0 {
+        let probe = triple.probe.get();
+        if probe.is_none_or(|probe| !triple.is_replayed(*front, &**probe))
+            && triple.middle.load(Ordering::Relaxed) & FRESH != 0
+        {
             *front = triple.middle.swap(*front, Ordering::AcqRel) & SLOT;
         }
-        match triple.slots[usize::from(*front)].look() {
-            Some(slot) => Looked(slot),
-            None => unreachable!("the writer has another slot"),
+        let Some(slot) = triple.slots[usize::from(*front)].look() else {
+            unreachable!("the writer has another slot");
+        };
+        if let Some(probe) = probe {
+            probe.look_at(slot.as_ref());
         }
+        Looked(slot)
     }
 }
 

@@ -1,12 +1,15 @@
 //! What crosses the edge of a run: written down, or taken from a recording.
 //!
-//! A *replay* does not call sources that are recorded, and takes their values; signals come when
-//! they came. A job that the recording has no values of, and an instance that was cut, is
+//! A *replay* does not call sources that are recorded, and takes their values; it gives subtasks
+//! what they sampled and the time that they were told; signals come when they came. No job is
+//! lost on the way: releases queue, and a fault cuts what it cut. A job that the recording has no values of, and an instance that was cut, is
 //! passed over: its function is not called. What else is recorded is compared.
 
+mod clock;
 mod replay;
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use fass::{Plan, Recorded};
 use recording::{Channel, DagHeader, Entry, Header, Malformed, What, Writer};
@@ -14,6 +17,7 @@ use sched_dag::journal::{self, Event};
 use sched_dag::law::Record;
 use sched_dag::{DagId, Instance, TaskSet};
 
+use clock::Clock;
 pub use replay::Divergence;
 use replay::Replay;
 
@@ -24,15 +28,28 @@ pub(crate) struct Edge {
     header: RefCell<Header>,
     /// The values so far, in the order in which they were complete.
     values: RefCell<Vec<Value>>,
+    clock: Clock,
     replay: RefCell<Option<Replay>>,
 }
 
 #[derive(Debug)]
 struct Value {
-    channel: u16,
+    of: Of,
     job: u64,
     at_ns: u64,
     bytes: Option<Vec<u8>>,
+}
+
+/// What a value is of.
+#[derive(Clone, Copy, Debug)]
+enum Of {
+    Channel(u16),
+    /// What an instance was answered that asked for the time.
+    Clock(Instance),
+}
+
+fn dag_id(dag: usize) -> Option<DagId> {
+    u32::try_from(dag).ok().map(DagId)
 }
 
 impl Edge {
@@ -56,7 +73,7 @@ impl Edge {
     }
 
     /// Takes a plan, which has to fit to what is replayed. Returns the signals of the replay.
-    pub(crate) fn launch(&self, plan: &Plan) -> Result<Vec<(DagId, u64)>, String> {
+    pub(crate) fn launch(&self, plan: &mut Plan) -> Result<Vec<(DagId, u64)>, String> {
         let mut header = self.header.borrow_mut();
         header.app = "virtual time".into();
         let dags = plan.task_set.dags();
@@ -64,17 +81,61 @@ impl Edge {
         for (header, dag) in header.dags.iter_mut().zip(dags) {
             header.name = dag.name().into();
         }
-        let signals = match self.replay.borrow_mut().as_mut() {
-            Some(replay) => {
-                replay.fit(&header)?;
-                replay.signals.clone()
+        if let Some(replay) = self.replay.borrow_mut().as_mut() {
+            replay.fit(&header, &plan.task_set)?;
+            let task_set = Arc::make_mut(&mut plan.task_set);
+            for dag in (0..header.dags.len()).filter_map(dag_id) {
+                if replay.is_of(dag) {
+                    task_set.queue_overruns(dag);
+                }
             }
-            None => Vec::new(),
-        };
-        let is_sporadic = |dag: DagId| plan.task_set.dag(dag).is_sporadic();
-        Ok((signals.into_iter())
-            .filter(|(dag, _)| is_sporadic(*dag))
+        }
+        let task_set = &plan.task_set;
+        let sporadic = (0..header.dags.len()).filter_map(dag_id);
+        let sporadic = sporadic.filter(|dag| task_set.dag(*dag).is_sporadic());
+        Ok(sporadic
+            .filter_map(|dag| Some((dag, self.next_signal_ns(dag)?)))
             .collect())
+    }
+
+    /// Takes the next recorded signal of a DAG. A signal follows when the one before it has led
+    /// to a release, for else it would be dropped where functions take longer than they took.
+    pub(crate) fn next_signal_ns(&self, dag: DagId) -> Option<u64> {
+        let mut replay = self.replay.borrow_mut();
+        replay.as_mut()?.signals.get_mut(&dag)?.pop_front()
+    }
+
+    /// Reports whether faults of a DAG are those of a replay: what they cut is recorded.
+    pub(crate) fn is_replayed(&self, dag: DagId) -> bool {
+        let replay = self.replay.borrow();
+        replay.as_ref().is_some_and(|replay| replay.is_of(dag))
+    }
+
+    /// Begins an instance.
+    pub(crate) fn begin(&self, instance: Instance) {
+        let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
+        let is_recorded = self.header.borrow().channels.iter().any(of_dag);
+        let replay = self.replay.borrow();
+        let recorded = replay.as_ref().and_then(|replay| replay.clock(instance));
+        self.clock.begin(is_recorded, recorded);
+    }
+
+    /// Answers a function that asks for the time: with what was answered then, if it is
+    /// recorded.
+    pub(crate) fn answer_ns(&self, now_ns: u64) -> u64 {
+        self.clock.answer_ns(now_ns)
+    }
+
+    /// Ends an instance, which began then.
+    pub(crate) fn end(&self, instance: Instance, start_ns: u64) {
+        if let Some(bytes) = self.clock.end() {
+            self.values.borrow_mut().push(Value {
+                of: Of::Clock(instance),
+                job: instance.job,
+                at_ns: start_ns,
+                bytes: Some(bytes),
+            });
+        }
     }
 
     /// Takes a value of this run, and compares it with the recorded one.
@@ -83,7 +144,7 @@ impl Edge {
             replay.compare(&self.header.borrow(), value);
         }
         self.values.borrow_mut().push(Value {
-            channel: value.channel,
+            of: Of::Channel(value.channel),
             job: value.job,
             at_ns: value.completed_ns,
             bytes: value.bytes.map(<[u8]>::to_vec),
@@ -128,12 +189,19 @@ impl Edge {
             of_job.and_then(|job| job.release_ns).unwrap_or(at_ns)
         };
         let values = self.values.borrow();
+        let narrow = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
         let values = values.iter().map(|value| {
-            let dag = header.channels[usize::from(value.channel)].dag;
+            let what = value.bytes.as_ref().map_or(What::Lost, |_| What::Value);
+            let (what, dag, place) = match value.of {
+                Of::Channel(channel) => (what, header.channels[usize::from(channel)].dag, channel),
+                Of::Clock(Instance { dag, subtask, .. }) => {
+                    (What::Clock, narrow(dag.0), narrow(subtask.0))
+                }
+            };
             Entry {
-                what: value.bytes.as_ref().map_or(What::Lost, |_| What::Value),
+                what,
                 dag,
-                place: value.channel,
+                place,
                 job: value.job,
                 release_ns: release_ns(dag, value.job, value.at_ns),
                 at_ns: value.at_ns,
@@ -150,6 +218,10 @@ impl Edge {
                 _ => return None,
             };
             let dag = u16::try_from(event.dag.0).ok()?;
+            // What was skipped or cut in the recorded run is not so here.
+            if self.is_replayed(event.dag) {
+                return None;
+            }
             Some(Entry {
                 what,
                 dag,
@@ -163,7 +235,9 @@ impl Edge {
                 value: &[],
             })
         });
-        let mut entries: Vec<Entry<'_>> = values.chain(others).collect();
+        let replay = self.replay.borrow();
+        let replayed = replay.iter().flat_map(Replay::events);
+        let mut entries: Vec<Entry<'_>> = values.chain(others).chain(replayed).collect();
         entries.sort_by_key(|entry| entry.at_ns);
         entries.iter().for_each(|entry| writer.write(entry));
         writer.finish()

@@ -1,23 +1,29 @@
 //! What a replay takes from a recording, and what it finds.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 
 use fass::Recorded;
-use recording::{Channel, Entry, Header, Malformed, Recording, Role, Shown, What};
-use sched_dag::{DagId, Instance, SubtaskId};
+use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, Shown, What};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 /// A recording that takes the place of what enters.
 #[derive(Debug)]
 pub(super) struct Replay {
     header: Header,
     values: BTreeMap<(u16, u64), Vec<u8>>,
-    /// The jobs of which a source has a value.
+    /// The jobs of these DAGs that have inputs.
     jobs: BTreeSet<(u16, u64)>,
     cuts: BTreeSet<(u16, u16, u64)>,
+    /// What instances were answered that asked for the time.
+    clock: BTreeMap<(u16, u16, u64), Vec<u64>>,
     /// The releases, if the DAG is sporadic; those of skipped jobs, too, so that the jobs after
     /// them keep their numbers.
-    pub(super) signals: Vec<(DagId, u64)>,
+    pub(super) signals: BTreeMap<DagId, VecDeque<u64>>,
+    /// What has no value.
+    events: Vec<Entry<'static>>,
+    /// The DAGs whose inputs are recorded.
+    dags: BTreeSet<u16>,
     /// The first value of a source that is lost: its channel and job.
     lost: Option<(u16, u64)>,
     /// For each channel of the plan that of the recording, if it has one.
@@ -69,28 +75,38 @@ impl Replay {
     pub(super) fn read(bytes: &[u8]) -> Result<Self, Malformed> {
         let recording = Recording::read(bytes)?;
         let header = recording.header().clone();
-        let (mut values, mut jobs) = (BTreeMap::new(), BTreeSet::new());
-        let (mut cuts, mut signals, mut lost) = (BTreeSet::new(), Vec::new(), None);
+        let mut values = BTreeMap::new();
+        let (mut cuts, mut clock, mut lost) = (BTreeSet::new(), BTreeMap::new(), None);
+        let mut signals = BTreeMap::<DagId, VecDeque<u64>>::new();
+        let mut events = Vec::new();
         let role = |place: u16| header.channels[usize::from(place)].role;
-        for Entry {
-            what,
-            dag,
-            place,
-            job,
-            release_ns,
-            value,
-            ..
-        } in recording.entries()
-        {
+        for entry in recording.entries() {
+            let Entry {
+                what,
+                dag,
+                place,
+                job,
+                release_ns,
+                value,
+                ..
+            } = entry;
+            if matches!(what, What::Signal | What::Skip | What::Cut | What::Restart) {
+                events.push(Entry {
+                    value: &[],
+                    ..entry
+                });
+            }
             match what {
-                What::Value => {
-                    if role(place) == Role::Source {
-                        jobs.insert((dag, job));
-                    }
-                    values.insert((place, job), value.to_vec());
-                }
+                What::Value => _ = values.insert((place, job), value.to_vec()),
                 What::Cut => _ = cuts.insert((dag, place, job)),
-                What::Signal | What::Skip => signals.push((DagId(dag.into()), release_ns)),
+                What::Signal | What::Skip => {
+                    let of_dag = signals.entry(DagId(dag.into())).or_default();
+                    of_dag.push_back(release_ns);
+                }
+                What::Clock => {
+                    let answers = Vec::<u64>::from_bytes(value)?;
+                    clock.insert((dag, place, job), answers);
+                }
                 What::Lost if role(place) == Role::Source => {
                     lost.get_or_insert((place, job));
                 }
@@ -102,9 +118,12 @@ impl Replay {
         Ok(Self {
             header,
             values,
-            jobs,
+            jobs: BTreeSet::new(),
             cuts,
+            clock,
             signals,
+            events,
+            dags: BTreeSet::new(),
             lost,
             channels: Vec::new(),
             to_compare,
@@ -114,7 +133,7 @@ impl Replay {
     }
 
     /// Finds the channels of the plan.
-    pub(super) fn fit(&mut self, own: &Header) -> Result<(), String> {
+    pub(super) fn fit(&mut self, own: &Header, task_set: &TaskSet) -> Result<(), String> {
         for (number, recorded) in self.header.dags.iter().enumerate() {
             let remedy = "commit the DAGs that were recorded, in their order";
             let Some(dag) = own.dags.get(number) else {
@@ -140,8 +159,12 @@ impl Replay {
         self.check_sources(own)?;
         for channel in &own.channels {
             let (topic, schema) = (&channel.topic, &channel.schema);
-            let mut others = (0..).zip(&self.header.channels);
-            match others.find(|(_, other)| is_same(other, channel)) {
+            let others = (0..).zip(&self.header.channels);
+            let mut others = others.filter(|(_, other)| is_same(other, channel));
+            // A subtask may sample topics of one name of several DAGs.
+            let before = own.channels.iter().take(self.channels.len());
+            let before = before.filter(|before| is_same(before, channel)).count();
+            match others.nth(before) {
                 Some((_, other)) if other.schema != *schema => {
                     return Err(format!(
                         "topic `{topic}` was recorded with values of type {}, and is of type \
@@ -157,7 +180,49 @@ impl Replay {
                 found => self.channels.push(found.map(|(number, _)| number)),
             }
         }
+        // Nothing but signals releases a sporadic DAG, and nothing else takes any.
+        let is_sporadic = |dag: &DagId| task_set.dags()[dag.index()].is_sporadic();
+        self.signals.retain(|dag, _| is_sporadic(dag));
+        self.find_inputs(task_set);
         Ok(())
+    }
+
+    /// Finds the DAGs whose inputs are recorded, and the jobs that have some: values that
+    /// sources returned, or else what they have sampled.
+    fn find_inputs(&mut self, task_set: &TaskSet) {
+        let is_source = |channel: &Channel| {
+            let dag = task_set.dags().get(usize::from(channel.dag));
+            dag.is_some_and(|dag| dag.sources().contains(&SubtaskId(channel.subtask.into())))
+        };
+        for role in [Role::Source, Role::Sample] {
+            let channels = (0_u16..).zip(&self.header.channels);
+            let inputs: Vec<(u16, u16)> = channels
+                .filter(|(_, channel)| channel.role == role && !self.dags.contains(&channel.dag))
+                .filter(|(_, channel)| role == Role::Source || is_source(channel))
+                .map(|(number, channel)| (number, channel.dag))
+                .collect();
+            for (number, dag) in inputs {
+                self.dags.insert(dag);
+                let values = self.values.range((number, 0)..=(number, u64::MAX));
+                self.jobs.extend(values.map(|((_, job), _)| (dag, *job)));
+            }
+        }
+    }
+
+    /// Reports whether the inputs of a DAG are recorded.
+    pub(super) fn is_of(&self, dag: DagId) -> bool {
+        u16::try_from(dag.0).is_ok_and(|dag| self.dags.contains(&dag))
+    }
+
+    /// Returns what the time was for an instance, whenever it asked.
+    pub(super) fn clock(&self, instance: Instance) -> Option<Vec<u64>> {
+        let (dag, subtask) = narrow(instance)?;
+        self.clock.get(&(dag, subtask, instance.job)).cloned()
+    }
+
+    /// Returns what is recorded of the DAGs besides values.
+    pub(super) fn events(&self) -> impl Iterator<Item = Entry<'_>> {
+        (self.events.iter().copied()).filter(|entry| self.dags.contains(&entry.dag))
     }
 
     /// Makes sure that no recorded source would be called, and that none of its values is lost.
@@ -188,24 +253,18 @@ impl Replay {
 
     /// Reports whether an instance is one whose function is not called.
     pub(super) fn passes_over(&self, instance: Instance) -> bool {
-        let Instance {
-            dag: DagId(dag),
-            subtask: SubtaskId(subtask),
-            job,
-        } = instance;
-        let (Ok(dag), Ok(subtask)) = (u16::try_from(dag), u16::try_from(subtask)) else {
+        let Some((dag, subtask)) = narrow(instance) else {
             return false;
         };
-        let is_recorded = |channel: &Channel| channel.dag == dag && channel.role == Role::Source;
-        let has_sources = self.header.channels.iter().any(is_recorded);
-        has_sources
+        let job = instance.job;
+        self.dags.contains(&dag)
             && (!self.jobs.contains(&(dag, job)) || self.cuts.contains(&(dag, subtask, job)))
     }
 
     pub(super) fn compare(&mut self, own: &Header, value: &Recorded<'_>) {
         let channel = &own.channels[usize::from(value.channel)];
         let bytes = value.bytes.unwrap_or_default();
-        if channel.role == Role::Source {
+        if channel.role != Role::Result {
             // It is where the value is from.
             return;
         }
@@ -267,5 +326,12 @@ fn divergence(
 
 /// Reports whether two channels have the same values, of two runs.
 fn is_same(one: &Channel, other: &Channel) -> bool {
-    (one.dag, one.role, &one.topic) == (other.dag, other.role, &other.topic)
+    let same_subtask = one.role != Role::Sample || one.subtask == other.subtask;
+    same_subtask && (one.dag, one.role, &one.topic) == (other.dag, other.role, &other.topic)
+}
+
+/// Returns the numbers of a DAG and of a subtask, as recordings have them.
+fn narrow(instance: Instance) -> Option<(u16, u16)> {
+    let dag = u16::try_from(instance.dag.0).ok()?;
+    Some((dag, u16::try_from(instance.subtask.0).ok()?))
 }

@@ -299,3 +299,48 @@ fn a_fault_is_replayed() {
     assert_eq!((report.compared, report.divergence), (7, None));
     assert_eq!(values(&again), values(&recording));
 }
+
+#[test]
+fn what_ran_next_to_a_fault_runs_in_its_replay() {
+    let build = || {
+        let dag = create_dag();
+        dag.name("forked").jobs(4);
+        let (faults, window, in_all) = (1, 1, 8);
+        dag.survive_faults(FaultLimit {
+            faults,
+            window,
+            in_all,
+        });
+        let mut input = 0_u32;
+        let source = move || {
+            input += 1;
+            (input,)
+        };
+        dag.register_periodic_subtask(source, vec!["in"], ms(10), named("source"));
+        dag.restarting(|| {
+            |(input,): (u32,)| {
+                execute_for(ms(2), Occupation::Hold);
+                assert!(input != 2, "two");
+                (input,)
+            }
+        })
+        .register_subtask(vec!["in"], vec!["frail"], named("frail"));
+        let mut sum = 0;
+        let add = move |(input,): (u32,)| {
+            execute_for(ms(1), Occupation::Hold);
+            sum += input;
+            (sum,)
+        };
+        dag.register_subtask(add, vec!["in"], vec!["sum"], named("sum"));
+        let join = |_: (u32, u32)| ();
+        dag.register_sink_subtask(join, vec!["frail", "sum"], ms(10), named("join"));
+        (dag.record::<u32>("in").record::<u32>("frail")).record::<u32>("sum");
+        dag
+    };
+    // On two cores `sum` runs in job 1 as well, on one the fault would cut it.
+    let recording = record(&VirtualTime::new().cores(2).contain_panics(), &[build()]);
+    let machine = VirtualTime::new().contain_panics();
+    let (report, again) = replay(&recording, machine, &[build()]);
+    assert_eq!((report.compared, report.divergence), (3 + 4, None));
+    assert_eq!(values(&again), values(&recording));
+}

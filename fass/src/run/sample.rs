@@ -1,0 +1,152 @@
+//! What a subtask samples of a recorded topic, written down or given back in a replay.
+//!
+//! The value is written into a buffer when the subtask looks, and given to the platform when
+//! the instance is complete, or has failed: without it nobody could compute its fault again.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU16, AtomicU64, Ordering};
+
+use recording::{Encoder, Recordable, Schema};
+use sched_dag::DagId;
+
+use super::cell::Shared;
+use super::effect::Effect;
+use super::latest::{Entry, Probe, SharedLatest};
+use super::plan::{Body, Subtask};
+use super::record::{Edge, Recorded, room_of};
+
+/// What the probe of a sampling subtask, its body and its completion share.
+pub(crate) struct SampleLine {
+    number: AtomicU16,
+    edge: &'static Edge,
+    /// The job whose instance runs.
+    job: AtomicU64,
+    room: Shared<Room>,
+}
+
+/// The sample of an instance that is not complete yet.
+struct Room {
+    bytes: Vec<u8>,
+    /// Its job, and how many bytes it has, if it fitted.
+    sample: Option<(u64, Option<usize>)>,
+}
+
+/// Sets a probe, and returns the type of the samples, and what the probe has of its instance.
+pub(super) fn probe<T: Recordable + Send + 'static>(
+    shared: &SharedLatest<T>,
+    sampler: usize,
+    edge: &'static Edge,
+) -> (Schema, Arc<SampleLine>) {
+    let room = Room {
+        bytes: alloc::vec![0; room_of::<Option<(u64, u64, T)>>()],
+        sample: None,
+    };
+    let line = Arc::new(SampleLine {
+        number: AtomicU16::new(0),
+        edge,
+        job: AtomicU64::new(0),
+        room: Shared::new(room),
+    });
+    shared.set_probe(sampler, Box::new(Arc::clone(&line)));
+    (<Option<(u64, u64, T)>>::schema(), line)
+}
+
+impl SampleLine {
+    pub(super) fn set_number(&self, number: u16) {
+        self.number.store(number, Ordering::Relaxed);
+    }
+
+    /// Gives the sample to the platform.
+    fn give(&self, at_ns: u64) {
+        // Only the subtask's body uses the room, which is `&mut` there.
+        let Some(mut room) = self.room.change() else {
+            return;
+        };
+        if let Some((job, length)) = room.sample.take() {
+            (self.edge.record)(&Recorded {
+                channel: self.number.load(Ordering::Relaxed),
+                job,
+                completed_ns: at_ns,
+                bytes: length.and_then(|length| room.bytes.get(..length)),
+            });
+        }
+    }
+}
+
+impl<T: Recordable> Probe<T> for Arc<SampleLine> {
+    fn replay(&self, slot: &mut Option<Entry<T>>) -> bool {
+        let mut found = None;
+        let number = self.number.load(Ordering::Relaxed);
+        let job = self.job.load(Ordering::Relaxed);
+        (self.edge.replay)(number, job, &mut |bytes| {
+            found = <Option<(u64, u64, T)>>::from_bytes(bytes).ok();
+        });
+        let Some(found) = found else {
+            return false;
+        };
+        *slot = found.map(|(job, completed_ns, value)| Entry {
+            value,
+            job,
+            completed_ns,
+        });
+        true
+    }
+
+    fn look_at(&self, sample: Option<&Entry<T>>) {
+        let Some(mut room) = self.room.change() else {
+            return;
+        };
+        let mut out = Encoder::new(&mut room.bytes);
+        // As `Option<(u64, u64, T)>` is written.
+        sample.is_some().encode(&mut out);
+        if let Some(entry) = sample {
+            (entry.job, entry.completed_ns).encode(&mut out);
+            entry.value.encode(&mut out);
+        }
+        let length = out.finish().ok();
+        room.sample = Some((self.job.load(Ordering::Relaxed), length));
+    }
+}
+
+impl Effect for Arc<SampleLine> {
+    fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
+        self.give(completed_ns);
+    }
+
+    fn fail(&mut self, failed_ns: u64) {
+        self.give(failed_ns);
+    }
+}
+
+/// Lets the bodies of sampling subtasks tell their lines which job they run.
+pub(crate) fn attach(lines: Vec<(usize, Arc<SampleLine>)>, bodies: &mut Vec<Body>) {
+    let mut all: Vec<Option<Body>> = core::mem::take(bodies).into_iter().map(Some).collect();
+    for (subtask, line) in lines {
+        all[subtask] = all[subtask].take().map(|body| {
+            let (of, effect) = (Arc::clone(&line), Box::new(line) as Box<dyn Effect>);
+            let mut body = body.wrapped(|subtask| Box::new(Sampling { subtask, line: of }));
+            body.add_effects([effect]);
+            body
+        });
+    }
+    bodies.extend(all.into_iter().flatten());
+}
+
+/// A subtask that samples recorded topics. (None such can be replaced after a fault.)
+struct Sampling {
+    subtask: Box<dyn Subtask>,
+    line: Arc<SampleLine>,
+}
+
+impl Subtask for Sampling {
+    fn take_turn(&mut self, job: u64) {
+        self.line.job.store(job, Ordering::Relaxed);
+        self.subtask.take_turn(job);
+    }
+
+    fn discard(&mut self, job: u64) {
+        self.subtask.discard(job);
+    }
+}
