@@ -4,6 +4,7 @@
 
 use harness::Guest;
 use tool::Outcome;
+use tool::places::Places;
 use tool::protocol::{MachineLine, Status};
 
 /// Commits the attack on 1 and 4 cores. The healthy DAG must meet every deadline, and the
@@ -43,18 +44,38 @@ fn says(cause: &str, message: &str) -> impl Fn(&Outcome, Option<&MachineLine>) {
 
 #[test]
 fn a_dag_that_uses_up_the_heap_in_small_pieces_ends_alone() {
-    let no_memory = || says("panic", "memory allocation of ");
-    attacked("leak_strings", 1, no_memory());
-    attacked("keep_boxes", 1, no_memory());
+    let no_memory = |function: &'static str| {
+        move |outcome: &Outcome, fault: Option<&MachineLine>| {
+            says("panic", "memory allocation of ")(outcome, fault);
+            let told = calls_told(outcome);
+            let line = told.lines().find(|line| line.contains(function));
+            assert!(
+                line.is_some_and(|line| line.contains(", tests/guest/src/attacks/heap.rs:")),
+                "{told}"
+            );
+        }
+    };
+    attacked("leak_strings", 1, no_memory("leak_strings"));
+    attacked("keep_boxes", 1, no_memory("keep_boxes"));
+}
+
+/// Returns the calls that led to the only fault, with names.
+fn calls_told(outcome: &Outcome) -> String {
+    let lines: Vec<_> = outcome.transcript.of_kind("backtrace").collect();
+    assert_eq!(lines.len(), 1, "{}", outcome.tail());
+    let told = Places::new(&outcome.image).explain(&lines[0].text);
+    told.unwrap_or_else(|| panic!("nothing is told of {}", lines[0].text))
 }
 
 #[test]
 fn a_stack_that_overflows_in_the_allocator_is_its_owners() {
-    attacked(
-        "allocator_stack",
-        1,
-        says("page fault", "a stack overflow (the stack has 64 KiB)"),
-    );
+    let overflow = says("page fault", "a stack overflow (the stack has 64 KiB)");
+    attacked("allocator_stack", 1, |outcome, fault| {
+        overflow(outcome, fault);
+        let told = calls_told(outcome);
+        assert!(told.contains("overflow_in_the_allocator"), "{told}");
+        assert!(told.lines().count() > 3, "{told}");
+    });
 }
 
 #[test]

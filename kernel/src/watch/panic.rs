@@ -16,6 +16,7 @@ use executive::machine::interrupt::Interrupted;
 use executive::machine::{cpu, exit, interrupt_flag, non_maskable, this_core};
 use executive::run::containment;
 use executive::run::execution;
+use executive::text::backtrace::Spot;
 use executive::text::console::{write_in_emergency, write_line_in_emergency};
 use executive::text::excerpt::Excerpt;
 use executive::text::json;
@@ -98,6 +99,12 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         }
         line.text("place", place).text("message", &message);
     });
+    write_line_in_emergency(&line);
+    let spot = registers.map_or_else(Spot::here, |registers| Spot {
+        instruction: Some(registers.rip),
+        stack_pointer: registers.rsp,
+    });
+    let line = json::line("backtrace", |line| spot.write(index, line));
     write_line_in_emergency(&line);
     give_verdict(what)
 }

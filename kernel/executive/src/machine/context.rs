@@ -11,6 +11,7 @@
 
 use core::cell::UnsafeCell;
 use core::fmt;
+use core::ops::Range;
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
@@ -168,11 +169,11 @@ impl Context {
         self.stack_top
     }
 
-    /// Returns the size of the context's stack if `address` lies in it, or in the guard
-    /// page below.
-    pub(super) fn stack_bytes_at(&self, address: u64) -> Option<u64> {
+    /// Returns the context's stack if `address` lies in it, or in the guard page below.
+    pub(super) fn stack_at(&self, address: u64) -> Option<Range<u64>> {
         let below = self.stack_top.checked_sub(address)?;
-        (below <= self.stack_bytes + super::paging::PAGE).then_some(self.stack_bytes)
+        (below <= self.stack_bytes + super::paging::PAGE)
+            .then_some(self.stack_top - self.stack_bytes..self.stack_top)
     }
 
     /// Reports whether this is what its core does when nothing is assigned to it.

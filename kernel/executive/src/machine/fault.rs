@@ -57,11 +57,10 @@ impl fmt::Display for Exception<'_> {
         }
         if self.is_stack_overflow() {
             f.write_str(", a stack overflow")?;
-            let bytes = this_core::get()
-                .context()
-                .stack_bytes_at(self.registers.rsp);
-            if let Some(bytes) = bytes {
-                write!(f, " (the stack has {} KiB)", bytes / 1024)?;
+            let stack = this_core::get().context().stack_at(self.registers.rsp);
+            if let Some(stack) = stack {
+                let kib = (stack.end - stack.start) / 1024;
+                write!(f, " (the stack has {kib} KiB)")?;
             }
         }
         let Registers {

@@ -59,6 +59,13 @@ impl Interrupted {
         unsafe { (*registers).rip }
     }
 
+    /// Returns the stack pointer at that instruction.
+    pub(crate) fn stack_pointer(&self) -> u64 {
+        let registers = this_core::get().context().registers();
+        // SAFETY: as for `instruction`.
+        unsafe { (*registers).rsp }
+    }
+
     /// Has this core go on with `next` when the handler returns, and returns
     /// the context that was interrupted.
     pub fn exchange(&mut self, next: Parked) -> Parked {

@@ -27,6 +27,7 @@ use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, this_core};
+use crate::text::backtrace::Spot;
 use crate::text::excerpt::Excerpt;
 use crate::text::json;
 
@@ -41,6 +42,7 @@ struct Fault<'a> {
     message: &'a dyn Display,
     place: &'a dyn Display,
     address: Option<u64>,
+    spot: Spot,
 }
 
 /// Ends the instance that panics, if it is a subtask's; else returns.
@@ -70,6 +72,7 @@ pub fn end_panicked(info: &PanicInfo<'_>) {
             message: &message,
             place: &place_of(info),
             address: None,
+            spot: Spot::here(),
         },
     );
     interrupt_flag::disable();
@@ -96,6 +99,10 @@ pub fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupted) -> b
             message: exception,
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: exception.address,
+            spot: Spot {
+                instruction: Some(rip),
+                stack_pointer: exception.registers.rsp,
+            },
         },
     );
     end_interrupted(interrupted, clock::now_ns());
@@ -123,6 +130,10 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
             message: &format_args!("executed for more than its budget of {budget:?}"),
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: None,
+            spot: Spot {
+                instruction: Some(rip),
+                stack_pointer: interrupted.stack_pointer(),
+            },
         },
     );
     end_interrupted(interrupted, now_ns);
@@ -153,6 +164,7 @@ fn report(instance: Instance, fault: &Fault<'_>) {
         message,
         place,
         address,
+        spot,
     } = fault;
     let core = this_core::get().index;
     // No lock is held by code that has interrupts enabled.
@@ -186,4 +198,5 @@ fn report(instance: Instance, fault: &Fault<'_>) {
             line.text("address", format_args!("{address:#x}"));
         }
     });
+    json::report("backtrace", |line| spot.write(core, line));
 }

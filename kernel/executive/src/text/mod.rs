@@ -4,6 +4,7 @@
 //! programs read, `graph` a DAG as one of them; `excerpt` keeps a text that may not fit, and
 //! `options` reads what the command line says. Of the run, nothing is known here.
 
+pub mod backtrace;
 pub mod console;
 pub mod excerpt;
 pub mod graph;

@@ -305,6 +305,7 @@ pub const KINDS: &[(&str, &[&str])] = &[
     ("proof", &["commit", "dag", "longest_ns"]),
     ("panic", &["cpu", "place", "message"]),
     ("exception", &["cpu", "place", "message"]),
+    ("backtrace", &["cpu", "calls"]),
     (
         "preemption",
         &[

@@ -1,16 +1,18 @@
-//! Places in code: the function of an image that an address lies in.
+//! Places in code: the function of an image that an address lies in, and the calls to it.
 //!
 //! A guest that reports a fault knows the address of the instruction, and its
 //! image has no names in it that it could read. So wherever the tool shows a line
 //! of kind `panic`, `exception` or `fault` whose `place` is an address, it adds one
-//! line that names the function, and the app's line there, if there is one. What the
-//! guest printed stays as it is.
+//! line that names the function, and the app's line there, if there is one. After a line of
+//! kind `backtrace` it tells the calls (`backtrace`). What the guest printed stays as it is.
 //!
 //! Names and lines are found by `addr2line`, which reads the image's symbols and
 //! debugging information and knows both ways in which the compiler writes names. It
 //! is part of binutils, which C compilers bring along; where it is missing, one
 //! sentence says so. An image that cannot be read adds nothing: the report of a fault
 //! is no place for another one.
+
+mod backtrace;
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -20,12 +22,16 @@ use std::process::{Command, Stdio};
 
 use crate::protocol::{MachineLine, read_line};
 use crate::system;
+use backtrace::Call;
 
 /// The program that finds names and lines.
 const PROGRAM: &str = "addr2line";
 
 /// The kinds whose `place` may be an address.
-const KINDS: [&str; 3] = ["panic", "exception", "fault"];
+const KINDS: [&str; 4] = ["panic", "exception", "fault", BACKTRACE];
+
+/// The kind that has the calls on a stack.
+const BACKTRACE: &str = "backtrace";
 
 /// Folders of the workspace whose code is not the app's.
 const OF_OTHERS: [&str; 4] = ["boot/", "fass/", "kernel/", "sched-dag/"];
@@ -54,12 +60,24 @@ impl Places {
     /// `0x20e0b8 is faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`.
     #[must_use]
     pub fn explain(&self, line: &str) -> Option<String> {
-        let address = address(&read_line(0, line)?.ok()?)?;
-        let Some(program) = system::find_program(self.program) else {
-            return (!self.is_missed.replace(true)).then(|| missed(address, self.program));
+        let line = read_line(0, line)?.ok()?;
+        let is_backtrace = line.kind == BACKTRACE;
+        let address = address(&line);
+        let calls = match is_backtrace {
+            true => Call::list(line.value.get("calls")),
+            false => Vec::new(),
         };
-        let frames = frames(&program, &self.image, &[address])?;
-        Some(sentence(address, frames.get(&address)?))
+        let addresses = calls.iter().flat_map(|call| call.addresses());
+        let addresses: Vec<u64> = address.into_iter().chain(addresses).collect();
+        let first = *addresses.first()?;
+        let Some(program) = system::find_program(self.program) else {
+            return (!self.is_missed.replace(true)).then(|| missed(first, self.program));
+        };
+        let frames = frames(&program, &self.image, &addresses)?;
+        if is_backtrace {
+            return backtrace::tell(address, &calls, &frames);
+        }
+        Some(sentence(first, frames.get(&first)?))
     }
 }
 
@@ -144,6 +162,27 @@ fn sentence(address: u64, frames: &[Frame]) -> String {
     format!("{address:#x} is {function}{line}")
 }
 
+impl Frame {
+    /// Reports whether the code is Rust's library.
+    fn is_of_library(&self) -> bool {
+        self.line.starts_with("/rustc/")
+    }
+
+    /// Returns file and line in short: from the workspace on, or from the library's root on.
+    fn place(&self) -> &str {
+        let line = self.line.as_str();
+        if let Some((_, below)) = line
+            .split_once("/library/")
+            .filter(|_| self.is_of_library())
+        {
+            return below;
+        }
+        let root = system::workspace().to_str();
+        let below = root.and_then(|root| line.strip_prefix(root)?.strip_prefix('/'));
+        below.unwrap_or(line)
+    }
+}
+
 /// Returns a file and line if it is the app's: from the workspace on, or from this folder on,
 /// which is the root of the app's own repository where cargo starts the tool.
 fn line_of_app(frame: &Frame) -> Option<&str> {
@@ -194,7 +233,7 @@ mod tests {
         assert_eq!(
             explained,
             format!(
-                "{inside} is tool::places::tests::fuse, of scripts/tool/src/places.rs:{}",
+                "{inside} is tool::places::tests::fuse, of scripts/tool/src/places/mod.rs:{}",
                 fuse()
             )
         );

@@ -1,0 +1,52 @@
+//! A backtrace as a machine line: addresses, which the host makes into names.
+
+use core::fmt;
+
+use super::json::Object;
+use crate::machine::backtrace::{self, Call};
+
+/// The most calls that a line has, so that it stays together (`console`).
+const MOST: usize = 24;
+
+/// Where code was as it failed.
+#[derive(Clone, Copy, Debug)]
+pub struct Spot {
+    /// The instruction, if it is known apart from the stack.
+    pub instruction: Option<u64>,
+    /// The stack pointer there, or further down.
+    pub stack_pointer: u64,
+}
+
+impl Spot {
+    /// Returns the place of this very call.
+    #[inline(never)]
+    #[must_use]
+    pub fn here() -> Spot {
+        let local = 0u8;
+        Spot {
+            instruction: None,
+            stack_pointer: (&raw const local) as u64,
+        }
+    }
+
+    /// Writes the members of a line of kind `backtrace`.
+    pub fn write(self, core: u32, line: &mut Object<'_, '_>) {
+        line.number("cpu", core);
+        if let Some(instruction) = self.instruction {
+            line.text("place", format_args!("{instruction:#x}"));
+        }
+        let calls = backtrace::calls(self.stack_pointer).take(MOST).map(shown);
+        line.list("calls", calls);
+    }
+}
+
+/// Shows a call as where it returns to and what it called.
+fn shown(call: Call) -> impl fmt::Display {
+    fmt::from_fn(move |f| {
+        write!(f, "\"{:#x}", call.returns_to)?;
+        if let Some(callee) = call.callee {
+            write!(f, " {callee:#x}")?;
+        }
+        f.write_str("\"")
+    })
+}
