@@ -97,6 +97,33 @@ pub fn timer_interrupts() -> u64 {
     executive::interrupts::timer_interrupts()
 }
 
+/// Reports whether functions may use AVX: the processor has it, and the word `avx=off` is
+/// not given.
+///
+/// A function that uses it bears `#[target_feature(enable = "avx")]`, and whoever calls it has
+/// asked. What else it names, such as `avx2`, is asked of the processor
+/// (`core::arch::x86_64::__cpuid`) besides; its state is AVX's.
+///
+/// ```no_run
+/// # #![allow(unsafe_code)]
+/// #[target_feature(enable = "avx")]
+/// fn sum_by_avx(values: &[f32]) -> f32 {
+///     values.iter().sum()
+/// }
+///
+/// fn sum(values: &[f32]) -> f32 {
+///     match kernel::has_avx() {
+///         // SAFETY: the processor has AVX.
+///         true => unsafe { sum_by_avx(values) },
+///         false => values.iter().sum(),
+///     }
+/// }
+/// ```
+#[must_use]
+pub fn has_avx() -> bool {
+    executive::machine::avx::is_on()
+}
+
 /// The README's app, compiled.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]

@@ -38,3 +38,14 @@ fn four_processors() {
     let run = transcript.of_kind("fork_join").next().expect("a result");
     assert_eq!(run.number_at("joins"), Some(2), "{}", run.text);
 }
+
+/// Bochs refuses to restore what was not saved as the manual says.
+#[test]
+fn preempted_instances_keep_256_bits_of_each_register() {
+    let words = "test=preemption work=halves rounds=1 ms=40";
+    let transcript = bochs::succeed("guest-tests", words, "corei7_skylake_x", 2);
+    let line = transcript.of_kind("preemption").next().expect("a result");
+    assert!(line.text.contains("\"avx\":true"), "{}", line.text);
+    assert_eq!(line.number_at("diverged"), Some(0), "{}", line.text);
+    assert!(line.number_at("preemptions") > Some(0), "{}", line.text);
+}

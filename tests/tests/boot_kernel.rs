@@ -175,7 +175,6 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
         "stack_overflow",
         "write_to_code",
         "undefined_instruction",
-        "avx",
         "nmi",
         "machine_check",
         "double_fault",

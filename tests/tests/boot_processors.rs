@@ -1,11 +1,10 @@
 //! The kernel boots with one processor and with many, on both boards.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use harness::Guest;
+use harness::altered::{qemu_and, qemu_with};
 use tool::protocol::{Status, Transcript};
 use tool::qemu::Ending;
 use tool::{Machine, Mode, system};
@@ -59,22 +58,6 @@ fn four_processors_in_real_time() {
 fn four_processors_in_real_time_on_a_q35() {
     let guest = Guest::new("fork-join").in_real_time();
     boots_with(guest.machine(Machine::Q35), 4);
-}
-
-/// Makes a program that is QEMU with another word in place of one of ours.
-fn qemu_with(other: &str, word: &str) -> PathBuf {
-    qemu_and(&[(other, word)], "")
-}
-
-/// Makes a program that is QEMU with other words in place of ours, and with these added.
-fn qemu_and(changes: &[(&str, &str)], more: &str) -> PathBuf {
-    let program = system::new_log("altered").expect("a file");
-    let change = |(other, word): &(&str, &str)| format!("set -- \"${{@/{other}/{word}}}\"\n");
-    let changes: String = changes.iter().map(change).collect();
-    let script = format!("#!/bin/bash\n{changes}exec qemu-system-x86_64 \"$@\" {more}\n");
-    fs::write(&program, script).expect("the script is written");
-    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
-    program
 }
 
 /// Where nothing takes the status, as on a PC, idle time is skipped until the limit: a core

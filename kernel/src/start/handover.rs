@@ -22,7 +22,7 @@ use executive::machine::known_clock::KnownClock;
 use executive::machine::power::{self, End};
 use executive::machine::this_core::{self, Stacks};
 use executive::machine::{
-    agreement, clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic,
+    agreement, avx, clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic,
     processors, screen, serial,
 };
 use executive::memory::{self, OutOfMemory};
@@ -69,6 +69,11 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
             release: contexts::give_back,
         }
     });
+    if info.value("avx") != Some("off") {
+        // SAFETY: the boot table maps all memory writable, and this is the boot processor's
+        // only way.
+        unsafe { avx::turn_on() };
+    }
     let platform = read_platform(info);
     let module = module(info);
     // SAFETY: 1. `boot` handed over with its table in use and the machine's
@@ -210,6 +215,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
             .text("clock", rate.clock)
             .number("counter_khz", rate.khz)
             .flag("x2apic", local_apic::is_x2apic())
+            .flag("avx", avx::is_on())
             .flag("clock_undisputed", rate.is_undisputed());
         if let Some((clock, khz)) = rate.check {
             line.text("clock_check", clock)

@@ -19,6 +19,7 @@
 //! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
 //! | `end=halt\|off\|reset` | what the machine does after the verdict, if no host ends it; it holds from the start on | `halt` |
 //! | `clock=acpi-pm-timer\|hpet\|local-apic-1ghz\|pit` | by which clock time is measured at the start | the first of them that counts |
+//! | `avx=on\|off` | whether functions can use AVX, where the processor has it | `on` |
 //! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left them so, they stay | `off` |
 
 use alloc::format;
@@ -79,6 +80,8 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     options.choice("end", &[("halt", ()), ("off", ()), ("reset", ())])?;
     // So was this, and what is wrong has been refused.
     options.text("clock");
+    // As were these; what is wrong is refused here.
+    options.choice("avx", &[("on", ()), ("off", ())])?;
     options.choice("x2apic", &[("off", ()), ("on", ())])?;
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;

@@ -4,7 +4,7 @@ use core::arch::asm;
 
 use faults::crimes::Unpunished;
 
-/// Uses a register of AVX, which the kernel does not enable.
+/// Uses a register of AVX, which the word `avx=off` has left off.
 pub(crate) fn use_avx() -> Unpunished {
     // SAFETY: none; the kernel has to report it (see the module).
     unsafe { asm!("vxorps ymm0, ymm0, ymm0", out("xmm0") _) };

@@ -23,6 +23,8 @@ mod sharing;
 mod stalled;
 mod storm;
 mod unnoticed;
+#[allow(unsafe_code, reason = "registers that the compiler would spill")]
+mod upper_halves;
 
 use faults::crimes::{CRIMES, Unpunished};
 use kernel::{Ending, Machine, json};

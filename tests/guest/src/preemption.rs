@@ -3,7 +3,8 @@
 //! Six fork-join DAGs of different rates share the cores, the faster ones with
 //! the higher priorities. Each instance repeats work whose result it knows: a
 //! register or a byte that a preemption, or a move to another core, does not
-//! restore shows as a difference.
+//! restore shows as a difference. With `work=halves` the registers are those of AVX, where
+//! there are any.
 
 use alloc::format;
 use alloc::string::String;
@@ -17,23 +18,46 @@ use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use kernel::{Ending, Machine, json};
 
 use crate::checksum::checksum;
+use crate::upper_halves;
+
+/// Reports whether work was right whose result is this checksum.
+type Check = fn(expected: u64) -> bool;
+
+const WORKS: [(&str, Check); 2] = [
+    ("checksum", |expected| checksum() == expected),
+    ("halves", upper_halves::are_kept_besides_others),
+];
 
 /// The periods in milliseconds; the shortest gets the highest priority.
 const PERIODS_MS: [u64; 6] = [2, 3, 5, 7, 11, 13];
 
-/// How often each instance repeats its work: about 0.15 ms, 70 % of one core in all.
-const ROUNDS: u32 = 12;
+/// How often each instance repeats its work, if no word says so: about 0.15 ms, 70 % of one
+/// core in all.
+const ROUNDS: u64 = 12;
+
+/// What each instance does.
+struct Work {
+    check: Check,
+    rounds: u64,
+    diverged: AtomicU64,
+}
 
 /// Runs the DAGs for `ms` milliseconds of releases.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let ms = options.number("ms", 1..=3_600_000, 500)?;
-    options.finish(&["test", "ms"])?;
+    let check = options.choice("work", &WORKS)?;
+    let rounds = options.number("rounds", 1..=1_000_000, ROUNDS)?;
+    options.finish(&["test", "ms", "work", "rounds"])?;
 
-    let diverged = Arc::new(AtomicU64::new(0));
+    let work = Arc::new(Work {
+        check,
+        rounds,
+        diverged: AtomicU64::new(0),
+    });
     let dags: Vec<Dag> = (0..)
         .zip(PERIODS_MS)
-        .map(|(priority, period_ms)| fork_join(priority, period_ms, ms, &diverged))
+        .map(|(priority, period_ms)| fork_join(priority, period_ms, ms, &work))
         .collect();
     finish_create_dags(&dags)?;
     let run = machine.run()?;
@@ -41,7 +65,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let violations = run.violations().count() as u64;
     // In real time the host may take a core away for longer.
     let passed_over = run.dispatch_violations(50_000).unwrap_or_default();
-    let diverged = diverged.load(Ordering::Relaxed);
+    let diverged = work.diverged.load(Ordering::Relaxed);
     let instances = || run.record().all_instances(run.task_set());
     json::emit("preemption", |line| {
         line.number("instances", instances().count() as u64)
@@ -54,6 +78,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
             .number("diverged", diverged)
             .number("violations", violations)
             .number("passed_over", passed_over.len() as u64)
+            .flag("avx", kernel::has_avx())
             .number("cpus", machine.cores());
     });
     if diverged + violations > 0 {
@@ -64,7 +89,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
 }
 
 /// Builds source -> three parallel subtasks -> sink, all of one priority.
-fn fork_join(priority: u32, period_ms: u64, ms: u64, diverged: &Arc<AtomicU64>) -> Dag {
+fn fork_join(priority: u32, period_ms: u64, ms: u64, work: &Arc<Work>) -> Dag {
     let period = Duration::from_millis(period_ms);
     let dag = create_dag();
     dag.name(&format!("every-{period_ms}-ms"))
@@ -81,16 +106,16 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, diverged: &Arc<AtomicU64>) 
     };
     dag.register_periodic_subtask(count, vec![&start], period, attributes("source"));
     for part in &parts {
-        let diverged = diverged.clone();
-        let work = move |(job,): (u64,)| {
-            compute(&diverged);
+        let work = work.clone();
+        let pass = move |(job,): (u64,)| {
+            work.compute();
             (job,)
         };
-        dag.register_subtask(work, vec![&start], vec![part], attributes(part));
+        dag.register_subtask(pass, vec![&start], vec![part], attributes(part));
     }
-    let diverged = diverged.clone();
+    let work = work.clone();
     let join = move |(a, b, c): (u64, u64, u64)| {
-        compute(&diverged);
+        work.compute();
         assert!(a == b && b == c, "a join of the jobs {a}, {b} and {c}");
     };
     let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
@@ -98,11 +123,13 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, diverged: &Arc<AtomicU64>) 
     dag
 }
 
-fn compute(diverged: &AtomicU64) {
-    let expected = checksum();
-    for _ in 0..ROUNDS {
-        if checksum() != expected {
-            diverged.fetch_add(1, Ordering::Relaxed);
+impl Work {
+    fn compute(&self) {
+        let expected = checksum();
+        for _ in 0..self.rounds {
+            if !(self.check)(expected) {
+                self.diverged.fetch_add(1, Ordering::Relaxed);
+            }
         }
     }
 }

@@ -98,19 +98,25 @@ impl fmt::Display for Registers {
     }
 }
 
-/// Vector state (x87 and SSE), then registers.
+/// What x87, SSE and AVX take of a save area: 512 bytes as `fxsave64` writes them, a header
+/// of 64 that says which parts are there, and the upper halves (Intel SDM 1, 13.4).
+pub(super) const VECTOR_BYTES: usize = 832;
+
+/// Vector state, then registers.
 #[derive(Debug)]
 #[repr(C, align(64))]
 struct SaveArea {
-    vector_state: [u8; 512],
+    vector_state: [u8; VECTOR_BYTES],
     registers: Registers,
 }
 
 const _: () = {
     // `interrupt.s` relies on each of these.
     assert!(size_of::<Registers>() == 22 * 8);
-    assert!(core::mem::offset_of!(SaveArea, registers) == 512);
-    assert!((512 + size_of::<Registers>()).is_multiple_of(16));
+    assert!(core::mem::offset_of!(SaveArea, registers) == VECTOR_BYTES);
+    assert!((VECTOR_BYTES + size_of::<Registers>()).is_multiple_of(16));
+    // What `xsaveopt64` writes to begins on a multiple of 64.
+    assert!(VECTOR_BYTES.is_multiple_of(64));
 };
 
 /// A computation with a stack of its own.
@@ -161,7 +167,7 @@ impl Context {
 
     /// Returns where `interrupt.s` keeps this context's registers.
     pub(super) fn registers(&self) -> *mut Registers {
-        self.save_area.get().wrapping_byte_add(512).cast()
+        self.save_area.get().wrapping_byte_add(VECTOR_BYTES).cast()
     }
 
     /// Returns the upper end of the context's stack.
@@ -230,13 +236,18 @@ impl Parked {
         /// The state after FNINIT, and MXCSR's state after reset (Intel SDM 1,
         /// 8.1.5 and 10.2.3): every exception masked, full precision.
         const CONTROL: [(usize, [u8; 2]); 2] = [(0, [0x7f, 0x03]), (24, [0x80, 0x1f])];
-        let mut vector_state = [0; 512];
+        let mut vector_state = [0; VECTOR_BYTES];
         for (offset, value) in CONTROL {
             vector_state[offset..offset + 2].copy_from_slice(&value);
         }
         let save_area = SaveArea {
             vector_state,
-            registers: Registers::default(),
+            // The segments stay these: all code has them.
+            registers: Registers {
+                cs: u64::from(super::descriptors::CODE),
+                ss: 0,
+                ..Registers::default()
+            },
         };
         Self(Box::leak(Box::new(Context {
             save_area: UnsafeCell::new(save_area),
@@ -258,14 +269,16 @@ impl Parked {
         // SAFETY: `&mut self` is the one holder of a context that does not run
         // (context invariant).
         let registers = unsafe { &mut *self.0.registers() };
+        let parts: *mut u64 = self.0.save_area.get().wrapping_byte_add(512).cast();
+        // No upper halves of vectors are in use; others' would be saved and restored in vain.
+        // SAFETY: likewise; the header begins with the parts that were saved.
+        unsafe { parts.write(0) };
         // What a function finds in the others means nothing to it.
         registers.rbp = 0;
         registers.rip = entry as *const () as u64;
-        registers.cs = u64::from(super::descriptors::CODE);
         registers.rflags = Registers::INTERRUPTS_ENABLED;
         // As after a call: a function expects the stack to be 8 off.
         registers.rsp = self.0.stack_top - 8;
-        registers.ss = 0;
     }
 
     /// Notes that the context is suspended from `now_ns` on.

@@ -7,7 +7,7 @@
 use core::arch::global_asm;
 use core::panic::Location;
 
-use super::context::{Parked, Registers};
+use super::context::{Parked, Registers, VECTOR_BYTES};
 use super::fault::{self, Exception};
 use super::once::Once;
 use super::this_core::Core;
@@ -21,6 +21,7 @@ global_asm!(
     handle_interrupt = sym handle_interrupt,
     handle_exception = sym handle_exception,
     handler_stack = const this_core::HANDLER_STACK_OFFSET,
+    vector_bytes = const VECTOR_BYTES,
 );
 
 unsafe extern "C" {
@@ -112,7 +113,8 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
     this_core::get().context().registers()
 }
 
-/// Handles one exception and returns the registers to resume.
+/// Handles one exception and returns the registers to resume, or null for those of the code
+/// that was interrupted.
 extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
     // SAFETY: `interrupt.s` passes the registers it pushed to the exception's
     // own stack, where nobody else looks.
@@ -125,9 +127,8 @@ extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
     let mut exception = Exception::new(pushed);
     if is_message && non_maskable::is_accusation() {
         if pushed.are_interrupts_enabled() {
-            // The host has not let this core run. It takes its interrupts now. The
-            // registers lie there as in a save area, below them the vector state.
-            return registers;
+            // The host has not let this core run. It takes its interrupts now.
+            return core::ptr::null_mut();
         }
         exception.name = "interrupts disabled for seconds";
     }

@@ -9,9 +9,13 @@
 # Exceptions (below 32) arrive on stacks of their own (IST 2 to 5) and are
 # handled there, in the same layout.
 #
-# The layout, from low to high: 512 bytes of vector state, then `Registers`.
-# Compiled code uses vector registers and the red zone everywhere: hence the
-# fxsave, and hence no handler ever pushes to the interrupted stack.
+# The layout, from low to high: vector state, then `Registers`. Compiled code uses
+# vector registers and the red zone everywhere: hence the fxsave, and hence no handler
+# ever pushes to the interrupted stack.
+#
+# Where AVX is on, `avx.rs` puts xsaveopt and xrstor in the place of two instructions.
+# Those take the parts of the state that edx:eax names, of what the processor was told to
+# have: all, as edx names parts that there are not. The others ignore eax.
 
 .section .text.interrupt_entry, "ax"
 
@@ -56,31 +60,25 @@ interrupt_stubs:
 
 interrupt_common:
     save_registers
-    fxsave64 [rsp - 512]
+    mov eax, -1
+.global save_vectors
+save_vectors:
+    fxsave64 [rsp - {vector_bytes}]
     mov rdi, rsp
     mov rsp, gs:[{handler_stack}]
     call {handle_interrupt}
-    jmp resume_registers
+resume_rax:
+    mov rsp, rax
 
-exception_common:
-    save_registers
-    lea rdi, [rsp]
-    sub rsp, 512
-    fxsave64 [rsp]
-    call {handle_exception}
-
-    jmp resume_registers
-
-# Resumes the context whose register area is at rdi, from anywhere in code that
+# Resumes the context whose register area rsp points to, from anywhere in code that
 # has interrupts disabled and will not go on.
 .global resume_context
 resume_context:
-    mov rax, rdi
-
-# Resumes the context whose register area is at rax.
-resume_registers:
-    fxrstor64 [rax - 512]
-    mov rsp, rax
+    mov eax, -1
+.global restore_vectors
+restore_vectors:
+    fxrstor64 [rsp - {vector_bytes}]
+pop_registers:
     pop r15
     pop r14
     pop r13
@@ -98,3 +96,22 @@ resume_registers:
     pop rax
     add rsp, 16                     # vector and error code
     iretq
+
+exception_common:
+    save_registers
+    mov rdi, rsp
+    sub rsp, 512
+    fxsave64 [rsp]
+    call {handle_exception}
+    test rax, rax
+    jnz resume_rax
+    # The interrupted code goes on. The kernel's code keeps the upper halves of vectors.
+    fxrstor64 [rsp]
+    add rsp, 512
+    jmp pop_registers
+
+.section .rodata.vectors_with_avx, "a"
+.global vectors_with_avx
+vectors_with_avx:
+    xsaveopt64 [rsp - {vector_bytes}]
+    xrstor64 [rsp - {vector_bytes}]

@@ -6,6 +6,7 @@
 //! SAFETY comments cite.
 
 pub mod agreement;
+pub mod avx;
 pub mod backtrace;
 pub mod calibration;
 pub mod clock;

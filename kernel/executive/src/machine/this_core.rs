@@ -168,8 +168,26 @@ pub fn all() -> &'static [Core] {
 }
 
 unsafe extern "C" {
-    /// Resumes the context with these registers (`interrupt.s`).
-    fn resume_context(registers: *mut Registers) -> !;
+    /// Resumes the context whose registers the stack pointer points to (`interrupt.s`).
+    fn resume_context() -> !;
+}
+
+/// Resumes the context with these registers.
+///
+/// # Safety
+///
+/// They are those of a context that does not run and that this core has made its own;
+/// interrupts are disabled.
+unsafe fn resume(registers: *mut Registers) -> ! {
+    // SAFETY: the caller's condition is what `interrupt.s` asks for.
+    unsafe {
+        asm!(
+            "mov rsp, {}", "jmp {}",
+            in(reg) registers,
+            sym resume_context,
+            options(noreturn),
+        )
+    }
 }
 
 /// Has this core go on with `next` when the current interrupt's handler
@@ -193,7 +211,7 @@ pub fn abandon_context(next: Parked) -> ! {
     get().run_next(next);
     // SAFETY: the registers are those of a context that does not run and that
     // this core has made its own; interrupts are disabled.
-    unsafe { resume_context(registers) }
+    unsafe { resume(registers) }
 }
 
 /// Leaves the context that runs, for good, for `next`. What was left becomes
@@ -212,7 +230,7 @@ pub(super) unsafe fn leave_context(next: Parked) -> ! {
         .store(core::ptr::from_ref(last).cast_mut(), Ordering::Relaxed);
     // SAFETY: the registers are those of a context that does not run and that
     // this core has made its own; interrupts are disabled (condition 1).
-    unsafe { resume_context(registers) }
+    unsafe { resume(registers) }
 }
 
 /// Takes the context that was left here last, to be restarted or to be given

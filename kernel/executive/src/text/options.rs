@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 18] = [
+const KERNELS: [&str; 19] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -31,6 +31,7 @@ const KERNELS: [&str; 18] = [
     "probe",
     "end",
     "clock",
+    "avx",
     "x2apic",
 ];
 
@@ -286,7 +287,7 @@ mod tests {
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
              budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, measure, \
-             idle, console, status, mode, probe, end, clock, x2apic"
+             idle, console, status, mode, probe, end, clock, avx, x2apic"
         );
     }
 
