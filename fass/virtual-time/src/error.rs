@@ -41,6 +41,13 @@ pub enum RunError {
         /// What happened up to the panic.
         report: Box<Report>,
     },
+    /// A job of a DAG was asked for that is not in the commit.
+    NoSuchDag {
+        /// The name.
+        name: String,
+        /// Those that are there.
+        there: String,
+    },
     /// An instance would finish after `u64::MAX` nanoseconds.
     TimeOverflow {
         /// The DAG.
@@ -69,6 +76,9 @@ impl fmt::Display for RunError {
                 message,
                 ..
             } => write!(f, "{subtask} of {dag} panicked in job {job}: {message}"),
+            Self::NoSuchDag { name, there } => {
+                write!(f, "there is no dag `{name}`; there are {there}")
+            }
             Self::TimeOverflow { dag, subtask, job } => write!(
                 f,
                 "{subtask} of {dag} would finish job {job} after {} ns, the last time there is; \

@@ -31,8 +31,10 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
+mod command;
 mod edge;
 mod error;
+mod job;
 mod platform;
 mod record;
 mod report;
@@ -51,9 +53,11 @@ pub use sched_dag::{
     CoreId, DagId, DagLabel, DagStatistics, Instance, JobOutcome, SubtaskId, SubtaskLabel,
 };
 
+pub use command::replay_command;
 pub use edge::Divergence;
 pub use error::RunError;
 use error::or_panic;
+pub use job::{JobShown, Passed, SubtaskShown, Value};
 use platform::Machine;
 pub use record::{InstanceRecord, JobRecord, PanicRecord};
 pub use report::Report;
@@ -155,14 +159,7 @@ impl VirtualTime {
         self
     }
 
-    /// Sets whether a started instance may lose its core.
-    ///
-    /// ```
-    /// use fass::Preemption;
-    /// use virtual_time::VirtualTime;
-    ///
-    /// let machine = VirtualTime::new().preemption(Preemption::Disabled);
-    /// ```
+    /// Sets whether a started instance may lose its core. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn preemption(self, preemption: Preemption) -> Self {
         self.machine.preemption.set(preemption);
@@ -171,14 +168,7 @@ impl VirtualTime {
 
     /// Sets the costs that the commit adds to each WCET before it answers about
     /// deadlines: those of the machine that the DAGs are meant for. The run
-    /// itself stays without overheads.
-    ///
-    /// ```
-    /// use fass::Overheads;
-    /// use virtual_time::VirtualTime;
-    ///
-    /// let machine = VirtualTime::new().overheads(Overheads::default());
-    /// ```
+    /// itself stays without overheads. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn overheads(self, overheads: Overheads) -> Self {
         self.machine.overheads.set(overheads);
@@ -378,6 +368,16 @@ impl VirtualTime {
     /// ```
     pub fn run_for(&self, duration: Duration) -> Report {
         or_panic(self.try_run_for(duration))
+    }
+
+    /// Runs until a job has ended, or one after it, and returns what its subtasks got and gave:
+    /// what is [recorded](fass::Dag::record) of that. May be called again to go on.
+    ///
+    /// # Errors
+    ///
+    /// See [`RunError`]; `docs/guide.md`, section 12, has an example.
+    pub fn until(&self, dag: &str, job: u64) -> Result<JobShown, RunError> {
+        self.machine.until(dag, job)
     }
 
     /// Runs as [`run`](Self::run) does.

@@ -20,6 +20,7 @@ use sched_dag::analysis::{self, NotAssigned, Settings};
 use sched_dag::{DagId, DagLabel, SchedulerOptions, TaskSet};
 
 use crate::error::RunError;
+use crate::job::JobShown;
 use crate::report::Report;
 use crate::session::Session;
 use crate::surroundings::Surroundings;
@@ -93,6 +94,17 @@ impl Machine {
         session
             .as_ref()
             .map_or(Vec::new(), |session| session.recording(edge))
+    }
+
+    /// Runs until a job of a DAG has ended, and returns what its subtasks got and gave.
+    pub(crate) fn until(self: &Rc<Self>, dag: &str, job: u64) -> Result<JobShown, RunError> {
+        let session = self.session.borrow();
+        let dag = session.as_ref().ok_or(RunError::NothingToRun)?.find(dag)?;
+        drop(session);
+        self.surroundings.until.set(Some((dag, job)));
+        let report = self.run(None);
+        self.surroundings.until.set(None);
+        Ok(JobShown::new(&report?, &self.surroundings.edge, dag, job))
     }
 
     /// Steps the session to its end or for a duration. Meanwhile this machine

@@ -18,6 +18,8 @@ pub(crate) struct Surroundings {
     pub(crate) edge: Edge,
     /// Bytes on their way in and out.
     pub(crate) wires: Wires,
+    /// The job with whose end the run stops.
+    pub(crate) until: Cell<Option<(DagId, u64)>>,
     /// Whether a panic of a function ends its DAG only.
     pub(crate) contains_panics: Cell<bool>,
     /// The time that functions are told: the start of the instance and what it

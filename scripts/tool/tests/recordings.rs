@@ -321,3 +321,30 @@ fn an_independent_reader_opens_the_mcap_file() {
     let wanted = "[('/eye/events', 1), ('/eye/seen', 4999)]\n";
     assert_eq!(counts, wanted, "{}", said(&read));
 }
+
+#[test]
+fn what_is_recorded_of_a_job_is_shown() {
+    let folder = Folder::new("recording-until");
+    let file = folder.write("demo.rec", &recording());
+    let said = |job: &str| {
+        let output = run(&[&file, "--until", job]);
+        (output.status.code(), said(&output))
+    };
+    let (code, shown) = said("eye/4");
+    assert_eq!(code, Some(0), "{shown}");
+    assert_eq!(
+        shown,
+        "job 4 of dag `eye`, due at 4000000 ns\n  4000250 ns, subtask 2, source `seen`: \
+         [\"job \\\"4\\\", \\u000a\",0.1,[-1,7],[]]\n"
+    );
+    assert!(said("eye/70").1.ends_with("source `seen`: lost\n"));
+    for (job, words) in [
+        ("eye", "DAG/JOB is wanted"),
+        ("ear/1", "there is no dag `ear`; there are `eye`"),
+        ("eye/5000", "nothing is recorded of job 5000"),
+    ] {
+        let (code, shown) = said(job);
+        assert_eq!(code, Some(2), "{shown}");
+        assert!(shown.contains(words), "{shown}");
+    }
+}

@@ -12,10 +12,12 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 use fass::{Plan, Recorded};
-use recording::{Channel, DagHeader, Entry, Header, Malformed, What, Writer};
+use recording::{
+    Channel, DagHeader, Entry, Header, Malformed, Recordable, Role, Schema, Shown, What, Writer,
+};
 use sched_dag::journal::{self, Event};
 use sched_dag::law::Record;
-use sched_dag::{DagId, Instance, TaskSet};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use clock::Clock;
 pub use replay::Divergence;
@@ -46,6 +48,17 @@ enum Of {
     Channel(u16),
     /// What an instance was answered that asked for the time.
     Clock(Instance),
+}
+
+/// A value of a job, for people.
+pub(crate) struct Crossed {
+    /// What it is to its DAG; `None`: what a subtask was answered that asked for the time.
+    pub(crate) role: Option<Role>,
+    /// What wrote it, or sampled or asked.
+    pub(crate) subtask: SubtaskId,
+    pub(crate) topic: String,
+    /// The value; `None`: it is lost.
+    pub(crate) json: Option<String>,
 }
 
 fn dag_id(dag: usize) -> Option<DagId> {
@@ -85,8 +98,8 @@ impl Edge {
             replay.fit(&header, &plan.task_set)?;
             let task_set = Arc::make_mut(&mut plan.task_set);
             for dag in (0..header.dags.len()).filter_map(dag_id) {
-                if replay.is_of(dag) {
-                    task_set.queue_overruns(dag);
+                if let Some(jobs) = replay.jobs_of(dag) {
+                    task_set.replay(dag, jobs);
                 }
             }
         }
@@ -173,6 +186,51 @@ impl Edge {
         let (replay, header) = (self.replay.borrow(), self.header.borrow());
         let outcome = |replay: &Replay| replay.outcome(&header, is_over);
         replay.as_ref().map_or((0, 0, None), outcome)
+    }
+
+    /// Reports whether a topic of a DAG is recorded.
+    pub(crate) fn records(&self, dag: DagId, topic: &str) -> bool {
+        let header = self.header.borrow();
+        let mut channels = header.channels.iter();
+        channels.any(|channel| {
+            let is_of = usize::from(channel.dag) == dag.index() && channel.role.is_written();
+            is_of && channel.topic == topic
+        })
+    }
+
+    /// Returns the values of a job so far.
+    pub(crate) fn crossed(&self, dag: DagId, job: u64) -> Vec<Crossed> {
+        let header = self.header.borrow();
+        let times = Vec::<u64>::schema();
+        let shown = |schema: &Schema, bytes: &Option<Vec<u8>>| {
+            let bytes = bytes.as_deref()?;
+            Some(Shown { schema, bytes }.to_string())
+        };
+        let values = self.values.borrow();
+        let of_job = values.iter().filter(|value| value.job == job);
+        let crossed = of_job.map(|value| match value.of {
+            Of::Channel(number) => {
+                let channel = &header.channels[usize::from(number)];
+                let crossed = Crossed {
+                    role: Some(channel.role),
+                    subtask: SubtaskId(channel.subtask.into()),
+                    topic: channel.topic.clone(),
+                    json: shown(&channel.schema, &value.bytes),
+                };
+                (DagId(channel.dag.into()), crossed)
+            }
+            Of::Clock(instance) => {
+                let crossed = Crossed {
+                    role: None,
+                    subtask: instance.subtask,
+                    topic: "the time".into(),
+                    json: shown(&times, &value.bytes),
+                };
+                (instance.dag, crossed)
+            }
+        });
+        let of_dag = crossed.filter(|(of, _)| *of == dag);
+        of_dag.map(|(_, crossed)| crossed).collect()
     }
 
     /// Returns the recording of the run so far.

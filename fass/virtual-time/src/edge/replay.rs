@@ -214,6 +214,17 @@ impl Replay {
         u16::try_from(dag.0).is_ok_and(|dag| self.dags.contains(&dag))
     }
 
+    /// Returns how many jobs of a DAG the recording is of, from job 0 on, if its inputs are
+    /// recorded.
+    pub(super) fn jobs_of(&self, dag: DagId) -> Option<u64> {
+        let dag = u16::try_from(dag.0).ok().filter(|_| self.is_of(dag))?;
+        let mut jobs = self.jobs.range((dag, 0)..=(dag, u64::MAX));
+        Some(
+            jobs.next_back()
+                .map_or(1, |(_, last)| last.saturating_add(1)),
+        )
+    }
+
     /// Returns what the time was for an instance, whenever it asked.
     pub(super) fn clock(&self, instance: Instance) -> Option<Vec<u64>> {
         let (dag, subtask) = narrow(instance)?;

@@ -9,6 +9,7 @@ mod mcap_schema;
 mod summary;
 mod table_in;
 mod table_out;
+mod until;
 
 use std::env;
 use std::ffi::OsString;
@@ -40,6 +41,12 @@ pub static RECORDING: Command = Command {
             "mcap",
             Takes::File("FILE"),
             "Write an MCAP file, with messages in JSON, for Foxglove and others.",
+        ),
+        Opt::new(
+            "until",
+            Takes::Text("DAG/JOB"),
+            "Show all that is recorded of a job. (What its subtasks compute of it is shown by the \
+             app's own replay.)",
         ),
         Opt::new(
             "from-csv",
@@ -126,7 +133,10 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     }
     let bytes = read(file).map_err(Refusal::Usage)?;
     let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
-    print!("{}", summary::of(&recording));
+    match options.text("until") {
+        Some(job) => print!("{}", until::of(&recording, job).map_err(Refusal::Usage)?),
+        None => print!("{}", summary::of(&recording)),
+    }
     if let Some(folder) = options.path("csv") {
         for (name, table) in table_out::tables(&recording) {
             let path = folder.join(name);
@@ -148,7 +158,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
 
 /// Makes sure of the options and of all files, before any is opened.
 fn check(file: &Path, options: &Parsed) -> Result<(), String> {
-    let (of_tables, of_recordings) = (["out", "dag", "topic"], ["csv", "mcap"]);
+    let (of_tables, of_recordings) = (["out", "dag", "topic"], ["csv", "mcap", "until"]);
     let others = ["type", "ignore", "period"];
     if options.is_given("from-csv") {
         if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {

@@ -1,214 +1,54 @@
-//! A plan while it runs: the scheduler's driver, the bodies and the journal.
-//!
-//! The driver is `sched_dag::virtual_time`, the one loop in virtual time; it
-//! asks for the execution time of each instance at its start. [`Runner`] answers
-//! by running the instance's real body and adding up what it executed.
+//! What a run does when its driver says so: bodies run, all else is written down.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
-use std::time::Duration;
 
-use fass::{Body, Plan};
+use fass::Body;
 use sched_dag::Recorder;
 use sched_dag::journal::What;
-use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
-use sched_dag::{
-    CoreId, Dag, DagId, DagLabel, Instance, JobOutcome, Observer, SchedulerOptions, SubtaskLabel,
-    TaskSet,
-};
+use sched_dag::virtual_time::Workload;
+use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, TaskSet};
 
-use crate::edge::Edge;
-use crate::error::RunError;
 use crate::record::PanicRecord;
-use crate::report::Report;
 use crate::surroundings::Surroundings;
-
-/// A plan that runs, or can go on running.
-#[derive(Debug)]
-pub(crate) struct Session {
-    task_set: Arc<TaskSet>,
-    options: SchedulerOptions,
-    driver: Driver,
-    bodies: Vec<Vec<Body>>,
-    /// By DAG, the one that gets a signal when a fault ends it.
-    after_fault: Vec<Option<DagId>>,
-    /// What replaces them after faults.
-    others: Vec<Vec<Vec<Body>>>,
-    recording: Recording,
-}
-
-impl Session {
-    pub(crate) fn new(plan: Plan, options: SchedulerOptions) -> Self {
-        let task_set = plan.task_set;
-        Self {
-            driver: Driver::of_clusters(&task_set, options),
-            options,
-            recording: Recording {
-                journal: Recorder::new(Arc::clone(&task_set)),
-                executed_ns: BTreeMap::new(),
-                panics: Vec::new(),
-                degraded: vec![false; task_set.dags().len()],
-                run_until_ns: 0,
-            },
-            bodies: plan.bodies,
-            after_fault: plan.after_fault,
-            others: plan.others,
-            task_set,
-        }
-    }
-
-    /// Runs for a duration, or to the end.
-    pub(crate) fn run(
-        &mut self,
-        machine: &Surroundings,
-        duration: Option<Duration>,
-    ) -> Result<Report, RunError> {
-        let until_ns = match duration {
-            Some(duration) => {
-                let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
-                self.recording.run_until_ns.saturating_add(ns)
-            }
-            None => {
-                self.require_end()?;
-                u64::MAX
-            }
-        };
-        let mut runner = Runner {
-            task_set: &self.task_set,
-            machine,
-            bodies: &mut self.bodies,
-            after_fault: &self.after_fault,
-            others: &mut self.others,
-            recording: &mut self.recording,
-            panic: None,
-        };
-        let end = self.driver.run_until(until_ns, &mut runner);
-        let panic = runner.panic;
-        self.recording.run_until_ns = until_ns;
-        machine.now_ns.set(match end {
-            End::TimeReached => until_ns,
-            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recording.journal.now_ns,
-        });
-        if let Some(PanicRecord { instance, message }) = panic {
-            return Err(RunError::Panicked {
-                dag: self.dag_label(instance.dag),
-                subtask: self.subtask_label(instance),
-                job: instance.job,
-                message,
-                report: Box::new(self.report(&machine.edge, false)),
-            });
-        }
-        match end {
-            End::Finished | End::TimeReached | End::Stopped => {
-                Ok(self.report(&machine.edge, end == End::Finished))
-            }
-            End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
-                dag: self.dag_label(instance.dag),
-                subtask: self.subtask_label(instance),
-                job: instance.job,
-            }),
-        }
-    }
-
-    fn require_end(&self) -> Result<(), RunError> {
-        let mut dags = (0..).map(DagId).zip(self.task_set.dags());
-        match dags.find(|(_, dag)| dag.jobs().is_none() && !dag.is_sporadic()) {
-            None => Ok(()),
-            Some((dag, _)) => Err(RunError::Endless {
-                dag: self.dag_label(dag),
-            }),
-        }
-    }
-
-    fn dag_label(&self, id: DagId) -> DagLabel {
-        let name = self.task_set.dag(id).name().to_owned();
-        DagLabel { id, name }
-    }
-
-    fn subtask_label(&self, instance: Instance) -> SubtaskLabel {
-        let id = instance.subtask;
-        let name = self
-            .task_set
-            .dag(instance.dag)
-            .subtask(id)
-            .name()
-            .to_owned();
-        SubtaskLabel { id, name }
-    }
-
-    /// Returns the recording of the run so far.
-    pub(crate) fn recording(&self, edge: &Edge) -> Vec<u8> {
-        let events = &self.recording.journal.events;
-        edge.recording(&self.task_set, events, &self.report(edge, false).record())
-    }
-
-    fn report(&self, edge: &Edge, is_over: bool) -> Report {
-        let (compared, uncompared, divergence) = edge.outcome(is_over);
-        let dags = (0..).map(DagId).zip(self.task_set.dags());
-        let sink_misses = |(dag, model): (DagId, &Dag)| {
-            let sinks = model.sinks().iter();
-            sinks
-                .map(|&sink| self.driver.scheduler_of(dag).sink_misses(dag, sink))
-                .collect()
-        };
-        let sink_misses = dags.clone().map(sink_misses).collect();
-        let statistics = dags.map(|(dag, _)| *self.driver.scheduler_of(dag).statistics(dag));
-        let Recording {
-            journal,
-            panics,
-            degraded,
-            ..
-        } = &self.recording;
-        let mut report = Report {
-            instances: Vec::new(),
-            jobs: Vec::new(),
-            panics: panics.clone(),
-            degraded: degraded.clone(),
-            events: journal.events.clone(),
-            statistics: statistics.collect(),
-            sink_misses,
-            end_ns: journal.now_ns,
-            compared,
-            uncompared,
-            divergence,
-            task_set: Arc::clone(&self.task_set),
-            options: self.options,
-        };
-        report.look_at_events(&self.recording.executed_ns);
-        report
-    }
-}
 
 /// What is written down of a run.
 #[derive(Debug)]
-struct Recording {
-    journal: Recorder,
+pub(super) struct Recording {
+    pub(super) journal: Recorder,
     /// How long each instance executes in all.
-    executed_ns: BTreeMap<Instance, u64>,
+    pub(super) executed_ns: BTreeMap<Instance, u64>,
     /// The contained panics.
-    panics: Vec<PanicRecord>,
+    pub(super) panics: Vec<PanicRecord>,
     /// For each DAG whether a subtask of it has fallen back.
-    degraded: Vec<bool>,
-    run_until_ns: u64,
+    pub(super) degraded: Vec<bool>,
+    pub(super) run_until_ns: u64,
 }
 
 /// The workload of the driver: runs bodies, and passes all else to the recorder.
-struct Runner<'s> {
-    task_set: &'s TaskSet,
-    machine: &'s Surroundings,
-    bodies: &'s mut [Vec<Body>],
-    after_fault: &'s [Option<DagId>],
-    others: &'s mut [Vec<Vec<Body>>],
-    recording: &'s mut Recording,
+pub(super) struct Runner<'s> {
+    pub(super) task_set: &'s TaskSet,
+    pub(super) machine: &'s Surroundings,
+    pub(super) bodies: &'s mut [Vec<Body>],
+    pub(super) after_fault: &'s [Option<DagId>],
+    pub(super) others: &'s mut [Vec<Vec<Body>>],
+    pub(super) recording: &'s mut Recording,
     /// The panic that fails the run and stops it. In what is left of its instant
     /// nothing runs, and nothing is recorded.
-    panic: Option<PanicRecord>,
+    pub(super) panic: Option<PanicRecord>,
+    /// Whether the job has ended at which the run shall stop.
+    pub(super) has_arrived: bool,
 }
 
 impl Runner<'_> {
     fn body(&mut self, instance: Instance) -> &mut Body {
         &mut self.bodies[instance.dag.index()][instance.subtask.index()]
+    }
+
+    /// Notes that a job of a DAG is over, and with it those before.
+    fn arrive_at(&mut self, dag: DagId, job: u64) {
+        let until = self.machine.until.get();
+        self.has_arrived |= until.is_some_and(|(of, last)| of == dag && last <= job);
     }
 
     /// Notes the next recorded signal of a DAG, if there is one.
@@ -303,7 +143,7 @@ impl Workload for Runner<'_> {
     }
 
     fn stops(&self) -> bool {
-        self.panic.is_some()
+        self.panic.is_some() || self.has_arrived
     }
 
     fn instant(&mut self, now_ns: u64) {
@@ -347,6 +187,7 @@ impl Observer for Runner<'_> {
 
     fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
         self.recording.journal.skipped(dag, job, release_ns);
+        self.arrive_at(dag, job);
         self.signal_next(dag);
     }
 
@@ -374,6 +215,7 @@ impl Observer for Runner<'_> {
 
     fn ended(&mut self, dag: DagId) {
         self.recording.journal.ended(dag);
+        self.arrive_at(dag, u64::MAX);
         // Nothing but a fault ends a DAG here.
         if let Some(handler) = self.after_fault[dag.index()] {
             self.machine
@@ -392,5 +234,6 @@ impl Observer for Runner<'_> {
 
     fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
         self.recording.journal.job_completed(dag, job, outcome);
+        self.arrive_at(dag, job);
     }
 }

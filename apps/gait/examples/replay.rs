@@ -1,0 +1,22 @@
+//! Replays a recorded walk on the host; `--until gait/JOB` shows what each subtask got and gave.
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use fass::finish_create_dags;
+use gait::filter::Quaternion;
+use gait::{Sample, TOPIC, build};
+use recording::Recording;
+
+fn main() -> ExitCode {
+    virtual_time::replay_command(commit)
+}
+
+fn commit(file: &'static [u8]) -> Result<(), Box<dyn Error>> {
+    let (dag, _walk) = build(&Recording::read(file)?)?;
+    dag.record::<Sample>(TOPIC)
+        .record::<Quaternion>("upper")
+        .record::<Quaternion>("lower");
+    finish_create_dags(&[dag])?;
+    Ok(())
+}

@@ -1,0 +1,156 @@
+//! The command by which an app replays its recordings on the host.
+
+use std::error::Error;
+use std::ffi::OsString;
+use std::process::ExitCode;
+use std::{env, fs};
+
+use fass::Policy;
+
+use crate::job::JobShown;
+use crate::platform;
+use crate::report::Report;
+
+const USAGE: &str = "\
+Replays a recording of this app in virtual time, and compares what it computes.
+
+usage: FILE [--until DAG/JOB] [--cores N] [--policy edf|static]
+
+--until shows what the subtasks of a job got and gave, as far as it is recorded. Without it the
+first job is shown in which a function panics, if one does.
+
+exit codes: 0 nothing differs; 1 something does, a function panics, or there is no such job;
+2 a refused command line or file";
+
+/// What the words of the command line say.
+struct Words {
+    file: OsString,
+    until: Option<(String, u64)>,
+    cores: u32,
+    policy: Policy,
+}
+
+/// Replays the recording that the command line names, in the `main` of an app's example;
+/// `--until DAG/JOB` stops at a job and shows what its subtasks got and gave, and `--help` says
+/// the rest. `commit` gets the file's bytes, builds the app's DAGs and commits them.
+///
+/// ```no_run
+/// use std::process::ExitCode;
+/// use fass::{create_dag, finish_create_dags};
+///
+/// fn main() -> ExitCode {
+///     virtual_time::replay_command(|_file| {
+///         let dag = create_dag(); // and all that belongs to it
+///         finish_create_dags(&[dag])?;
+///         Ok(())
+///     })
+/// }
+/// ```
+pub fn replay_command(
+    commit: impl FnOnce(&'static [u8]) -> Result<(), Box<dyn Error>>,
+) -> ExitCode {
+    let words: Vec<OsString> = env::args_os().skip(1).collect();
+    if words.iter().any(|word| word == "--help" || word == "-h") {
+        println!("{USAGE}");
+        return ExitCode::SUCCESS;
+    }
+    let result = read(words).and_then(|words| replay(&words, commit));
+    result.unwrap_or_else(|line| {
+        eprintln!("replay: {line}");
+        ExitCode::from(2)
+    })
+}
+
+fn read(words: Vec<OsString>) -> Result<Words, String> {
+    let mut read = Words {
+        file: OsString::new(),
+        until: None,
+        cores: 1,
+        policy: Policy::Edf,
+    };
+    let mut words = words.into_iter();
+    while let Some(word) = words.next() {
+        let text = word.to_string_lossy();
+        if !text.starts_with("--") {
+            read.file = word;
+            continue;
+        }
+        let value = words.next().unwrap_or_default();
+        let value = value.to_string_lossy();
+        let refused = |wanted| format!("`{text} {value}`: {wanted} is wanted");
+        match &*text {
+            "--until" => {
+                let parts = value.rsplit_once('/');
+                let parts = parts.and_then(|(dag, job)| Some((dag.into(), job.parse().ok()?)));
+                read.until = Some(parts.ok_or_else(|| refused("DAG/JOB"))?);
+            }
+            "--cores" => {
+                let cores = value.parse().ok().filter(|cores| (1..=64).contains(cores));
+                read.cores = cores.ok_or_else(|| refused("a number from 1 to 64"))?;
+            }
+            "--policy" => {
+                read.policy = match &*value {
+                    "edf" => Policy::Edf,
+                    "static" => Policy::StaticPriority,
+                    _ => return Err(refused("`edf` or `static`")),
+                }
+            }
+            _ => return Err(format!("there is no option `{text}`; see --help")),
+        }
+    }
+    match read.file.is_empty() {
+        true => Err("which file? name a recording; see --help".into()),
+        false => Ok(read),
+    }
+}
+
+fn replay(
+    words: &Words,
+    commit: impl FnOnce(&'static [u8]) -> Result<(), Box<dyn Error>>,
+) -> Result<ExitCode, String> {
+    let place = words.file.to_string_lossy();
+    let bytes = fs::read(&words.file).map_err(|error| format!("{place}: {error}"))?;
+    // An app keeps what it reads for as long as it runs, as on its machine.
+    let bytes: &'static [u8] = bytes.leak();
+    let machine = platform::make_current();
+    machine.cores.set(words.cores);
+    machine.policy.set(words.policy);
+    let surroundings = &machine.surroundings;
+    surroundings.contains_panics.set(true);
+    let replay = surroundings.edge.replay(bytes);
+    replay.map_err(|malformed| format!("{place}: {malformed}"))?;
+    commit(bytes).map_err(|error| error.to_string())?;
+    if let Some((dag, job)) = &words.until {
+        let shown = machine
+            .until(dag, *job)
+            .map_err(|error| error.to_string())?;
+        println!("{shown}");
+        return Ok(ExitCode::from(u8::from(shown.times.is_none())));
+    }
+    let report = machine.run(None).map_err(|error| error.to_string())?;
+    println!("{}", summary(&report));
+    let Some(panic) = report.panics.first() else {
+        return Ok(ExitCode::from(u8::from(report.divergence.is_some())));
+    };
+    let (dag, job) = (panic.instance.dag, panic.instance.job);
+    println!("{}", JobShown::new(&report, &surroundings.edge, dag, job));
+    Ok(ExitCode::FAILURE)
+}
+
+fn summary(report: &Report) -> String {
+    let compared = report.compared;
+    let differs = match &report.divergence {
+        Some(divergence) => divergence.to_string(),
+        None if report.uncompared == 0 => "nothing differs".into(),
+        None => "nothing differs of the others".into(),
+    };
+    let uncompared = match report.uncompared {
+        0 => String::new(),
+        count => format!(", {count} are not"),
+    };
+    let panics = match report.panics.len() {
+        0 => String::new(),
+        count => format!("\n{count} panics, first of all in this job:"),
+    };
+    format!("{compared} values are compared{uncompared}: {differs}{panics}")
+}

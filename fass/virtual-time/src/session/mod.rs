@@ -1,0 +1,205 @@
+//! A plan while it runs: the scheduler's driver, the bodies and the journal.
+//!
+//! The driver is `sched_dag::virtual_time`, the one loop in virtual time; it
+//! asks for the execution time of each instance at its start. [`Runner`] answers
+//! by running the instance's real body and adding up what it executed.
+
+mod runner;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use fass::{Body, Plan};
+use sched_dag::Recorder;
+use sched_dag::virtual_time::{End, VirtualTime as Driver};
+use sched_dag::{Dag, DagId, DagLabel, Instance, SchedulerOptions, SubtaskLabel, TaskSet};
+
+use crate::edge::Edge;
+use crate::error::RunError;
+use crate::record::{JobRecord, PanicRecord};
+use crate::report::Report;
+use crate::surroundings::Surroundings;
+use runner::{Recording, Runner};
+
+/// A plan that runs, or can go on running.
+#[derive(Debug)]
+pub(crate) struct Session {
+    task_set: Arc<TaskSet>,
+    options: SchedulerOptions,
+    driver: Driver,
+    bodies: Vec<Vec<Body>>,
+    /// By DAG, the one that gets a signal when a fault ends it.
+    after_fault: Vec<Option<DagId>>,
+    /// What replaces them after faults.
+    others: Vec<Vec<Vec<Body>>>,
+    recording: Recording,
+}
+
+impl Session {
+    pub(crate) fn new(plan: Plan, options: SchedulerOptions) -> Self {
+        let task_set = plan.task_set;
+        Self {
+            driver: Driver::of_clusters(&task_set, options),
+            options,
+            recording: Recording {
+                journal: Recorder::new(Arc::clone(&task_set)),
+                executed_ns: BTreeMap::new(),
+                panics: Vec::new(),
+                degraded: vec![false; task_set.dags().len()],
+                run_until_ns: 0,
+            },
+            bodies: plan.bodies,
+            after_fault: plan.after_fault,
+            others: plan.others,
+            task_set,
+        }
+    }
+
+    /// Returns the number of the DAG of this name.
+    pub(crate) fn find(&self, name: &str) -> Result<DagId, RunError> {
+        let dags = (0..).map(DagId).zip(self.task_set.dags());
+        let mut of_name = dags.clone().filter(|(_, dag)| dag.name() == name);
+        of_name.next().map(|(dag, _)| dag).ok_or_else(|| {
+            let there = dags.map(|(_, dag)| format!("`{}`", dag.name()));
+            RunError::NoSuchDag {
+                name: name.into(),
+                there: there.collect::<Vec<String>>().join(", "),
+            }
+        })
+    }
+
+    /// Runs for a duration, or to the end; in either case not beyond the end of the job that the
+    /// machine shall stop at.
+    pub(crate) fn run(
+        &mut self,
+        machine: &Surroundings,
+        duration: Option<Duration>,
+    ) -> Result<Report, RunError> {
+        let until = machine.until.get();
+        let until_ns = match duration {
+            Some(duration) => {
+                let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+                self.recording.run_until_ns.saturating_add(ns)
+            }
+            None => {
+                if until.is_none() {
+                    self.require_end()?;
+                }
+                u64::MAX
+            }
+        };
+        let report = || self.report(&machine.edge, false);
+        let has_arrived = until.is_some_and(|(dag, last)| {
+            let is_behind = |job: &JobRecord| job.dag == dag && job.job >= last;
+            (report().jobs.iter()).any(|job| is_behind(job) && job.finish_ns.is_some())
+        });
+        let mut runner = Runner {
+            task_set: &self.task_set,
+            machine,
+            bodies: &mut self.bodies,
+            after_fault: &self.after_fault,
+            others: &mut self.others,
+            recording: &mut self.recording,
+            panic: None,
+            has_arrived,
+        };
+        let end = self.driver.run_until(until_ns, &mut runner);
+        let panic = runner.panic;
+        self.recording.run_until_ns = match end {
+            End::Stopped => self.recording.journal.now_ns,
+            _ => until_ns,
+        };
+        machine.now_ns.set(match end {
+            End::TimeReached => until_ns,
+            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recording.journal.now_ns,
+        });
+        if let Some(PanicRecord { instance, message }) = panic {
+            return Err(RunError::Panicked {
+                dag: self.dag_label(instance.dag),
+                subtask: self.subtask_label(instance),
+                job: instance.job,
+                message,
+                report: Box::new(self.report(&machine.edge, false)),
+            });
+        }
+        match end {
+            End::Finished | End::TimeReached | End::Stopped => {
+                Ok(self.report(&machine.edge, end == End::Finished))
+            }
+            End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
+                dag: self.dag_label(instance.dag),
+                subtask: self.subtask_label(instance),
+                job: instance.job,
+            }),
+        }
+    }
+
+    fn require_end(&self) -> Result<(), RunError> {
+        let mut dags = (0..).map(DagId).zip(self.task_set.dags());
+        match dags.find(|(_, dag)| dag.jobs().is_none() && !dag.is_sporadic()) {
+            None => Ok(()),
+            Some((dag, _)) => Err(RunError::Endless {
+                dag: self.dag_label(dag),
+            }),
+        }
+    }
+
+    fn dag_label(&self, id: DagId) -> DagLabel {
+        let name = self.task_set.dag(id).name().to_owned();
+        DagLabel { id, name }
+    }
+
+    fn subtask_label(&self, instance: Instance) -> SubtaskLabel {
+        let id = instance.subtask;
+        let name = self
+            .task_set
+            .dag(instance.dag)
+            .subtask(id)
+            .name()
+            .to_owned();
+        SubtaskLabel { id, name }
+    }
+
+    /// Returns the recording of the run so far.
+    pub(crate) fn recording(&self, edge: &Edge) -> Vec<u8> {
+        let events = &self.recording.journal.events;
+        edge.recording(&self.task_set, events, &self.report(edge, false).record())
+    }
+
+    fn report(&self, edge: &Edge, is_over: bool) -> Report {
+        let (compared, uncompared, divergence) = edge.outcome(is_over);
+        let dags = (0..).map(DagId).zip(self.task_set.dags());
+        let sink_misses = |(dag, model): (DagId, &Dag)| {
+            let sinks = model.sinks().iter();
+            sinks
+                .map(|&sink| self.driver.scheduler_of(dag).sink_misses(dag, sink))
+                .collect()
+        };
+        let sink_misses = dags.clone().map(sink_misses).collect();
+        let statistics = dags.map(|(dag, _)| *self.driver.scheduler_of(dag).statistics(dag));
+        let Recording {
+            journal,
+            panics,
+            degraded,
+            ..
+        } = &self.recording;
+        let mut report = Report {
+            instances: Vec::new(),
+            jobs: Vec::new(),
+            panics: panics.clone(),
+            degraded: degraded.clone(),
+            events: journal.events.clone(),
+            statistics: statistics.collect(),
+            sink_misses,
+            end_ns: journal.now_ns,
+            compared,
+            uncompared,
+            divergence,
+            task_set: Arc::clone(&self.task_set),
+            options: self.options,
+        };
+        report.look_at_events(&self.recording.executed_ns);
+        report
+    }
+}
