@@ -27,8 +27,8 @@ use tool::image::{self, Image};
 use tool::install;
 use tool::outcome::{Outcome, boot_with_input};
 use tool::protocol::Status;
-use tool::qemu::{Loader, Machine, Mode, Qemu};
-use tool::system;
+use tool::qemu::{Loader, Machine, Mode, Qemu, Second};
+use tool::{system, wire_script};
 
 /// How long a guest may take in wall time if the test does not say: many times what
 /// any takes, so that it ends what hangs and nothing that a busy host makes slow.
@@ -133,6 +133,41 @@ impl Guest {
     pub fn module(mut self, file: &Path) -> Guest {
         self.qemu.module = Some(file.into());
         self
+    }
+
+    /// Lets bytes arrive on the app's wire, as a file of `run --input` has them.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the file is wrong, or cannot be written.
+    #[must_use]
+    pub fn input(self, text: &str) -> Guest {
+        let entries = wire_script::read(text).unwrap_or_else(|why| panic!("the input:{why}"));
+        let script = wire_script::for_guest(&entries);
+        let file = system::new_log("input").expect("a folder for logs");
+        fs::write(&file, &script).expect("a file in it");
+        self.module(&file).word(&format!("input={}", script.len()))
+    }
+
+    /// Boots the guest, which must succeed, and returns what it has sent on its wire, too. Removes
+    /// the file of its input.
+    ///
+    /// # Panics
+    ///
+    /// As [`succeed`](Self::succeed).
+    #[must_use]
+    pub fn succeed_sending(mut self) -> (Outcome, Vec<u8>) {
+        let file = system::new_log("output").expect("a folder for logs");
+        self.qemu.second = Some(Second {
+            is_live: false,
+            output: Some(file.clone()),
+        });
+        let outcome = self.succeed();
+        let sent = fs::read(&file).expect("QEMU writes it");
+        for file in self.qemu.module.iter().chain([&file]) {
+            let _ = fs::remove_file(file);
+        }
+        (outcome, sent)
     }
 
     /// Gives the guest a console. Each pair is a text to wait for, in any line that

@@ -16,7 +16,7 @@ use super::fault_verdict::FaultVerdict;
 use super::wcet_notes;
 use crate::report::run::Run;
 use crate::report::{self, Ns};
-use crate::watch::background::{Background, Wishes, session};
+use crate::watch::background::{Background, LINE, Wishes, session};
 use executive::machine;
 use executive::machine::interrupts_off;
 use executive::memory::heap;
@@ -45,7 +45,7 @@ use executive::text::{console, json};
 #[derive(Debug)]
 pub struct Machine {
     pub(crate) options: Options<'static>,
-    pub(crate) module: Option<&'static [u8]>,
+    pub(crate) module: Cell<Option<&'static [u8]>>,
     /// Whether the app has asked for that.
     pub(crate) has_asked: Cell<bool>,
     /// Whether each run's trace is printed after it.
@@ -100,7 +100,7 @@ impl Machine {
     #[must_use]
     pub fn module(&self) -> Option<&'static [u8]> {
         self.has_asked.set(true);
-        self.module
+        self.module.get()
     }
 
     /// Reports whether a person can talk to the kernel during a run (`console=on`), and
@@ -257,6 +257,9 @@ impl Machine {
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
         wcet_notes::note(&run);
+        if let Some(line) = LINE.get() {
+            line.report();
+        }
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }

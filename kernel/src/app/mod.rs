@@ -12,3 +12,4 @@ pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
 mod wcet_notes;
+mod wires;

@@ -43,7 +43,9 @@ const HANDLER_STACK: u64 = 16 * 1024;
 /// Brings up memory and interrupts, then goes on on the core's own stack: the
 /// boot stack has no guard page.
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
-    serial::initialize();
+    serial::FIRST.initialize();
+    // What an app's wire gets from now on waits there.
+    serial::SECOND.initialize();
     let screen = screen_pages(info);
     // The boot table maps no more; what is to be said before the kernel's shows later.
     let is_early = screen.end <= 1 << 32;
@@ -334,7 +336,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
     }
     let machine = Machine {
         options,
-        module,
+        module: Cell::new(module),
         has_asked: Cell::new(false),
         dumps_trace: settings.dump,
         dumps_times: settings.dumps_times,
@@ -345,7 +347,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         bound_verdict: BoundVerdict::new(settings.judges_bounds),
     };
     let result = app(&machine);
-    if result.is_ok() && module.is_some() && !machine.has_asked.get() {
+    if result.is_ok() && machine.module.get().is_some() && !machine.has_asked.get() {
         println!("warning: the app takes no file, and has not looked at the one it was given");
     }
     let result = machine.fault_verdict.judge(result);

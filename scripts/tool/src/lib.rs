@@ -68,6 +68,7 @@ pub mod tail;
 pub mod test;
 pub mod tiny;
 pub mod trace;
+pub mod wire_script;
 
 pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};

@@ -75,6 +75,7 @@ pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> 
         module: None,
         loader: Loader::Pvh,
         has_input: false,
+        second: None,
         wait_for_debugger: false,
         ..machine.clone()
     };

@@ -256,6 +256,14 @@ impl Wire {
         signal.target()
     }
 
+    /// Reports whether there is a byte that is to go.
+    ///
+    /// For platforms.
+    #[must_use]
+    pub fn has_bytes_to_go(&self) -> bool {
+        !self.shared.outgoing.is_empty()
+    }
+
     /// Takes the next byte that is to go, if there is one.
     ///
     /// For platforms, which have one place that calls this.

@@ -24,7 +24,7 @@ pub fn exit(status: Status) -> ! {
     if this_core::is_ready() {
         non_maskable::stop_others();
     }
-    serial::drain();
+    serial::FIRST.drain();
     power::end();
     cpu::halt_forever()
 }

@@ -25,7 +25,7 @@ pub mod legacy;
 pub mod local_apic;
 mod meter;
 pub mod non_maskable;
-pub(crate) mod once;
+pub mod once;
 pub(crate) mod paging;
 pub(crate) mod port;
 pub mod power;

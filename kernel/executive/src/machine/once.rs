@@ -12,7 +12,7 @@ const FULL: u8 = 2;
 /// **Once invariant**: `value` is written only by the one caller that moved
 /// `state` from `EMPTY` to `WRITING`, and is constant once `state` is `FULL`.
 #[derive(Debug)]
-pub(crate) struct Once<T> {
+pub struct Once<T> {
     state: AtomicU8,
     value: UnsafeCell<Option<T>>,
 }
@@ -23,7 +23,8 @@ unsafe impl<T: Send + Sync> Sync for Once<T> {}
 
 impl<T> Once<T> {
     /// Creates an empty place.
-    pub(crate) const fn new() -> Self {
+    #[allow(clippy::new_without_default, reason = "it is for statics")]
+    pub const fn new() -> Self {
         Self {
             state: AtomicU8::new(EMPTY),
             value: UnsafeCell::new(None),
@@ -31,7 +32,7 @@ impl<T> Once<T> {
     }
 
     /// Fills the place, unless it is full, and returns what is in it.
-    pub(crate) fn set(&self, value: T) -> Result<&T, T> {
+    pub fn set(&self, value: T) -> Result<&T, T> {
         if self
             .state
             .compare_exchange(EMPTY, WRITING, Ordering::Acquire, Ordering::Relaxed)
@@ -47,7 +48,7 @@ impl<T> Once<T> {
     }
 
     /// Returns the value, if it has been set.
-    pub(crate) fn get(&self) -> Option<&T> {
+    pub fn get(&self) -> Option<&T> {
         if self.state.load(Ordering::Acquire) != FULL {
             return None;
         }

@@ -30,7 +30,7 @@ impl Listener {
     /// Raises the signal for each byte that has come.
     pub(super) fn step(&self) {
         for _ in 0..MOST_BYTES {
-            if serial::receive().is_none() {
+            if serial::FIRST.receive().is_none() {
                 return;
             }
             execution::raise(self.plan, self.dag);

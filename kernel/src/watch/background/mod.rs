@@ -24,10 +24,12 @@ pub(crate) mod session;
 mod stall;
 mod status;
 pub(crate) mod watchdog;
+pub(crate) mod wire;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use executive::machine::clock;
+use executive::machine::once::Once;
 use executive::machine::spinlock::SpinLock;
 use executive::run::heartbeat;
 use executive::text::console;
@@ -64,6 +66,28 @@ pub(crate) enum Echo {
     Off,
 }
 
+/// A device that a run serves, besides people. It is reached through this only, so that an
+/// image whose app connects none has no code for it.
+pub(crate) trait Line: Sync {
+    /// Begins a run.
+    fn begin(&self, now_ns: u64);
+
+    /// Takes what has arrived. In core 0's heartbeat.
+    fn beat(&self, now_ns: u64);
+
+    /// Sends some of what is to go, and reports whether there may be more. In the background.
+    fn step(&self) -> bool;
+
+    /// Ends the run: sends the rest.
+    fn end(&self);
+
+    /// Prints what has come and gone.
+    fn report(&self);
+}
+
+/// The device, if the app has connected one.
+pub(crate) static LINE: Once<&'static dyn Line> = Once::new();
+
 /// For how long the background may not run before the heartbeat helps out.
 const STARVED_NS: u64 = 200_000_000;
 
@@ -95,6 +119,9 @@ impl Sliced {
 /// Does in core 0's heartbeat what is its own, and a slice if the background does not
 /// come to it.
 pub(crate) fn beat(now_ns: u64) {
+    if let Some(line) = LINE.get() {
+        line.beat(now_ns);
+    }
     stall::beat(now_ns);
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
@@ -123,6 +150,7 @@ impl Background {
         let periods = [
             (wishes.console.is_some() || wishes.input.is_some()).then_some(session::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
+            LINE.get().map(|_| wire::PERIOD_NS),
         ];
         let periods = periods.into_iter().flatten();
         heartbeat::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
@@ -135,6 +163,9 @@ impl Background {
             RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }
         stall::begin();
+        if let Some(line) = LINE.get() {
+            line.begin(clock::now_ns());
+        }
         Self {
             heartbeat_before_ns: before_ns,
             progress: Progress::new(total),
@@ -150,17 +181,21 @@ impl Background {
         if let Some(listener) = &self.listener {
             listener.step();
         }
+        let has_more = LINE.get().is_some_and(|line| line.step());
         if !self.is_sliced {
-            return false;
+            return has_more;
         }
         RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
-        SLICED.lock().slice(false)
+        SLICED.lock().slice(false) || has_more
     }
 
     /// Ends it. Reports whether a person has asked for the machine to shut down.
     pub(crate) fn end(self) -> bool {
         heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
         stall::end();
+        if let Some(line) = LINE.get() {
+            line.end();
+        }
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;

@@ -77,7 +77,7 @@ impl Session {
             end_what_is_idle(&task_set);
         }
         for _ in 0..MOST_BYTES {
-            let Some(byte) = serial::receive() else {
+            let Some(byte) = serial::FIRST.receive() else {
                 return false;
             };
             if self.echoes {

@@ -1,7 +1,6 @@
 //! The kinds of machine lines that are known, and what each must say.
 //!
-//! `docs/serial-protocol.md` and its two companions describe the same kinds for people; a
-//! test next to the reader makes sure that they leave none out.
+//! `docs/serial-protocol.md` and its two companions have the same kinds; a test compares them.
 
 /// Each known kind and the members that its lines must have; a dot leads into
 /// an object. Members beyond these are allowed.
@@ -36,6 +35,18 @@ pub const KINDS: &[(&str, &[&str])] = &[
         ],
     ),
     ("console", &["command", "accepted"]),
+    (
+        "wire",
+        &[
+            "name",
+            "packets",
+            "bytes",
+            "lost_packets",
+            "malformed",
+            "sent_bytes",
+            "unsent_bytes",
+        ],
+    ),
     (
         "dag_status",
         &[

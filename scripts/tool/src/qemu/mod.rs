@@ -14,6 +14,7 @@
 mod loader;
 mod machine;
 mod process;
+mod second;
 
 use std::ffi::OsString;
 use std::fmt;
@@ -26,6 +27,7 @@ use boot::MOST_COMMAND_LINE_BYTES;
 pub use loader::{Loader, OVMF_FILE};
 pub use machine::Machine;
 pub use process::{Ending, Running};
+pub use second::Second;
 
 /// The name under which QEMU is looked for.
 pub const PROGRAM: &str = "qemu-system-x86_64";
@@ -133,6 +135,8 @@ pub struct Qemu {
     pub module: Option<PathBuf>,
     /// Hand what is written to [`Running::input`] to the guest's serial port.
     pub has_input: bool,
+    /// What the second serial port is connected to; `None`: there is none.
+    pub second: Option<Second>,
     /// Write the address of each instruction that is executed to [`Running::log`].
     pub logs_instructions: bool,
     /// Wait for a debugger on TCP port 1234 before the first instruction.
@@ -152,6 +156,7 @@ impl Default for Qemu {
             guest_words: String::new(),
             module: None,
             has_input: false,
+            second: None,
             logs_instructions: false,
             wait_for_debugger: false,
         }
@@ -181,6 +186,7 @@ impl Qemu {
             port.push(serial);
             arguments.extend(["-serial".into(), port]);
         }
+        arguments.extend(self.second.iter().flat_map(Second::arguments));
         let exit_device = "isa-debug-exit,iobase=0xf4,iosize=0x04";
         arguments.extend(["-device", exit_device].map(OsString::from));
         arguments.extend(["-nodefaults", "-no-user-config"].map(OsString::from));
@@ -246,7 +252,9 @@ impl Qemu {
             log_instructions(&program, &mut arguments);
         }
         command.args(arguments);
-        Running::start(command, serial, self.has_input, self.logs_instructions)
+        let is_live = self.second.as_ref().is_some_and(|second| second.is_live);
+        let has_input = self.has_input || is_live;
+        Running::start(command, serial, has_input, self.logs_instructions)
     }
 }
 

@@ -18,6 +18,7 @@ mod seeing;
 mod status;
 mod table;
 mod wcets;
+mod wire;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -107,8 +108,10 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
-    let inputs = options.named(&["dag", "module", "image", "qemu", "wcets"]);
-    let outputs = options.named(&["serial", "trace", "dot", "witness", "observe"]);
+    wire::check(options)?;
+    let mut inputs = options.named(&["dag", "module", "image", "qemu", "wcets"]);
+    inputs.extend(wire::input(options));
+    let outputs = options.named(&["serial", "trace", "dot", "witness", "observe", "output"]);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     log::check(options).map_err(Refusal::Usage)
 }
@@ -141,7 +144,7 @@ fn boot_app(
     let describe = |mode| {
         let module = dags.and_then(|dags| dags.module.clone());
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
-        qemu.guest_words += &wcets.guest_word();
+        qemu.guest_words += &wcets.guest_words();
         qemu.module = module.or_else(|| wcets.module());
         qemu
     };
@@ -162,7 +165,8 @@ fn boot_app(
         }
     };
     // A person needs time to type, and a firmware takes long where instructions are counted.
-    let otherwise = match options.is_given("console") || longest.loader.needs_stick() {
+    let is_live = options.is_given("console") || wire::is_live(options);
+    let otherwise = match is_live || longest.loader.needs_stick() {
         true => Mode::Threads,
         false => Mode::Deterministic,
     };
@@ -192,6 +196,7 @@ fn boot_app(
     for written in [
         seeing::write_dot(options, &outcome),
         seeing::write_witness(options, &outcome),
+        Ok(wire::warning(options, &outcome)),
     ] {
         if outcome.judge().is_err() {
             // There are worse news.
@@ -304,6 +309,7 @@ fn describe(
         guest_words: words.join(" "),
         module: None,
         has_input: options.is_given("console"),
+        second: wire::second(options),
         logs_instructions: false,
         wait_for_debugger: options.is_given("gdb"),
     }

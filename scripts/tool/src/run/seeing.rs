@@ -73,7 +73,7 @@ pub(super) fn write_witness(options: &Parsed, outcome: &Outcome) -> Result<Optio
     witness::write(path, &commits::read(&outcome.transcript)?).map(Some)
 }
 
-/// Hands standard input on to the guest's serial port, until either ends. At its end the
+/// Hands standard input on to the guest's serial port, until either ends. At its end a console's
 /// last line is ended, too; a run without end is shut down then, for nobody can do so
 /// any more.
 ///
@@ -82,6 +82,7 @@ pub(super) fn write_witness(options: &Parsed, outcome: &Outcome) -> Result<Optio
 pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
     let log = log.to_path_buf();
     let farewell = match options.number("jobs") {
+        _ if !options.is_given("console") => "",
         Some(0) => "\nshutdown\n",
         _ => "\n",
     };

@@ -214,6 +214,18 @@ pub static RUN: Command = Command {
              otherwise, no timeout unless --timeout does, no machine lines unless --json.",
         ),
         Opt::new(
+            "input",
+            Takes::File("FILE"),
+            "Bytes for the app's wire, with their times: lines such as 4ms \"on\\n\"; \
+             docs/wires.md. With - what comes on standard input, in real time unless --mode says \
+             otherwise.",
+        ),
+        Opt::new(
+            "output",
+            Takes::File("FILE"),
+            "Write what the app sends on its wire to this file.",
+        ),
+        Opt::new(
             "append",
             Takes::Text("WORDS"),
             "More words for the guest's command line.",

@@ -1,18 +1,20 @@
-//! What `--wcets FILE` and `--module FILE` hand to the guest: both in one boot module, the WCETs
-//! first.
+//! What `--wcets FILE`, `--module FILE` and `--input FILE` hand to the guest: all in one boot
+//! module, in this order.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::Refusal;
+use super::{Refusal, wire};
 use crate::files;
 use crate::options::Parsed;
 use crate::proof::wcets;
 use crate::system;
 
-/// A file of WCETs on its way to the guest; empty if none is given.
+/// Files on their way to the guest; empty if none is given.
 pub(super) struct Wcets {
     text: String,
+    /// How many bytes at the module's end are a wire's.
+    input_bytes: usize,
     /// Where the module of both files lies, if there is no other. It is removed with this
     /// value.
     module: Temporary,
@@ -29,19 +31,21 @@ impl Drop for Temporary {
 }
 
 impl Wcets {
-    /// Reads the files that `--wcets` and `--module` name, if they do, and writes a module of
-    /// them unless DAGs of a file are the module.
+    /// Reads the files that `--wcets`, `--module` and `--input` name, if they do, and writes a
+    /// module of them unless DAGs of a file are the module.
     pub(super) fn read(options: &Parsed, is_alone: bool) -> Result<Wcets, Refusal> {
         let read = |path: &Path| wcets::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
         let own = options.path("module").map(read_module).transpose()?;
+        let input = wire::script(options)?;
         let mut module = Temporary(None);
-        if is_alone && (text.is_some() || own.is_some()) {
+        if is_alone && (text.is_some() || own.is_some() || !input.is_empty()) {
             let path = system::new_log("module").map_err(Refusal::Failure)?;
             let path = path.with_extension("module");
             let parts = [
                 text.as_deref().unwrap_or_default().as_bytes(),
                 &own.unwrap_or_default(),
+                &input,
             ];
             let written = fs::write(&path, parts.concat());
             module.0 = Some(path.clone());
@@ -51,6 +55,7 @@ impl Wcets {
         }
         Ok(Wcets {
             text: text.unwrap_or_default(),
+            input_bytes: input.len(),
             module,
         })
     }
@@ -65,12 +70,14 @@ impl Wcets {
         self.module.0.clone()
     }
 
-    /// Returns the word that tells the guest where the file ends, after a blank.
-    pub(super) fn guest_word(&self) -> String {
-        match self.text.len() {
-            0 => String::new(),
-            bytes => format!(" wcets={bytes}"),
-        }
+    /// Returns the words that tell the guest where the WCETs end and the input begins, each after
+    /// a blank.
+    pub(super) fn guest_words(&self) -> String {
+        let parts = [("wcets", self.text.len()), ("input", self.input_bytes)];
+        let parts = parts.into_iter().filter(|(_, bytes)| *bytes > 0);
+        parts
+            .map(|(name, bytes)| format!(" {name}={bytes}"))
+            .collect()
     }
 }
 

@@ -36,7 +36,7 @@ pub use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, t
 pub use events::{complete, fail, find_work, interrupt};
 pub use runner::Runner;
 use signals::Signals;
-pub use signals::raise;
+pub use signals::{raise, raise_in_interrupt};
 pub use status::{
     Cost, budget_ns, cost_of_fault, is_finished, jobs_ended, lock_acquisitions, next_event_ns,
     running, try_journal, try_names, with_journal,

@@ -87,7 +87,7 @@ pub fn raise(plan: u64, dag: DagId) {
     let were_enabled = interrupt_flag::disable();
     let is_instance = status::running(this_core::get()).is_some();
     if !is_instance {
-        raise_here(plan, dag);
+        raise_in_interrupt(plan, dag);
     }
     if were_enabled {
         interrupt_flag::enable();
@@ -99,8 +99,9 @@ pub fn raise(plan: u64, dag: DagId) {
     );
 }
 
-/// Takes a signal from outside. Interrupts are disabled.
-fn raise_here(plan: u64, dag: DagId) {
+/// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
+/// are disabled.
+pub fn raise_in_interrupt(plan: u64, dag: DagId) {
     let mut place = EXECUTION.lock();
     let Some(execution) = place.as_mut() else {
         return;

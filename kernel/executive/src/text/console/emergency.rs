@@ -40,7 +40,7 @@ fn send(kind: Kind, text: fmt::Arguments<'_>) {
 
 #[inline(never)]
 fn send_byte(byte: u8) {
-    serial::send(byte);
+    serial::FIRST.send(byte);
     screen::put(byte);
 }
 

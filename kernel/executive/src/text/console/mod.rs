@@ -101,15 +101,15 @@ pub fn send_pending_byte() -> bool {
     if !has_pending() {
         return false;
     }
-    let was_ready = serial::wait_until_ready();
+    let was_ready = serial::FIRST.wait_until_ready();
     let mut buffer = BUFFER.lock();
-    if was_ready && !serial::is_ready() {
+    if was_ready && !serial::FIRST.is_ready() {
         // Another core was faster. It is not waited for with the lock held.
         return true;
     }
     let byte = buffer.pop();
     if let Some(byte) = byte {
-        serial::write(byte);
+        serial::FIRST.write(byte);
         screen::put(byte);
     }
     let cell = if byte.is_none() {
@@ -131,7 +131,7 @@ pub fn send_pending_byte() -> bool {
 pub fn send_what_goes_at_once() {
     const MOST_BYTES: usize = 512;
     for _ in 0..MOST_BYTES {
-        if !serial::is_ready() || !send_pending_byte() {
+        if !serial::FIRST.is_ready() || !send_pending_byte() {
             break;
         }
     }

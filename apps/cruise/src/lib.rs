@@ -1,0 +1,114 @@
+//! A car that keeps its distance: a radar says how far the car ahead is, and a motor takes speeds.
+//!
+//! Both are at the ends of one wire. The radar sends lines such as `gap 2350`, in cm; the motor
+//! gets lines such as `speed 1235`, in cm/s. The DAG `cruise` has three subtasks:
+//!
+//! | subtask | takes | gives |
+//! |---|---|---|
+//! | `measure`, the source | what came on the wire | the newest gap, if one is fresh |
+//! | `control` | the gap | a speed |
+//! | `drive`, the sink | the speed | a line on the wire |
+//!
+//! It runs every 10 ms, or, released by packets, at most so often. Without a fresh gap the car
+//! stops. The DAG `clock` does nothing but keep the run going. The code here knows no kernel.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+use alloc::vec;
+use core::fmt::Write;
+use core::time::Duration;
+
+use fass::{Dag, Received, Sender, SubtaskAttributes, Wire, create_dag};
+
+/// The time between two jobs, or the least time.
+pub const PERIOD: Duration = Duration::from_millis(10);
+
+/// For how long a gap is fresh.
+const FRESH_NS: u64 = 50_000_000;
+
+/// The gap to keep, in cm, and the highest speed, in cm/s.
+const WANTED_CM: i32 = 2_000;
+const FASTEST_CM_S: i32 = 3_000;
+
+/// What a packet means: a gap in cm.
+pub type Decoder = fn(&[u8]) -> Option<i32>;
+
+/// What releases a job of `cruise`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Releases {
+    /// The time.
+    Period,
+    /// A packet.
+    Packets,
+}
+
+/// Reads a line such as `gap 2350`.
+#[must_use]
+pub fn careful(line: &[u8]) -> Option<i32> {
+    let gap = str::from_utf8(line).ok()?.strip_prefix("gap ")?;
+    gap.parse().ok().filter(|gap| (0..100_000).contains(gap))
+}
+
+/// Reads such a line as if nothing could be wrong with it: a short one makes it panic.
+#[must_use]
+pub fn trusting(line: &[u8]) -> Option<i32> {
+    let digits = line[4..].iter().map(|digit| i32::from(*digit) - 0x30);
+    Some(digits.fold(0_i32, |gap, digit| gap.wrapping_mul(10).wrapping_add(digit)))
+}
+
+/// Builds the DAGs. Those with a period end after `jobs` jobs.
+pub fn build(wire: &Wire, releases: Releases, decode: Decoder, jobs: u64) -> [Dag; 2] {
+    let taking = |name, us| SubtaskAttributes::named(name).wcet(Duration::from_micros(us));
+    let cruise = create_dag();
+    cruise.name("cruise");
+    let mut newest = None;
+    let measure = move |packets: Received<'_, i32>| {
+        newest = packets.last().or(newest);
+        let age_ns = |received_ns| fass::now_ns().saturating_sub(received_ns);
+        let fresh = newest.filter(|packet| age_ns(packet.received_ns) < FRESH_NS);
+        (fresh.map(|packet| packet.value),)
+    };
+    let receiving = cruise.using(wire.receiving(decode));
+    match releases {
+        Releases::Period => {
+            cruise.jobs(jobs);
+            let attributes = taking("measure", 300);
+            receiving.register_periodic_subtask(measure, vec!["gap"], PERIOD, attributes);
+        }
+        Releases::Packets => {
+            let attributes = taking("measure", 300);
+            // The wire raises the signal.
+            let _ = receiving.register_sporadic_subtask(measure, vec!["gap"], PERIOD, attributes);
+        }
+    }
+    let mut speed = 0_i32;
+    let control = move |(gap,): (Option<i32>,)| {
+        speed = gap.map_or(0, |gap| {
+            (speed + (gap - WANTED_CM) / 10).clamp(0, FASTEST_CM_S)
+        });
+        (speed,)
+    };
+    cruise.register_subtask(control, vec!["gap"], vec!["speed"], taking("control", 100));
+    let drive = |mut wire: Sender<'_>, (speed,): (i32,)| {
+        // Sending never fails: what finds no room is lost, and counted.
+        let _ = writeln!(wire, "speed {speed}");
+    };
+    cruise.using(wire.sending()).register_sink_subtask(
+        drive,
+        vec!["speed"],
+        PERIOD,
+        taking("drive", 100),
+    );
+
+    let clock = create_dag();
+    clock
+        .name("clock")
+        .jobs(jobs)
+        .period(PERIOD)
+        .relative_deadline(PERIOD);
+    clock.register_untyped_subtask(|_job| (), taking("tick", 50));
+    [cruise, clock]
+}

@@ -1,0 +1,52 @@
+//! Boots into a car that keeps its distance, and says how it went.
+
+#![no_std]
+#![no_main]
+
+extern crate alloc;
+
+use alloc::format;
+
+use cruise::{Releases, build, careful, trusting};
+use fass::{Wire, finish_create_dags};
+use kernel::{Ending, Machine, println};
+use sched_dag::DagId;
+
+kernel::entry!(main);
+
+fn main(machine: &Machine) -> Result<(), Ending> {
+    let options = machine.options();
+    let jobs = options.number("jobs", 1..=100_000, 50)?;
+    let releases = [("period", Releases::Period), ("packets", Releases::Packets)];
+    let releases = options.choice("releases", &releases)?;
+    let trusts = options.choice("decoder", &[("careful", false), ("trusting", true)])?;
+    let wire = Wire::new("radar");
+    machine.connect(&wire)?;
+    options.finish(&["jobs", "releases", "decoder", "input"])?;
+    if trusts {
+        machine.accept_faults();
+    }
+
+    let decode = if trusts { trusting } else { careful };
+    let commit = finish_create_dags(&build(&wire, releases, decode, jobs))?;
+    for answer in commit.answers() {
+        println!("{answer}");
+    }
+    let run = machine.run()?;
+    println!();
+    for (id, dag) in (0..).map(DagId).zip(run.task_set().dags()) {
+        let counts = run.statistics(id);
+        println!(
+            "{}: {} jobs complete, {} deadlines missed, {} faults",
+            dag.name(),
+            counts.completed,
+            counts.misses,
+            counts.faults
+        );
+    }
+    println!("{} allocations while jobs ran", run.allocations());
+    match run.violations().count() {
+        0 => Ok(()),
+        count => Err(Ending::Failure(format!("{count} violations"))),
+    }
+}

@@ -1,0 +1,187 @@
+//! Bytes with their times, as a file for `run --input` has them.
+//!
+//! Each line is a time of the run and bytes, as text in quotation marks or as hexadecimal pairs:
+//!
+//! ```text
+//! # A radar says how far the car ahead is.
+//! 4ms "gap 2350\n"
+//! 1500us 67 61 70 0a
+//! ```
+//!
+//! In quotation marks `\n`, `\r`, `\t`, `\0`, `\"` and `\\` stand for bytes, and `\x` with two
+//! hexadecimal digits for any. What begins with `#`, and an empty line, is nothing. Times do not
+//! go back. The guest gets entries: a time in nanoseconds, a length, and the bytes.
+
+use dag_file::time::parse_ns;
+use replay::shown::visible;
+
+/// The most bytes of a line: the guest takes them in one interrupt.
+const MOST_BYTES: usize = 1024;
+
+/// Bytes, and the time of the run at which they arrive.
+pub type Entry = (u64, Vec<u8>);
+
+/// Reads the text of such a file.
+///
+/// # Errors
+///
+/// In words that begin with the number of the line: what is wrong, and what would be right.
+pub fn read(text: &str) -> Result<Vec<Entry>, String> {
+    let mut entries: Vec<Entry> = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let entry = entry(line).map_err(|why| format!("{number}: {why}"))?;
+        if entries.last().is_some_and(|last| last.0 > entry.0) {
+            return Err(format!(
+                "{number}: this is before the line above; put the lines in the order of their times"
+            ));
+        }
+        entries.push(entry);
+    }
+    Ok(entries)
+}
+
+fn entry(line: &str) -> Result<Entry, String> {
+    let (time, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+    let at_ns = parse_ns(time)?;
+    let rest = rest.trim();
+    let bytes = match rest.strip_prefix('"') {
+        Some(text) => unescaped(text)?,
+        None => pairs(rest)?,
+    };
+    match bytes.len() {
+        0 => Err(
+            "there are no bytes; give a text such as \"on\\n\", or pairs such as 6f 6e 0a".into(),
+        ),
+        1..=MOST_BYTES => Ok((at_ns, bytes)),
+        count => Err(format!(
+            "{count} bytes arrive at once, and {MOST_BYTES} is the most; divide them, the time may \
+             be the same"
+        )),
+    }
+}
+
+/// Reads what stands behind a quotation mark, up to the next.
+fn unescaped(text: &str) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let mut rest = text.chars();
+    loop {
+        let Some(letter) = rest.next() else {
+            return Err("the text has no end; close it with \"".into());
+        };
+        match letter {
+            '"' if rest.as_str().trim().is_empty() => return Ok(bytes),
+            '"' => return Err("something follows the text; write one text in a line".into()),
+            '\\' => bytes.push(escaped(&mut rest)?),
+            letter => bytes.extend(letter.encode_utf8(&mut [0; 4]).bytes()),
+        }
+    }
+}
+
+fn escaped(rest: &mut std::str::Chars<'_>) -> Result<u8, String> {
+    let name = rest.next();
+    match name {
+        Some('n') => Ok(b'\n'),
+        Some('r') => Ok(b'\r'),
+        Some('t') => Ok(b'\t'),
+        Some('0') => Ok(0),
+        Some(letter @ ('"' | '\\')) => Ok(letter as u8),
+        Some('x') => {
+            let digits: String = rest.by_ref().take(2).collect();
+            pair(&digits)
+        }
+        _ => Err(
+            "a backslash is followed by none of n, r, t, 0, x, \" and \\; double it to mean \
+             itself"
+                .into(),
+        ),
+    }
+}
+
+fn pairs(words: &str) -> Result<Vec<u8>, String> {
+    words.split_whitespace().map(pair).collect()
+}
+
+fn pair(digits: &str) -> Result<u8, String> {
+    let is_pair = digits.len() == 2 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    let byte = u8::from_str_radix(digits, 16).ok().filter(|_| is_pair);
+    byte.ok_or_else(|| {
+        format!(
+            "`{}` is no pair of hexadecimal digits; write bytes such as 0a, or a text in \
+             quotation marks",
+            visible(digits)
+        )
+    })
+}
+
+/// Returns the entries as the guest takes them.
+#[must_use]
+pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
+    let mut script = Vec::new();
+    for (at_ns, bytes) in entries {
+        let length = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
+        script.extend(at_ns.to_le_bytes());
+        script.extend(length.to_le_bytes());
+        script.extend(bytes);
+    }
+    script
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{for_guest, read};
+
+    #[test]
+    fn texts_and_pairs_become_bytes_at_their_times() {
+        let text = "# radar\n\n4ms \"gap 2350\\n\"\n4ms \"\\x00\\\"\\\\ \\r\\t\\0é\"  \n1s 67 0A\n";
+        let entries = read(text).unwrap();
+        assert_eq!(
+            entries,
+            [
+                (4_000_000, b"gap 2350\n".to_vec()),
+                (4_000_000, b"\0\"\\ \r\t\0\xc3\xa9".to_vec()),
+                (1_000_000_000, vec![0x67, 0x0a]),
+            ]
+        );
+        let script = for_guest(&entries[2..]);
+        assert_eq!(script, b"\x00\xca\x9a\x3b\0\0\0\0\x02\0g\n");
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line_and_the_remedy() {
+        for (text, says) in [
+            (
+                "5 \"a\"",
+                "1: `5` has no unit; append one of ns, us, ms and s",
+            ),
+            ("# a\nsoon 0a", "2: `soon` is no time"),
+            ("5ms", "1: there are no bytes; give a text"),
+            ("5ms \"\"", "1: there are no bytes; give a text"),
+            ("5ms \"a", "1: the text has no end; close it"),
+            ("5ms \"a\" 0a", "1: something follows the text; write one"),
+            ("5ms \"\\q\"", "1: a backslash is followed by none of"),
+            (
+                "5ms \"\\x1\"",
+                "1: `1\"` is no pair of hexadecimal digits; write",
+            ),
+            (
+                "5ms 0a0",
+                "1: `0a0` is no pair of hexadecimal digits; write",
+            ),
+            ("5ms +1", "1: `+1` is no pair"),
+            ("5ms 0a\n4ms 0a", "2: this is before the line above; put"),
+        ] {
+            let refused = read(text).unwrap_err();
+            assert!(refused.starts_with(says), "{text}: {refused}");
+        }
+        let long = format!("5ms \"{}\"", "x".repeat(1025));
+        assert!(
+            read(&long)
+                .unwrap_err()
+                .starts_with("1: 1025 bytes arrive at once")
+        );
+    }
+}
