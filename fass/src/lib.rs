@@ -121,6 +121,7 @@ pub use draft::attributes::SubtaskAttributes;
 pub use platform::{
     AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
 };
+pub use run::latest_jobs::LatestJobs;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan};
 pub use run::record::Recorded;

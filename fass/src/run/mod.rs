@@ -9,6 +9,7 @@
 pub(crate) mod cell;
 pub(crate) mod effect;
 pub(crate) mod latest;
+pub(crate) mod latest_jobs;
 pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod record;

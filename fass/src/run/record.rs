@@ -201,7 +201,12 @@ fn channel(topic: &dyn AnyRecorded, number: u16, dag: DagId, spec: &DagSpec) -> 
 
 /// Returns the room for a value.
 pub(super) fn room_of<T: Recordable>() -> usize {
-    ROOM.max(2 * T::LEAST_BYTES)
+    room_for(T::LEAST_BYTES)
+}
+
+/// Returns the room for a value of at least so many bytes.
+pub(super) fn room_for(least_bytes: usize) -> usize {
+    ROOM.max(2 * least_bytes)
 }
 
 /// What sends recorded values to a topic.

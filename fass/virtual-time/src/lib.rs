@@ -204,26 +204,7 @@ impl VirtualTime {
     /// no time, unless this says otherwise. What executes counts from the call's start, so
     /// `fass::now_ns` in the function does not show it.
     ///
-    /// ```
-    /// use std::time::Duration;
-    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-    /// use virtual_time::{Silent, VirtualTime};
-    ///
-    /// let response_ns = |silent| {
-    ///     let machine = VirtualTime::new().silent(silent);
-    ///     let (dag, period) = (create_dag(), Duration::from_millis(10));
-    ///     dag.period(period).relative_deadline(period).jobs(1);
-    ///     let tick = SubtaskAttributes::named("tick").wcet(Duration::from_millis(2));
-    ///     dag.register_untyped_subtask(|_| (), tick);
-    ///     finish_create_dags(&[dag]).unwrap();
-    ///     let report = machine.run();
-    ///     assert_eq!(report.took_no_time(), silent == Silent::NoTime);
-    ///     report.jobs[0].response_time_ns().unwrap()
-    /// };
-    /// assert_eq!(response_ns(Silent::NoTime), 0);
-    /// assert_eq!(response_ns(Silent::Wcet), 2_000_000);
-    /// assert!((1..=2_000_000).contains(&response_ns(Silent::Drawn { seed: 7 })));
-    /// ```
+    /// See [`Silent`].
     #[must_use = "the machine itself is returned"]
     pub fn silent(self, silent: Silent) -> Self {
         self.machine.surroundings.silent.set(silent);
@@ -287,6 +268,16 @@ impl VirtualTime {
     pub fn replay(self, recording: &[u8]) -> Result<Self, Malformed> {
         self.machine.surroundings.edge.replay(recording)?;
         Ok(self)
+    }
+
+    /// Keeps no more than the inputs of each DAG's last jobs, in memory that is made at the
+    /// commit, as a machine does that records nothing else; so
+    /// [`recording`](Self::recording) has what led to a fault, and no results. Of what a
+    /// function remembers of earlier jobs it says nothing.
+    #[must_use = "the machine itself is returned"]
+    pub fn keep_latest(self, jobs: u32) -> Self {
+        self.machine.surroundings.edge.most_jobs.set(Some(jobs));
+        self
     }
 
     /// Returns the recording of all that was run since the commit: the values of the topics

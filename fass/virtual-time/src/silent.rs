@@ -6,9 +6,24 @@ use sched_dag::Instance;
 /// the subtask has a WCET.
 ///
 /// ```
+/// use std::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::{Silent, VirtualTime};
 ///
-/// let machine = VirtualTime::new().silent(Silent::Wcet);
+/// let response_ns = |silent| {
+///     let machine = VirtualTime::new().silent(silent);
+///     let (dag, period) = (create_dag(), Duration::from_millis(10));
+///     dag.period(period).relative_deadline(period).jobs(1);
+///     let tick = SubtaskAttributes::named("tick").wcet(Duration::from_millis(2));
+///     dag.register_untyped_subtask(|_| (), tick);
+///     finish_create_dags(&[dag]).unwrap();
+///     let report = machine.run();
+///     assert_eq!(report.took_no_time(), silent == Silent::NoTime);
+///     report.jobs[0].response_time_ns().unwrap()
+/// };
+/// assert_eq!(response_ns(Silent::NoTime), 0);
+/// assert_eq!(response_ns(Silent::Wcet), 2_000_000);
+/// assert!((1..=2_000_000).contains(&response_ns(Silent::Drawn { seed: 7 })));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Silent {

@@ -8,10 +8,10 @@
 mod clock;
 mod replay;
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::sync::Arc;
 
-use fass::{Plan, Recorded};
+use fass::{LatestJobs, Plan, Recorded};
 use recording::{
     Channel, DagHeader, Entry, Header, Malformed, Recordable, Role, Schema, Shown, What, Writer,
 };
@@ -31,6 +31,9 @@ pub(crate) struct Edge {
     /// The values so far, in the order in which they were complete.
     values: RefCell<Vec<Value>>,
     clock: Clock,
+    /// How many jobs' inputs are kept, if not all is.
+    pub(crate) most_jobs: Cell<Option<u32>>,
+    latest: RefCell<Option<LatestJobs>>,
     replay: RefCell<Option<Replay>>,
 }
 
@@ -103,6 +106,8 @@ impl Edge {
                 }
             }
         }
+        let latest = |jobs| LatestJobs::new(&header.channels, jobs);
+        self.latest.replace(self.most_jobs.get().map(latest));
         let task_set = &plan.task_set;
         let sporadic = (0..header.dags.len()).filter_map(dag_id);
         let sporadic = sporadic.filter(|dag| task_set.dag(*dag).is_sporadic());
@@ -124,6 +129,14 @@ impl Edge {
         replay.as_ref().is_some_and(|replay| replay.is_of(dag))
     }
 
+    /// Takes note that an instance of a replay has failed: nothing behind it runs in its job,
+    /// whether that is recorded or not.
+    pub(crate) fn failed(&self, instance: Instance, task_set: &TaskSet) {
+        if let Some(replay) = self.replay.borrow_mut().as_mut() {
+            replay.cut_behind(instance, task_set);
+        }
+    }
+
     /// Begins an instance.
     pub(crate) fn begin(&self, instance: Instance) {
         let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
@@ -142,7 +155,14 @@ impl Edge {
     /// Ends an instance, which began then.
     pub(crate) fn end(&self, instance: Instance, start_ns: u64) {
         if let Some(bytes) = self.clock.end() {
-            self.values.borrow_mut().push(Value {
+            let mut values = self.values.borrow_mut();
+            if let Some(latest) = self.latest.borrow().as_ref() {
+                values.retain(|value| match value.of {
+                    Of::Clock(of) => latest.has(of.dag.index(), of.job),
+                    Of::Channel(_) => true,
+                });
+            }
+            values.push(Value {
                 of: Of::Clock(instance),
                 job: instance.job,
                 at_ns: start_ns,
@@ -155,6 +175,10 @@ impl Edge {
     pub(crate) fn record(&self, value: &Recorded<'_>) {
         if let Some(replay) = self.replay.borrow_mut().as_mut() {
             replay.compare(&self.header.borrow(), value);
+        }
+        if let Some(latest) = self.latest.borrow_mut().as_mut() {
+            latest.take(value);
+            return;
         }
         self.values.borrow_mut().push(Value {
             of: Of::Channel(value.channel),
@@ -246,9 +270,25 @@ impl Edge {
             let of_job = record.job(DagId(dag.into()), job);
             of_job.and_then(|job| job.release_ns).unwrap_or(at_ns)
         };
+        let latest = self.latest.borrow();
+        let kept = latest
+            .iter()
+            .flat_map(LatestJobs::values)
+            .map(|value| Value {
+                of: Of::Channel(value.channel),
+                job: value.job,
+                at_ns: value.completed_ns,
+                bytes: value.bytes.map(<[u8]>::to_vec),
+            });
+        let kept: Vec<Value> = kept.collect();
+        let is_kept = |dag: usize, job| latest.as_ref().is_none_or(|latest| latest.has(dag, job));
         let values = self.values.borrow();
         let narrow = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
-        let values = values.iter().map(|value| {
+        let values = values.iter().filter(|value| match value.of {
+            Of::Clock(Instance { dag, job, .. }) => is_kept(dag.index(), job),
+            Of::Channel(_) => true,
+        });
+        let values = values.chain(&kept).map(|value| {
             let what = value.bytes.as_ref().map_or(What::Lost, |_| What::Value);
             let (what, dag, place) = match value.of {
                 Of::Channel(channel) => (what, header.channels[usize::from(channel)].dag, channel),
@@ -277,7 +317,7 @@ impl Edge {
             };
             let dag = u16::try_from(event.dag.0).ok()?;
             // What was skipped or cut in the recorded run is not so here.
-            if self.is_replayed(event.dag) {
+            if self.is_replayed(event.dag) || !is_kept(event.dag.index(), event.job) {
                 return None;
             }
             Some(Entry {

@@ -20,6 +20,8 @@ pub(super) struct Replay {
     /// The releases, if the DAG is sporadic; those of skipped jobs, too, so that the jobs after
     /// them keep their numbers.
     pub(super) signals: BTreeMap<DagId, VecDeque<u64>>,
+    /// The first job of each DAG that a signal is recorded of.
+    first_signals: BTreeMap<DagId, u64>,
     /// What has no value.
     events: Vec<Entry<'static>>,
     /// The DAGs whose inputs are recorded.
@@ -78,7 +80,7 @@ impl Replay {
         let mut values = BTreeMap::new();
         let (mut cuts, mut clock, mut lost) = (BTreeSet::new(), BTreeMap::new(), None);
         let mut signals = BTreeMap::<DagId, VecDeque<u64>>::new();
-        let mut events = Vec::new();
+        let (mut first_signals, mut events) = (BTreeMap::new(), Vec::new());
         let role = |place: u16| header.channels[usize::from(place)].role;
         for entry in recording.entries() {
             let Entry {
@@ -100,6 +102,7 @@ impl Replay {
                 What::Value => _ = values.insert((place, job), value.to_vec()),
                 What::Cut => _ = cuts.insert((dag, place, job)),
                 What::Signal | What::Skip => {
+                    first_signals.entry(DagId(dag.into())).or_insert(job);
                     let of_dag = signals.entry(DagId(dag.into())).or_default();
                     of_dag.push_back(release_ns);
                 }
@@ -122,6 +125,7 @@ impl Replay {
             cuts,
             clock,
             signals,
+            first_signals,
             events,
             dags: BTreeSet::new(),
             lost,
@@ -183,6 +187,14 @@ impl Replay {
         // Nothing but signals releases a sporadic DAG, and nothing else takes any.
         let is_sporadic = |dag: &DagId| task_set.dags()[dag.index()].is_sporadic();
         self.signals.retain(|dag, _| is_sporadic(dag));
+        for (dag, signals) in &mut self.signals {
+            // Where only the last jobs are recorded, the ones before are passed over. They were
+            // as far apart as the DAG says, so there is time for them.
+            let (dag, first) = (task_set.dag(*dag), self.first_signals.get(dag));
+            for job in (0..first.copied().unwrap_or(0)).rev() {
+                signals.push_front(dag.grid_ns(job));
+            }
+        }
         self.find_inputs(task_set);
         Ok(())
     }
@@ -212,6 +224,21 @@ impl Replay {
     /// Reports whether the inputs of a DAG are recorded.
     pub(super) fn is_of(&self, dag: DagId) -> bool {
         u16::try_from(dag.0).is_ok_and(|dag| self.dags.contains(&dag))
+    }
+
+    /// Cuts all that waits for an instance in its job.
+    pub(super) fn cut_behind(&mut self, instance: Instance, task_set: &TaskSet) {
+        let Instance { dag, subtask, job } = instance;
+        let mut behind = task_set.dag(dag).successors(subtask).to_vec();
+        while let Some(subtask) = behind.pop() {
+            let instance = Instance { dag, subtask, job };
+            let Some((dag, number)) = narrow(instance) else {
+                continue;
+            };
+            if self.cuts.insert((dag, number, job)) {
+                behind.extend(task_set.dag(instance.dag).successors(subtask));
+            }
+        }
     }
 
     /// Returns how many jobs of a DAG the recording is of, from job 0 on, if its inputs are

@@ -111,6 +111,7 @@ impl Workload for Runner<'_> {
             if machine.edge.is_replayed(instance.dag) {
                 // What it cuts is recorded, and is passed over.
                 self.replace(instance);
+                machine.edge.failed(instance, self.task_set);
             }
         }
         self.recording.executed_ns.insert(instance, executed_ns);

@@ -1,5 +1,6 @@
 //! What was recorded in one run is computed again in others.
 
+mod latest;
 mod until;
 mod wrong;
 
