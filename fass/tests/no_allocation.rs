@@ -11,7 +11,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
-use fass::{Raiser, Sample, SubtaskAttributes, Unique, create_dag};
+use fass::{Raiser, Received, Sample, Sender, SubtaskAttributes, Unique, Wire, create_dag};
 use support::{commit, run_job};
 
 struct Counting;
@@ -152,4 +152,31 @@ fn states_latest_values_and_signals_allocate_nothing() {
     }
     assert_eq!(ALLOCATIONS.get() - before, 0);
     assert_eq!(signals, 2 * 1_000);
+}
+
+#[test]
+fn wires_allocate_nothing() {
+    let period = Duration::from_millis(10);
+    let (wire, dag) = (Wire::new("numbers"), create_dag());
+    dag.relative_deadline(period);
+    dag.using((wire.receiving(|line| line.first().copied()), wire.sending()))
+        .register_periodic_subtask(
+            |(packets, mut wire): (Received<'_, u8>, Sender<'_>)| {
+                packets.for_each(|packet| wire.send(&[packet.value]));
+            },
+            vec![],
+            period,
+            SubtaskAttributes::named("echo"),
+        );
+    let mut plan = commit(&[dag]);
+
+    let before = ALLOCATIONS.get();
+    let mut gone = 0;
+    for job in 0..1_000 {
+        wire.arrive(b"a\nb\n", job);
+        plan.bodies[0][0].run(job);
+        plan.bodies[0][0].complete(job, &mut |_| ());
+        gone += std::iter::from_fn(|| wire.depart()).count();
+    }
+    assert_eq!((gone, ALLOCATIONS.get() - before), (2_000, 0));
 }

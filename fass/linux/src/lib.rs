@@ -46,9 +46,11 @@ mod state;
 mod sys;
 mod team;
 mod warnings;
+mod wires;
 mod worker;
 
 pub use control::Control;
 pub use machine::{Linux, Mechanism, StartError};
 pub use run::{Counts, Run};
 pub use state::Fault;
+pub use wires::Connection;

@@ -81,6 +81,37 @@ fn what_comes_after_the_mark_waits() {
 }
 
 #[test]
+fn packets_pass_from_one_thread_to_another_whole_and_in_order() {
+    const PACKETS: u64 = 20_000;
+    let incoming = Incoming::new(Framing::Lines, 64, 256);
+    let length = |number: u64| 1 + usize::try_from(number % 40).unwrap();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            for number in 0..PACKETS {
+                let mut line = vec![b'a' + (number % 26) as u8; length(number)];
+                line.push(b'\n');
+                incoming.arrive(&line, number);
+            }
+        });
+        let (mut buffer, mut next) = (incoming.buffer(), 0);
+        let all = || incoming.packets.get() + incoming.lost.get() == PACKETS;
+        loop {
+            let is_last = all();
+            while let Some((bytes, number)) = incoming.take(incoming.mark(), &mut buffer) {
+                assert!(next <= number);
+                next = number + 1;
+                assert_eq!(bytes, vec![b'a' + (number % 26) as u8; length(number)]);
+            }
+            if is_last {
+                break;
+            }
+        }
+    });
+    assert_eq!(incoming.too_long.get(), 0);
+    assert!(incoming.packets.get() > 0);
+}
+
+#[test]
 fn bytes_go_at_the_completion_and_whole_or_not_at_all() {
     let outgoing = Arc::new(Outgoing::new(16));
     let mut departure = Departure(Arc::clone(&outgoing));

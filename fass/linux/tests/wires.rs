@@ -1,0 +1,111 @@
+//! Bytes that come from a pipe, and go into one.
+
+mod support;
+
+use std::fmt::Write as _;
+use std::io::{self, BufRead, BufReader, Read as _, Write as _};
+use std::thread;
+
+use fass::{
+    Dag, Received, Sender, SubtaskAttributes, Wire, WireOptions, create_dag, finish_create_dags,
+};
+use linux::Mechanism;
+use sched_dag::DagId;
+use support::{alone, ms};
+
+fn number(line: &[u8]) -> Option<u64> {
+    str::from_utf8(line).ok()?.parse().ok()
+}
+
+/// A sink that sends the squares of a job's numbers.
+fn answer(dag: &Dag, wire: &Wire) {
+    dag.using(wire.sending()).register_sink_subtask(
+        |mut wire: Sender<'_>, (numbers,): (Vec<u64>,)| {
+            for number in numbers {
+                let _ = writeln!(wire, "{}", number * number);
+            }
+        },
+        vec!["numbers"],
+        ms(50),
+        SubtaskAttributes::named("answer"),
+    );
+}
+
+fn receive(numbers: Received<'_, u64>) -> (Vec<u64>,) {
+    (numbers.map(|packet| packet.value).collect(),)
+}
+
+#[test]
+fn each_packet_is_answered_once_and_in_order() {
+    let alone = alone(2, Mechanism::Normal);
+    let (wire, dag) = (Wire::new("squares"), create_dag());
+    dag.jobs(3);
+    let attributes = SubtaskAttributes::named("receive");
+    let _raised = (dag.using(wire.receiving(number))).register_sporadic_subtask(
+        receive,
+        vec!["numbers"],
+        ms(1),
+        attributes,
+    );
+    answer(&dag, &wire);
+    finish_create_dags(&[dag]).expect("it is sound");
+    let (input, mut questions) = io::pipe().expect("a pipe");
+    let (answers, output) = io::pipe().expect("a pipe");
+    let connection = alone
+        .machine
+        .connect(&wire, input, output)
+        .expect("threads");
+    // The next question comes when the answer is there, so each has a job.
+    let asker = thread::spawn(move || {
+        let mut answers = BufReader::new(answers).lines();
+        for question in [7_u64, 8, 9] {
+            writeln!(questions, "{question}").expect("it is read");
+            let answer = answers.next().expect("there is one").expect("it is text");
+            assert_eq!(answer, (question * question).to_string());
+        }
+    });
+    let run = alone.machine.run().expect("it is committed");
+    drop(connection);
+    asker.join().expect("all answers are right");
+    assert_eq!(run.statistics(DagId(0)).completed, 3);
+    assert_eq!(run.violations().count(), 0);
+    assert_eq!((wire.counts().packets, wire.counts().sent_bytes), (3, 9));
+}
+
+#[test]
+fn what_is_sent_last_goes_when_the_connection_ends_and_losses_are_counted() {
+    let alone = alone(1, Mechanism::Normal);
+    let options = WireOptions {
+        room_bytes: 256,
+        ..WireOptions::default()
+    };
+    let (wire, dag) = (Wire::with("squares", options), create_dag());
+    dag.jobs(20);
+    let attributes = SubtaskAttributes::named("receive");
+    dag.using(wire.receiving(number)).register_periodic_subtask(
+        receive,
+        vec!["numbers"],
+        ms(2),
+        attributes,
+    );
+    answer(&dag, &wire);
+    finish_create_dags(&[dag]).expect("it is sound");
+    let (mut answers, output) = io::pipe().expect("a pipe");
+    // More than there is room for, whenever the jobs are.
+    let input = "1\nx\n".repeat(2_000).into_bytes();
+    let connection = (alone.machine)
+        .connect(&wire, io::Cursor::new(input), output)
+        .expect("threads");
+    alone.machine.run().expect("it is committed");
+    // The reader goes on after the run.
+    while wire.counts().packets + wire.counts().lost_packets < 4_000 {
+        thread::sleep(ms(1));
+    }
+    drop(connection);
+    let mut sent = String::new();
+    answers.read_to_string(&mut sent).expect("it is text");
+    let counts = wire.counts();
+    assert!(counts.lost_packets > 0, "{counts:?}");
+    assert_eq!(sent.len() as u64, counts.sent_bytes);
+    assert!(sent.lines().all(|line| line == "1"), "{sent}");
+}
