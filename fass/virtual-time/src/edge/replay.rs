@@ -7,6 +7,9 @@ use fass::Recorded;
 use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, Shown, What};
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
+/// The most jobs of a DAG that a replay goes through: everything of them is kept.
+const MOST_JOBS: u64 = 10_000_000;
+
 /// A recording that takes the place of what enters.
 #[derive(Debug)]
 pub(super) struct Replay {
@@ -184,6 +187,7 @@ impl Replay {
                 found => self.channels.push(found.map(|(number, _)| number)),
             }
         }
+        self.check_jobs()?;
         // Nothing but signals releases a sporadic DAG, and nothing else takes any.
         let is_sporadic = |dag: &DagId| task_set.dags()[dag.index()].is_sporadic();
         self.signals.retain(|dag, _| is_sporadic(dag));
@@ -197,6 +201,24 @@ impl Replay {
         }
         self.find_inputs(task_set);
         Ok(())
+    }
+
+    /// Makes sure that a replay can go through all jobs up to the last one.
+    fn check_jobs(&self) -> Result<(), String> {
+        let of_values = self.values.iter().map(|((place, job), _)| {
+            let channel = &self.header.channels[usize::from(*place)];
+            (channel.dag, *job)
+        });
+        let of_signals = self.first_signals.iter();
+        let of_signals = of_signals.filter_map(|(dag, job)| Some((dag.0.try_into().ok()?, *job)));
+        match of_values.chain(of_signals).max_by_key(|(_, job)| *job) {
+            Some((dag, job)) if job >= MOST_JOBS => Err(format!(
+                "the recording has job {job} of dag `{}`, and a replay goes through all jobs from 0 \
+                 on, which may be {MOST_JOBS} at most; record a shorter run",
+                self.header.dags[usize::from(dag)].name
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// Finds the DAGs whose inputs are recorded, and the jobs that have some: values that

@@ -170,3 +170,27 @@ fn a_second_commit_that_is_refused_leaves_the_recording_as_it_is() {
     finish_create_dags(&[overrun(OverrunPolicy::Skip, 0), cheating()]).expect_err("a second plan");
     assert_eq!(machine.recording(), recording);
 }
+
+#[test]
+fn a_recording_of_more_jobs_than_a_replay_can_go_through_is_refused() {
+    let recorded = record(&VirtualTime::new(), &[forked(1)]);
+    let recorded = Recording::read(&recorded).expect("whole");
+    let entry = recorded.entries().next().expect("the first");
+    for what in [What::Value, What::Signal] {
+        let mut writer = Writer::new(recorded.header());
+        writer.write(&Entry {
+            what,
+            job: 1 << 40,
+            value: match what {
+                What::Value => entry.value,
+                _ => &[],
+            },
+            ..entry
+        });
+        let said = refused(&writer.finish(), &[forked(1)]);
+        assert!(
+            said.contains("the recording has job 1099511627776 of dag `forked`"),
+            "{said}"
+        );
+    }
+}
