@@ -289,6 +289,8 @@ fn every_panic_of_a_wrong_program_is_one() {
         "fass/src/api/untyped.rs",
         "fass/src/api/signal.rs",
         "fass/src/api/using.rs",
+        "fass/src/api/wire/mod.rs",
+        "fass/src/api/wire/uses.rs",
         "fass/virtual-time/src/platform.rs",
     ]);
     all_are_in(&documented, &sources);

@@ -293,7 +293,7 @@ fn a_replay_takes_what_the_receiver_wrote_and_no_bytes() {
 }
 
 #[test]
-fn each_end_of_a_wire_has_one_subtask() {
+fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
     let options = WireOptions {
         framing: Framing::Chunks,
         ..WireOptions::default()
@@ -309,4 +309,20 @@ fn each_end_of_a_wire_has_one_subtask() {
         "another subtask receives on wire `radio`; let that one do it, or make another wire"
     );
     assert!(message(&|| _ = wire.sending()).starts_with("another subtask sends on wire"));
+    let sink = || {
+        let (dag, wire) = (create_dag(), Wire::new("radio"));
+        let attributes = SubtaskAttributes::named("late");
+        let receive = |_: Received<'_, u32>, _: (u32,)| ();
+        (dag.using(wire.receiving(number))).register_sink_subtask(
+            receive,
+            vec!["x"],
+            ms(10),
+            attributes,
+        );
+    };
+    assert_eq!(
+        *message(&sink),
+        "a subtask with inputs receives on wire `radio`; let a source receive, and send along an \
+         edge"
+    );
 }

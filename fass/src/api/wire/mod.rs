@@ -1,8 +1,8 @@
 //! Wires: how bytes come in and go out while DAGs run.
 //!
 //! For our purposes a *wire* is a way for bytes between a device, such as a serial port, and
-//! the functions of an app; a *packet* is those of them that belong together. One subtask
-//! receives on a wire, and one sends on it. Which device it is the platform is told, not the
+//! the functions of an app; a *packet* is those of them that belong together. One source
+//! receives on a wire, and one subtask sends on it. Which device it is the platform is told, not the
 //! DAG: so the same functions run on the machine and, with bytes that a test gives, in virtual
 //! time.
 //!
@@ -179,8 +179,9 @@ impl Wire {
         }
     }
 
-    /// Returns the use of the subtask that receives: `decode` says what a packet means, or
-    /// `None` if it is malformed, which is counted.
+    /// Returns the use of the source that receives: `decode` says what a packet means, or
+    /// `None` if it is malformed, which is counted. (A replay takes what a source wrote, so it
+    /// needs no bytes; a subtask with inputs cannot receive.)
     ///
     /// See [`Wire`].
     ///

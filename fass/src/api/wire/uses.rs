@@ -114,6 +114,13 @@ impl<T: 'static> Uses for Receiving<T> {
         held.wire.shared.signal.set(dag.signal());
     }
 
+    fn follows(held: &Self::Held) {
+        panic!(
+            "a subtask with inputs receives on wire `{}`; let a source receive, and send along an edge",
+            held.wire.name()
+        );
+    }
+
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
         held
     }
