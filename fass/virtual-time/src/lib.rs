@@ -274,6 +274,12 @@ impl VirtualTime {
     /// commit, as a machine does that records nothing else; so
     /// [`recording`](Self::recording) has what led to a fault, and no results. Of what a
     /// function remembers of earlier jobs it says nothing.
+    ///
+    /// ```
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new().contain_panics().keep_latest(16);
+    /// ```
     #[must_use = "the machine itself is returned"]
     pub fn keep_latest(self, jobs: u32) -> Self {
         self.machine.surroundings.edge.most_jobs.set(Some(jobs));
