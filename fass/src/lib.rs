@@ -100,6 +100,7 @@ extern crate alloc;
 mod api;
 mod commit;
 mod draft;
+pub mod edge;
 mod platform;
 mod run;
 
@@ -121,6 +122,7 @@ pub use draft::attributes::SubtaskAttributes;
 pub use platform::{
     AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
 };
+pub use recording::Channel;
 pub use run::latest_jobs::LatestJobs;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan};

@@ -14,6 +14,7 @@ use recording::Channel;
 use sched_dag::analysis::Overheads;
 use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
+use crate::edge::Begin;
 use crate::run::cell::SetOnce;
 use crate::run::plan::Plan;
 use crate::run::record::Recorded;
@@ -136,11 +137,17 @@ pub trait Platform: Sync {
         panic!("this platform takes no signals from outside; raise them in subtasks");
     }
 
-    /// Takes the recorded topics of a DAG ([`Dag::record`](crate::Dag::record)) and the hash
-    /// of its names and edges, before the plan comes. Channels are numbered over all DAGs, in
-    /// the order of the calls.
-    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel]) {
-        let _ = (dag, graph, channels);
+    /// Reports whether the plan to come shall be recorded or replayed. If it shall not, recorded
+    /// topics ([`Dag::record`](crate::Dag::record)) cost nothing.
+    fn crosses(&self) -> bool {
+        false
+    }
+
+    /// Takes the recorded topics of a DAG and the hash of its names and edges, before the plan
+    /// comes. Channels are numbered over all DAGs, in the order of the calls. `begin` is for
+    /// platforms that have no memory of their own for what crosses.
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
+        let _ = (dag, graph, channels, begin);
     }
 
     /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had

@@ -170,6 +170,24 @@ impl Guest {
         (outcome, sent)
     }
 
+    /// Has the guest's recording written to a file, from a buffer of so many KiB.
+    #[must_use]
+    pub fn records(mut self, file: &Path, kib: u64) -> Guest {
+        self.qemu.records = Some(file.into());
+        self.word(&format!("record={kib}"))
+    }
+
+    /// Has the guest replay a recording.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such file.
+    #[must_use]
+    pub fn replays(self, file: &Path) -> Guest {
+        let bytes = fs::metadata(file).expect("the recording").len();
+        self.module(file).word(&format!("replay={bytes}"))
+    }
+
     /// Gives the guest a console. Each pair is a text to wait for, in any line that
     /// comes after what was said before, and what to say then.
     #[must_use]

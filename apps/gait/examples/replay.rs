@@ -4,8 +4,7 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use fass::finish_create_dags;
-use gait::filter::Quaternion;
-use gait::{Sample, TOPIC, build};
+use gait::build;
 use recording::Recording;
 
 fn main() -> ExitCode {
@@ -14,9 +13,6 @@ fn main() -> ExitCode {
 
 fn commit(file: &'static [u8]) -> Result<(), Box<dyn Error>> {
     let (dag, _walk) = build(&Recording::read(file)?)?;
-    dag.record::<Sample>(TOPIC)
-        .record::<Quaternion>("upper")
-        .record::<Quaternion>("lower");
     finish_create_dags(&[dag])?;
     Ok(())
 }

@@ -23,6 +23,9 @@ pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
     let walk = Walk::new(count);
     let dag = create_dag();
     dag.name(DAG).jobs(count as u64).demand_proof();
+    (dag.record::<Sample>(TOPIC))
+        .record::<Quaternion>("upper")
+        .record::<Quaternion>("lower");
     let taking = |name| SubtaskAttributes::named(name).wcet(WCET);
     let read = move || {
         let (_, sample) = samples.next().expect("there is a job for each sample");

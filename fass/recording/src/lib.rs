@@ -55,7 +55,8 @@ mod value;
 
 pub use file::entry::{Entry, What};
 pub use file::header::{Channel, DagHeader, Header, Role};
-pub use file::read::{Entries, Recording};
+pub use file::read::{Entries, Recording, mended};
+pub use file::stream::Stream;
 pub use file::values::{Mismatch, Values};
 pub use file::write::Writer;
 pub use file::{MAGIC, VERSION};

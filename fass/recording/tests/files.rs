@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use recording::{
     Channel, Crc, DagHeader, Entry, Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable,
-    Recording, Role, Schema, VERSION, What, Writer, to_bytes,
+    Recording, Role, Schema, VERSION, What, Writer, mended, to_bytes,
 };
 
 fn header() -> Header {
@@ -87,6 +87,25 @@ fn every_altered_byte_is_found() {
         }
         assert!(Recording::read(&bytes[..place]).is_err(), "{place} bytes");
     }
+}
+
+#[test]
+fn of_a_run_that_died_all_whole_entries_are_read() {
+    let bytes = recording();
+    let all: Vec<Entry<'_>> = Recording::read(&bytes).unwrap().entries().collect();
+    let mut counts = BTreeSet::new();
+    for place in 0..bytes.len() {
+        let Ok(mended) = mended(&bytes[..place]) else {
+            assert!(counts.is_empty(), "the header is whole before {place}");
+            continue;
+        };
+        let recording = Recording::read(&mended).unwrap();
+        assert!(recording.is_cut());
+        let entries: Vec<Entry<'_>> = recording.entries().collect();
+        assert_eq!(entries, all[..entries.len()], "{place} bytes");
+        counts.insert(entries.len());
+    }
+    assert_eq!(counts, (0..=all.len()).collect());
 }
 
 #[test]

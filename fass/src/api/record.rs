@@ -5,12 +5,14 @@ use alloc::rc::Rc;
 use recording::Recordable;
 
 use super::dag::Dag;
+use crate::edge::begin;
 use crate::platform::expect_installed;
 use crate::run::message::Message;
 use crate::run::record::{Edge, RecordedTopic};
 
 static EDGE: Edge = Edge {
-    open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels),
+    crosses: || expect_installed().crosses(),
+    open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, begin),
     replays: || expect_installed().replays(),
     record: |value| expect_installed().record(value),
     replay: |channel, job, take| expect_installed().replay(channel, job, take),

@@ -54,6 +54,8 @@ pub struct Recorded<'v> {
 /// The way from a topic to the platform, and back. What a commit does about recorded topics is
 /// reached through them only, so that an image without any has no code for it.
 pub(crate) struct Edge {
+    /// Reports whether anything is recorded or replayed.
+    pub(crate) crosses: fn() -> bool,
     /// Takes the recorded topics of a DAG, and the hash of its graph.
     pub(crate) open: fn(DagId, u64, &[Channel]),
     /// Reports whether there is a replay.
@@ -99,6 +101,9 @@ pub(crate) trait AnyRecorded {
         (dag, spec): (DagId, &DagSpec),
         next: &mut usize,
     ) -> Vec<(usize, Arc<SampleLine>)> {
+        if !(self.edge().crosses)() {
+            return Vec::new();
+        }
         let number = || {
             *next += 1;
             narrow(*next - 1)
@@ -230,14 +235,13 @@ struct Room {
 
 impl<T: Recordable> RecordedTopic<T> {
     pub(crate) fn new(topic: &str, edge: &'static Edge) -> Self {
-        let room = room_of::<T>();
         Self {
             topic: topic.into(),
             line: Arc::new(Line {
                 number: AtomicU16::new(0),
                 edge,
                 room: Shared::new(Room {
-                    bytes: alloc::vec![0; room],
+                    bytes: Vec::new(),
                     value: None,
                 }),
             }),
@@ -261,12 +265,14 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
     }
 
     fn stages(&self) -> Box<dyn Any> {
-        let tap: Box<dyn Stage<T>> = Box::new(Tap(Arc::clone(&self.line)));
-        Box::new(Vec::from([tap]))
+        let tap = || Box::new(Tap(Arc::clone(&self.line))) as Box<dyn Stage<T>>;
+        let tap = (self.line.edge.crosses)().then(tap);
+        Box::new(Vec::from_iter(tap))
     }
 
     fn effects(&self) -> Vec<Box<dyn Effect>> {
-        Vec::from([Box::new(Tap(Arc::clone(&self.line))) as Box<dyn Effect>])
+        let tap = || Box::new(Tap(Arc::clone(&self.line))) as Box<dyn Effect>;
+        (self.line.edge.crosses)().then(tap).into_iter().collect()
     }
 
     fn as_any(&self) -> &dyn Any {
@@ -285,6 +291,9 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
 
     fn open(&self, number: u16) -> Schema {
         self.line.number.store(number, Ordering::Relaxed);
+        if let Some(mut room) = self.line.room.change() {
+            room.bytes.resize(room_of::<T>(), 0);
+        }
         T::schema()
     }
 

@@ -11,6 +11,7 @@ use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::Duration;
 
+use fass::edge::Begin;
 use fass::{
     Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
 };
@@ -203,7 +204,11 @@ impl Platform for HostPlatform {
         machine.raise_at(machine.surroundings.now_ns.get(), (plan, dag));
     }
 
-    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel]) {
+    fn crosses(&self) -> bool {
+        true
+    }
+
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], _: Begin) {
         let machine = expect_current();
         // Those of a second plan, which will be refused, are not this run's.
         if !machine.has_launched.get() {

@@ -21,7 +21,7 @@ use executive::machine;
 use executive::machine::interrupts_off;
 use executive::memory::heap;
 use executive::run::platform::KERNEL;
-use executive::run::{contexts, execution, heartbeat, worker};
+use executive::run::{contexts, edge, execution, heartbeat, worker};
 use executive::text::options::Options;
 use executive::text::{console, json};
 
@@ -234,6 +234,7 @@ impl Machine {
     pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
+        let mut outgoing = edge::begin();
         let allocations_before = heap::usage().allocations;
         let locks_before = execution::lock_acquisitions();
         console::defer();
@@ -241,7 +242,7 @@ impl Machine {
         let mut background = Background::begin(self.wishes.with_input(self.input.get()), total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();
-        worker::wait_in_background(|| background.step());
+        worker::wait_in_background(|| edge::send(&mut outgoing) | background.step());
         let shuts_down = background.end();
         let longest = interrupts_off::take_longest();
         let allocations = heap::usage().allocations - allocations_before;
@@ -252,6 +253,7 @@ impl Machine {
             crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
         let ended = execution::end().ok_or_else(nothing)?;
+        edge::end(outgoing, !shuts_down);
         let run = Run::new(ended, allocations, locks, epoch_ns);
         let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);

@@ -27,7 +27,7 @@ use executive::machine::{
 };
 use executive::memory::{self, OutOfMemory};
 use executive::run::platform::KERNEL;
-use executive::run::{contexts, heartbeat, worker};
+use executive::run::{contexts, edge, heartbeat, worker};
 use executive::text::options::Options;
 use executive::text::{console, json};
 
@@ -230,7 +230,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
     end(if *probes {
         probe::run()
     } else {
-        run_app(info, *app)
+        run_app(info, name, *app)
     })
 }
 
@@ -313,7 +313,7 @@ extern "C" fn other_core(apic_id: u32) -> ! {
     interrupt::begin_work()
 }
 
-fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
+fn run_app(info: &'static BootInfo, name: &'static str, app: App) -> Result<(), Ending> {
     let usage = |message: &str| Ending::Usage(executive::text::options::UsageError::new(message));
     if info.is_command_line_cut {
         return Err(usage(&format!(
@@ -334,6 +334,7 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         KERNEL.set_wcets(wcets.ok_or_else(|| usage("`wcets`: the module is no such text"))?);
         module = parts.map(|(_, rest)| rest).filter(|rest| !rest.is_empty());
     }
+    module = settings.set_wish(name, module)?;
     let machine = Machine {
         options,
         module: Cell::new(module),
@@ -347,11 +348,15 @@ fn run_app(info: &'static BootInfo, app: App) -> Result<(), Ending> {
         bound_verdict: BoundVerdict::new(settings.judges_bounds),
     };
     let result = app(&machine);
+    if let Some(refusal) = edge::refusal() {
+        return Err(usage(refusal));
+    }
     if result.is_ok() && machine.module.get().is_some() && !machine.has_asked.get() {
         println!("warning: the app takes no file, and has not looked at the one it was given");
     }
     let result = machine.fault_verdict.judge(result);
-    machine.bound_verdict.judge(result)
+    let result = machine.bound_verdict.judge(result);
+    Ending::or_complaint(result, edge::complaint())
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.

@@ -7,6 +7,8 @@
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
 //! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
 //! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
+//! | `record=N` | what crosses the edge of the run is sent to QEMU's debug port, from a buffer of N KiB; 0: nothing is | 0 |
+//! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
 //! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
@@ -24,12 +26,13 @@
 
 use alloc::format;
 
+use fass::edge::Wish;
 use fass::{Overheads, Policy, Preemption};
 
 use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
-use executive::run::worker;
+use executive::run::{edge, worker};
 use executive::text::graph;
 use executive::text::options::{Options, UsageError};
 
@@ -50,10 +53,37 @@ pub(crate) struct Settings {
     pub(crate) dumps_times: bool,
     /// How many bytes of the loader's module are WCETs.
     pub(crate) wcet_bytes: usize,
+    /// How many bytes after them are a recording to replay.
+    pub(crate) replay_bytes: usize,
+    /// How many bytes of memory a recording may wait in; 0: nothing is recorded.
+    pub(crate) record_bytes: usize,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
     /// Whether a response time beyond its bound is the app's fault.
     pub(crate) judges_bounds: bool,
+}
+
+impl Settings {
+    /// Has the runs to come recorded or replayed, if the words say so. Returns what is left of
+    /// the module.
+    pub(crate) fn set_wish(
+        &self,
+        app: &'static str,
+        mut module: Option<&'static [u8]>,
+    ) -> Result<Option<&'static [u8]>, UsageError> {
+        if self.replay_bytes > 0 {
+            let parts = module.and_then(|bytes| bytes.split_at_checked(self.replay_bytes));
+            let shorter = || UsageError::new("`replay`: the module is shorter than that");
+            let (recording, rest) = parts.ok_or_else(shorter)?;
+            edge::set_wish(Wish::Replay(recording)).map_err(UsageError::new)?;
+            module = Some(rest).filter(|rest| !rest.is_empty());
+        }
+        if self.record_bytes > 0 {
+            let bytes = self.record_bytes;
+            edge::set_wish(Wish::Record { app, bytes }).map_err(UsageError::new)?;
+        }
+        Ok(module)
+    }
 }
 
 /// Takes the kernel's words and does what they say.
@@ -93,8 +123,17 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
         ("echo", Some(Echo::On)),
     ];
     let wcet_bytes = options.number("wcets", 0..=1 << 32, 0)?;
+    let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
+    let record_kib = options.number("record", 0..=1 << 20, 0)?;
+    if replay_bytes > 0 && record_kib > 0 {
+        return Err(UsageError::new(
+            "`record` and `replay` exclude each other; give one",
+        ));
+    }
     Ok(Settings {
         events,
+        replay_bytes: usize::try_from(replay_bytes).unwrap_or(0),
+        record_bytes: usize::try_from(record_kib * 1024).unwrap_or(0),
         wcet_bytes: usize::try_from(wcet_bytes).unwrap_or(0),
         dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
         dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,

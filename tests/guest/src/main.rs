@@ -19,6 +19,7 @@ mod limits;
 mod occupation;
 mod overrun;
 mod preemption;
+mod recorded;
 mod sharing;
 mod stalled;
 mod storm;
@@ -34,7 +35,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 29] = [
+const TESTS: [(&str, Test); 31] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -66,6 +67,8 @@ const TESTS: [(&str, Test); 29] = [
     ("flood", limits::flood),
     ("large", large::run),
     ("overrun", overrun::run),
+    ("recorded", recorded::run),
+    ("recorded_long", recorded::long),
     ("sharing", sharing::run),
     ("stalled", stalled::run),
     ("spend_stacks", limits::spend_stacks),

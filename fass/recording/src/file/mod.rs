@@ -7,13 +7,17 @@
 //!
 //! The checksum of a frame is that of all bytes from the file's first one on, checksums left
 //! out. So a frame that is altered, left out, doubled or moved is found, and so is a cut at a
-//! frame's end, by the missing frame of the end.
+//! frame's end, by the missing frame of the end. There are two kinds of ends: of a recording
+//! that says of everything what became of it, if only that it is lost, and of one that says
+//! nothing of what came after its last entry. [`mended`](read::mended) gives the second one to
+//! what a run that died has left.
 
 use core::ops::RangeInclusive;
 
 pub(crate) mod entry;
 pub(crate) mod header;
 pub(crate) mod read;
+pub(crate) mod stream;
 pub(crate) mod values;
 pub(crate) mod write;
 
@@ -32,3 +36,4 @@ const READ: RangeInclusive<u16> = 1..=VERSION;
 const HEADER: u8 = 1;
 const ENTRY: u8 = 2;
 const END: u8 = 3;
+const CUT: u8 = 4;

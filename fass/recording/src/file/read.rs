@@ -1,8 +1,11 @@
 //! Reading a recording, all of which may be wrong.
 
+use alloc::vec::Vec;
+
 use super::entry::{Entry, What};
 use super::header::{Channel, Header};
-use super::{END, ENTRY, HEADER, MAGIC, READ};
+use super::stream::Stream;
+use super::{CUT, END, ENTRY, HEADER, MAGIC, READ};
 use crate::value::crc::Crc;
 use crate::value::decode::{Decoder, Malformed};
 use crate::value::recordable::Recordable;
@@ -16,6 +19,18 @@ pub struct Recording<'b> {
     header: Header,
     /// Where the first entry stands.
     first: usize,
+    count: u64,
+    lost: u64,
+    is_cut: bool,
+}
+
+/// How far a recording was read.
+struct Progress {
+    header: Option<Header>,
+    /// Where the first entry stands, and what is behind the last whole frame.
+    first: usize,
+    last: usize,
+    crc: Crc,
     count: u64,
     lost: u64,
 }
@@ -46,6 +61,75 @@ impl<'b> Recording<'b> {
     ///
     /// See [`Writer`](crate::Writer).
     pub fn read(bytes: &'b [u8]) -> Result<Self, Malformed> {
+        let mut progress = Progress::none();
+        let is_cut = progress.read(bytes)?;
+        Ok(Self {
+            bytes,
+            header: progress.header.unwrap_or_default(),
+            first: progress.first,
+            count: progress.count,
+            lost: progress.lost,
+            is_cut,
+        })
+    }
+
+    /// Returns what the recording says of itself.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub const fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Returns the number of entries.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Returns how many entries are of what was lost; 0, if the recording is not
+    /// [cut](Self::is_cut): it is complete.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub const fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Reports whether the recording says nothing of what happened after its last entry: the
+    /// run died, or its buffer was full of what is never lost.
+    ///
+    /// See [`Stream`](crate::Stream).
+    #[must_use]
+    pub const fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    /// Returns the entries.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[must_use]
+    pub fn entries(&self) -> Entries<'b> {
+        Entries(Decoder::new(&self.bytes[self.first..]))
+    }
+}
+
+impl Progress {
+    const fn none() -> Self {
+        Self {
+            header: None,
+            first: 0,
+            last: 0,
+            crc: Crc::new(),
+            count: 0,
+            lost: 0,
+        }
+    }
+
+    /// Reads all frames, and reports whether the last one is of a recording that is cut.
+    fn read(&mut self, bytes: &[u8]) -> Result<bool, Malformed> {
         let mut input = Decoder::new(bytes);
         let mark = "the mark of a recording, 0x89 and `FASSREC`";
         if input.take(MAGIC.len(), mark)? != MAGIC {
@@ -69,22 +153,23 @@ impl<'b> Recording<'b> {
             offset: frame.offset,
             expected,
         })?;
+        let header = self.header.insert(header);
 
-        let first = input.offset();
-        let (mut count, mut lost) = (0, 0);
+        (self.first, self.last, self.crc) = (input.offset(), input.offset(), crc);
         loop {
             let frame = checked(&mut input, &mut crc)?;
             let inside = |malformed: Malformed| malformed.behind(frame.offset);
             match frame.kind {
                 ENTRY => {
                     let entry = Entry::decode(frame.payload).map_err(inside)?;
-                    entry.check(&header).map_err(inside)?;
-                    count += 1;
-                    lost += u64::from(entry.what == What::Lost);
+                    entry.check(header).map_err(inside)?;
+                    self.count += 1;
+                    self.lost += u64::from(entry.what == What::Lost);
+                    (self.last, self.crc) = (input.offset(), crc);
                 }
-                END => {
+                END | CUT => {
                     let said = <(u64, u64)>::from_bytes(frame.payload).map_err(inside)?;
-                    if said != (count, lost) {
+                    if said != (self.count, self.lost) {
                         return Err(inside(Malformed {
                             offset: 0,
                             expected: "how many entries there are, and how many of them are lost",
@@ -93,50 +178,42 @@ impl<'b> Recording<'b> {
                     if input.remaining() > 0 {
                         return Err(input.expected("the end of the file"));
                     }
-                    return Ok(Self {
-                        bytes,
-                        header,
-                        first,
-                        count,
-                        lost,
-                    });
+                    return Ok(frame.kind == CUT);
                 }
-                _ => return Err(frame.expected("an entry, frame kind 2, or the end, 3")),
+                _ => return Err(frame.expected("an entry, frame kind 2, or an end, 3 or 4")),
             }
         }
     }
+}
 
-    /// Returns what the recording says of itself.
-    ///
-    /// See [`Writer`](crate::Writer).
-    #[must_use]
-    pub const fn header(&self) -> &Header {
-        &self.header
+/// Returns a recording of what is whole and unaltered at the start of these bytes, as a run
+/// leaves them that died. It is [cut](Recording::is_cut).
+///
+/// # Errors
+///
+/// Not even the header is whole: what is wrong with it.
+///
+/// ```
+/// use recording::{Header, Recording, Writer};
+///
+/// let mut bytes = Writer::new(&Header::default()).finish();
+/// bytes.pop();
+/// assert!(Recording::read(&bytes).is_err());
+/// let mended = recording::mended(&bytes).unwrap();
+/// assert!(Recording::read(&mended).unwrap().is_cut());
+/// ```
+pub fn mended(bytes: &[u8]) -> Result<Vec<u8>, Malformed> {
+    let mut progress = Progress::none();
+    let malformed = progress.read(bytes).err();
+    if let Some(malformed) = malformed
+        && progress.header.is_none()
+    {
+        return Err(malformed);
     }
-
-    /// Returns the number of entries.
-    ///
-    /// See [`Writer`](crate::Writer).
-    #[must_use]
-    pub const fn count(&self) -> u64 {
-        self.count
-    }
-
-    /// Returns how many entries are of what was lost; 0: the recording is complete.
-    ///
-    /// See [`Writer`](crate::Writer).
-    #[must_use]
-    pub const fn lost(&self) -> u64 {
-        self.lost
-    }
-
-    /// Returns the entries.
-    ///
-    /// See [`Writer`](crate::Writer).
-    #[must_use]
-    pub fn entries(&self) -> Entries<'b> {
-        Entries(Decoder::new(&self.bytes[self.first..]))
-    }
+    let mut whole = bytes[..progress.last].to_vec();
+    let stream = Stream::behind(progress.crc, progress.count, progress.lost);
+    stream.cut(&mut |part| whole.extend_from_slice(part));
+    Ok(whole)
 }
 
 impl<'b> Iterator for Entries<'b> {

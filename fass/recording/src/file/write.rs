@@ -2,12 +2,9 @@
 
 use alloc::vec::Vec;
 
-use super::entry::{Entry, What};
+use super::entry::Entry;
 use super::header::Header;
-use super::{END, ENTRY, HEADER, MAGIC, VERSION};
-use crate::value::crc::Crc;
-use crate::value::encode::{Encoder, Full};
-use crate::value::recordable::{Recordable, to_bytes};
+use super::stream::Stream;
 
 /// Writes a recording into memory.
 ///
@@ -51,10 +48,7 @@ use crate::value::recordable::{Recordable, to_bytes};
 #[derive(Clone, Debug)]
 pub struct Writer {
     bytes: Vec<u8>,
-    /// Of all bytes that are no checksums.
-    crc: Crc,
-    entries: u64,
-    lost: u64,
+    stream: Stream,
 }
 
 impl Writer {
@@ -63,60 +57,30 @@ impl Writer {
     /// See [`Writer`].
     #[must_use]
     pub fn new(header: &Header) -> Self {
-        let mut writer = Self {
-            bytes: MAGIC.to_vec(),
-            crc: Crc::new(),
-            entries: 0,
-            lost: 0,
-        };
-        writer.bytes.extend(VERSION.to_le_bytes());
-        writer.crc.update(&writer.bytes);
-        writer.frame(HEADER, |out| header.encode(out));
-        writer
+        let mut bytes = Vec::new();
+        let stream = Stream::begin(header, &mut |part| bytes.extend_from_slice(part));
+        Self { bytes, stream }
     }
 
     /// Adds an entry. It has to fit to the header, or the recording will be refused.
     ///
+    /// # Panics
+    ///
+    /// If the value has 4 GiB or more.
+    ///
     /// See [`Writer`].
     pub fn write(&mut self, entry: &Entry<'_>) {
-        self.entries += 1;
-        self.lost += u64::from(entry.what == What::Lost);
-        self.frame(ENTRY, |out| entry.encode(out));
+        let Self { bytes, stream } = self;
+        stream.write(entry, &mut |part| bytes.extend_from_slice(part));
     }
 
     /// Ends the recording and returns its bytes. One in which something is lost says so.
     ///
     /// See [`Writer`].
     #[must_use]
-    pub fn finish(mut self) -> Vec<u8> {
-        let end = to_bytes(&(self.entries, self.lost));
-        self.frame(END, |out| out.put(&end));
-        self.bytes
-    }
-
-    /// # Panics
-    ///
-    /// If the payload has 4 GiB or more.
-    fn frame(&mut self, kind: u8, payload: impl Fn(&mut Encoder<'_>)) {
-        /// What stands before the payload.
-        const HEAD: usize = 5;
-        let start = self.bytes.len();
-        self.bytes.extend([kind, 0, 0, 0, 0]);
-        // An entry is short, so mostly one pass is enough.
-        let mut room = 256;
-        let length = loop {
-            self.bytes.resize(start + HEAD + room, 0);
-            let mut out = Encoder::new(&mut self.bytes[start + HEAD..]);
-            payload(&mut out);
-            match out.finish() {
-                Ok(length) => break length,
-                Err(Full { needed }) => room = needed,
-            }
-        };
-        let count = u32::try_from(length).expect("a payload of less than 4 GiB");
-        self.bytes[start + 1..start + HEAD].copy_from_slice(&count.to_le_bytes());
-        self.bytes.truncate(start + HEAD + length);
-        self.crc.update(&self.bytes[start..]);
-        self.bytes.extend(self.crc.value().to_le_bytes());
+    pub fn finish(self) -> Vec<u8> {
+        let Self { mut bytes, stream } = self;
+        stream.end(&mut |part| bytes.extend_from_slice(part));
+        bytes
     }
 }

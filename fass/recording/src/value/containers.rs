@@ -47,7 +47,7 @@ impl<T: Recordable> Recordable for Vec<T> {
 
     fn encode(&self, out: &mut Encoder<'_>) {
         out.count(self.len());
-        self.iter().for_each(|value| value.encode(out));
+        T::encode_all(self, out);
     }
 
     fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
@@ -80,7 +80,7 @@ impl<T: Recordable, const N: usize> Recordable for [T; N] {
     }
 
     fn encode(&self, out: &mut Encoder<'_>) {
-        self.iter().for_each(|value| value.encode(out));
+        T::encode_all(self, out);
     }
 
     fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {

@@ -45,11 +45,17 @@ impl<'b> Encoder<'b> {
     ///
     /// See [`Encoder`].
     pub fn put(&mut self, bytes: &[u8]) {
-        let end = self.written.saturating_add(bytes.len());
-        if let Some(place) = self.buffer.get_mut(self.written..end) {
-            place.copy_from_slice(bytes);
+        let places = self.places(bytes.len());
+        if !places.is_empty() {
+            places.copy_from_slice(bytes);
         }
-        self.written = end;
+    }
+
+    /// Returns the place of the next so many bytes, to be filled; none if they do not fit.
+    pub(crate) fn places(&mut self, count: usize) -> &mut [u8] {
+        let start = self.written;
+        self.written = start.saturating_add(count);
+        self.buffer.get_mut(start..self.written).unwrap_or_default()
     }
 
     /// Writes how many elements or bytes follow. More than 2^32 - 1 fit into no buffer.

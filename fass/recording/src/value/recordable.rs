@@ -51,6 +51,12 @@ pub trait Recordable: Sized {
     /// See [`Encoder`].
     fn encode(&self, out: &mut Encoder<'_>);
 
+    /// Writes values one after the other; numbers at once, for that is many times as fast.
+    #[doc(hidden)]
+    fn encode_all(values: &[Self], out: &mut Encoder<'_>) {
+        values.iter().for_each(|value| value.encode(out));
+    }
+
     /// Reads a value.
     ///
     /// # Errors
@@ -106,6 +112,14 @@ macro_rules! implement_number {
 
             fn encode(&self, out: &mut Encoder<'_>) {
                 out.put(&self.to_le_bytes());
+            }
+
+            fn encode_all(values: &[Self], out: &mut Encoder<'_>) {
+                const BYTES: usize = size_of::<$number>();
+                let places = out.places(values.len().saturating_mul(BYTES));
+                for (place, value) in places.chunks_exact_mut(BYTES).zip(values) {
+                    place.copy_from_slice(&value.to_le_bytes());
+                }
             }
 
             fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {

@@ -6,22 +6,18 @@
 //! passed over: its function is not called. What else is recorded is compared.
 
 mod clock;
-mod replay;
 
 use std::cell::{Cell, RefCell};
-use std::sync::Arc;
 
+use fass::edge::{self, Outcome, Replay};
 use fass::{LatestJobs, Plan, Recorded};
-use recording::{
-    Channel, DagHeader, Entry, Header, Malformed, Recordable, Role, Schema, Shown, What, Writer,
-};
-use sched_dag::journal::{self, Event};
+use recording::{Channel, Entry, Header, Malformed, Recordable, Role, Schema, Shown, What, Writer};
+use sched_dag::journal::Event;
 use sched_dag::law::Record;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use clock::Clock;
-pub use replay::Divergence;
-use replay::Replay;
+pub use fass::edge::Divergence;
 
 /// The edge of one machine.
 #[derive(Debug, Default)]
@@ -71,7 +67,7 @@ fn dag_id(dag: usize) -> Option<DagId> {
 impl Edge {
     /// Makes the machine replay a recording.
     pub(crate) fn replay(&self, bytes: &[u8]) -> Result<(), Malformed> {
-        self.replay.replace(Some(Replay::read(bytes)?));
+        self.replay.replace(Some(Replay::read(bytes.to_vec())?));
         Ok(())
     }
 
@@ -81,30 +77,16 @@ impl Edge {
 
     /// Takes the recorded topics of a DAG.
     pub(crate) fn open(&self, dag: DagId, graph: u64, channels: &[Channel]) {
-        let mut header = self.header.borrow_mut();
-        let dags = header.dags.len().max(dag.index() + 1);
-        header.dags.resize(dags, DagHeader::default());
-        header.dags[dag.index()].graph = graph;
-        header.channels.extend_from_slice(channels);
+        edge::open(&mut self.header.borrow_mut(), dag, graph, channels);
     }
 
     /// Takes a plan, which has to fit to what is replayed. Returns the signals of the replay.
     pub(crate) fn launch(&self, plan: &mut Plan) -> Result<Vec<(DagId, u64)>, String> {
         let mut header = self.header.borrow_mut();
-        header.app = "virtual time".into();
-        let dags = plan.task_set.dags();
-        header.dags.resize(dags.len(), DagHeader::default());
-        for (header, dag) in header.dags.iter_mut().zip(dags) {
-            header.name = dag.name().into();
-        }
+        edge::name(&mut header, "virtual time", &plan.task_set);
         if let Some(replay) = self.replay.borrow_mut().as_mut() {
             replay.fit(&header, &plan.task_set)?;
-            let task_set = Arc::make_mut(&mut plan.task_set);
-            for dag in (0..header.dags.len()).filter_map(dag_id) {
-                if let Some(jobs) = replay.jobs_of(dag) {
-                    task_set.replay(dag, jobs);
-                }
-            }
+            replay.prepare(plan);
         }
         let latest = |jobs| LatestJobs::new(&header.channels, jobs);
         self.latest.replace(self.most_jobs.get().map(latest));
@@ -120,7 +102,7 @@ impl Edge {
     /// to a release, for else it would be dropped where functions take longer than they took.
     pub(crate) fn next_signal_ns(&self, dag: DagId) -> Option<u64> {
         let mut replay = self.replay.borrow_mut();
-        replay.as_mut()?.signals.get_mut(&dag)?.pop_front()
+        replay.as_mut()?.next_signal_ns(dag)
     }
 
     /// Reports whether faults of a DAG are those of a replay: what they cut is recorded.
@@ -142,8 +124,8 @@ impl Edge {
         let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
         let is_recorded = self.header.borrow().channels.iter().any(of_dag);
         let replay = self.replay.borrow();
-        let recorded = replay.as_ref().and_then(|replay| replay.clock(instance));
-        self.clock.begin(is_recorded, recorded);
+        let recorded = (replay.as_ref()).and_then(|replay| replay.clock(instance));
+        self.clock.begin(is_recorded, recorded.map(<[u64]>::to_vec));
     }
 
     /// Answers a function that asks for the time: with what was answered then, if it is
@@ -174,7 +156,7 @@ impl Edge {
     /// Takes a value of this run, and compares it with the recorded one.
     pub(crate) fn record(&self, value: &Recorded<'_>) {
         if let Some(replay) = self.replay.borrow_mut().as_mut() {
-            replay.compare(&self.header.borrow(), value);
+            replay.compare(value);
         }
         if let Some(latest) = self.latest.borrow_mut().as_mut() {
             latest.take(value);
@@ -204,12 +186,11 @@ impl Edge {
             .is_some_and(|replay| replay.passes_over(instance))
     }
 
-    /// Returns how many values were compared, how many were not, and the first one that
-    /// differs; if the run is over, also one that it has not computed.
-    pub(crate) fn outcome(&self, is_over: bool) -> (u64, u64, Option<Divergence>) {
-        let (replay, header) = (self.replay.borrow(), self.header.borrow());
-        let outcome = |replay: &Replay| replay.outcome(&header, is_over);
-        replay.as_ref().map_or((0, 0, None), outcome)
+    /// Returns what the replay has found, if it is one; if the run is over, also a value that it has
+    /// not computed.
+    pub(crate) fn outcome(&self, is_over: bool) -> Outcome {
+        let replay = self.replay.borrow();
+        (replay.as_ref()).map_or_else(Outcome::default, |replay| replay.outcome(is_over))
     }
 
     /// Reports whether a topic of a DAG is recorded.
@@ -308,13 +289,7 @@ impl Edge {
         });
         let others = events.iter().filter_map(|event| {
             let is_sporadic = task_set.dag(event.dag).is_sporadic();
-            let what = match event.what {
-                journal::What::Released if is_sporadic => What::Signal,
-                journal::What::Skipped => What::Skip,
-                journal::What::Cancelled => What::Cut,
-                journal::What::Restarted => What::Restart,
-                _ => return None,
-            };
+            let what = edge::recorded(event.what, is_sporadic)?;
             let dag = u16::try_from(event.dag.0).ok()?;
             // What was skipped or cut in the recorded run is not so here.
             if self.is_replayed(event.dag) || !is_kept(event.dag.index(), event.job) {

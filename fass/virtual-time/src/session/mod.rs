@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use fass::edge::Outcome;
 use fass::{Body, Plan};
 use sched_dag::Recorder;
 use sched_dag::virtual_time::{End, VirtualTime as Driver};
@@ -168,7 +169,11 @@ impl Session {
     }
 
     fn report(&self, edge: &Edge, is_over: bool) -> Report {
-        let (compared, uncompared, divergence) = edge.outcome(is_over);
+        let Outcome {
+            compared,
+            uncompared,
+            divergence,
+        } = edge.outcome(is_over);
         let dags = (0..).map(DagId).zip(self.task_set.dags());
         let sink_misses = |(dag, model): (DagId, &Dag)| {
             let sinks = model.sinks().iter();

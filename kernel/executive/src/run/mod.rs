@@ -6,6 +6,7 @@
 
 pub mod containment;
 pub mod contexts;
+pub mod edge;
 pub mod execution;
 pub mod heartbeat;
 pub(crate) mod occupation;

@@ -4,11 +4,14 @@ use alloc::borrow::Cow;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+use fass::edge::Begin;
+use fass::{
+    Channel, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
+};
 use sched_dag::{DagId, SchedulerOptions};
 
 use super::execution::{self, Terms};
-use super::occupation;
+use super::{edge, occupation};
 use crate::machine::once::Once;
 use crate::machine::{clock, this_core};
 use crate::text::graph;
@@ -144,7 +147,31 @@ impl Platform for Kernel {
         execution::raise(plan, dag);
     }
 
-    fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
+    fn crosses(&self) -> bool {
+        edge::is_wished()
+    }
+
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
+        edge::open(dag, graph, channels, begin);
+    }
+
+    fn record(&self, value: &Recorded<'_>) {
+        edge::record(&Recorded {
+            completed_ns: execution::since_epoch(value.completed_ns),
+            ..*value
+        });
+    }
+
+    fn replays(&self) -> bool {
+        edge::is_replay()
+    }
+
+    fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        edge::lend(channel, job, take);
+    }
+
+    fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
+        edge::launch(&mut plan)?;
         let options = SchedulerOptions {
             policy: self.policy(),
             preemption: self.preemption(),

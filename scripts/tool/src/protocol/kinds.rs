@@ -1,9 +1,6 @@
-//! The kinds of machine lines that are known, and what each must say.
-//!
-//! `docs/serial-protocol.md` and its two companions have the same kinds; a test compares them.
+//! The kinds of machine lines, and what each must say; a test compares `docs/serial-protocol.md`.
 
-/// Each known kind and the members that its lines must have; a dot leads into
-/// an object. Members beyond these are allowed.
+/// Each known kind, and the members that its lines have at least; a dot leads into an object.
 pub const KINDS: &[(&str, &[&str])] = &[
     (
         "boot",
@@ -130,6 +127,8 @@ pub const KINDS: &[(&str, &[&str])] = &[
         ],
     ),
     ("gait_knee", &["from_job", "angles_udeg"]),
+    ("recorded", &["entries", "lost", "complete"]),
+    ("replayed", &["compared", "uncompared"]),
     (
         "fork_join",
         &[

@@ -133,6 +133,8 @@ pub struct Qemu {
     pub guest_words: String,
     /// A file to leave in the guest's memory.
     pub module: Option<PathBuf>,
+    /// Where the bytes go that the guest sends to QEMU's debug port; it has none otherwise.
+    pub records: Option<PathBuf>,
     /// Hand what is written to [`Running::input`] to the guest's serial port.
     pub has_input: bool,
     /// What the second serial port is connected to; `None`: there is none.
@@ -155,6 +157,7 @@ impl Default for Qemu {
             memory_mib: 32,
             guest_words: String::new(),
             module: None,
+            records: None,
             has_input: false,
             second: None,
             logs_instructions: false,
@@ -187,6 +190,13 @@ impl Qemu {
             arguments.extend(["-serial".into(), port]);
         }
         arguments.extend(self.second.iter().flat_map(Second::arguments));
+        if let Some(path) = &self.records {
+            let mut port = OsString::from("file,id=edge,path=");
+            port.push(with_doubled_commas(path));
+            arguments.extend(["-chardev".into(), port]);
+            let device = "isa-debugcon,iobase=0x402,chardev=edge";
+            arguments.extend(["-device", device].map(OsString::from));
+        }
         let exit_device = "isa-debug-exit,iobase=0xf4,iosize=0x04";
         arguments.extend(["-device", exit_device].map(OsString::from));
         arguments.extend(["-nodefaults", "-no-user-config"].map(OsString::from));
@@ -338,6 +348,17 @@ mod tests {
         let port = "-chardev stdio,id=console,signal=off,logfile=a,,b.log -serial chardev:console";
         assert!(line.contains(port), "{line}");
         assert!(!line.contains("file:a"));
+    }
+
+    #[test]
+    fn only_a_guest_that_records_has_a_debug_port() {
+        assert!(!line(&Qemu::default()).contains("debugcon"));
+        let line = line(&Qemu {
+            records: Some("a,b.rec".into()),
+            ..Qemu::default()
+        });
+        let port = "-chardev file,id=edge,path=a,,b.rec -device isa-debugcon,iobase=0x402,";
+        assert!(line.contains(port), "{line}");
     }
 
     #[test]

@@ -191,6 +191,19 @@ pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
     files::read(file).map_err(|why| format!("{}: {why}; name another file", files::place(file)))
 }
 
+/// Reads what a guest has sent to the debug port. Firmware says what it does there, before.
+///
+/// # Errors
+///
+/// The file cannot be read.
+pub fn received(file: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = fs::read(file)?;
+    let mut windows = bytes.windows(recording::MAGIC.len());
+    let start = windows.position(|window| window == recording::MAGIC);
+    bytes.drain(..start.unwrap_or(bytes.len()));
+    Ok(bytes)
+}
+
 /// Takes what was read for a recording.
 pub(crate) fn parse<'b>(file: &Path, bytes: &'b [u8]) -> Result<Recording<'b>, String> {
     let place = files::place(file);

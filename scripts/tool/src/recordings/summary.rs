@@ -53,6 +53,10 @@ pub(super) fn of(recording: &Recording<'_>) -> String {
         }
     }
     let _ = match recording.lost() {
+        _ if recording.is_cut() => writeln!(
+            text,
+            "incomplete: it says nothing of what came after its last entry"
+        ),
         0 => writeln!(text, "complete"),
         lost => writeln!(text, "incomplete: {lost} values are lost"),
     };

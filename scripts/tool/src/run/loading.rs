@@ -1,7 +1,15 @@
-//! What brings the image into memory: which loader the options choose, and on what board.
+//! What brings the image into memory: which loader the options choose, and on what machine of
+//! which QEMU.
 
+use std::path::PathBuf;
+
+use super::Refusal;
+use crate::dag_file::Prepared;
+use crate::files;
+use crate::install;
 use crate::options::Parsed;
-use crate::qemu::{Loader, Machine, Mode};
+use crate::qemu::{Loader, Machine, Mode, PROGRAM};
+use crate::system;
 
 /// Returns the loader that the options choose.
 pub(super) fn chosen(options: &Parsed) -> Loader {
@@ -43,6 +51,50 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
         );
     }
     Ok(())
+}
+
+/// Settles the memory: the person's choice, or what is usual, and in both
+/// cases enough for the stacks and tables of that many processors.
+pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
+    let cores = options.number("cores").unwrap_or(1);
+    let loader = chosen(options);
+    let bytes = |name| {
+        let data = options.path(name).and_then(|path| path.metadata().ok());
+        data.map_or(0, |data| data.len())
+    };
+    // A replay has a table of its values besides.
+    let module_mib = (bytes("module") + 3 * bytes("replay")).div_ceil(1 << 20);
+    let mut least = loader.least_memory_mib().max((cores * 5).div_ceil(8)) + module_mib;
+    if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
+        least = least.max(dags.memory_mib);
+    }
+    let memory_mib = options.number("memory").unwrap_or(least);
+    if memory_mib >= least {
+        return Ok(memory_mib);
+    }
+    if options.is_given("memory") {
+        let with = match module_mib {
+            0 => String::new(),
+            mib => format!(" with a module of {mib} MiB,"),
+        };
+        return Err(Refusal::Usage(format!(
+            "`--memory {memory_mib}`: {cores} cores,{with} booted by {loader}, take at least \
+             {least} MiB; give more, or fewer cores"
+        )));
+    }
+    Ok(least)
+}
+
+/// Finds the QEMU to use, installing one if none is named and none is there.
+pub(super) fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
+    if let Some(named) = options.path("qemu") {
+        return system::find_program(named).ok_or_else(|| {
+            let place = files::place(named);
+            Refusal::Usage(format!("`--qemu {place}`: there is no such program"))
+        });
+    }
+    install::ensure_qemu().map_err(Refusal::Failure)?;
+    Ok(PROGRAM.into())
 }
 
 #[cfg(test)]

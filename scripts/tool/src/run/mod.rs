@@ -13,6 +13,7 @@ mod folder;
 mod loading;
 mod log;
 mod prove;
+mod recording;
 mod screen;
 mod seeing;
 mod status;
@@ -21,7 +22,7 @@ mod wcets;
 mod wire;
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -34,9 +35,9 @@ use crate::options::Parsed;
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::{Status, Transcript};
-use crate::qemu::{Ending, Mode, PROGRAM, Qemu};
-use crate::system;
+use crate::qemu::{Ending, Mode, Qemu};
 use log::Log;
+use recording::Recorded;
 use screen::Screen;
 use wcets::Wcets;
 
@@ -91,6 +92,12 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
         let line = "`--dag` and `--module` exclude each other: the DAGs are the module; give one";
         return Err(Refusal::Usage(line.into()));
     }
+    let lone = ["record", "replay"].map(|name| options.is_given(name));
+    if lone == [true, true] || lone[1] && options.is_given("dag") {
+        let other = if lone[0] { "record" } else { "dag" };
+        let line = format!("`--replay` and `--{other}` exclude each other; give one");
+        return Err(Refusal::Usage(line));
+    }
     check_files(options)?;
     let mut dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
@@ -109,9 +116,12 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
     wire::check(options)?;
-    let mut inputs = options.named(&["dag", "module", "image", "qemu", "wcets"]);
+    let mut inputs = options.named(&["dag", "module", "replay", "image", "qemu", "wcets"]);
     inputs.extend(wire::input(options));
-    let outputs = options.named(&["serial", "trace", "dot", "witness", "observe", "output"]);
+    let outputs = [
+        "serial", "trace", "record", "dot", "witness", "observe", "output",
+    ];
+    let outputs = options.named(&outputs);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     log::check(options).map_err(Refusal::Usage)
 }
@@ -130,13 +140,14 @@ fn boot_app(
     shows: bool,
 ) -> Result<Booted, Refusal> {
     let app = choose_app(options, dags.is_some())?;
-    let memory_mib = choose_memory(options, dags.as_deref())?;
+    let memory_mib = loading::choose_memory(options, dags.as_deref())?;
     let named = options.text("mode").and_then(Mode::from_name);
     loading::check(options, named).map_err(Refusal::Usage)?;
-    let program = choose_program(options)?;
+    let program = loading::choose_program(options)?;
     install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
 
     let wcets = Wcets::read(options, dags.is_none())?;
+    let recorded = Recorded::new(options).map_err(Refusal::Failure)?;
     if let Some(dags) = dags.as_deref_mut() {
         dags.write_module(wcets.text()).map_err(Refusal::Failure)?;
     }
@@ -145,6 +156,8 @@ fn boot_app(
         let module = dags.and_then(|dags| dags.module.clone());
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
         qemu.guest_words += &wcets.guest_words();
+        qemu.guest_words += recorded.guest_word();
+        qemu.records = recorded.raw();
         qemu.module = module.or_else(|| wcets.module());
         qemu
     };
@@ -192,6 +205,12 @@ fn boot_app(
             "{file}: the log with its trace; `./scripts/check-trace {file}` judges it, \
              `./scripts/trace {file} -o {file}.json` draws it"
         ));
+    }
+    if let Some(line) = recorded
+        .write(options, &outcome)
+        .map_err(Refusal::Failure)?
+    {
+        screen.say(&line);
     }
     for written in [
         seeing::write_dot(options, &outcome),
@@ -243,46 +262,6 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
     }
 }
 
-/// Settles the memory: the person's choice, or what is usual, and in both
-/// cases enough for the stacks and tables of that many processors.
-fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
-    let cores = options.number("cores").unwrap_or(1);
-    let loader = loading::chosen(options);
-    let module = options.path("module").and_then(|path| path.metadata().ok());
-    let module_mib = module.map_or(0, |module| module.len().div_ceil(1 << 20));
-    let mut least = loader.least_memory_mib().max((cores * 5).div_ceil(8)) + module_mib;
-    if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
-        least = least.max(dags.memory_mib);
-    }
-    let memory_mib = options.number("memory").unwrap_or(least);
-    if memory_mib >= least {
-        return Ok(memory_mib);
-    }
-    if options.is_given("memory") {
-        let with = match module_mib {
-            0 => String::new(),
-            mib => format!(" with a module of {mib} MiB,"),
-        };
-        return Err(Refusal::Usage(format!(
-            "`--memory {memory_mib}`: {cores} cores,{with} booted by {loader}, take at least \
-             {least} MiB; give more, or fewer cores"
-        )));
-    }
-    Ok(least)
-}
-
-/// Finds the QEMU to use, installing one if none is named and none is there.
-fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
-    if let Some(named) = options.path("qemu") {
-        return system::find_program(named).ok_or_else(|| {
-            let place = files::place(named);
-            Refusal::Usage(format!("`--qemu {place}`: there is no such program"))
-        });
-    }
-    install::ensure_qemu().map_err(Refusal::Failure)?;
-    Ok(PROGRAM.into())
-}
-
 fn describe(
     options: &Parsed,
     program: &Path,
@@ -308,6 +287,7 @@ fn describe(
         memory_mib,
         guest_words: words.join(" "),
         module: None,
+        records: None,
         has_input: options.is_given("console"),
         second: wire::second(options),
         logs_instructions: false,

@@ -96,6 +96,18 @@ pub static RUN: Command = Command {
             "Leave this file in the guest's memory, for the app: a recording for gait.",
         ),
         Opt::new(
+            "record",
+            Takes::File("FILE"),
+            "Write what crosses the edge of the run to this file: the values of the topics that \
+             the app records, see docs/recordings.md.",
+        ),
+        Opt::new(
+            "replay",
+            Takes::File("FILE"),
+            "Take the values of sources from this recording, compare the others with it, and \
+             fail where one differs.",
+        ),
+        Opt::new(
             "print-dag",
             Takes::Nothing,
             "--dag: print the file in our text format; run nothing.",

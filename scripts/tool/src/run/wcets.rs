@@ -1,4 +1,4 @@
-//! What `--wcets FILE`, `--module FILE` and `--input FILE` hand to the guest: all in one boot
+//! What `--wcets`, `--replay`, `--module` and `--input` hand to the guest: all in one boot
 //! module, in this order.
 
 use std::fs;
@@ -15,6 +15,8 @@ pub(super) struct Wcets {
     text: String,
     /// How many bytes at the module's end are a wire's.
     input_bytes: usize,
+    /// How many bytes after it are a recording.
+    replay_bytes: usize,
     /// Where the module of both files lies, if there is no other. It is removed with this
     /// value.
     module: Temporary,
@@ -36,14 +38,18 @@ impl Wcets {
     pub(super) fn read(options: &Parsed, is_alone: bool) -> Result<Wcets, Refusal> {
         let read = |path: &Path| wcets::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
+        let replayed = super::recording::read(options)?;
         let own = options.path("module").map(read_module).transpose()?;
         let input = wire::script(options)?;
         let mut module = Temporary(None);
-        if is_alone && (text.is_some() || own.is_some() || !input.is_empty()) {
+        if is_alone
+            && (text.is_some() || !replayed.is_empty() || own.is_some() || !input.is_empty())
+        {
             let path = system::new_log("module").map_err(Refusal::Failure)?;
             let path = path.with_extension("module");
             let parts = [
                 text.as_deref().unwrap_or_default().as_bytes(),
+                &replayed,
                 &own.unwrap_or_default(),
                 &input,
             ];
@@ -56,6 +62,7 @@ impl Wcets {
         Ok(Wcets {
             text: text.unwrap_or_default(),
             input_bytes: input.len(),
+            replay_bytes: replayed.len(),
             module,
         })
     }
@@ -70,10 +77,14 @@ impl Wcets {
         self.module.0.clone()
     }
 
-    /// Returns the words that tell the guest where the WCETs end and the input begins, each after
-    /// a blank.
+    /// Returns the words that tell the guest where the files end, and where the input begins,
+    /// each after a blank.
     pub(super) fn guest_words(&self) -> String {
-        let parts = [("wcets", self.text.len()), ("input", self.input_bytes)];
+        let parts = [
+            ("wcets", self.text.len()),
+            ("replay", self.replay_bytes),
+            ("input", self.input_bytes),
+        ];
         let parts = parts.into_iter().filter(|(_, bytes)| *bytes > 0);
         parts
             .map(|(name, bytes)| format!(" {name}={bytes}"))

@@ -5,6 +5,7 @@ use core::sync::atomic::Ordering;
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 
+use fass::edge::Happened;
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Placement;
 use sched_dag::{CoreId, DagId, Instance, JobOutcome, Journal, Observer, TaskSet, Vertex};
@@ -13,6 +14,7 @@ use super::runner::Others;
 use super::time::here;
 use super::{JOBS_ENDED, Runner};
 use crate::machine::context::Parked;
+use crate::run::edge;
 
 /// Writes what the scheduler reports into the journal, with the time of the instant that
 /// the scheduler is told of: at a completion when the function returned, so a join's
@@ -55,6 +57,19 @@ impl Watcher {
         self.note(what, self.instant_ns, Subject::of_job(dag, job));
     }
 
+    /// Tells what crosses the edge: of a job, or of an instance.
+    fn tell(&self, what: What, (dag, subtask, job): (DagId, u32, u64), release_ns: Option<u64>) {
+        let at_ns = self.instant_ns;
+        let happened = Happened {
+            dag,
+            subtask,
+            job,
+            release_ns,
+            at_ns,
+        };
+        edge::happened(what, &happened);
+    }
+
     /// Writes down what has happened.
     fn note(&mut self, what: What, time_ns: u64, subject: Subject) {
         let here = here();
@@ -78,6 +93,7 @@ impl Observer for Watcher {
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
         if self.task_set.dag(dag).is_sporadic() {
             self.note(What::Due, release_ns, Subject::of_job(dag, job));
+            self.tell(What::Released, (dag, 0, job), Some(release_ns));
         }
         self.of_job(What::Released, dag, job);
     }
@@ -86,7 +102,8 @@ impl Observer for Watcher {
         self.of_job(What::Queued, dag, job);
     }
 
-    fn skipped(&mut self, dag: DagId, job: u64, _: u64) {
+    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.tell(What::Skipped, (dag, 0, job), Some(release_ns));
         self.of_job(What::Skipped, dag, job);
     }
 
@@ -96,6 +113,8 @@ impl Observer for Watcher {
 
     fn restarted(&mut self, instance: Instance) {
         self.note(What::Restarted, self.instant_ns, Subject::of(instance));
+        let Instance { dag, subtask, job } = instance;
+        self.tell(What::Restarted, (dag, subtask.0, job), None);
         let vertex = self.task_set.vertex(instance);
         if let Some(mut next) = self.others[vertex.index()].pop() {
             next.body.take_over();
@@ -125,6 +144,8 @@ impl Observer for Watcher {
 
     fn cancelled(&mut self, instance: Instance) {
         self.note(What::Cancelled, self.instant_ns, Subject::of(instance));
+        let Instance { dag, subtask, job } = instance;
+        self.tell(What::Cancelled, (dag, subtask.0, job), None);
         let vertex = self.task_set.vertex(instance);
         if let Some(runner) = self.placement.resting(vertex) {
             runner.body.discard(instance.job);

@@ -1,0 +1,119 @@
+//! Functions that a replay does not call.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::mem;
+
+use sched_dag::{DagId, Instance, SubtaskId};
+
+use crate::run::plan::{Body, Plan, Subtask};
+
+/// The instances whose functions are not called.
+#[derive(Clone, Debug)]
+pub(super) struct Passed {
+    /// The DAGs whose inputs are recorded, in order.
+    pub(super) dags: Vec<u16>,
+    /// The jobs of these that have some, in order.
+    pub(super) jobs: Vec<(u16, u64)>,
+    /// The instances that were cut, in order.
+    pub(super) cuts: Vec<(u16, u16, u64)>,
+}
+
+impl Passed {
+    /// Reports whether the inputs of a DAG are recorded.
+    pub(super) fn is_of(&self, dag: u16) -> bool {
+        self.dags.binary_search(&dag).is_ok()
+    }
+
+    /// Adds an instance that is cut; `false`: it was before.
+    pub(super) fn cut(&mut self, instance: Instance) -> bool {
+        let Some((dag, subtask)) = narrow(instance) else {
+            return false;
+        };
+        let cut = (dag, subtask, instance.job);
+        let place = self.cuts.binary_search(&cut);
+        place.map_err(|place| self.cuts.insert(place, cut)).is_err()
+    }
+
+    /// Reports whether an instance is one of them.
+    pub(super) fn has(&self, instance: Instance) -> bool {
+        let Some((dag, subtask)) = narrow(instance) else {
+            return false;
+        };
+        let job = instance.job;
+        self.is_of(dag)
+            && (self.jobs.binary_search(&(dag, job)).is_err()
+                || self.cuts.binary_search(&(dag, subtask, job)).is_ok())
+    }
+}
+
+/// Returns the numbers of a DAG and of a subtask, as recordings have them.
+pub(super) fn narrow(instance: Instance) -> Option<(u16, u16)> {
+    let dag = u16::try_from(instance.dag.0).ok()?;
+    Some((dag, u16::try_from(instance.subtask.0).ok()?))
+}
+
+/// A subtask some of whose instances are passed over.
+struct Guarded {
+    subtask: Box<dyn Subtask>,
+    /// The instance, but for its job.
+    of: Instance,
+    passed: Arc<Passed>,
+}
+
+impl Subtask for Guarded {
+    fn take_turn(&mut self, job: u64) {
+        match self.passed.has(Instance { job, ..self.of }) {
+            true => self.subtask.discard(job),
+            false => self.subtask.take_turn(job),
+        }
+    }
+
+    fn discard(&mut self, job: u64) {
+        self.subtask.discard(job);
+    }
+
+    fn can_take_over(&self) -> bool {
+        self.subtask.can_take_over()
+    }
+
+    fn take_over(&mut self) {
+        self.subtask.take_over();
+    }
+
+    fn is_fallback(&self) -> bool {
+        self.subtask.is_fallback()
+    }
+}
+
+/// Makes all bodies of a plan pass over these.
+pub(super) fn guard(plan: &mut Plan, passed: &Arc<Passed>) {
+    let guarded = |bodies: &mut Vec<Body>, dag, subtask: &dyn Fn(u32) -> u32| {
+        let of_bodies = (0..).zip(mem::take(bodies));
+        *bodies = (of_bodies.map(|(number, body): (u32, Body)| {
+            let of = Instance {
+                dag,
+                subtask: SubtaskId(subtask(number)),
+                job: 0,
+            };
+            let passed = Arc::clone(passed);
+            body.wrapped(|subtask| {
+                Box::new(Guarded {
+                    subtask,
+                    of,
+                    passed,
+                })
+            })
+        }))
+        .collect();
+    };
+    for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
+        guarded(bodies, dag, &|number| number);
+    }
+    for (dag, of_dag) in (0..).map(DagId).zip(&mut plan.others) {
+        for (subtask, bodies) in (0..).zip(of_dag) {
+            guarded(bodies, dag, &|_| subtask);
+        }
+    }
+}

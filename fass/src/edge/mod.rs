@@ -1,0 +1,169 @@
+//! What crosses the edge of a run on a machine: written into a buffer, or taken from a recording.
+//!
+//! A *tape* takes what happens, from the core that completes: it allocates nothing and waits for
+//! nothing. The *drain* makes the file of it, whenever a core has time. A *replay* lends recorded
+//! values, and compares those that are computed.
+//!
+//! A platform reaches all this by what [`Platform::open_channels`](crate::Platform::open_channels)
+//! gives it, so that an image in which no topic is recorded has none of this code.
+
+mod drain;
+mod guard;
+mod machine;
+mod replay;
+mod ring;
+mod tape;
+
+use alloc::boxed::Box;
+use alloc::string::String;
+
+use recording::{Channel, DagHeader, Header};
+use sched_dag::journal::What;
+use sched_dag::{DagId, TaskSet};
+
+use crate::run::plan::Plan;
+use crate::run::record::Recorded;
+
+pub use replay::{Divergence, Outcome, Replay};
+
+/// What a platform is to do with what crosses.
+///
+/// See [`Crossing`].
+#[derive(Clone, Copy, Debug)]
+pub enum Wish {
+    /// Record it.
+    Record {
+        /// What is recorded, by its name.
+        app: &'static str,
+        /// The room for what is not drained yet.
+        bytes: usize,
+    },
+    /// Replay these bytes.
+    Replay(&'static [u8]),
+}
+
+/// Begins to do what is wished.
+pub type Begin = fn(Wish) -> Box<dyn Crossing>;
+
+/// What a platform asks for in order to record or to replay; times are of the run. What does
+/// not concern a replay, or a tape, does nothing there.
+///
+/// ```
+/// use fass::edge::{Begin, Crossing, Wish};
+///
+/// /// What a platform does in `open_channels`, once.
+/// fn crossing(begin: Begin, file: &'static [u8]) -> Box<dyn Crossing> {
+///     begin(Wish::Replay(file))
+/// }
+/// ```
+pub trait Crossing: Send {
+    /// Takes the recorded topics of a DAG, and the hash of its names and edges.
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]);
+
+    /// Takes the plan, before anything of it has run. Takes all memory that will be needed.
+    ///
+    /// # Errors
+    ///
+    /// In words: there is no memory, or the replay does not fit.
+    fn launch(&mut self, plan: &mut Plan) -> Result<(), String>;
+
+    /// Takes a value, at the completion of its writer.
+    fn record(&mut self, value: &Recorded<'_>);
+
+    /// Takes what has become of a job, or of an instance.
+    fn happened(&mut self, what: What, happened: &Happened);
+
+    /// Lends the recorded value of a channel and a job, if there is one.
+    fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8]));
+
+    /// Returns what makes a file of what is recorded; the first time only.
+    fn drain(&mut self) -> Option<Box<dyn Drain>>;
+
+    /// Hands what is left to the drain, at the end of the run; `false`: not all has room.
+    fn flush(&mut self) -> bool;
+
+    /// Returns what a replay has found; if the run is over, also a value that it has not computed.
+    fn outcome(&self, is_over: bool) -> Option<Outcome>;
+}
+
+/// Makes a file of what is recorded. Allocates nothing but for the header.
+///
+/// See [`Crossing`].
+pub trait Drain: Send {
+    /// Sends the header.
+    fn begin(&mut self, send: &mut dyn FnMut(&[u8]));
+
+    /// Sends the next entry; `false`: there is none.
+    fn step(&mut self, send: &mut dyn FnMut(&[u8])) -> bool;
+
+    /// Sends the end.
+    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Drained;
+}
+
+/// How complete a recording is.
+///
+/// See [`Drain`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drained {
+    /// The entries.
+    pub entries: u64,
+    /// Those of values for which there was no room.
+    pub lost: u64,
+    /// Whether it says nothing of what happened after its last entry.
+    pub is_cut: bool,
+}
+
+/// To what something has happened, and when.
+///
+/// See [`Crossing`].
+#[derive(Clone, Copy, Debug)]
+pub struct Happened {
+    /// The DAG.
+    pub dag: DagId,
+    /// The subtask, where it is an instance's.
+    pub subtask: u32,
+    /// The job.
+    pub job: u64,
+    /// When the job was due.
+    pub release_ns: Option<u64>,
+    /// When it happened.
+    pub at_ns: u64,
+}
+
+/// Begins to do what is wished.
+pub(crate) fn begin(wish: Wish) -> Box<dyn Crossing> {
+    match wish {
+        Wish::Record { app, bytes } => Box::new(tape::Tape::new(app, bytes)),
+        Wish::Replay(bytes) => Box::new(machine::OfMachine::new(bytes)),
+    }
+}
+
+/// Adds the recorded topics of a DAG to a header.
+pub fn open(header: &mut Header, dag: DagId, graph: u64, channels: &[Channel]) {
+    let dags = header.dags.len().max(dag.index() + 1);
+    header.dags.resize(dags, DagHeader::default());
+    header.dags[dag.index()].graph = graph;
+    header.channels.extend_from_slice(channels);
+}
+
+/// Adds the names to a header: of what is recorded, and of its DAGs.
+pub fn name(header: &mut Header, app: &str, task_set: &TaskSet) {
+    header.app = app.into();
+    let dags = task_set.dags();
+    header.dags.resize(dags.len(), DagHeader::default());
+    for (header, dag) in header.dags.iter_mut().zip(dags) {
+        header.name = dag.name().into();
+    }
+}
+
+/// Returns what a recording says of an event, if it says anything.
+#[must_use]
+pub fn recorded(what: What, is_sporadic: bool) -> Option<recording::What> {
+    match what {
+        What::Released if is_sporadic => Some(recording::What::Signal),
+        What::Skipped => Some(recording::What::Skip),
+        What::Cancelled => Some(recording::What::Cut),
+        What::Restarted => Some(recording::What::Restart),
+        _ => None,
+    }
+}

@@ -1,0 +1,337 @@
+//! What a replay takes from a recording, and what it finds.
+
+mod fit;
+
+use alloc::borrow::Cow;
+use alloc::collections::{BTreeMap, VecDeque};
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt;
+use core::ops::Range;
+
+use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, Shown, What};
+use sched_dag::{DagId, Instance, TaskSet};
+
+use super::guard::{Passed, guard, narrow};
+use crate::run::plan::Plan;
+use crate::run::record::Recorded;
+
+/// A recording that takes the place of what enters.
+#[derive(Debug)]
+pub struct Replay {
+    bytes: Cow<'static, [u8]>,
+    header: Header,
+    /// Where the values lie, by channel and job.
+    values: Vec<((u16, u64), Range<usize>)>,
+    /// Whether it says nothing of what came after its last entry.
+    is_cut: bool,
+    passed: Arc<Passed>,
+    /// What instances were answered that asked for the time.
+    clock: BTreeMap<(u16, u16, u64), Vec<u64>>,
+    /// The releases, if the DAG is sporadic; those of skipped jobs, too, so that the jobs after
+    /// them keep their numbers.
+    signals: BTreeMap<DagId, VecDeque<u64>>,
+    /// The first job of each DAG that a signal is recorded of.
+    first_signals: BTreeMap<DagId, u64>,
+    /// What has no value.
+    events: Vec<Entry<'static>>,
+    /// The first value of a source that is lost: its channel and job.
+    lost: Option<(u16, u64)>,
+    /// What the plan says of itself.
+    own: Header,
+    /// For each channel of the plan that of the recording, if it has one.
+    channels: Vec<Option<u16>>,
+    /// How many recorded values this run can be compared with.
+    to_compare: u64,
+    compared: u64,
+    /// For each value whether it was.
+    is_compared: Vec<bool>,
+    /// The channel of the plan, the job, and the place of the recorded value.
+    divergence: Option<(u16, u64, Range<usize>)>,
+    /// The value that is not the recorded one.
+    computed: Vec<u8>,
+}
+
+/// What a replay has found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// How many values were compared.
+    pub compared: u64,
+    /// How many recorded ones the replay has not computed.
+    pub uncompared: u64,
+    /// The first value that is not the recorded one.
+    pub divergence: Option<Divergence>,
+}
+
+/// The first value of a replay that is not the recorded one, or, if all that were computed are,
+/// the first recorded one that was not computed.
+///
+/// See [`Outcome`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Divergence {
+    /// The name of the DAG.
+    pub dag: String,
+    /// The topic.
+    pub topic: String,
+    /// The job.
+    pub job: u64,
+    /// The recorded value, as JSON.
+    pub recorded: String,
+    /// The value of this run, as JSON; none if the run is over and has computed none.
+    pub computed: Option<String>,
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            dag,
+            topic,
+            job,
+            recorded,
+            computed,
+        } = self;
+        write!(
+            f,
+            "topic `{topic}` of dag `{dag}` diverges in job {job}: {recorded} is recorded, and {} is \
+             computed; does a function share something behind the scheduler's back?",
+            computed.as_deref().unwrap_or("nothing")
+        )
+    }
+}
+
+impl Replay {
+    /// Reads a recording.
+    ///
+    /// # Errors
+    ///
+    /// It is no whole and unaltered one, or there is no memory for the places of its values.
+    pub fn read(bytes: impl Into<Cow<'static, [u8]>>) -> Result<Self, Malformed> {
+        let bytes = bytes.into();
+        let recording = Recording::read(&bytes)?;
+        let header = recording.header().clone();
+        let role = |place: u16| header.channels[usize::from(place)].role;
+        let no_memory = |_| Malformed {
+            offset: bytes.len(),
+            expected: "fewer entries, for whose places there is memory",
+        };
+        let is_value = |entry: &Entry<'_>| entry.what == What::Value;
+        let count = recording.entries().filter(is_value).count();
+        let (mut values, mut is_compared) = (Vec::new(), Vec::new());
+        values.try_reserve_exact(count).map_err(no_memory)?;
+        is_compared.try_reserve_exact(count).map_err(no_memory)?;
+        let (mut cuts, mut clock, mut lost) = (Vec::new(), BTreeMap::new(), None);
+        let mut signals = BTreeMap::<DagId, VecDeque<u64>>::new();
+        let (mut first_signals, mut events) = (BTreeMap::new(), Vec::new());
+        for entry in recording.entries() {
+            let Entry {
+                what,
+                dag,
+                place,
+                job,
+                release_ns,
+                value,
+                ..
+            } = entry;
+            if matches!(what, What::Signal | What::Skip | What::Cut | What::Restart) {
+                events.push(Entry {
+                    value: &[],
+                    ..entry
+                });
+            }
+            match what {
+                What::Value => {
+                    let start = value.as_ptr().addr() - bytes.as_ptr().addr();
+                    values.push(((place, job), start..start + value.len()));
+                    is_compared.push(false);
+                }
+                What::Cut => cuts.push((dag, place, job)),
+                What::Signal | What::Skip => {
+                    first_signals.entry(DagId(dag.into())).or_insert(job);
+                    let of_dag = signals.entry(DagId(dag.into())).or_default();
+                    of_dag.push_back(release_ns);
+                }
+                What::Clock => {
+                    let answers = Vec::<u64>::from_bytes(value)?;
+                    clock.insert((dag, place, job), answers);
+                }
+                What::Lost if role(place) == Role::Source => {
+                    lost.get_or_insert((place, job));
+                }
+                What::Restart | What::Lost => {}
+            }
+        }
+        values.sort_unstable_by_key(|(of, _)| *of);
+        cuts.sort_unstable();
+        Ok(Self {
+            is_cut: recording.is_cut(),
+            values,
+            is_compared,
+            passed: Arc::new(Passed {
+                dags: Vec::new(),
+                jobs: Vec::new(),
+                cuts,
+            }),
+            clock,
+            signals,
+            first_signals,
+            events,
+            lost,
+            own: Header::default(),
+            channels: Vec::new(),
+            to_compare: 0,
+            compared: 0,
+            divergence: None,
+            // A value of a usual size allocates nothing.
+            computed: Vec::with_capacity(4096),
+            header,
+            bytes,
+        })
+    }
+
+    /// Reports whether the inputs of a DAG are recorded.
+    #[must_use]
+    pub fn is_of(&self, dag: DagId) -> bool {
+        u16::try_from(dag.0).is_ok_and(|dag| self.passed.is_of(dag))
+    }
+
+    /// Returns what the time was for an instance, whenever it asked.
+    #[must_use]
+    pub fn clock(&self, instance: Instance) -> Option<&[u64]> {
+        let (dag, subtask) = narrow(instance)?;
+        let answers = self.clock.get(&(dag, subtask, instance.job))?;
+        Some(answers)
+    }
+
+    /// Returns what is recorded of the DAGs besides values.
+    pub fn events(&self) -> impl Iterator<Item = Entry<'_>> {
+        (self.events.iter().copied()).filter(|entry| self.passed.is_of(entry.dag))
+    }
+
+    /// Takes the next signal of a sporadic DAG, or release of a job that was skipped.
+    pub fn next_signal_ns(&mut self, dag: DagId) -> Option<u64> {
+        self.signals.get_mut(&dag)?.pop_front()
+    }
+
+    /// Returns the recorded value of a channel of the plan.
+    #[must_use]
+    pub fn value(&self, channel: u16, job: u64) -> Option<&[u8]> {
+        let (_, place) = &self.values[self.find(channel, job)?];
+        self.bytes.get(place.clone())
+    }
+
+    /// Returns the number of a recorded value.
+    fn find(&self, channel: u16, job: u64) -> Option<usize> {
+        let channel = *self.channels.get(usize::from(channel))?;
+        let of = (channel?, job);
+        (self.values.binary_search_by_key(&of, |(of, _)| *of)).ok()
+    }
+
+    /// Reports whether an instance is one whose function is not called.
+    #[must_use]
+    pub fn passes_over(&self, instance: Instance) -> bool {
+        self.passed.has(instance)
+    }
+
+    /// Compares a value of the run with the recorded one.
+    pub fn compare(&mut self, value: &Recorded<'_>) {
+        if self.own.channels[usize::from(value.channel)].role != Role::Result {
+            // It is where the value is from.
+            return;
+        }
+        let Some(found) = self.find(value.channel, value.job) else {
+            return;
+        };
+        if !core::mem::replace(&mut self.is_compared[found], true) {
+            self.compared += 1;
+        }
+        let place = self.values[found].1.clone();
+        let bytes = value.bytes.unwrap_or_default();
+        if self.bytes[place.clone()] != *bytes && self.divergence.is_none() {
+            self.computed.extend_from_slice(bytes);
+            self.divergence = Some((value.channel, value.job, place));
+        }
+    }
+
+    /// Returns what was found so far; if the run is over, also a value that it has not computed.
+    #[must_use]
+    pub fn outcome(&self, is_over: bool) -> Outcome {
+        let differs = self.divergence.as_ref().map(|(channel, job, place)| {
+            let channel = &self.own.channels[usize::from(*channel)];
+            self.describe(channel, *job, place, Some(&self.computed))
+        });
+        let missing = || is_over.then(|| self.missing()).flatten();
+        Outcome {
+            compared: self.compared,
+            uncompared: self.to_compare - self.compared,
+            divergence: differs.or_else(missing),
+        }
+    }
+
+    /// Returns the recorded value of the earliest job that this run has not computed.
+    fn missing(&self) -> Option<Divergence> {
+        let all = self.values.iter().zip(&self.is_compared);
+        let missing = all.filter_map(|(((place, job), range), is_compared)| {
+            let mut of_run = self.channels.iter().zip(&self.own.channels);
+            let (_, channel) = of_run.find(|(recorded, _)| **recorded == Some(*place))?;
+            let is_missing = channel.role == Role::Result && !is_compared;
+            is_missing.then_some((*job, channel, range))
+        });
+        let (job, channel, range) = missing.min_by_key(|(job, ..)| *job)?;
+        Some(self.describe(channel, job, range, None))
+    }
+
+    /// Describes a value that differs.
+    fn describe(
+        &self,
+        channel: &Channel,
+        job: u64,
+        recorded: &Range<usize>,
+        computed: Option<&[u8]>,
+    ) -> Divergence {
+        let schema = &channel.schema;
+        let shown = |bytes| Shown { schema, bytes }.to_string();
+        Divergence {
+            dag: self.own.dags[usize::from(channel.dag)].name.clone(),
+            topic: channel.topic.clone(),
+            job,
+            recorded: shown(&self.bytes[recorded.clone()]),
+            computed: computed.map(shown),
+        }
+    }
+
+    /// Cuts all that waits for an instance in its job.
+    pub fn cut_behind(&mut self, instance: Instance, task_set: &TaskSet) {
+        let Instance { dag, subtask, job } = instance;
+        let mut behind = task_set.dag(dag).successors(subtask).to_vec();
+        while let Some(subtask) = behind.pop() {
+            let instance = Instance { dag, subtask, job };
+            if Arc::make_mut(&mut self.passed).cut(instance) {
+                behind.extend(task_set.dag(dag).successors(subtask));
+            }
+        }
+    }
+
+    /// Makes what is replayed release the jobs that are recorded, and lose none on the way.
+    pub fn prepare(&self, plan: &mut Plan) {
+        let task_set = Arc::make_mut(&mut plan.task_set);
+        for dag in (0..).map(DagId).take(task_set.dags().len()) {
+            if let Some(jobs) = self.jobs_of(dag) {
+                task_set.replay(dag, jobs);
+            }
+        }
+    }
+
+    /// Returns how many jobs of a DAG the recording is of, from job 0 on, if its inputs are
+    /// recorded.
+    fn jobs_of(&self, dag: DagId) -> Option<u64> {
+        let dag = u16::try_from(dag.0).ok().filter(|_| self.is_of(dag))?;
+        let of_dag = self.passed.jobs.iter().rev().find(|(of, _)| *of == dag);
+        Some(of_dag.map_or(1, |(_, last)| last.saturating_add(1)))
+    }
+
+    /// Makes the bodies of a plan pass over what is not called.
+    pub(super) fn guard(&self, plan: &mut Plan) {
+        guard(plan, &self.passed);
+    }
+}

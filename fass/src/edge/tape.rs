@@ -1,0 +1,177 @@
+//! What happens at the edge, on its way into the buffer.
+//!
+//! What has no room is lost, but not what was lost: for each channel the jobs are noted, and go
+//! into the buffer before the channel's next value does. If even these are too many, or an
+//! event is lost, the tape ends there, and the recording says that it is cut.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use recording::{Channel, Header};
+use sched_dag::DagId;
+use sched_dag::journal::What;
+
+use super::drain::{OfTape, Tag};
+use super::replay::Outcome;
+use super::ring::{Head, RingWriter, ring};
+use super::{Crossing, Drain, Happened, name, open, recorded};
+use crate::run::plan::Plan;
+use crate::run::record::Recorded;
+
+/// The words of the buffer that are left for events.
+const KEPT_WORDS: usize = 512;
+
+/// The most runs of jobs that are noted as lost, of each channel.
+const MOST_RUNS: usize = 32;
+
+/// Records a run.
+pub(super) struct Tape {
+    app: &'static str,
+    bytes: usize,
+    header: Header,
+    ring: Option<RingWriter>,
+    drain: Option<Box<dyn Drain>>,
+    /// By channel: the jobs whose values had no room, from one to another one.
+    lost: Vec<Vec<(u64, u64)>>,
+}
+
+impl Tape {
+    pub(super) fn new(app: &'static str, bytes: usize) -> Self {
+        Self {
+            app,
+            bytes,
+            header: Header::default(),
+            ring: None,
+            drain: None,
+            lost: Vec::new(),
+        }
+    }
+
+    /// Notes that a value is lost.
+    #[cold]
+    fn lose(&mut self, channel: u16, job: u64) {
+        let (Some(ring), Some(runs)) = (&self.ring, self.lost.get_mut(usize::from(channel))) else {
+            return;
+        };
+        let is_full = runs.len() == runs.capacity();
+        match runs.last_mut() {
+            Some((_, last)) if *last + 1 == job => *last = job,
+            _ if is_full => ring.close(),
+            _ => runs.push((job, job)),
+        }
+    }
+
+    /// Hands the lost jobs of a channel to the drain; `false`: they have no room.
+    #[cold]
+    fn tell_lost(&mut self, channel: u16, at_ns: u64) -> bool {
+        let (Some(ring), Some(runs)) = (&mut self.ring, self.lost.get_mut(usize::from(channel)))
+        else {
+            return true;
+        };
+        while let Some(&(first, last)) = runs.first() {
+            let head = Head {
+                tag: Tag::Lost { channel }.to_word(),
+                job: first,
+                at_ns,
+            };
+            if !ring.put(head, &last.to_le_bytes(), KEPT_WORDS) {
+                return false;
+            }
+            runs.remove(0);
+        }
+        true
+    }
+}
+
+impl Crossing for Tape {
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) {
+        open(&mut self.header, dag, graph, channels);
+    }
+
+    fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
+        name(&mut self.header, self.app, &plan.task_set);
+        let Some((writer, reader)) = ring(self.bytes) else {
+            return Err(alloc::format!(
+                "`record`: there is no memory for a buffer of {} KiB; give the machine more \
+                 memory, or the buffer less",
+                self.bytes / 1024
+            ));
+        };
+        self.ring = Some(writer);
+        self.lost = (self.header.channels.iter())
+            .map(|_| Vec::with_capacity(MOST_RUNS))
+            .collect();
+        let drain = OfTape::new(reader, self.header.clone(), &plan.task_set);
+        self.drain = Some(Box::new(drain));
+        Ok(())
+    }
+
+    fn record(&mut self, value: &Recorded<'_>) {
+        let (channel, job, at_ns) = (value.channel, value.job, value.completed_ns);
+        let Some(ring) = &mut self.ring else {
+            return;
+        };
+        if ring.is_closed() {
+            return;
+        }
+        let is_whole = (self.lost.get(usize::from(channel))).is_none_or(Vec::is_empty);
+        if is_whole && let Some(bytes) = value.bytes {
+            let head = Head {
+                tag: Tag::Value { channel }.to_word(),
+                job,
+                at_ns,
+            };
+            if ring.put(head, bytes, KEPT_WORDS) {
+                return;
+            }
+        } else if !is_whole && value.bytes.is_some() && self.tell_lost(channel, at_ns) {
+            // There may be room for this one again.
+            self.record(value);
+            return;
+        }
+        self.lose(channel, job);
+    }
+
+    fn happened(&mut self, what: What, happened: &Happened) {
+        let Happened {
+            dag,
+            subtask,
+            job,
+            release_ns,
+            at_ns,
+        } = *happened;
+        // The platform tells of releases only where they are signals.
+        let (Some(ring), Some(what)) = (&mut self.ring, recorded(what, true)) else {
+            return;
+        };
+        if ring.is_closed() {
+            return;
+        }
+        let tag = Tag::Event { what, dag, subtask }.to_word();
+        let release_ns = release_ns.map(u64::to_le_bytes);
+        let bytes = release_ns.as_ref().map_or(&[][..], |bytes| bytes);
+        if !ring.put(Head { tag, job, at_ns }, bytes, 0) {
+            ring.close();
+        }
+    }
+
+    fn lend(&self, _channel: u16, _job: u64, _take: &mut dyn FnMut(&[u8])) {}
+
+    fn drain(&mut self) -> Option<Box<dyn Drain>> {
+        self.drain.take()
+    }
+
+    fn flush(&mut self) -> bool {
+        (0..)
+            .zip(&self.header.channels.clone())
+            .all(|(channel, _)| {
+                let runs = self.lost.get(usize::from(channel));
+                runs.is_none_or(Vec::is_empty) || self.tell_lost(channel, u64::MAX)
+            })
+    }
+
+    fn outcome(&self, _is_over: bool) -> Option<Outcome> {
+        None
+    }
+}

@@ -1,0 +1,204 @@
+//! What crosses the edge of a run: recorded for the host, or replayed.
+//!
+//! All that is known of recordings is behind [`Crossing`], which only an image with a recorded
+//! topic has. It is used under the scheduler's lock, or for a moment by a source that is
+//! replayed; the drain belongs to core 0's background alone, so sending disturbs nobody.
+
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::{String, ToString};
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use fass::edge::{Begin, Crossing, Drain, Happened, Outcome, Wish};
+use fass::{Channel, LaunchError, Plan, Recorded};
+use sched_dag::DagId;
+use sched_dag::journal::What;
+
+use crate::machine::debug_port;
+use crate::machine::once::Once;
+use crate::machine::spinlock::SpinLock;
+use crate::text::json;
+
+/// What the command line says.
+static WISH: Once<Wish> = Once::new();
+
+static CROSSING: SpinLock<Option<Box<dyn Crossing>>> = SpinLock::new(None);
+
+/// Whether a plan has been launched with it, so that events are of interest.
+static IS_ON: AtomicBool = AtomicBool::new(false);
+
+/// What sends the recording of the run to come.
+static OUTGOING: SpinLock<Outgoing> = SpinLock::new(None);
+
+/// Why the recording, or the app, does not go with the wish.
+static REFUSAL: Once<String> = Once::new();
+
+/// What a replay has found.
+static OUTCOME: Once<Outcome> = Once::new();
+
+/// What to send, if anything.
+pub type Outgoing = Option<Box<dyn Drain>>;
+
+/// Takes what the command line says.
+pub fn set_wish(wish: Wish) -> Result<(), &'static str> {
+    if matches!(wish, Wish::Record { .. }) && !debug_port::is_there() {
+        return Err(
+            "`record`: there is no debug port at 0x402 to send it to; run it in QEMU, by \
+             `./scripts/run --record FILE`",
+        );
+    }
+    // It is called once.
+    let _ = WISH.set(wish);
+    Ok(())
+}
+
+/// Reports whether there is a wish.
+pub fn is_wished() -> bool {
+    WISH.get().is_some()
+}
+
+/// Takes the recorded topics of a DAG.
+pub fn open(dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
+    let Some(wish) = WISH.get() else {
+        return;
+    };
+    let mut crossing = CROSSING.lock();
+    let crossing = crossing.get_or_insert_with(|| begin(*wish));
+    crossing.open(dag, graph, channels);
+}
+
+/// Makes a plan one that is recorded or replayed, if there is a wish.
+pub fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
+    let Some(wish) = WISH.get() else {
+        return Ok(());
+    };
+    let word = match wish {
+        Wish::Record { .. } => "record",
+        Wish::Replay(_) => "replay",
+    };
+    let mut place = CROSSING.lock();
+    let launched = match place.as_mut() {
+        None => Err(format!(
+            "`{word}`: no topic of the app is recorded; name topics by `Dag::record`"
+        )),
+        Some(_) if IS_ON.load(Ordering::Relaxed) => Err(format!(
+            "`{word}`: a recording is of one commit, and this is another one; leave the word out"
+        )),
+        Some(crossing) => crossing.launch(plan).map(|()| crossing.drain()),
+    };
+    drop(place);
+    let mut outgoing = launched.map_err(|why| {
+        let _ = REFUSAL.set(why.clone());
+        LaunchError::new(why)
+    })?;
+    if let Some(drain) = &mut outgoing {
+        // Not during the run: it takes long where a byte does.
+        drain.begin(&mut debug_port::send);
+    }
+    *OUTGOING.lock() = outgoing;
+    IS_ON.store(true, Ordering::Relaxed);
+    Ok(())
+}
+
+/// Takes what sends the recording of the run that begins.
+pub fn begin() -> Outgoing {
+    OUTGOING.lock().take()
+}
+
+/// Sends an entry, if there is one; `false`: there was none.
+pub fn send(outgoing: &mut Outgoing) -> bool {
+    (outgoing.as_mut()).is_some_and(|drain| drain.step(&mut debug_port::send))
+}
+
+/// Sends what is left when the run is over, and says what came of it.
+pub fn end(mut outgoing: Outgoing, is_over: bool) {
+    if let Some(outcome) = outcome(is_over) {
+        report(&outcome);
+        // Of the one run.
+        let _ = OUTCOME.set(outcome);
+    }
+    loop {
+        while send(&mut outgoing) {}
+        if (CROSSING.lock().as_mut()).is_none_or(|crossing| crossing.flush()) {
+            break;
+        }
+    }
+    while send(&mut outgoing) {}
+    let Some(mut drain) = outgoing else {
+        return;
+    };
+    let drained = drain.end(&mut debug_port::send);
+    let is_complete = !drained.is_cut && drained.lost == 0;
+    json::emit("recorded", |line| {
+        line.number("entries", drained.entries)
+            .number("lost", drained.lost)
+            .flag("complete", is_complete);
+    });
+}
+
+/// Takes a value, on the run's time. The scheduler's lock is held.
+pub fn record(value: &Recorded<'_>) {
+    if let Some(crossing) = CROSSING.lock_uninterrupted().as_mut() {
+        crossing.record(value);
+    }
+}
+
+/// Takes what became of a job or an instance, if it is of interest. The scheduler's lock is
+/// held.
+pub fn happened(what: What, happened: &Happened) {
+    if IS_ON.load(Ordering::Relaxed)
+        && let Some(crossing) = CROSSING.lock_uninterrupted().as_mut()
+    {
+        crossing.happened(what, happened);
+    }
+}
+
+/// Reports whether a replay is wished.
+pub fn is_replay() -> bool {
+    matches!(WISH.get(), Some(Wish::Replay(_)))
+}
+
+/// Lends a recorded value.
+pub fn lend(channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+    if let Some(crossing) = CROSSING.lock().as_ref() {
+        crossing.lend(channel, job, take);
+    }
+}
+
+/// Returns why the wish could not be met, if it could not.
+pub fn refusal() -> Option<&'static str> {
+    REFUSAL.get().map(String::as_str)
+}
+
+/// Returns how a replay differs from its recording, if it does.
+pub fn complaint() -> Option<String> {
+    let divergence = OUTCOME.get()?.divergence.as_ref()?;
+    Some(divergence.to_string())
+}
+
+fn outcome(is_over: bool) -> Option<Outcome> {
+    if !is_replay() {
+        return None;
+    }
+    CROSSING.lock().as_ref()?.outcome(is_over)
+}
+
+fn report(outcome: &Outcome) {
+    let (compared, uncompared) = (outcome.compared, outcome.uncompared);
+    crate::println!(
+        "replay: {compared} values were compared, {uncompared} recorded ones were not computed"
+    );
+    json::emit("replayed", |line| {
+        line.number("compared", outcome.compared)
+            .number("uncompared", outcome.uncompared);
+        if let Some(divergence) = &outcome.divergence {
+            line.text("dag_name", &divergence.dag)
+                .text("topic", &divergence.topic)
+                .number("job", divergence.job)
+                .text("recorded", &divergence.recorded);
+            if let Some(computed) = &divergence.computed {
+                line.text("computed", computed);
+            }
+        }
+    });
+}

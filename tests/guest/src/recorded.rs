@@ -1,0 +1,96 @@
+//! A DAG whose topics are recorded: honest, cheating, too much for the buffer, or ended midway.
+
+use alloc::string::ToString;
+use alloc::sync::Arc;
+use alloc::{format, vec};
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+
+use fass::{Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use kernel::{Ending, Machine};
+
+use crate::kernel_crimes;
+
+const PERIOD: Duration = Duration::from_millis(20);
+
+/// What is recorded of a link of [`long`]: 2 KiB.
+type Block = [u64; 256];
+
+/// The links of [`long`].
+const LINKS: usize = 8;
+
+/// Runs a fork and a join, in which both branches may share a counter behind the scheduler's
+/// back.
+pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    let options = machine.options();
+    let cheats = options.choice("cheats", &[("no", false), ("yes", true)])?;
+    let dies_in = options.number("dies_in", 0..=1000, 1000)?;
+    let step = options.number("step", 1..=1000, 1)?;
+    options.finish(&["test", "cheats", "dies_in", "step"])?;
+    let named = SubtaskAttributes::named;
+    let dag = create_dag();
+    dag.name("counts").jobs(50);
+    (dag.record::<u64>("input").record::<u64>("first")).record::<u64>("second");
+    let mut input = 0;
+    let source = move || {
+        input += step;
+        (input,)
+    };
+    dag.register_periodic_subtask(source, vec!["input"], PERIOD, named("source"));
+    let calls = Arc::new(AtomicU64::new(0));
+    for (wait, waited, output, ms) in [("slow", "a", "first", 3), ("quick", "b", "second", 1)] {
+        let pass = move |(input,): (u64,)| {
+            execute_for(Duration::from_millis(ms), Occupation::Hold);
+            (input,)
+        };
+        dag.register_subtask(pass, vec!["input"], vec![waited], named(wait));
+        let calls = Arc::clone(&calls);
+        let count = move |(input,): (u64,)| {
+            let call = calls.fetch_add(1, Ordering::Relaxed);
+            (input + if cheats { call } else { 0 },)
+        };
+        dag.register_subtask(count, vec![waited], vec![output], named(output));
+    }
+    let mut job = 0;
+    let sink = move |_: (u64, u64)| {
+        job += 1;
+        if job > dies_in {
+            let _ = kernel_crimes::end_the_machine();
+        }
+    };
+    dag.register_sink_subtask(sink, vec!["first", "second"], PERIOD, named("sink"));
+    finish_create_dags(&[dag])?;
+    machine.run().map(drop)
+}
+
+/// Runs a chain that computes without a pause, each link of which is recorded.
+pub(crate) fn long(machine: &Machine) -> Result<(), Ending> {
+    machine.options().finish(&["test"])?;
+    let dag = create_dag();
+    dag.name("chain").jobs(20);
+    let topics = (0..LINKS).map(|link| format!("link {link}"));
+    let topics: vec::Vec<_> = topics.collect();
+    for topic in &topics {
+        dag.record::<Block>(topic);
+    }
+    let mut job = 0_u64;
+    let first = move || {
+        job += 1;
+        ([job; 256],)
+    };
+    let attributes = |link: usize| SubtaskAttributes::named(&link.to_string());
+    dag.register_periodic_subtask(first, vec![&topics[0]], PERIOD, attributes(0));
+    for link in 1..LINKS {
+        let pass = |(block,): (Block,)| (block.map(|word| word + 1),);
+        let (from, to) = (&topics[link - 1], &topics[link]);
+        dag.register_subtask(pass, vec![from], vec![to], attributes(link));
+    }
+    let last = |_: (Block,)| ();
+    dag.register_sink_subtask(last, vec![&topics[LINKS - 1]], PERIOD, attributes(LINKS));
+    finish_create_dags(&[dag])?;
+    let run = machine.run()?;
+    match run.allocations() {
+        0 => Ok(()),
+        count => Err(Ending::Failure(format!("{count} allocations"))),
+    }
+}
