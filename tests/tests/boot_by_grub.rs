@@ -1,7 +1,12 @@
 //! The image boots from a stick, as on a PC: by GRUB, under a BIOS and under UEFI.
 
+use std::fs;
+use std::time::Duration;
+
+use harness::Guest;
+use harness::altered::qemu_and;
 use harness::stick::{self, boots};
-use tool::qemu::Loader;
+use tool::qemu::{Ending, Loader};
 
 #[test]
 fn two_processors_by_a_bios() {
@@ -28,4 +33,26 @@ fn four_processors_by_uefi() {
 fn a_file_on_the_stick_reaches_the_app_by_both() {
     stick::hands_over_a_file(Loader::Bios);
     stick::hands_over_a_file(Loader::Uefi);
+}
+
+/// GRUB stays with its line, so the run ends by its limit, which a busy host may need more of.
+#[test]
+fn a_processor_without_64_bits_is_refused_by_grub() {
+    // Without a screen the BIOS shows letters at the serial port.
+    let changes = [("#max", "qemu32"), ("#q35", "q35,graphics=off")];
+    let program = qemu_and(&changes, "");
+    let guest = Guest::new("fork-join").from_stick(Loader::Bios);
+    let guest = guest.program(&program);
+    let line = "this processor has no 64-bit mode, which the image needs";
+    let mut outcome = guest.clone().limit(Duration::from_secs(8)).boot();
+    for seconds in [60, 600] {
+        if outcome.serial.contains(line) {
+            break;
+        }
+        outcome = guest.clone().limit(Duration::from_secs(seconds)).boot();
+    }
+    fs::remove_file(&program).expect("it is ours");
+    assert!(outcome.serial.contains(line), "{}", outcome.tail());
+    let waited = matches!(outcome.ending, Ending::TimedOut { .. });
+    assert!(waited, "{}\n{}", outcome.ending, outcome.tail());
 }

@@ -209,6 +209,28 @@ fn a_machine_without_a_clock_of_known_rate_is_refused() {
     assert!(message.starts_with(expected), "{message}");
 }
 
+#[test]
+fn what_a_machine_lacks_is_named() {
+    for (other, word, why) in [
+        (
+            "#max",
+            "max,-nx",
+            "the processor has no no-execute pages (NX, XD); ",
+        ),
+        ("#max", "max,-apic", "the processor has no local APIC; "),
+        (
+            "#microvm",
+            "microvm,acpi=off",
+            "the machine has no ACPI root pointer; ",
+        ),
+    ] {
+        let program = qemu_with(other, word);
+        let message = refusal(&Guest::new("fork-join").program(&program));
+        fs::remove_file(&program).expect("it is ours");
+        assert!(message.starts_with(why), "{message}");
+    }
+}
+
 /// `boot_in_bochs.rs` has a processor with x2APIC.
 #[test]
 fn x2apic_is_refused_where_the_processor_lacks_it() {

@@ -80,17 +80,24 @@ pvh_entry:
 
 # Turns on long mode with the tables that cr3 holds, and SSE, which compiled
 # code uses from its first instruction on. Continues in 64-bit mode at the far
-# pointer that esi points to. Needs no stack; changes eax, ecx, edx. Used by every
-# processor (Intel SDM volume 3, 10.8.5).
+# pointer that esi points to. Needs no stack; changes eax, ebx, ecx, edx. Used by every
+# processor (Intel SDM volume 3, 10.8.5). No-execute pages are turned on where there are
+# any: where a firmware has put them away, the kernel says so.
 #
 # Nothing is taken over from whoever ran before: a firmware may leave five-level paging
 # on, and after INIT a processor has its caches off (CD, NW).
 enable_long_mode:
     mov eax, (1 << 5) | (1 << 9) | (1 << 10)    # PAE, OSFXSR, OSXMMEXCPT
     mov cr4, eax
+    mov eax, 0x80000001
+    cpuid
+    and edx, 1 << 20                            # no-execute pages
+    shr edx, 20 - 11
+    mov ebx, edx
     mov ecx, 0xc0000080                         # EFER
     rdmsr
-    or eax, (1 << 8) | (1 << 11)                # long mode, no-execute pages
+    or eax, 1 << 8                              # long mode
+    or eax, ebx
     wrmsr
     # Paging, write protection, NE, ET, MP, protected mode; no emulation, no trap.
     mov eax, (1 << 31) | (1 << 16) | (1 << 5) | (1 << 4) | (1 << 1) | (1 << 0)

@@ -57,6 +57,9 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         Some("reset") => power::set_end(End::Reset),
         _ => {}
     }
+    if let Some(feature) = cpu::missing_feature() {
+        panic!("the processor has no {feature}; turn it on in the firmware's settings");
+    }
     legacy::silence_interrupt_controllers();
     let probes = info.value("probe") == Some("on");
     interrupt::install(if probes {

@@ -104,6 +104,18 @@ pub fn finish_writes() {
     unsafe { asm!("mfence", "lfence", options(nostack)) };
 }
 
+/// Names what the kernel needs and this processor lacks, as far as not every processor of 64
+/// bits has it.
+pub fn missing_feature() -> Option<&'static str> {
+    const LOCAL_APIC: u32 = 1 << 9;
+    const NO_EXECUTE: u32 = 1 << 20;
+    if __cpuid(1).edx & LOCAL_APIC == 0 {
+        return Some("local APIC");
+    }
+    let has_no_execute = __cpuid(0x8000_0001).edx & NO_EXECUTE != 0;
+    (!has_no_execute).then_some("no-execute pages (NX, XD)")
+}
+
 /// Reports whether local APICs can be reached by model-specific registers.
 pub fn has_x2apic() -> bool {
     const X2APIC: u32 = 1 << 21;
