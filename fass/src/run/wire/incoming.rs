@@ -58,7 +58,7 @@ pub(crate) struct Incoming {
 struct Open {
     /// How many bytes of it have come.
     seen: usize,
-    /// Whether one of them found no room.
+    /// Whether some of them found no room.
     is_lost: bool,
     /// [`Framing::LengthFirst`]: how many bytes of the length have come, and what they say.
     prefix: u8,
@@ -98,57 +98,68 @@ impl Incoming {
             self.lost_bytes.add(bytes.len());
             return false;
         };
-        let mut is_whole = false;
-        for byte in bytes {
-            if self.ends(&mut open, *byte) {
+        let (mut is_whole, mut rest) = (false, bytes);
+        while !rest.is_empty() {
+            let (part, after, ends) = self.divide(&mut open, rest);
+            self.put(&mut open, part);
+            rest = after;
+            if ends {
                 is_whole |= self.close(&mut open, now_ns);
             }
-        }
-        if self.framing == Framing::Chunks {
-            is_whole |= self.close(&mut open, now_ns);
         }
         is_whole
     }
 
-    /// Takes a byte. Reports whether the packet ends with it.
-    fn ends(&self, open: &mut Open, byte: u8) -> bool {
-        match self.framing {
-            Framing::Lines if byte == b'\n' => {
-                let is_kept = 0 < open.seen && open.seen <= self.longest && !open.is_lost;
-                if is_kept && self.ring.ahead(HEADER_BYTES + open.seen - 1) == b'\r' {
-                    open.seen -= 1;
-                }
-                return true;
-            }
-            Framing::Until(end) if byte == end => return true,
+    /// Divides bytes into those that belong to the packet and those after it, at least one in
+    /// all. Reports whether the packet ends between them.
+    fn divide<'b>(&self, open: &mut Open, bytes: &'b [u8]) -> (&'b [u8], &'b [u8], bool) {
+        let end = match self.framing {
+            Framing::Chunks => return (bytes, &[], true),
             Framing::LengthFirst if open.prefix < 2 => {
                 open.prefix += 1;
-                open.announced = open.announced << 8 | usize::from(byte);
-                return open.prefix == 2 && open.announced == 0;
+                open.announced = open.announced << 8 | usize::from(bytes[0]);
+                return (&[], &bytes[1..], open.prefix == 2 && open.announced == 0);
             }
-            _ => {}
+            Framing::LengthFirst | Framing::Fixed(_) => {
+                let length = match self.framing {
+                    Framing::Fixed(length) => length.max(1),
+                    _ => open.announced,
+                };
+                let (part, after) = bytes.split_at(bytes.len().min(length - open.seen));
+                return (part, after, open.seen + part.len() == length);
+            }
+            Framing::Lines => b'\n',
+            Framing::Until(end) => end,
+        };
+        match bytes.iter().position(|byte| *byte == end) {
+            Some(at) => (&bytes[..at], &bytes[at + 1..], true),
+            None => (bytes, &[], false),
         }
-        let fits = open.seen < self.longest;
-        if fits && !open.is_lost {
-            let ahead = HEADER_BYTES + open.seen;
-            open.is_lost = !self.ring.put(ahead, &[byte]);
+    }
+
+    /// Puts bytes of the packet into the ring, if it can still be shown.
+    fn put(&self, open: &mut Open, part: &[u8]) {
+        let seen = open.seen.saturating_add(part.len());
+        if seen <= self.longest && !part.is_empty() {
+            open.is_lost |= !self.ring.put(HEADER_BYTES + open.seen, part);
         }
-        open.seen = open.seen.saturating_add(1);
-        match self.framing {
-            Framing::Fixed(bytes) => open.seen >= bytes,
-            Framing::LengthFirst => open.seen == open.announced,
-            Framing::Lines | Framing::Until(_) | Framing::Chunks => false,
-        }
+        open.seen = seen;
     }
 
     /// Ends the packet, and shows it. Reports whether there is one.
     fn close(&self, open: &mut Open, now_ns: u64) -> bool {
-        let Open { seen, is_lost, .. } = core::mem::take(open);
-        if seen == 0 {
-            return false;
-        }
+        let Open {
+            mut seen, is_lost, ..
+        } = core::mem::take(open);
         if seen > self.longest {
             self.too_long.add(1);
+            return false;
+        }
+        let is_line = self.framing == Framing::Lines && seen > 0 && !is_lost;
+        if is_line && self.ring.ahead(HEADER_BYTES + seen - 1) == b'\r' {
+            seen -= 1;
+        }
+        if seen == 0 {
             return false;
         }
         if is_lost {

@@ -27,6 +27,7 @@ impl Ring {
         }
     }
 
+    #[inline(always)]
     fn place(&self, at: usize) -> &AtomicU8 {
         &self.bytes[at & (self.bytes.len() - 1)]
     }
@@ -38,8 +39,10 @@ impl Ring {
         if bytes.len() > self.bytes.len().saturating_sub(used + ahead) {
             return false;
         }
-        for (at, byte) in (written.wrapping_add(ahead)..).zip(bytes) {
+        let mut at = written.wrapping_add(ahead);
+        for byte in bytes {
             self.place(at).store(*byte, Ordering::Relaxed);
+            at = at.wrapping_add(1);
         }
         true
     }

@@ -26,6 +26,11 @@ fn framed(framing: Framing, bytes: &[u8]) -> Vec<String> {
         assert_eq!(is_whole, !new.is_empty());
         all.extend(new);
     }
+    if framing != Framing::Chunks {
+        let at_once = Incoming::new(framing, 5, 256);
+        at_once.arrive(bytes, 7);
+        assert_eq!(packets(&at_once), all, "the same, at once");
+    }
     all
 }
 
