@@ -2,9 +2,14 @@
 
 mod support;
 
-use fass::Policy;
+use std::fs;
+
+use fass::{Policy, finish_create_dags};
+use gait::build;
 use harness::Guest;
 use support::{File, walk};
+use tool::{recordings, system};
+use virtual_time::VirtualTime;
 
 #[test]
 fn the_machine_computes_the_bits_of_the_host() {
@@ -26,4 +31,43 @@ fn the_machine_computes_the_bits_of_the_host() {
             .map_or(0, |list| list.elements().len())
     });
     assert_eq!(angles.sum::<usize>(), 3_511);
+}
+
+#[test]
+fn a_walk_that_the_machine_recorded_is_replayed_on_the_machine_and_on_the_host() {
+    let file = File::new();
+    let wanted = walk(&file.read(), 1, Policy::Edf).digest();
+    let log = system::new_log("walk").expect("a folder for logs");
+    let run = log.with_extension("rec");
+    let guest = Guest::new("gait").cores(2).module(&file.0);
+    let _ = guest.clone().records(&run, 1024).succeed();
+    let bytes = recordings::received(&run).expect("the guest has sent it");
+
+    // The recording stands before the app's own file.
+    let both = [&bytes[..], &fs::read(&file.0).expect("the walk")].concat();
+    fs::write(&run, &both).expect("it is our file");
+    let guest = (guest.cores(4).module(&run)).word(&format!("replay={}", bytes.len()));
+    let outcome = guest.word("policy=edf").succeed();
+    let _ = fs::remove_file(&run);
+    let number = |kind: &str, name: &str| {
+        let line = outcome.transcript.of_kind(kind).next();
+        line.and_then(|line| line.number_at(name)).expect(name)
+    };
+    assert_eq!(number("gait", "digest"), wanted);
+    assert_eq!(number("replayed", "compared"), 7_022);
+    assert_eq!(number("replayed", "uncompared"), 0);
+
+    let policies = [Policy::StaticPriority, Policy::Edf];
+    for (cores, policy) in [1, 2, 4, 8]
+        .into_iter()
+        .flat_map(|cores| policies.map(|of| (cores, of)))
+    {
+        let machine = VirtualTime::new().cores(cores).policy(policy);
+        let machine = machine.replay(&bytes).expect("it is whole");
+        let (dag, walk) = build(&file.read()).expect("it has the samples");
+        finish_create_dags(&[dag]).expect("it is the DAG that was recorded");
+        let report = machine.run();
+        assert_eq!((report.compared, report.divergence), (7_022, None));
+        assert_eq!(walk.digest(), wanted);
+    }
 }

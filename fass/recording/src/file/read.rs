@@ -101,7 +101,7 @@ impl<'b> Recording<'b> {
     /// Reports whether the recording says nothing of what happened after its last entry: the
     /// run died, or its buffer was full of what is never lost.
     ///
-    /// See [`Stream`](crate::Stream).
+    /// See [`Stream`].
     #[must_use]
     pub const fn is_cut(&self) -> bool {
         self.is_cut
