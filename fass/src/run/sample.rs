@@ -6,6 +6,8 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::any::Any;
+use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
 use recording::{Encoder, Recordable, Schema};
@@ -13,7 +15,7 @@ use sched_dag::DagId;
 
 use super::cell::Shared;
 use super::effect::Effect;
-use super::latest::{Entry, Probe, SharedLatest};
+use super::latest::{Entry, Probe, SharedLatest, Slot};
 use super::plan::{Body, Subtask};
 use super::record::{Edge, Recorded, room_of};
 
@@ -49,7 +51,13 @@ pub(super) fn probe<T: Recordable + Send + 'static>(
         job: AtomicU64::new(0),
         room: Shared::new(room),
     });
-    shared.set_probe(sampler, Box::new(Arc::clone(&line)));
+    shared.set_probe(
+        sampler,
+        Box::new(SampleProbe {
+            line: Arc::clone(&line),
+            of: PhantomData::<fn() -> T>,
+        }),
+    );
     (<Option<(u64, u64, T)>>::schema(), line)
 }
 
@@ -75,15 +83,23 @@ impl SampleLine {
     }
 }
 
-impl<T: Recordable> Probe<T> for Arc<SampleLine> {
-    fn replay(&self, slot: &mut Option<Entry<T>>) -> bool {
+/// The probe of a subtask that samples values of this type.
+struct SampleProbe<T> {
+    line: Arc<SampleLine>,
+    of: PhantomData<fn() -> T>,
+}
+
+impl<T: Recordable + 'static> Probe for SampleProbe<T> {
+    fn replay(&self, slot: &dyn Any) -> bool {
+        let line = &self.line;
         let mut found = None;
-        let number = self.number.load(Ordering::Relaxed);
-        let job = self.job.load(Ordering::Relaxed);
-        (self.edge.replay)(number, job, &mut |bytes| {
+        let number = line.number.load(Ordering::Relaxed);
+        let job = line.job.load(Ordering::Relaxed);
+        (line.edge.replay)(number, job, &mut |bytes| {
             found = <Option<(u64, u64, T)>>::from_bytes(bytes).ok();
         });
-        let Some(found) = found else {
+        let slot = slot.downcast_ref::<Slot<T>>();
+        let Some((found, mut slot)) = found.zip(slot.and_then(Slot::change)) else {
             return false;
         };
         *slot = found.map(|(job, completed_ns, value)| Entry {
@@ -94,19 +110,21 @@ impl<T: Recordable> Probe<T> for Arc<SampleLine> {
         true
     }
 
-    fn look_at(&self, sample: Option<&Entry<T>>) {
-        let Some(mut room) = self.room.change() else {
+    fn look_at(&self, slot: &dyn Any) {
+        let slot = slot.downcast_ref::<Slot<T>>();
+        let (Some(mut room), Some(sample)) = (self.line.room.change(), slot.and_then(Slot::look))
+        else {
             return;
         };
         let mut out = Encoder::new(&mut room.bytes);
         // As `Option<(u64, u64, T)>` is written.
         sample.is_some().encode(&mut out);
-        if let Some(entry) = sample {
+        if let Some(entry) = &*sample {
             (entry.job, entry.completed_ns).encode(&mut out);
             entry.value.encode(&mut out);
         }
         let length = out.finish().ok();
-        room.sample = Some((self.job.load(Ordering::Relaxed), length));
+        room.sample = Some((self.line.job.load(Ordering::Relaxed), length));
     }
 }
 

@@ -43,7 +43,7 @@ impl<T> SharedLatest<T> {
     }
 
     /// Sets what looks at each sample of a sampling subtask.
-    pub(crate) fn set_probe(&self, sampler: usize, probe: Box<dyn Probe<T>>) {
+    pub(crate) fn set_probe(&self, sampler: usize, probe: Box<dyn Probe>) {
         // The commit, which comes once, does so for each sampler once.
         let _ = self.triples.borrow()[sampler].probe.set(probe);
     }
@@ -112,19 +112,24 @@ pub(crate) trait Stage<T>: Send + Sync {
     }
 }
 
-/// What looks at the samples of one subtask, or gives them in a replay.
-pub(crate) trait Probe<T>: Send + Sync {
-    /// Puts into the reader's slot what the instance found when it was recorded, and reports
-    /// whether that is known.
-    fn replay(&self, slot: &mut Option<Entry<T>>) -> bool;
+/// What looks at the samples of one subtask, or gives them in a replay. It gets the reader's slot,
+/// a [`Slot<T>`] whose type it knows, so that a subtask whose samples are not recorded has next to
+/// no code for it.
+pub(crate) trait Probe: Send + Sync {
+    /// Puts into the slot what the instance found when it was recorded, and reports whether that
+    /// is known.
+    fn replay(&self, slot: &dyn Any) -> bool;
 
     /// Looks at what the instance finds.
-    fn look_at(&self, sample: Option<&Entry<T>>);
+    fn look_at(&self, slot: &dyn Any);
 }
+
+/// A slot of a sampling subtask.
+pub(crate) type Slot<T> = Shared<Option<Entry<T>>>;
 
 /// The slots of one sampling subtask.
 struct Triple<T> {
-    slots: [Shared<Option<Entry<T>>>; 3],
+    slots: [Slot<T>; 3],
     /// The slot in the middle, with [`FRESH`] if the reader has not had it.
     middle: AtomicU8,
     /// The writer's slot. Only the writer's body uses it, which is `&mut` there.
@@ -132,7 +137,7 @@ struct Triple<T> {
     /// Whether the writer's slot has a value that shall show at its completion.
     staged: AtomicBool,
     /// Looks at what the reader finds, if the topic is recorded.
-    probe: SetOnce<Box<dyn Probe<T>>>,
+    probe: SetOnce<Box<dyn Probe>>,
 }
 
 /// A value, the job that it is of, and when its writer was complete.
@@ -154,13 +159,6 @@ impl<T> Triple<T> {
             staged: AtomicBool::new(false),
             probe: SetOnce::new(),
         }
-    }
-
-    /// Lets a replay fill the reader's slot, and reports whether it did.
-    #[cold]
-    fn is_replayed(&self, front: u8, probe: &dyn Probe<T>) -> bool {
-        let slot = self.slots[usize::from(front)].change();
-        slot.is_some_and(|mut slot| probe.replay(&mut slot))
     }
 
     /// Changes the writer's slot.
@@ -214,23 +212,25 @@ pub struct Sampler<T> {
 #[doc(hidden)]
 pub struct Looked<'a, T>(Looking<'a, Option<Entry<T>>>);
 
-impl<T> Sampler<T> {
+impl<T: 'static> Sampler<T> {
     /// Takes the slot of the latest complete instance, for the time of the guard.
     pub(crate) fn look(&mut self) -> Looked<'_, T> {
         let Self { triple, front } = self;
         let probe = triple.probe.get();
-        if probe.is_none_or(|probe| !triple.is_replayed(*front, &**probe))
+        let slot = &triple.slots[usize::from(*front)];
+        if probe.is_none_or(|probe| !probe.replay(slot))
             && triple.middle.load(Ordering::Relaxed) & FRESH != 0
         {
             *front = triple.middle.swap(*front, Ordering::AcqRel) & SLOT;
         }
-        let Some(slot) = triple.slots[usize::from(*front)].look() else {
-            unreachable!("the writer has another slot");
-        };
+        let slot = &triple.slots[usize::from(*front)];
         if let Some(probe) = probe {
-            probe.look_at(slot.as_ref());
+            probe.look_at(slot);
         }
-        Looked(slot)
+        match slot.look() {
+            Some(slot) => Looked(slot),
+            None => unreachable!("the writer has another slot"),
+        }
     }
 }
 
