@@ -33,10 +33,29 @@ const LIMIT: Duration = Duration::from_secs(600);
 /// Panics with what is missing, or with the serial log if it does not succeed.
 #[must_use]
 pub fn succeed(package: &str, words: &str, model: &str, cores: u64) -> Transcript {
+    succeed_after("", package, words, model, cores)
+}
+
+/// As [`succeed`], with a command of GRUB's before it loads the image.
+///
+/// # Panics
+///
+/// As [`succeed`].
+#[must_use]
+pub fn succeed_after(
+    command: &str,
+    package: &str,
+    words: &str,
+    model: &str,
+    cores: u64,
+) -> Transcript {
     let run = || -> Result<String, String> {
         install::ensure(&install::BOCHS)?;
         let words = format!("{words} end=off");
         let iso = Medium::new(Loader::Bios, &built(package)?.path, &words, None)?;
+        if !command.is_empty() {
+            put_before(command, iso.path())?;
+        }
         let log = new_log("bochs")?;
         let (settings, said) = (log.with_extension("bochs"), log.with_extension("said"));
         let text = settings_text(model, cores, iso.path(), &log, &said);
@@ -55,6 +74,33 @@ pub fn succeed(package: &str, words: &str, model: &str, cores: u64) -> Transcrip
         panic!("{}\n{serial}", fault.reason);
     }
     transcript
+}
+
+/// Puts a command in the place of the question whether the processor has 64 bits, which is in
+/// the ISO as text.
+fn put_before(command: &str, iso: &Path) -> Result<(), String> {
+    const QUESTION: &[u8] = b"if cpuid -l; then\n";
+    const ANSWER: &[u8] = b"\nelse\n";
+    const END: &[u8] = b"\nfi\n";
+    let mut bytes = fs::read(iso).map_err(|why| format!("`{}`: {why}", iso.display()))?;
+    let place = |from: usize, text: &[u8]| {
+        let found = bytes[from..].windows(text.len());
+        found
+            .enumerate()
+            .find(|(_, window)| *window == text)
+            .map(|(at, _)| from + at)
+    };
+    let places = || {
+        let start = place(0, QUESTION)?;
+        let answer = place(start, ANSWER)?;
+        Some((start, answer, place(answer, END)? + END.len()))
+    };
+    let (start, answer, end) = places().ok_or("the ISO has other commands")?;
+    let mut commands = [command.as_bytes(), b"\n"].concat();
+    commands.extend(&bytes[start + QUESTION.len()..=answer]);
+    commands.resize(end - start, b'\n');
+    bytes[start..end].copy_from_slice(&commands);
+    fs::write(iso, bytes).map_err(|why| format!("`{}`: {why}", iso.display()))
 }
 
 /// Runs Bochs until it ends, at most for the limit, and returns the serial log.

@@ -30,6 +30,21 @@ fn two_processors_by_x2apic() {
     assert_eq!(run.number_at("joins"), Some(2), "{}", run.text);
 }
 
+/// As some firmware does for many processors, GRUB leaves the boot processor's local APIC in
+/// x2APIC mode, by the register that says where it is. No word asks for that.
+#[test]
+fn x2apic_that_was_left_on_is_used() {
+    let left_on = "wrmsr 0x1b 0xfee00d00";
+    let words = "jobs=2 subtasks=2";
+    let model = "corei7_skylake_x";
+    let transcript = bochs::succeed_after(left_on, "fork-join", words, model, 2);
+    let boot = transcript.of_kind("boot").next().expect("a boot line");
+    assert!(boot.text.contains("\"x2apic\":true"), "{}", boot.text);
+    assert_eq!(boot.number_at("cpus"), Some(2), "{}", boot.text);
+    let run = transcript.of_kind("fork_join").next().expect("a result");
+    assert_eq!(run.number_at("joins"), Some(2), "{}", run.text);
+}
+
 #[test]
 fn four_processors() {
     let transcript = bochs::succeed("fork-join", "jobs=2 subtasks=2", "ryzen", 4);

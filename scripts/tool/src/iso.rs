@@ -15,8 +15,10 @@ use crate::install;
 use crate::system;
 
 /// What GRUB has to be able to do besides what it brings itself to its own files.
-/// The kinds of partitions are those that it asks for at its start.
-const MODULES: &str = "--install-modules=normal multiboot2 cpuid echo read iso9660 all_video part_acorn \
+/// The kinds of partitions are those that it asks for at its start. A test has it leave a
+/// processor as some firmware does, by `wrmsr`.
+const MODULES: &str = "--install-modules=normal multiboot2 cpuid echo read wrmsr iso9660 \
+                       all_video part_acorn \
                        part_amiga part_apple part_bsd part_dfly part_dvh part_gpt part_msdos \
                        part_plan part_sun part_sunpc";
 
