@@ -123,10 +123,10 @@ pub use platform::{
     AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
 };
 pub use recording::Channel;
+pub use run::crossing::Recorded;
 pub use run::latest_jobs::LatestJobs;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan};
-pub use run::record::Recorded;
 pub use run::staleness::Staleness;
 pub use run::topic::{Ports, Publisher, Subscriber};
 

@@ -16,8 +16,8 @@ use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::edge::Begin;
 use crate::run::cell::SetOnce;
+use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
-use crate::run::record::Recorded;
 
 static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
 

@@ -7,8 +7,9 @@ use recording::Recordable;
 use super::dag::Dag;
 use crate::edge::begin;
 use crate::platform::expect_installed;
+use crate::run::crossing::Edge;
 use crate::run::message::Message;
-use crate::run::record::{Edge, RecordedTopic};
+use crate::run::record::RecordedTopic;
 
 static EDGE: Edge = Edge {
     crosses: || expect_installed().crosses(),

@@ -10,8 +10,8 @@ use sched_dag::journal::What;
 
 use super::replay::{Outcome, Replay};
 use super::{Crossing, Drain, Happened, name, open};
+use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
-use crate::run::record::Recorded;
 
 /// A replay of what the loader has left in memory.
 pub(super) struct OfMachine {

@@ -21,8 +21,8 @@ use recording::{Channel, DagHeader, Header};
 use sched_dag::journal::What;
 use sched_dag::{DagId, TaskSet};
 
+use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
-use crate::run::record::Recorded;
 
 pub use replay::{Divergence, Outcome, Replay};
 

@@ -16,8 +16,8 @@ use super::drain::{OfTape, Tag};
 use super::replay::Outcome;
 use super::ring::{Head, RingWriter, ring};
 use super::{Crossing, Drain, Happened, name, open, recorded};
+use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
-use crate::run::record::Recorded;
 
 /// The words of the buffer that are left for events.
 const KEPT_WORDS: usize = 512;

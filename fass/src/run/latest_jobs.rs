@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 
 use recording::{Channel, Role};
 
-use super::record::{Recorded, room_for};
+use super::crossing::{Recorded, room_for};
 
 /// The inputs of each DAG's last jobs. It allocates nothing but when it is made.
 ///

@@ -7,6 +7,7 @@
 
 #[allow(unsafe_code, reason = "the one cell type of the job slots")]
 pub(crate) mod cell;
+pub(crate) mod crossing;
 pub(crate) mod effect;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;

@@ -14,10 +14,10 @@ use recording::{Encoder, Recordable, Schema};
 use sched_dag::DagId;
 
 use super::cell::Shared;
+use super::crossing::{Edge, Recorded, room_of};
 use super::effect::Effect;
 use super::latest::{Entry, Probe, SharedLatest, Slot};
 use super::plan::{Body, Subtask};
-use super::record::{Edge, Recorded, room_of};
 
 /// What the probe of a sampling subtask, its body and its completion share.
 pub(crate) struct SampleLine {

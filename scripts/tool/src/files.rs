@@ -254,6 +254,16 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
     Err(format!("{}: {why}; name another folder", output.words()))
 }
 
+/// A file of ours, removed when it is of no more use.
+pub(crate) struct Temporary(pub(crate) Option<PathBuf>);
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // It is in the way of no one if it cannot be removed.
+        let _ = self.0.take().map(fs::remove_file);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::{MOST_BYTES, Named, check, check_folder, check_once, check_room, read, read_text};

@@ -14,8 +14,8 @@ use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, 
 use sched_dag::{DagId, Instance, TaskSet};
 
 use super::guard::{Passed, guard, narrow};
+use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
-use crate::run::record::Recorded;
 
 /// A recording that takes the place of what enters.
 #[derive(Debug)]

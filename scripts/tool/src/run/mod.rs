@@ -10,6 +10,7 @@
 
 mod boot;
 mod folder;
+mod handed;
 mod loading;
 mod log;
 mod prove;
@@ -18,7 +19,6 @@ mod screen;
 mod seeing;
 mod status;
 mod table;
-mod wcets;
 mod wire;
 
 use std::ffi::OsString;
@@ -36,10 +36,10 @@ use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::{Status, Transcript};
 use crate::qemu::{Ending, Mode, Qemu};
+use handed::Handed;
 use log::Log;
 use recording::Recorded;
 use screen::Screen;
-use wcets::Wcets;
 
 pub use boot::boot;
 pub use table::RUN;
@@ -146,19 +146,19 @@ fn boot_app(
     let program = loading::choose_program(options)?;
     install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
 
-    let wcets = Wcets::read(options, dags.is_none())?;
+    let handed = Handed::read(options, dags.is_none())?;
     let recorded = Recorded::new(options).map_err(Refusal::Failure)?;
     if let Some(dags) = dags.as_deref_mut() {
-        dags.write_module(wcets.text()).map_err(Refusal::Failure)?;
+        dags.write_module(handed.text()).map_err(Refusal::Failure)?;
     }
     let dags = dags.as_deref();
     let describe = |mode| {
         let module = dags.and_then(|dags| dags.module.clone());
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
-        qemu.guest_words += &wcets.guest_words();
+        qemu.guest_words += &handed.guest_words();
         qemu.guest_words += recorded.guest_word();
         qemu.records = recorded.raw();
-        qemu.module = module.or_else(|| wcets.module());
+        qemu.module = module.or_else(|| handed.module());
         qemu
     };
     // No mode has a longer name than this one.

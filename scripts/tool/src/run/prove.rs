@@ -8,9 +8,8 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
-use super::wcets::Temporary;
 use super::{Booted, RUN, Refusal, boot_app, check_files, conclude, prepare};
-use crate::files;
+use crate::files::{self, Temporary};
 use crate::options::Parsed;
 use crate::proof::observed::{self, OfDag};
 use crate::proof::overheads::{self, Measured};

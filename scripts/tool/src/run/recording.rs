@@ -7,8 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use super::Refusal;
-use super::wcets::Temporary;
-use crate::files;
+use crate::files::{self, Temporary};
 use crate::options::Parsed;
 use crate::outcome::Outcome;
 use crate::protocol::Status;

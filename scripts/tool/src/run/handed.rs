@@ -5,13 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Refusal, wire};
-use crate::files;
+use crate::files::{self, Temporary};
 use crate::options::Parsed;
 use crate::proof::wcets;
 use crate::system;
 
 /// Files on their way to the guest; empty if none is given.
-pub(super) struct Wcets {
+pub(super) struct Handed {
     text: String,
     /// How many bytes at the module's end are a wire's.
     input_bytes: usize,
@@ -22,20 +22,10 @@ pub(super) struct Wcets {
     module: Temporary,
 }
 
-/// A file of ours, removed when it is of no more use.
-pub(super) struct Temporary(pub(super) Option<PathBuf>);
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        // It is in the way of no one if it cannot be removed.
-        let _ = self.0.take().map(fs::remove_file);
-    }
-}
-
-impl Wcets {
+impl Handed {
     /// Reads the files that `--wcets`, `--module` and `--input` name, if they do, and writes a
     /// module of them unless DAGs of a file are the module.
-    pub(super) fn read(options: &Parsed, is_alone: bool) -> Result<Wcets, Refusal> {
+    pub(super) fn read(options: &Parsed, is_alone: bool) -> Result<Handed, Refusal> {
         let read = |path: &Path| wcets::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
         let replayed = super::recording::read(options)?;
@@ -59,7 +49,7 @@ impl Wcets {
                 Refusal::Failure(format!("cannot write `{}`: {error}", path.display()))
             })?;
         }
-        Ok(Wcets {
+        Ok(Handed {
             text: text.unwrap_or_default(),
             input_bytes: input.len(),
             replay_bytes: replayed.len(),

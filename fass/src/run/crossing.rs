@@ -1,0 +1,58 @@
+//! What crosses the edge of a DAG: a value on its way to the platform, the way there and back,
+//! and the room that it is written into.
+
+use recording::{Channel, Recordable};
+use sched_dag::DagId;
+
+/// The least room for a value.
+const ROOM: usize = 4096;
+
+/// A value that a recorded topic gives to the platform, when its writer's instance is complete.
+///
+/// ```
+/// fn show(value: &fass::Recorded<'_>) {
+///     match value.bytes {
+///         Some(bytes) => println!("channel {}, job {}: {bytes:?}", value.channel, value.job),
+///         None => println!("channel {}, job {} is lost", value.channel, value.job),
+///     }
+/// }
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Recorded<'v> {
+    /// The number of the channel ([`Platform::open_channels`](crate::Platform::open_channels)).
+    pub channel: u16,
+    /// The job.
+    pub job: u64,
+    /// When the instance was complete, on the clock of [`crate::now_ns`].
+    pub completed_ns: u64,
+    /// The value; `None` if there was no room for it.
+    pub bytes: Option<&'v [u8]>,
+}
+
+/// The way from a topic to the platform, and back. What a commit does about recorded topics is
+/// reached through them only, so that an image without any has no code for it.
+pub(crate) struct Edge {
+    /// Reports whether anything is recorded or replayed.
+    pub(crate) crosses: fn() -> bool,
+    /// Takes the recorded topics of a DAG, and the hash of its graph.
+    pub(crate) open: fn(DagId, u64, &[Channel]),
+    /// Reports whether there is a replay.
+    pub(crate) replays: fn() -> bool,
+    /// Takes a value.
+    pub(crate) record: fn(&Recorded<'_>),
+    /// Lends a value, if there is one.
+    pub(crate) replay: Lend,
+}
+
+/// Lends the value of a channel and a job.
+type Lend = fn(u16, u64, &mut dyn FnMut(&[u8]));
+
+/// Returns the room for a value.
+pub(super) fn room_of<T: Recordable>() -> usize {
+    room_for(T::LEAST_BYTES)
+}
+
+/// Returns the room for a value of at least so many bytes.
+pub(super) fn room_for(least_bytes: usize) -> usize {
+    ROOM.max(2 * least_bytes)
+}
