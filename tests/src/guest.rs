@@ -177,6 +177,13 @@ impl Guest {
         self.word(&format!("record={kib}"))
     }
 
+    /// Has the guest send to this file what it keeps of the last jobs, if one fails.
+    #[must_use]
+    pub fn keeps(mut self, file: &Path) -> Guest {
+        self.qemu.records = Some(file.into());
+        self
+    }
+
     /// Has the guest replay a recording.
     ///
     /// # Panics

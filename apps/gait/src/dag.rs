@@ -12,17 +12,19 @@ use crate::{DAG, PERIOD, Sample, TOPIC, Walk};
 /// Each WCET: several times what was observed on two cores in mode `deterministic`.
 const WCET: Duration = Duration::from_micros(50);
 
-/// Builds the DAG, which runs a job for each sample of a recording, and the place of its results.
+/// Builds the DAG, which runs the jobs of a recording up to its last sample, and the place of its
+/// results.
 ///
 /// # Errors
 ///
 /// The recording has no samples of ours.
 pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
     let mut samples = recording.values::<Sample>(DAG, TOPIC)?;
+    let jobs = samples.clone().last().map_or(0, |(job, _)| job + 1);
     let count = samples.clone().count();
     let walk = Walk::new(count);
     let dag = create_dag();
-    dag.name(DAG).jobs(count as u64).demand_proof();
+    dag.name(DAG).jobs(jobs).demand_proof();
     (dag.record::<Sample>(TOPIC))
         .record::<Quaternion>("upper")
         .record::<Quaternion>("lower");

@@ -39,8 +39,15 @@ pub fn conjugate([w, x, y, z]: Quaternion) -> Quaternion {
 
 /// Returns the orientation after a sample. Without a rate it stays; without an acceleration
 /// only the rates count.
+///
+/// # Panics
+///
+/// If a part of the sample is no number, for then no orientation after it would be one.
 #[must_use]
 pub fn after(orientation: Quaternion, sensor: &Sensor) -> Quaternion {
+    let parts = [sensor.acc, sensor.gyr, sensor.mag];
+    let are_numbers = parts.as_flattened().iter().all(|part| part.is_finite());
+    assert!(are_numbers, "a sensor has given what is no number");
     let [gx, gy, gz] = sensor.gyr;
     if norm(&sensor.gyr) == 0.0 {
         return orientation;

@@ -15,7 +15,13 @@ use virtual_time::VirtualTime;
 fn the_machine_computes_the_bits_of_the_host() {
     let file = File::new();
     let wanted = walk(&file.read(), 1, Policy::Edf).digest();
-    let outcome = Guest::new("gait").cores(2).module(&file.0).succeed();
+    let log = system::new_log("walk").expect("a folder for logs");
+    let sent = log.with_extension("sent");
+    let guest = Guest::new("gait").cores(2).module(&file.0);
+    let outcome = guest.keeps(&sent).succeed();
+    let crash = recordings::received(&sent).expect("QEMU has made it");
+    let _ = fs::remove_file(&sent);
+    assert!(crash.is_empty(), "nothing has failed");
     let line = outcome.transcript.of_kind("gait").next();
     let line = line.expect("the app's line");
     let number = |name: &str| line.number_at(name).expect(name);

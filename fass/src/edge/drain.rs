@@ -65,7 +65,7 @@ pub(super) struct OfTape {
 }
 
 /// When a DAG's jobs are due.
-enum Releases {
+pub(super) enum Releases {
     Periodic {
         offset_ns: u64,
         period_ns: u64,
@@ -75,45 +75,55 @@ enum Releases {
 }
 
 /// How many signals of a DAG are remembered.
-const SIGNALS: u64 = 64;
+pub(super) const SIGNALS: u32 = 64;
 
 impl Releases {
-    fn of(&self, job: u64) -> Option<u64> {
+    /// Returns those of each DAG.
+    pub(super) fn of_all(task_set: &TaskSet) -> Vec<Self> {
+        let releases = task_set.dags().iter().map(|dag| match dag.is_sporadic() {
+            true => Self::Sporadic((0..SIGNALS).map(|_| (u64::MAX, 0)).collect()),
+            false => Self::Periodic {
+                offset_ns: dag.offset_ns(),
+                period_ns: dag.period_ns(),
+            },
+        });
+        releases.collect()
+    }
+
+    pub(super) fn of(&self, job: u64) -> Option<u64> {
         match self {
             Self::Periodic {
                 offset_ns,
                 period_ns,
             } => offset_ns.checked_add(period_ns.checked_mul(job)?),
             Self::Sporadic(signals) => {
-                let (of, release_ns) = signals[usize::try_from(job % SIGNALS).ok()?];
+                let (of, release_ns) = signals[place_of(job)?];
                 (of == job).then_some(release_ns)
             }
         }
     }
 
-    fn note(&mut self, job: u64, release_ns: u64) {
+    pub(super) fn note(&mut self, job: u64, release_ns: u64) {
         if let Self::Sporadic(signals) = self
-            && let Some(place) = usize::try_from(job % SIGNALS).ok()
+            && let Some(place) = place_of(job)
         {
             signals[place] = (job, release_ns);
         }
     }
 }
 
+/// Returns the place of a signal.
+fn place_of(job: u64) -> Option<usize> {
+    usize::try_from(job % u64::from(SIGNALS)).ok()
+}
+
 impl OfTape {
     pub(super) fn new(ring: RingReader, header: Header, task_set: &TaskSet) -> Self {
-        let releases = task_set.dags().iter().map(|dag| match dag.is_sporadic() {
-            true => Releases::Sporadic((0..SIGNALS).map(|_| (u64::MAX, 0)).collect()),
-            false => Releases::Periodic {
-                offset_ns: dag.offset_ns(),
-                period_ns: dag.period_ns(),
-            },
-        });
         Self {
             ring,
             header,
             stream: None,
-            releases: releases.collect(),
+            releases: Releases::of_all(task_set),
         }
     }
 }

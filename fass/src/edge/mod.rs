@@ -2,13 +2,15 @@
 //!
 //! A *tape* takes what happens, from the core that completes: it allocates nothing and waits for
 //! nothing. The *drain* makes the file of it, whenever a core has time. A *replay* lends recorded
-//! values, and compares those that are computed.
+//! values, and compares those that are computed. If neither is asked for, the inputs of the last
+//! jobs may be kept, for the case that one fails.
 //!
 //! A platform reaches all this by what [`Platform::open_channels`](crate::Platform::open_channels)
 //! gives it, so that an image in which no topic is recorded has none of this code.
 
 mod drain;
 mod guard;
+mod latest;
 mod machine;
 mod replay;
 mod ring;
@@ -40,6 +42,13 @@ pub enum Wish {
     },
     /// Replay these bytes.
     Replay(&'static [u8]),
+    /// Keep the inputs of the last jobs, and give them away if one fails.
+    Latest {
+        /// What is recorded, by its name.
+        app: &'static str,
+        /// How many jobs of each DAG.
+        jobs: u32,
+    },
 }
 
 /// Begins to do what is wished.
@@ -73,10 +82,14 @@ pub trait Crossing: Send {
     /// Takes what has become of a job, or of an instance.
     fn happened(&mut self, what: What, happened: &Happened);
 
+    /// Takes note that an instance of a job has failed.
+    fn failed(&mut self, _dag: DagId, _job: u64) {}
+
     /// Lends the recorded value of a channel and a job, if there is one.
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8]));
 
-    /// Returns what makes a file of what is recorded; the first time only.
+    /// Returns what makes a file of what is recorded; the first time only. Of the last jobs there
+    /// is a file when one has failed.
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
 
     /// Hands what is left to the drain, at the end of the run; `false`: not all has room.
@@ -135,6 +148,7 @@ pub(crate) fn begin(wish: Wish) -> Box<dyn Crossing> {
     match wish {
         Wish::Record { app, bytes } => Box::new(tape::Tape::new(app, bytes)),
         Wish::Replay(bytes) => Box::new(machine::OfMachine::new(bytes)),
+        Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
     }
 }
 

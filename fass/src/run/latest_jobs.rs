@@ -6,12 +6,14 @@
 //! the commit; a value takes the place of the one so many jobs before.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use recording::{Channel, Role};
 
 use super::crossing::{Recorded, room_for};
 
-/// The inputs of each DAG's last jobs. It allocates nothing but when it is made.
+/// The inputs of each DAG's last jobs, or, once one has failed, of those up to it. It allocates
+/// nothing but when it is made.
 ///
 /// ```
 /// use fass::{LatestJobs, Recorded};
@@ -19,8 +21,12 @@ use super::crossing::{Recorded, room_for};
 ///
 /// let (dag, subtask, role, topic) = (0, 0, Role::Source, "turns".into());
 /// let schema = u32::schema();
-/// let mut latest = LatestJobs::new(&[Channel { dag, subtask, role, topic, schema }], 2);
-/// for job in 0..5_u32 {
+/// let channels = [Channel { dag, subtask, role, topic, schema }];
+/// let mut latest = LatestJobs::new(&channels, 2).expect("there is memory");
+/// for job in 0..9_u32 {
+///     if job == 5 {
+///         latest.hold(0, 4); // it has failed
+///     }
 ///     latest.take(&Recorded {
 ///         channel: 0,
 ///         job: job.into(),
@@ -39,6 +45,8 @@ pub struct LatestJobs {
     places: Vec<Places>,
     /// For each DAG, the jobs before the next one.
     ends: Vec<u64>,
+    /// For each DAG, the last job of interest.
+    last: Vec<u64>,
 }
 
 /// The places of a channel.
@@ -53,31 +61,34 @@ struct Places {
 }
 
 impl LatestJobs {
-    /// Makes room for the inputs of so many jobs.
+    /// Makes room for the inputs of so many jobs; `None`: there is no memory.
     ///
     /// See [`LatestJobs`].
     #[must_use]
-    pub fn new(channels: &[Channel], jobs: u32) -> Self {
+    pub fn new(channels: &[Channel], jobs: u32) -> Option<Self> {
         let count = usize::try_from(jobs).unwrap_or(usize::MAX);
-        let places = channels.iter().map(|channel| {
+        let mut places = Vec::with_capacity(channels.len());
+        for channel in channels {
             let count = match channel.role {
                 Role::Source | Role::Sample => count,
                 Role::Result => 0,
             };
             let room = room_for(channel.schema.least_bytes());
-            Places {
+            places.push(Places {
                 dag: channel.dag.into(),
                 room,
-                bytes: alloc::vec![0; room * count],
-                values: alloc::vec![None; count],
-            }
-        });
-        let dags = channels.iter().map(|channel| usize::from(channel.dag) + 1);
-        Self {
-            jobs,
-            places: places.collect(),
-            ends: alloc::vec![0; dags.max().unwrap_or(0)],
+                bytes: filled(0, room.checked_mul(count)?)?,
+                values: filled(None, count)?,
+            });
         }
+        let dags = channels.iter().map(|channel| usize::from(channel.dag) + 1);
+        let dags = dags.max().unwrap_or(0);
+        Some(Self {
+            jobs,
+            places,
+            ends: filled(0, dags)?,
+            last: filled(u64::MAX, dags)?,
+        })
     }
 
     /// Takes a value, if it is an input.
@@ -90,6 +101,9 @@ impl LatestJobs {
         let Some(place) = place_of(value.job, places.values.len()) else {
             return;
         };
+        if value.job > self.last[places.dag] {
+            return;
+        }
         let end = &mut self.ends[places.dag];
         *end = (*end).max(value.job.saturating_add(1));
         let room = &mut places.bytes[place * places.room..][..places.room];
@@ -98,6 +112,33 @@ impl LatestJobs {
             Some(bytes.len())
         });
         places.values[place] = Some((value.job, value.completed_ns, fitting));
+    }
+
+    /// Holds what is kept of a DAG, one job of which has failed: later jobs take no place of
+    /// those before. What is held already stays.
+    ///
+    /// See [`LatestJobs`].
+    pub fn hold(&mut self, dag: usize, job: u64) {
+        if let Some(last @ &mut u64::MAX) = self.last.get_mut(dag) {
+            *last = job;
+        }
+    }
+
+    /// Reports whether an input of a job would be kept: it is not behind one that has failed.
+    ///
+    /// See [`LatestJobs`].
+    #[must_use]
+    pub fn is_of_interest(&self, dag: usize, job: u64) -> bool {
+        self.last.get(dag).is_some_and(|last| job <= *last)
+    }
+
+    /// Returns the last jobs of a DAG.
+    ///
+    /// See [`LatestJobs`].
+    #[must_use]
+    pub fn jobs(&self, dag: usize) -> Range<u64> {
+        let end = self.ends.get(dag).copied().unwrap_or(0);
+        end.saturating_sub(self.jobs.into())..end
     }
 
     /// Reports whether a job is among the last ones of its DAG.
@@ -114,9 +155,7 @@ impl LatestJobs {
     /// See [`LatestJobs`].
     pub fn values(&self) -> impl Iterator<Item = Recorded<'_>> {
         (0_u16..).zip(&self.places).flat_map(|(channel, places)| {
-            let end = self.ends.get(places.dag).copied().unwrap_or(0);
-            let jobs = end.saturating_sub(self.jobs.into())..end;
-            jobs.filter_map(move |job| {
+            self.jobs(places.dag).filter_map(move |job| {
                 let place = place_of(job, places.values.len())?;
                 let (_, completed_ns, length) =
                     places.values[place].filter(|(of, ..)| *of == job)?;
@@ -130,6 +169,14 @@ impl LatestJobs {
             })
         })
     }
+}
+
+/// Returns so many of a value; `None`: there is no memory.
+fn filled<T: Clone>(value: T, count: usize) -> Option<Vec<T>> {
+    let mut all = Vec::new();
+    all.try_reserve_exact(count).ok()?;
+    all.resize(count, value);
+    Some(all)
 }
 
 /// Returns the place of a job, if there are places.

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::ffi::OsString;
 use std::process::ExitCode;
-use std::{env, fs};
+use std::{env, fs, panic};
 
 use fass::Policy;
 
@@ -117,6 +117,9 @@ fn replay(
     machine.policy.set(words.policy);
     let surroundings = &machine.surroundings;
     surroundings.contains_panics.set(true);
+    if cfg!(panic = "abort") {
+        name_remedy();
+    }
     let replay = surroundings.edge.replay(bytes);
     replay.map_err(|malformed| format!("{place}: {malformed}"))?;
     commit(bytes).map_err(|error| error.to_string())?;
@@ -135,6 +138,18 @@ fn replay(
     let (dag, job) = (panic.instance.dag, panic.instance.job);
     println!("{}", JobShown::new(&report, &surroundings.edge, dag, job));
     Ok(ExitCode::FAILURE)
+}
+
+/// Says, after a panic that ends the command, how it is built so that it shows the job instead.
+fn name_remedy() {
+    let show = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        show(info);
+        eprintln!(
+            "replay: this build ends at a panic; by `cargo run --profile host`, that is a profile \
+             with `panic = \"unwind\"`, the job is shown instead"
+        );
+    }));
 }
 
 fn summary(report: &Report) -> String {

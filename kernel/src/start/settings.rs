@@ -8,6 +8,7 @@
 //! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
 //! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
 //! | `record=N` | what crosses the edge of the run is sent to QEMU's debug port, from a buffer of N KiB; 0: nothing is | 0 |
+//! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
 //! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
@@ -57,6 +58,8 @@ pub(crate) struct Settings {
     pub(crate) replay_bytes: usize,
     /// How many bytes of memory a recording may wait in; 0: nothing is recorded.
     pub(crate) record_bytes: usize,
+    /// Of how many jobs the inputs are kept, where nothing is recorded or replayed.
+    pub(crate) latest_jobs: u32,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
     /// Whether a response time beyond its bound is the app's fault.
@@ -81,6 +84,9 @@ impl Settings {
         if self.record_bytes > 0 {
             let bytes = self.record_bytes;
             edge::set_wish(Wish::Record { app, bytes }).map_err(UsageError::new)?;
+        } else if self.replay_bytes == 0 && self.latest_jobs > 0 {
+            let jobs = self.latest_jobs;
+            edge::set_wish(Wish::Latest { app, jobs }).map_err(UsageError::new)?;
         }
         Ok(module)
     }
@@ -125,6 +131,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     let wcet_bytes = options.number("wcets", 0..=1 << 32, 0)?;
     let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
     let record_kib = options.number("record", 0..=1 << 20, 0)?;
+    let latest_jobs = options.number("latest", 0..=64, 16)?;
     if replay_bytes > 0 && record_kib > 0 {
         return Err(UsageError::new(
             "`record` and `replay` exclude each other; give one",
@@ -134,6 +141,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
         events,
         replay_bytes: usize::try_from(replay_bytes).unwrap_or(0),
         record_bytes: usize::try_from(record_kib * 1024).unwrap_or(0),
+        latest_jobs: u32::try_from(latest_jobs).unwrap_or(0),
         wcet_bytes: usize::try_from(wcet_bytes).unwrap_or(0),
         dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
         dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,

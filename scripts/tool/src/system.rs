@@ -110,7 +110,7 @@ fn clear(folder: &Path) {
         let is_process = process.bytes().all(|byte| byte.is_ascii_digit());
         if !is_process
             || is_alive(process)
-            || !["dag", "before", "iso", "img", "log.qemu"].contains(&ending)
+            || !["dag", "before", "iso", "img", "log.qemu", "sent"].contains(&ending)
         {
             continue;
         }

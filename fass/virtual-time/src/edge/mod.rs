@@ -88,8 +88,12 @@ impl Edge {
             replay.fit(&header, &plan.task_set)?;
             replay.prepare(plan);
         }
-        let latest = |jobs| LatestJobs::new(&header.channels, jobs);
-        self.latest.replace(self.most_jobs.get().map(latest));
+        let latest = |jobs| {
+            let latest = LatestJobs::new(&header.channels, jobs);
+            latest.ok_or("there is no memory for the inputs of so many jobs")
+        };
+        self.latest
+            .replace(self.most_jobs.get().map(latest).transpose()?);
         let task_set = &plan.task_set;
         let sporadic = (0..header.dags.len()).filter_map(dag_id);
         let sporadic = sporadic.filter(|dag| task_set.dag(*dag).is_sporadic());

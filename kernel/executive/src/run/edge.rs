@@ -11,8 +11,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::edge::{Begin, Crossing, Drain, Happened, Outcome, Wish};
 use fass::{Channel, LaunchError, Plan, Recorded};
-use sched_dag::DagId;
 use sched_dag::journal::What;
+use sched_dag::{DagId, Instance};
 
 use crate::machine::debug_port;
 use crate::machine::once::Once;
@@ -41,11 +41,16 @@ pub type Outgoing = Option<Box<dyn Drain>>;
 
 /// Takes what the command line says.
 pub fn set_wish(wish: Wish) -> Result<(), &'static str> {
-    if matches!(wish, Wish::Record { .. }) && !debug_port::is_there() {
-        return Err(
-            "`record`: there is no debug port at 0x402 to send it to; run it in QEMU, by \
-             `./scripts/run --record FILE`",
-        );
+    match wish {
+        Wish::Record { .. } if !debug_port::is_there() => {
+            return Err(
+                "`record`: there is no debug port at 0x402 to send it to; run it in QEMU, by \
+                 `./scripts/run --record FILE`",
+            );
+        }
+        // Nobody has asked for it.
+        Wish::Latest { .. } if !debug_port::is_there() => return Ok(()),
+        _ => {}
     }
     // It is called once.
     let _ = WISH.set(wish);
@@ -75,13 +80,16 @@ pub fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let word = match wish {
         Wish::Record { .. } => "record",
         Wish::Replay(_) => "replay",
+        Wish::Latest { .. } => "latest",
     };
+    let is_asked_for = !matches!(wish, Wish::Latest { .. });
     let mut place = CROSSING.lock();
     let launched = match place.as_mut() {
+        None if !is_asked_for => return Ok(()),
         None => Err(format!(
             "`{word}`: no topic of the app is recorded; name topics by `Dag::record`"
         )),
-        Some(_) if IS_ON.load(Ordering::Relaxed) => Err(format!(
+        Some(_) if is_asked_for && IS_ON.load(Ordering::Relaxed) => Err(format!(
             "`{word}`: a recording is of one commit, and this is another one; leave the word out"
         )),
         Some(crossing) => crossing.launch(plan).map(|()| crossing.drain()),
@@ -110,13 +118,15 @@ pub fn send(outgoing: &mut Outgoing) -> bool {
     (outgoing.as_mut()).is_some_and(|drain| drain.step(&mut debug_port::send))
 }
 
-/// Sends what is left when the run is over, and says what came of it.
-pub fn end(mut outgoing: Outgoing, is_over: bool) {
+/// Sends what is left when the run is over, or what is kept of jobs before a fault, and says what
+/// came of it.
+pub fn end(outgoing: Outgoing, is_over: bool) {
     if let Some(outcome) = outcome(is_over) {
         report(&outcome);
         // Of the one run.
         let _ = OUTCOME.set(outcome);
     }
+    let mut outgoing = outgoing.or_else(before_fault);
     loop {
         while send(&mut outgoing) {}
         if (CROSSING.lock().as_mut()).is_none_or(|crossing| crossing.flush()) {
@@ -134,6 +144,27 @@ pub fn end(mut outgoing: Outgoing, is_over: bool) {
             .number("lost", drained.lost)
             .flag("complete", is_complete);
     });
+}
+
+/// Begins to send what is kept of the jobs before a fault, if there was one; once, for there is
+/// one file.
+fn before_fault() -> Outgoing {
+    static IS_SENT: AtomicBool = AtomicBool::new(false);
+    let mut drain = CROSSING.lock().as_mut()?.drain()?;
+    if IS_SENT.swap(true, Ordering::Relaxed) {
+        return None;
+    }
+    drain.begin(&mut debug_port::send);
+    Some(drain)
+}
+
+/// Takes note that an instance has failed. The scheduler's lock is held.
+pub fn failed(instance: Instance) {
+    if IS_ON.load(Ordering::Relaxed)
+        && let Some(crossing) = CROSSING.lock_uninterrupted().as_mut()
+    {
+        crossing.failed(instance.dag, instance.job);
+    }
 }
 
 /// Takes a value, on the run's time. The scheduler's lock is held.

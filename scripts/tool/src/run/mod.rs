@@ -147,7 +147,7 @@ fn boot_app(
     install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
 
     let handed = Handed::read(options, dags.is_none())?;
-    let recorded = Recorded::new(options).map_err(Refusal::Failure)?;
+    let recorded = Recorded::new(options, &app).map_err(Refusal::Failure)?;
     if let Some(dags) = dags.as_deref_mut() {
         dags.write_module(handed.text()).map_err(Refusal::Failure)?;
     }

@@ -1,10 +1,11 @@
-//! What a guest records, and what it replays.
+//! What a guest records, or has kept before a fault, and what it replays.
 //!
 //! The guest sends a recording as it comes, and the tool keeps these bytes in a file of its own
 //! until the run is over: what the person names is one whole recording, or what it was before.
+//! What nobody has named, because nobody expects a fault, goes next to the logs.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::Refusal;
 use crate::files::{self, Temporary};
@@ -15,27 +16,36 @@ use crate::qemu::Ending;
 use crate::recordings;
 use crate::system;
 
-/// The bytes that a guest sends; none if the options do not ask for them.
-pub(super) struct Recorded(Temporary);
+/// The bytes that a guest sends; none in a replay.
+pub(super) struct Recorded {
+    raw: Temporary,
+    app: String,
+    /// Whether the person wants all of the run.
+    is_named: bool,
+}
 
 impl Recorded {
     /// Settles where they go.
-    pub(super) fn new(options: &Parsed) -> Result<Recorded, String> {
-        let is_given = options.is_given("record");
-        let path = is_given.then(|| system::new_log("recording")).transpose()?;
-        let path = path.map(|path| path.with_extension("rec"));
-        Ok(Recorded(Temporary(path)))
+    pub(super) fn new(options: &Parsed, app: &str) -> Result<Recorded, String> {
+        let is_wanted = !options.is_given("replay");
+        let path = is_wanted.then(|| system::new_log(app)).transpose()?;
+        let path = path.map(|path| path.with_extension("sent"));
+        Ok(Recorded {
+            raw: Temporary(path),
+            app: app.into(),
+            is_named: options.is_given("record"),
+        })
     }
 
     pub(super) fn raw(&self) -> Option<PathBuf> {
-        self.0.0.clone()
+        self.raw.0.clone()
     }
 
     /// Returns the word that asks for it, after a blank: how many KiB may wait in the guest.
     pub(super) const fn guest_word(&self) -> &'static str {
-        match self.0.0 {
-            Some(_) => " record=1024",
-            None => "",
+        match self.is_named {
+            true => " record=1024",
+            false => "",
         }
     }
 
@@ -46,8 +56,11 @@ impl Recorded {
         options: &Parsed,
         outcome: &Outcome,
     ) -> Result<Option<String>, String> {
-        let (Some(path), Some(raw)) = (options.path("record"), &self.0.0) else {
+        let Some(raw) = &self.raw.0 else {
             return Ok(None);
+        };
+        let Some(path) = options.path("record") else {
+            return self.write_crash(raw);
         };
         if outcome.ending == Ending::Guest(Status::Usage) {
             return Ok(None);
@@ -68,6 +81,31 @@ impl Recorded {
         Ok(Some(format!(
             "{file}: a recording, {how}{} bytes; `./scripts/recording {file}` shows it",
             bytes.len()
+        )))
+    }
+
+    /// Writes what the guest has kept of the jobs before a fault, if there was one.
+    fn write_crash(&self, raw: &Path) -> Result<Option<String>, String> {
+        // No guest, no file.
+        let bytes = recordings::received(raw).unwrap_or_default();
+        if recording::Recording::read(&bytes).is_err() {
+            return Ok(None);
+        }
+        let path = raw.with_extension("rec");
+        let file = files::place(&path);
+        fs::write(&path, &bytes).map_err(|error| format!("{file}: cannot be written: {error}"))?;
+        let app = &self.app;
+        let example = format!("apps/{app}/examples/replay.rs");
+        let shown = match system::workspace().join(example).is_file() {
+            true => format!(
+                ", and `cargo run --profile host -p {app} --example replay -- {file}` shows the job \
+                 that crashed"
+            ),
+            false => String::new(),
+        };
+        Ok(Some(format!(
+            "{file}: the inputs of the last jobs before the fault; `./scripts/recording {file}` \
+             lists them{shown}"
         )))
     }
 }

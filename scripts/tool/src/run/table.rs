@@ -10,6 +10,7 @@ pub(super) const GUEST_WORDS: &[&str] = &[
     "policy",
     "preemption",
     "jobs",
+    "latest",
     "seconds",
     "seed",
     "execution",
@@ -100,6 +101,12 @@ pub static RUN: Command = Command {
             Takes::File("FILE"),
             "Write what crosses the edge of the run to this file: the values of the topics that \
              the app records, see docs/recordings.md.",
+        ),
+        Opt::new(
+            "latest",
+            Takes::number(0..=64),
+            "Without --record and --replay: of how many jobs of each DAG the inputs are kept, for a \
+             file that shows a crash; 0: of none; the default is 16.",
         ),
         Opt::new(
             "replay",

@@ -19,6 +19,7 @@ use super::{EXECUTION, Event, Work};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::{clock, section, this_core, turns};
+use crate::run::edge;
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
 pub fn find_work() -> Work {
@@ -99,6 +100,7 @@ pub fn fail(now_ns: u64) {
         .journal
         .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
+    edge::failed(instance);
     let woken = execution.step(now_ns, Event::Failed(instance));
     drop(place);
     woken.wake();

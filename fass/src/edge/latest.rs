@@ -1,0 +1,294 @@
+//! The last jobs before a fault, kept where nothing else is recorded or replayed.
+//!
+//! Only inputs are kept, in memory that is taken at the launch ([`LatestJobs`]). Nothing is sent
+//! unless an instance fails; then a drain makes a recording of them, when the run is over. It is
+//! one that is cut, for some of its jobs may lack an input.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::mem;
+
+use recording::{Channel, Entry, Header, Stream};
+use sched_dag::DagId;
+use sched_dag::journal::What;
+
+use super::drain::{Releases, SIGNALS};
+use super::replay::Outcome;
+use super::{Crossing, Drain, Drained, Happened, name, open};
+use crate::run::crossing::Recorded;
+use crate::run::latest_jobs::LatestJobs;
+use crate::run::plan::Plan;
+
+/// Keeps the last jobs.
+pub(super) struct Latest {
+    app: &'static str,
+    jobs: u32,
+    /// What the next plan says of itself.
+    header: Header,
+    /// From the launch on, if there is memory.
+    kept: Option<Kept>,
+}
+
+/// What is kept of a plan.
+struct Kept {
+    header: Header,
+    latest: LatestJobs,
+    releases: Vec<Releases>,
+    has_failed: bool,
+}
+
+impl Latest {
+    pub(super) fn new(app: &'static str, jobs: u32) -> Self {
+        Self {
+            app,
+            // No more than signals are remembered of.
+            jobs: jobs.min(SIGNALS),
+            header: Header::default(),
+            kept: None,
+        }
+    }
+}
+
+impl Crossing for Latest {
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) {
+        open(&mut self.header, dag, graph, channels);
+    }
+
+    fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
+        let mut header = mem::take(&mut self.header);
+        name(&mut header, self.app, &plan.task_set);
+        // Without memory the app runs as if nothing was kept, for nobody has asked for it.
+        let latest = LatestJobs::new(&header.channels, self.jobs);
+        self.kept = latest.map(|latest| Kept {
+            header,
+            latest,
+            releases: Releases::of_all(&plan.task_set),
+            has_failed: false,
+        });
+        Ok(())
+    }
+
+    fn record(&mut self, value: &Recorded<'_>) {
+        if let Some(kept) = &mut self.kept {
+            kept.latest.take(value);
+        }
+    }
+
+    fn happened(&mut self, what: What, happened: &Happened) {
+        // A skipped job counts, or those after it would be others in a replay.
+        if let What::Released | What::Skipped = what
+            && let Some(kept) = &mut self.kept
+            && let Some(release_ns) = happened.release_ns
+            && let Some(releases) = kept.releases.get_mut(happened.dag.index())
+            && kept
+                .latest
+                .is_of_interest(happened.dag.index(), happened.job)
+        {
+            releases.note(happened.job, release_ns);
+        }
+    }
+
+    fn failed(&mut self, dag: DagId, job: u64) {
+        if let Some(kept) = &mut self.kept {
+            kept.latest.hold(dag.index(), job);
+            kept.has_failed = true;
+        }
+    }
+
+    fn lend(&self, _channel: u16, _job: u64, _take: &mut dyn FnMut(&[u8])) {}
+
+    fn drain(&mut self) -> Option<Box<dyn Drain>> {
+        let kept = self.kept.take_if(|kept| kept.has_failed)?;
+        Some(Box::new(OfLatest { kept, stream: None }))
+    }
+
+    fn flush(&mut self) -> bool {
+        true
+    }
+
+    fn outcome(&self, _is_over: bool) -> Option<Outcome> {
+        None
+    }
+}
+
+/// Makes the file.
+struct OfLatest {
+    kept: Kept,
+    stream: Option<Stream>,
+}
+
+impl Drain for OfLatest {
+    fn begin(&mut self, send: &mut dyn FnMut(&[u8])) {
+        let Kept {
+            header,
+            latest,
+            releases,
+            ..
+        } = &self.kept;
+        let mut stream = Stream::begin(header, send);
+        for (dag, of_dag) in (0_u16..).zip(releases) {
+            if let Releases::Periodic { .. } = of_dag {
+                continue;
+            }
+            for job in latest.jobs(dag.into()) {
+                if let Some(release_ns) = of_dag.of(job) {
+                    let signal = Entry {
+                        what: recording::What::Signal,
+                        dag,
+                        place: 0,
+                        job,
+                        release_ns,
+                        at_ns: release_ns,
+                        value: &[],
+                    };
+                    stream.write(&signal, send);
+                }
+            }
+        }
+        for value in latest.values() {
+            let dag = header.channels[usize::from(value.channel)].dag;
+            let release_ns = releases[usize::from(dag)].of(value.job);
+            let lost = recording::What::Lost;
+            let entry = Entry {
+                what: value.bytes.map_or(lost, |_| recording::What::Value),
+                dag,
+                place: value.channel,
+                job: value.job,
+                release_ns: release_ns.unwrap_or(value.completed_ns),
+                at_ns: value.completed_ns,
+                value: value.bytes.unwrap_or_default(),
+            };
+            stream.write(&entry, send);
+        }
+        self.stream = Some(stream);
+    }
+
+    /// All has been sent at the beginning.
+    fn step(&mut self, _send: &mut dyn FnMut(&[u8])) -> bool {
+        false
+    }
+
+    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Drained {
+        let (mut entries, mut lost) = (0, 0);
+        if let Some(stream) = self.stream.take() {
+            (entries, lost) = (stream.entries(), stream.lost());
+            stream.cut(send);
+        }
+        Drained {
+            entries,
+            lost,
+            is_cut: true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::sync::Arc;
+    use alloc::vec;
+
+    use recording::{Recordable, Recording, Role};
+    use sched_dag::{Activation, CommitOptions, DagSpec, Policy, SubtaskSpec, verify};
+
+    use super::*;
+
+    /// The DAGs: a periodic one, and a sporadic one, which fails.
+    const STEADY: u16 = 0;
+    const FAILS: u16 = 1;
+
+    /// Keeps the inputs of 16 jobs.
+    fn launched() -> Latest {
+        let dags = ["steady", "fails"].map(|name| DagSpec {
+            name: name.into(),
+            activation: match name {
+                "fails" => Activation::Sporadic,
+                _ => Activation::Periodic,
+            },
+            period_ns: Some(10),
+            relative_deadline_ns: Some(10),
+            subtasks: vec![SubtaskSpec::default()],
+            ..DagSpec::default()
+        });
+        let options = CommitOptions::new(Policy::Edf, 1);
+        let task_set = verify(&dags, &options).expect("sound DAGs").task_set;
+        let mut latest = Latest::new("test", 16);
+        for dag in [STEADY, FAILS] {
+            let channel = Channel {
+                dag,
+                subtask: 0,
+                role: Role::Source,
+                topic: "n".into(),
+                schema: u64::schema(),
+            };
+            latest.open(DagId(dag.into()), 1, &[channel]);
+        }
+        let mut plan = Plan {
+            task_set: Arc::new(task_set),
+            number: 1,
+            bodies: Vec::new(),
+            others: Vec::new(),
+            bounds_ns: Vec::new(),
+            sink_bounds_ns: Vec::new(),
+            after_fault: Vec::new(),
+            staleness: Vec::new(),
+        };
+        latest.launch(&mut plan).expect("it refuses nothing");
+        latest
+    }
+
+    /// When a job of the sporadic DAG is due.
+    fn due_ns(job: u64) -> u64 {
+        7 + 13 * job
+    }
+
+    fn run(latest: &mut Latest, job: u64) {
+        let happened = Happened {
+            dag: DagId(FAILS.into()),
+            subtask: 0,
+            job,
+            release_ns: Some(due_ns(job)),
+            at_ns: due_ns(job),
+        };
+        latest.happened(What::Released, &happened);
+        for channel in [STEADY, FAILS] {
+            latest.record(&Recorded {
+                channel,
+                job,
+                completed_ns: due_ns(job) + 1,
+                bytes: Some(&job.to_le_bytes()),
+            });
+        }
+    }
+
+    #[test]
+    fn of_a_dag_that_fails_there_are_the_jobs_before_and_their_signals() {
+        let mut latest = launched();
+        (0..=30).for_each(|job| run(&mut latest, job));
+        assert!(latest.drain().is_none(), "nothing has failed");
+        latest.failed(DagId(FAILS.into()), 30);
+        (31..=100).for_each(|job| run(&mut latest, job));
+        latest.failed(DagId(FAILS.into()), 90);
+
+        let mut drain = latest.drain().expect("a job has failed");
+        assert!(latest.drain().is_none(), "once");
+        let mut file = Vec::new();
+        let mut send = |bytes: &[u8]| file.extend_from_slice(bytes);
+        drain.begin(&mut send);
+        assert!(!drain.step(&mut send));
+        assert_eq!(drain.end(&mut send).entries, 3 * 16);
+
+        let recording = Recording::read(&file).expect("it is one");
+        assert!(recording.is_cut());
+        let of = |what, dag| {
+            let entries = recording.entries();
+            let entries = entries.filter(move |entry| (entry.what, entry.dag) == (what, dag));
+            entries.map(|entry| (entry.job, entry.release_ns))
+        };
+        let value = recording::What::Value;
+        assert!(of(value, STEADY).eq((85..=100).map(|job| (job, 10 * job))));
+        let of_fails = || (15..=30).map(|job| (job, due_ns(job)));
+        assert!(of(value, FAILS).eq(of_fails()));
+        assert!(of(recording::What::Signal, FAILS).eq(of_fails()));
+    }
+}
