@@ -3,10 +3,44 @@
 
 use super::{SetOnce, Shared, ring};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 use std::{iter, thread, vec::Vec};
 
 const JOBS: u64 = if cfg!(miri) { 100 } else { 200_000 };
+
+/// How long a sender goes on. On a busy host a thread that waits for another one gets a few
+/// turns a second.
+const LONGEST: Duration = Duration::from_secs(1);
+
+/// How many jobs a sender has sent, once it has ended.
+struct End(AtomicU64);
+
+impl End {
+    fn new() -> Arc<Self> {
+        Arc::new(Self(AtomicU64::new(u64::MAX)))
+    }
+
+    /// Calls `send` for one job after the other, until there were enough.
+    fn send_jobs(&self, mut send: impl FnMut(u64)) {
+        let start = Instant::now();
+        let is_in_time = |job: &u64| *job < 8 || start.elapsed() < LONGEST;
+        let sent = (0..JOBS / 8).take_while(is_in_time).map(&mut send).count();
+        self.0.store(sent as u64, Ordering::Release);
+    }
+
+    /// Waits for what `found` finds of a job; `None` if the sender has ended before it.
+    fn wait<T>(&self, job: u64, mut found: impl FnMut() -> Option<T>) -> Option<T> {
+        loop {
+            let is_over = self.0.load(Ordering::Acquire) <= job;
+            let found = found();
+            if found.is_some() || is_over {
+                return found;
+            }
+            thread::yield_now();
+        }
+    }
+}
 
 /// A value that counts how many of its kind are alive.
 struct Counted(Arc<AtomicUsize>, u64);
@@ -138,23 +172,27 @@ fn given_up_slots_race_with_their_writer() {
     for slots in [1, 2, 4] {
         let alive = Arc::new(AtomicUsize::new(0));
         let (mut writer, mut reader) = ring(slots);
-        let counter = Arc::clone(&alive);
+        let (counter, end) = (Arc::clone(&alive), End::new());
+        let its_end = Arc::clone(&end);
         let sender = thread::spawn(move || {
-            for job in 0..JOBS / 8 {
+            its_end.send_jobs(|job| {
                 let mut message = ([job; 5], Counted::new(&counter, job));
                 while let Err(back) = writer.put(job, message) {
                     message = back;
                     thread::yield_now();
                 }
-            }
+            });
         });
-        for job in 0..JOBS / 8 {
-            let is_there = |reader: &super::Reader<_>| {
+        for job in 0.. {
+            let is_there = || {
                 let mut slots = iter::once(&reader.ring.near).chain(&reader.ring.others);
-                slots.any(|slot| slot.turn.load(Ordering::Acquire) == super::turn_of(job))
+                let is_its = |slot: &super::Slot<_>| {
+                    slot.turn.load(Ordering::Acquire) == super::turn_of(job)
+                };
+                slots.any(is_its).then_some(())
             };
-            while !is_there(&reader) {
-                thread::yield_now();
+            if end.wait(job, is_there).is_none() {
+                break;
             }
             if job % 2 == 0 {
                 reader.give_up(job);
@@ -175,23 +213,21 @@ fn two_threads_hand_over_every_job_intact() {
     for slots in [1, 2, 3, 8] {
         let alive = Arc::new(AtomicUsize::new(0));
         let (mut writer, mut reader) = ring(slots);
-        let counter = Arc::clone(&alive);
+        let (counter, end) = (Arc::clone(&alive), End::new());
+        let its_end = Arc::clone(&end);
         let sender = thread::spawn(move || {
-            for job in 0..JOBS / 8 {
+            its_end.send_jobs(|job| {
                 // Several words, so that a torn hand-over would show.
                 let mut message = ([job; 5], Counted::new(&counter, job));
                 while let Err(back) = writer.put(job, message) {
                     message = back;
                     thread::yield_now();
                 }
-            }
+            });
         });
-        for job in 0..JOBS / 8 {
-            let (words, counted) = loop {
-                match reader.take(job) {
-                    Some(message) => break message,
-                    None => thread::yield_now(),
-                }
+        for job in 0.. {
+            let Some((words, counted)) = end.wait(job, || reader.take(job)) else {
+                break;
             };
             assert_eq!(words, [job; 5]);
             assert_eq!(counted.1, job);
@@ -207,33 +243,33 @@ fn two_threads_hand_over_every_job_intact() {
 fn a_chain_of_rings_keeps_jobs_apart() {
     let (mut first_writer, mut first_reader) = ring(2);
     let (mut second_writer, mut second_reader) = ring(2);
-    let jobs = JOBS / 8;
-    let source = thread::spawn(move || {
-        for job in 0..jobs {
-            while first_writer.put(job, job * 3).is_err() {
-                thread::yield_now();
-            }
-        }
-    });
-    let middle = thread::spawn(move || {
-        for job in 0..jobs {
-            let value = loop {
-                match first_reader.take(job) {
-                    Some(value) => break value,
-                    None => thread::yield_now(),
+    let (end, middle_end) = (End::new(), End::new());
+    let source = thread::spawn({
+        let end = Arc::clone(&end);
+        move || {
+            end.send_jobs(|job| {
+                while first_writer.put(job, job * 3).is_err() {
+                    thread::yield_now();
                 }
-            };
-            while second_writer.put(job, value + 1).is_err() {
-                thread::yield_now();
-            }
+            });
         }
     });
-    for job in 0..jobs {
-        let value = loop {
-            match second_reader.take(job) {
-                Some(value) => break value,
-                None => thread::yield_now(),
+    let middle = thread::spawn({
+        let middle_end = Arc::clone(&middle_end);
+        move || {
+            let mut jobs = 0;
+            while let Some(value) = end.wait(jobs, || first_reader.take(jobs)) {
+                while second_writer.put(jobs, value + 1).is_err() {
+                    thread::yield_now();
+                }
+                jobs += 1;
             }
+            middle_end.0.store(jobs, Ordering::Release);
+        }
+    });
+    for job in 0.. {
+        let Some(value) = middle_end.wait(job, || second_reader.take(job)) else {
+            break;
         };
         assert_eq!(value, job * 3 + 1);
     }
