@@ -143,6 +143,12 @@ pub trait Platform: Sync {
         false
     }
 
+    /// Reports whether recorded topics matter that other subtasks than sources write: a replay
+    /// compares their values, and computes them if they are not there.
+    fn results_cross(&self) -> bool {
+        true
+    }
+
     /// Takes the recorded topics of a DAG and the hash of its names and edges, before the plan
     /// comes. Channels are numbered over all DAGs, in the order of the calls. `begin` is for
     /// platforms that have no memory of their own for what crosses.

@@ -13,6 +13,7 @@ use crate::run::record::RecordedTopic;
 
 static EDGE: Edge = Edge {
     crosses: || expect_installed().crosses(),
+    has_results: || expect_installed().results_cross(),
     open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, begin),
     replays: || expect_installed().replays(),
     record: |value| expect_installed().record(value),

@@ -34,6 +34,8 @@ pub struct Recorded<'v> {
 pub(crate) struct Edge {
     /// Reports whether anything is recorded or replayed.
     pub(crate) crosses: fn() -> bool,
+    /// Reports whether that is so of what other subtasks than sources write, too.
+    pub(crate) has_results: fn() -> bool,
     /// Takes the recorded topics of a DAG, and the hash of its graph.
     pub(crate) open: fn(DagId, u64, &[Channel]),
     /// Reports whether there is a replay.

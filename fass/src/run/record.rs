@@ -67,8 +67,17 @@ pub(crate) trait AnyRecorded {
             narrow(*next - 1)
         };
         let numbers = core::iter::repeat_with(number);
-        let mut channels: Vec<Channel> = (all.iter().zip(numbers))
-            .map(|(topic, number)| channel(&**topic, number, dag, spec))
+        let has_results = (self.edge().has_results)();
+        let written = all.iter().map(|topic| (topic, writer(&**topic, spec)));
+        let written = written.filter(|(_, (_, role))| has_results || *role != Role::Result);
+        let mut channels: Vec<Channel> = (written.zip(numbers))
+            .map(|((topic, (subtask, role)), number)| Channel {
+                dag: narrow(dag.index()),
+                subtask,
+                role,
+                topic: topic.topic().into(),
+                schema: topic.open(number),
+            })
             .collect();
         let mut lines = Vec::new();
         for Sampled {
@@ -142,8 +151,8 @@ fn narrow(number: usize) -> u16 {
     u16::try_from(number).unwrap_or(u16::MAX)
 }
 
-/// Numbers a recorded topic.
-fn channel(topic: &dyn AnyRecorded, number: u16, dag: DagId, spec: &DagSpec) -> Channel {
+/// Returns the subtask that writes a recorded topic, and what the topic is to its DAG.
+fn writer(topic: &dyn AnyRecorded, spec: &DagSpec) -> (u16, Role) {
     let mut subtasks = spec.subtasks.iter().enumerate();
     let writer = subtasks.find(|(_, subtask)| {
         let mut outputs = subtask.outputs.iter();
@@ -153,19 +162,16 @@ fn channel(topic: &dyn AnyRecorded, number: u16, dag: DagId, spec: &DagSpec) -> 
         Some((_, writer)) if writer.inputs.is_empty() => Role::Source,
         _ => Role::Result,
     };
-    Channel {
-        dag: narrow(dag.index()),
-        subtask: narrow(writer.map_or(0, |(number, _)| number)),
-        role,
-        topic: topic.topic().into(),
-        schema: topic.open(number),
-    }
+    (narrow(writer.map_or(0, |(number, _)| number)), role)
 }
 
 /// What sends recorded values to a topic.
 pub(crate) trait Replayed: Send {
     fn send(&mut self, job: u64);
 }
+
+/// The number of a topic's channel while it has none.
+const NO_CHANNEL: u16 = u16::MAX;
 
 /// What the tap, the completion and a replay of a topic share.
 struct Line {
@@ -186,7 +192,7 @@ impl<T: Recordable> RecordedTopic<T> {
         Self {
             topic: topic.into(),
             line: Arc::new(Line {
-                number: AtomicU16::new(0),
+                number: AtomicU16::new(NO_CHANNEL),
                 edge,
                 room: Shared::new(Room {
                     bytes: Vec::new(),
@@ -195,6 +201,13 @@ impl<T: Recordable> RecordedTopic<T> {
             }),
             of: PhantomData,
         }
+    }
+}
+
+impl Line {
+    /// Reports whether values of the topic are of interest.
+    fn is_open(&self) -> bool {
+        self.number.load(Ordering::Relaxed) != NO_CHANNEL
     }
 }
 
@@ -214,13 +227,13 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
 
     fn stages(&self) -> Box<dyn Any> {
         let tap = || Box::new(Tap(Arc::clone(&self.line))) as Box<dyn Stage<T>>;
-        let tap = (self.line.edge.crosses)().then(tap);
+        let tap = self.line.is_open().then(tap);
         Box::new(Vec::from_iter(tap))
     }
 
     fn effects(&self) -> Vec<Box<dyn Effect>> {
         let tap = || Box::new(Tap(Arc::clone(&self.line))) as Box<dyn Effect>;
-        (self.line.edge.crosses)().then(tap).into_iter().collect()
+        self.line.is_open().then(tap).into_iter().collect()
     }
 
     fn as_any(&self) -> &dyn Any {

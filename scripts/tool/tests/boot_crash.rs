@@ -74,6 +74,7 @@ fn a_crash_leaves_what_shows_its_job_on_the_host() {
     let bytes = fs::read(file).expect("the file that is named");
     let recording = Recording::read(&bytes).expect("it is whole");
     assert!(recording.is_cut() && recording.lost() == 0);
+    assert_eq!(recording.header().channels.len(), 1, "inputs alone");
     let values = (recording.entries()).filter(|entry| entry.what == What::Value);
     let jobs: Vec<u64> = values.map(|entry| entry.job).collect();
     assert_eq!(jobs.len(), 16, "of one source: {jobs:?}");

@@ -62,6 +62,11 @@ pub fn is_wished() -> bool {
     WISH.get().is_some()
 }
 
+/// Reports whether there are results among what crosses.
+pub fn has_results() -> bool {
+    !matches!(WISH.get(), Some(Wish::Latest { .. }))
+}
+
 /// Takes the recorded topics of a DAG.
 pub fn open(dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
     let Some(wish) = WISH.get() else {

@@ -151,6 +151,10 @@ impl Platform for Kernel {
         edge::is_wished()
     }
 
+    fn results_cross(&self) -> bool {
+        edge::has_results()
+    }
+
     fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
         edge::open(dag, graph, channels, begin);
     }
