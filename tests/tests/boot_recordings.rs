@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use harness::Guest;
-use recording::{Entry, Recording, What};
+use recording::{Entry, Recordable, Recording, Role, What};
 use tool::json::Value;
 use tool::protocol::Status;
 use tool::{Machine, Outcome, recordings, system};
@@ -142,6 +142,34 @@ fn of_a_run_that_dies_there_is_what_came_before() {
     fs::write(&file.0, &mended).expect("it is our file");
     let [compared, _] = replay(1, "static", &file.0);
     assert!((30..=42).contains(&compared), "{compared}");
+}
+
+#[test]
+fn what_a_failed_instance_had_sampled_is_there() {
+    let file = File::new("crash");
+    for guest in [
+        guest(&["test=recorded_crash"]).keeps(&file.0),
+        guest(&["test=recorded_crash"]).records(&file.0, 64),
+    ] {
+        let outcome = guest.cores(2).end_in(Status::Failure);
+        let fault = line(&outcome, "fault");
+        let [job] = numbers(&fault, ["job"]);
+        let message = fault.get("message").and_then(Value::as_text);
+        let bytes = file.bytes();
+        let recording = Recording::read(&bytes).expect("it is whole");
+        let channels = recording.header().channels.iter();
+        let samples = (0_u16..).zip(channels);
+        let mut samples = samples.filter(|(_, channel)| channel.role == Role::Sample);
+        let (place, _) = samples.next().expect("one subtask samples");
+        let entries =
+            (recording.entries()).filter(|entry| (entry.what, entry.place) == (What::Value, place));
+        let last = entries.max_by_key(|entry| entry.job);
+        let last = last.expect("it has sampled");
+        assert_eq!(last.job, job);
+        let sample = <Option<(u64, u64, u64)>>::from_bytes(last.value).expect("a sample");
+        let found = sample.map(|(_, _, told)| format!("found {told}"));
+        assert_eq!(found.as_deref(), message);
+    }
 }
 
 #[test]

@@ -35,7 +35,7 @@ pub(crate) fn tie(
         .map(|dag| core::mem::take(&mut dag.draft.borrow_mut().recorded));
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
-    let mut channels = 0;
+    let (mut channels, mut samplers) = (0, Vec::new());
     let (bodies, others) = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
         .map(|((id, dag), verified)| {
             let (spec, make_bodies, latest, effects, resets) = {
@@ -92,7 +92,7 @@ pub(crate) fn tie(
                 }
             }
             if let (Some(any), Some(lines)) = (any, lines) {
-                any.attach(lines, &mut bodies);
+                any.attach(lines, (id, &mut bodies), &mut samplers);
             }
             (bodies, others)
         })
@@ -107,6 +107,7 @@ pub(crate) fn tie(
         sink_bounds_ns: answers.sink_bounds_ns(),
         after_fault: dags.iter().map(handler).collect(),
         staleness,
+        samplers,
     }
 }
 

@@ -10,8 +10,8 @@ use alloc::vec::Vec;
 use core::mem;
 
 use recording::{Channel, Entry, Header, Stream};
-use sched_dag::DagId;
 use sched_dag::journal::What;
+use sched_dag::{DagId, Instance};
 
 use super::drain::{Releases, SIGNALS};
 use super::replay::Outcome;
@@ -19,6 +19,7 @@ use super::{Crossing, Drain, Drained, Happened, name, open};
 use crate::run::crossing::Recorded;
 use crate::run::latest_jobs::LatestJobs;
 use crate::run::plan::Plan;
+use crate::run::sample::{SampledBy, give_failed};
 
 /// Keeps the last jobs.
 pub(super) struct Latest {
@@ -35,6 +36,7 @@ struct Kept {
     header: Header,
     latest: LatestJobs,
     releases: Vec<Releases>,
+    samplers: Vec<SampledBy>,
     has_failed: bool,
 }
 
@@ -64,6 +66,7 @@ impl Crossing for Latest {
             header,
             latest,
             releases: Releases::of_all(&plan.task_set),
+            samplers: mem::take(&mut plan.samplers),
             has_failed: false,
         });
         Ok(())
@@ -89,9 +92,11 @@ impl Crossing for Latest {
         }
     }
 
-    fn failed(&mut self, dag: DagId, job: u64) {
+    fn failed(&mut self, instance: Instance, at_ns: u64) {
         if let Some(kept) = &mut self.kept {
-            kept.latest.hold(dag.index(), job);
+            let mut take = |sample: &Recorded<'_>| kept.latest.take(sample);
+            give_failed(&kept.samplers, instance, at_ns, &mut take);
+            kept.latest.hold(instance.dag.index(), instance.job);
             kept.has_failed = true;
         }
     }
@@ -189,7 +194,7 @@ mod tests {
     use alloc::vec;
 
     use recording::{Recordable, Recording, Role};
-    use sched_dag::{Activation, CommitOptions, DagSpec, Policy, SubtaskSpec, verify};
+    use sched_dag::{Activation, CommitOptions, DagSpec, Policy, SubtaskId, SubtaskSpec, verify};
 
     use super::*;
 
@@ -232,9 +237,15 @@ mod tests {
             sink_bounds_ns: Vec::new(),
             after_fault: Vec::new(),
             staleness: Vec::new(),
+            samplers: Vec::new(),
         };
         latest.launch(&mut plan).expect("it refuses nothing");
         latest
+    }
+
+    fn instance(job: u64) -> Instance {
+        let (dag, subtask) = (DagId(FAILS.into()), SubtaskId(0));
+        Instance { dag, subtask, job }
     }
 
     /// When a job of the sporadic DAG is due.
@@ -266,9 +277,9 @@ mod tests {
         let mut latest = launched();
         (0..=30).for_each(|job| run(&mut latest, job));
         assert!(latest.drain().is_none(), "nothing has failed");
-        latest.failed(DagId(FAILS.into()), 30);
+        latest.failed(instance(30), due_ns(30));
         (31..=100).for_each(|job| run(&mut latest, job));
-        latest.failed(DagId(FAILS.into()), 90);
+        latest.failed(instance(90), due_ns(90));
 
         let mut drain = latest.drain().expect("a job has failed");
         assert!(latest.drain().is_none(), "once");

@@ -21,7 +21,7 @@ use alloc::string::String;
 
 use recording::{Channel, DagHeader, Header};
 use sched_dag::journal::What;
-use sched_dag::{DagId, TaskSet};
+use sched_dag::{DagId, Instance, TaskSet};
 
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
@@ -82,8 +82,8 @@ pub trait Crossing: Send {
     /// Takes what has become of a job, or of an instance.
     fn happened(&mut self, what: What, happened: &Happened);
 
-    /// Takes note that an instance of a job has failed.
-    fn failed(&mut self, _dag: DagId, _job: u64) {}
+    /// Takes note that an instance has failed, and what it had sampled.
+    fn failed(&mut self, _instance: Instance, _at_ns: u64) {}
 
     /// Lends the recorded value of a channel and a job, if there is one.
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8]));

@@ -7,10 +7,11 @@
 use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::mem;
 
 use recording::{Channel, Header};
-use sched_dag::DagId;
 use sched_dag::journal::What;
+use sched_dag::{DagId, Instance};
 
 use super::drain::{OfTape, Tag};
 use super::replay::Outcome;
@@ -18,6 +19,7 @@ use super::ring::{Head, RingWriter, ring};
 use super::{Crossing, Drain, Happened, name, open, recorded};
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
+use crate::run::sample::{SampledBy, give_failed};
 
 /// The words of the buffer that are left for events.
 const KEPT_WORDS: usize = 512;
@@ -32,6 +34,7 @@ pub(super) struct Tape {
     header: Header,
     ring: Option<RingWriter>,
     drain: Option<Box<dyn Drain>>,
+    samplers: Vec<SampledBy>,
     /// By channel: the jobs whose values had no room, from one to another one.
     lost: Vec<Vec<(u64, u64)>>,
 }
@@ -44,6 +47,7 @@ impl Tape {
             header: Header::default(),
             ring: None,
             drain: None,
+            samplers: Vec::new(),
             lost: Vec::new(),
         }
     }
@@ -99,6 +103,7 @@ impl Crossing for Tape {
             ));
         };
         self.ring = Some(writer);
+        self.samplers = mem::take(&mut plan.samplers);
         self.lost = (self.header.channels.iter())
             .map(|_| Vec::with_capacity(MOST_RUNS))
             .collect();
@@ -154,6 +159,14 @@ impl Crossing for Tape {
         if !ring.put(Head { tag, job, at_ns }, bytes, 0) {
             ring.close();
         }
+    }
+
+    fn failed(&mut self, instance: Instance, at_ns: u64) {
+        let samplers = mem::take(&mut self.samplers);
+        give_failed(&samplers, instance, at_ns, &mut |sample| {
+            self.record(sample)
+        });
+        self.samplers = samplers;
     }
 
     fn lend(&self, _channel: u16, _job: u64, _take: &mut dyn FnMut(&[u8])) {}

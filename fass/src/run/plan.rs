@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use sched_dag::{DagId, TaskSet};
 
 use super::effect::Effect;
+use super::sample::SampledBy;
 use super::staleness::Staleness;
 
 /// A committed set of DAGs, ready to be scheduled.
@@ -51,6 +52,8 @@ pub struct Plan {
     /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
     /// passes between DAGs, for platforms that show it.
     pub staleness: Vec<Staleness>,
+    /// The subtasks that sample recorded topics.
+    pub(crate) samplers: Vec<SampledBy>,
 }
 
 /// The executable part of a subtask: its function with its ends of the topics.

@@ -24,7 +24,7 @@ use super::effect::Effect;
 use super::latest::{AnyLatest, SharedLatest, Stage};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
-use super::sample::{self, SampleLine};
+use super::sample::{self, SampleLine, SampledBy};
 use super::topic::{Ports, Publisher, Wiring};
 
 /// A recorded topic while DAGs are built.
@@ -106,9 +106,15 @@ pub(crate) trait AnyRecorded {
         lines
     }
 
-    /// Lets the bodies of sampling subtasks tell their lines which job they run.
-    fn attach(&self, lines: Vec<(usize, Arc<SampleLine>)>, bodies: &mut Vec<Body>) {
-        sample::attach(lines, bodies);
+    /// Lets the bodies of sampling subtasks tell their lines which job they run, and notes who
+    /// they are.
+    fn attach(
+        &self,
+        lines: Vec<(usize, Arc<SampleLine>)>,
+        bodies: (DagId, &mut Vec<Body>),
+        samplers: &mut Vec<SampledBy>,
+    ) {
+        sample::attach(lines, bodies, samplers);
     }
 
     /// Returns the body of a source in a replay, if there is one and the source is recorded.

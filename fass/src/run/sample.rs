@@ -7,11 +7,12 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::any::Any;
+use core::fmt;
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
 use recording::{Encoder, Recordable, Schema};
-use sched_dag::DagId;
+use sched_dag::{DagId, Instance};
 
 use super::cell::Shared;
 use super::crossing::{Edge, Recorded, room_of};
@@ -68,12 +69,17 @@ impl SampleLine {
 
     /// Gives the sample to the platform.
     fn give(&self, at_ns: u64) {
+        self.take(at_ns, &mut |sample| (self.edge.record)(sample));
+    }
+
+    /// Takes the sample, if there is one.
+    fn take(&self, at_ns: u64, take: &mut dyn FnMut(&Recorded<'_>)) {
         // Only the subtask's body uses the room, which is `&mut` there.
         let Some(mut room) = self.room.change() else {
             return;
         };
         if let Some((job, length)) = room.sample.take() {
-            (self.edge.record)(&Recorded {
+            take(&Recorded {
                 channel: self.number.load(Ordering::Relaxed),
                 job,
                 completed_ns: at_ns,
@@ -138,8 +144,45 @@ impl Effect for Arc<SampleLine> {
     }
 }
 
-/// Lets the bodies of sampling subtasks tell their lines which job they run.
-pub(crate) fn attach(lines: Vec<(usize, Arc<SampleLine>)>, bodies: &mut Vec<Body>) {
+/// What a subtask samples, for a platform on which a fault takes the body with it.
+pub(crate) struct SampledBy {
+    dag: DagId,
+    subtask: usize,
+    line: Arc<SampleLine>,
+}
+
+impl fmt::Debug for SampledBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SampledBy")
+    }
+}
+
+/// Gives what a failed instance had sampled, once.
+pub(crate) fn give_failed(
+    samplers: &[SampledBy],
+    failed: Instance,
+    at_ns: u64,
+    take: &mut dyn FnMut(&Recorded<'_>),
+) {
+    let of_failed = |sampler: &&SampledBy| {
+        (sampler.dag, sampler.subtask) == (failed.dag, failed.subtask.index())
+    };
+    let samplers = samplers.iter().filter(of_failed);
+    samplers.for_each(|sampler| sampler.line.take(at_ns, take));
+}
+
+/// Lets the bodies of sampling subtasks tell their lines which job they run, and notes who they
+/// are.
+pub(crate) fn attach(
+    lines: Vec<(usize, Arc<SampleLine>)>,
+    (dag, bodies): (DagId, &mut Vec<Body>),
+    samplers: &mut Vec<SampledBy>,
+) {
+    samplers.extend(lines.iter().map(|(subtask, line)| SampledBy {
+        dag,
+        subtask: *subtask,
+        line: Arc::clone(line),
+    }));
     let mut all: Vec<Option<Body>> = core::mem::take(bodies).into_iter().map(Some).collect();
     for (subtask, line) in lines {
         all[subtask] = all[subtask].take().map(|body| {

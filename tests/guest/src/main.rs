@@ -35,7 +35,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 31] = [
+const TESTS: [(&str, Test); 32] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -68,6 +68,7 @@ const TESTS: [(&str, Test); 31] = [
     ("large", large::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
+    ("recorded_crash", recorded::crash),
     ("recorded_long", recorded::long),
     ("sharing", sharing::run),
     ("stalled", stalled::run),

@@ -163,12 +163,12 @@ fn before_fault() -> Outgoing {
     Some(drain)
 }
 
-/// Takes note that an instance has failed. The scheduler's lock is held.
-pub fn failed(instance: Instance) {
+/// Takes note that an instance has failed, on the run's time. The scheduler's lock is held.
+pub fn failed(instance: Instance, at_ns: u64) {
     if IS_ON.load(Ordering::Relaxed)
         && let Some(crossing) = CROSSING.lock_uninterrupted().as_mut()
     {
-        crossing.failed(instance.dag, instance.job);
+        crossing.failed(instance, at_ns);
     }
 }
 

@@ -100,7 +100,7 @@ pub fn fail(now_ns: u64) {
         .journal
         .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
-    edge::failed(instance);
+    edge::failed(instance, ended_ns);
     let woken = execution.step(now_ns, Event::Failed(instance));
     drop(place);
     woken.wake();
