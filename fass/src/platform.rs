@@ -357,6 +357,15 @@ pub(crate) fn expect_installed() -> &'static dyn Platform {
     }
 }
 
+/// Gives a value to the platform. It looks for the platform itself: a function that is called for
+/// that is, in a crate compiled for size, as long again.
+pub(crate) fn record(value: &Recorded<'_>) {
+    match PLATFORM.get() {
+        Some(platform) => platform.record(value),
+        None => missing(),
+    }
+}
+
 #[cold]
 fn missing() -> ! {
     panic!("no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`")

@@ -6,7 +6,7 @@ use recording::Recordable;
 
 use super::dag::Dag;
 use crate::edge::begin;
-use crate::platform::expect_installed;
+use crate::platform::{expect_installed, record};
 use crate::run::crossing::Edge;
 use crate::run::message::Message;
 use crate::run::record::RecordedTopic;
@@ -15,8 +15,8 @@ static EDGE: Edge = Edge {
     crosses: || expect_installed().crosses(),
     has_results: || expect_installed().results_cross(),
     open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, begin),
+    record,
     replays: || expect_installed().replays(),
-    record: |value| expect_installed().record(value),
     replay: |channel, job, take| expect_installed().replay(channel, job, take),
 };
 

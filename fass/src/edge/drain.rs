@@ -27,7 +27,7 @@ pub(super) enum Tag {
 const EVENTS: [What; 4] = [What::Signal, What::Skip, What::Cut, What::Restart];
 
 impl Tag {
-    #[inline]
+    #[inline(always)]
     pub(super) fn to_word(self) -> u64 {
         match self {
             Self::Value { channel } => u64::from(channel) << 8,

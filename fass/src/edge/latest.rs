@@ -72,9 +72,12 @@ impl Crossing for Latest {
         Ok(())
     }
 
-    fn record(&mut self, value: &Recorded<'_>) {
+    fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
         if let Some(kept) = &mut self.kept {
-            kept.latest.take(value);
+            kept.latest.take(&Recorded {
+                completed_ns: at_ns,
+                ..*value
+            });
         }
     }
 
@@ -263,12 +266,14 @@ mod tests {
         };
         latest.happened(What::Released, &happened);
         for channel in [STEADY, FAILS] {
-            latest.record(&Recorded {
+            let at_ns = due_ns(job) + 1;
+            let value = Recorded {
                 channel,
                 job,
-                completed_ns: due_ns(job) + 1,
+                completed_ns: at_ns,
                 bytes: Some(&job.to_le_bytes()),
-            });
+            };
+            latest.record(&value, at_ns);
         }
     }
 

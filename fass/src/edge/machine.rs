@@ -56,7 +56,7 @@ impl Crossing for OfMachine {
         Ok(())
     }
 
-    fn record(&mut self, value: &Recorded<'_>) {
+    fn record(&mut self, value: &Recorded<'_>, _at_ns: u64) {
         if let Some(replay) = &mut self.replay {
             replay.compare(value);
         }

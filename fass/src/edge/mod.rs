@@ -76,8 +76,8 @@ pub trait Crossing: Send {
     /// In words: there is no memory, or the replay does not fit.
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String>;
 
-    /// Takes a value, at the completion of its writer.
-    fn record(&mut self, value: &Recorded<'_>);
+    /// Takes a value, at the completion of its writer: `at_ns` on the time of the run.
+    fn record(&mut self, value: &Recorded<'_>, at_ns: u64);
 
     /// Takes what has become of a job, or of an instance.
     fn happened(&mut self, what: What, happened: &Happened);

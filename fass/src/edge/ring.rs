@@ -69,44 +69,58 @@ pub(super) fn ring(bytes: usize) -> Option<(RingWriter, RingReader)> {
 
 impl RingWriter {
     /// Writes a record, and leaves room for `kept` words; `false`: it has no room.
-    #[inline]
+    ///
+    /// Each recorded value comes by here, and this crate is compiled for size: so it is made part
+    /// of what calls it, and copies by eight.
+    #[inline(always)]
     pub(super) fn put(&mut self, head: Head, bytes: &[u8], kept: usize) -> bool {
-        let words = &*self.ring.words;
-        let count = HEAD + bytes.len().div_ceil(8);
-        let mut place = self.written & (words.len() - 1);
-        let mut skipped = 0;
-        if count > words.len() - place {
-            skipped = words.len() - place;
-        }
-        let end = self.written.wrapping_add(skipped + count);
-        if end.wrapping_add(kept).wrapping_sub(self.read) > words.len() {
-            self.read = self.ring.read.load(Ordering::Acquire);
-            if end.wrapping_add(kept).wrapping_sub(self.read) > words.len() {
+        // Shorter than `div_ceil`; no slice is so long that it overflows.
+        let count = HEAD + ((bytes.len() + 7) >> 3);
+        let size = self.ring.words.len();
+        let mut place = self.written & (size - 1);
+        let end = self.written.wrapping_add(count + kept);
+        if place + count > size || end.wrapping_sub(self.read) > size {
+            if !self.make_room(count, kept) {
                 return false;
             }
+            place = self.written & (size - 1);
         }
-        if skipped > 0 {
-            words[place].store(WRAP, Ordering::Relaxed);
-            place = 0;
-        }
-        let Some([tag, job, at, rest @ ..]) = words.get(place..place + count) else {
+        let words = self.ring.words.get(place..place + count);
+        let Some([tag, job, at, rest @ ..]) = words else {
             return false;
         };
         // A record is shorter than the ring, so its length has 24 bits or fewer.
         tag.store(head.tag | (bytes.len() as u64) << 40, Ordering::Relaxed);
         job.store(head.job, Ordering::Relaxed);
         at.store(head.at_ns, Ordering::Relaxed);
-        let (whole, last) = bytes.as_chunks::<8>();
-        for (word, bytes) in rest.iter().zip(whole) {
-            word.store(u64::from_le_bytes(*bytes), Ordering::Relaxed);
+        copy(bytes, rest);
+        self.written = self.written.wrapping_add(count);
+        self.ring.written.store(self.written, Ordering::Release);
+        true
+    }
+
+    /// Does the same, apart, for what happens seldom.
+    #[cold]
+    pub(super) fn put_seldom(&mut self, head: Head, bytes: &[u8], kept: usize) -> bool {
+        self.put(head, bytes, kept)
+    }
+
+    /// Goes to the start if that is where the next `count` words lie; `false`: they have no room.
+    #[cold]
+    fn make_room(&mut self, count: usize, kept: usize) -> bool {
+        let words = &*self.ring.words;
+        let place = self.written & (words.len() - 1);
+        let left = words.len() - place;
+        let skipped = if count > left { left } else { 0 };
+        self.read = self.ring.read.load(Ordering::Acquire);
+        let end = self.written.wrapping_add(skipped + count + kept);
+        if end.wrapping_sub(self.read) > words.len() {
+            return false;
         }
-        if let (false, Some(word)) = (last.is_empty(), rest.last()) {
-            let mut bytes = [0; 8];
-            bytes[..last.len()].copy_from_slice(last);
-            word.store(u64::from_le_bytes(bytes), Ordering::Relaxed);
+        if skipped > 0 {
+            words[place].store(WRAP, Ordering::Relaxed);
+            self.written = self.written.wrapping_add(skipped);
         }
-        self.written = end;
-        self.ring.written.store(end, Ordering::Release);
         true
     }
 
@@ -117,6 +131,48 @@ impl RingWriter {
     pub(super) fn is_closed(&self) -> bool {
         self.ring.is_closed.load(Ordering::Relaxed)
     }
+}
+
+/// Copies bytes into words, of which there are as many as are needed.
+#[inline(always)]
+fn copy(bytes: &[u8], words: &[AtomicU64]) {
+    let (eights, _) = bytes.as_chunks::<64>();
+    for (bytes, words) in eights.iter().zip(words.as_chunks().0) {
+        let [a, b, c, d, e, f, g, h]: &[AtomicU64; 8] = words;
+        let ([b_0, b_1, b_2, b_3, b_4, b_5, b_6, b_7], _) = bytes.as_chunks() else {
+            continue;
+        };
+        put(a, b_0);
+        put(b, b_1);
+        put(c, b_2);
+        put(d, b_3);
+        put(e, b_4);
+        put(f, b_5);
+        put(g, b_6);
+        put(h, b_7);
+    }
+    if !bytes.len().is_multiple_of(64) {
+        copy_few(&bytes[64 * eights.len()..], &words[8 * eights.len()..]);
+    }
+}
+
+/// Copies fewer than 64 bytes.
+#[inline(never)]
+fn copy_few(bytes: &[u8], words: &[AtomicU64]) {
+    let (whole, last) = bytes.as_chunks();
+    for (word, bytes) in words.iter().zip(whole) {
+        put(word, bytes);
+    }
+    if let (false, Some(word)) = (last.is_empty(), words.last()) {
+        let mut bytes = [0; 8];
+        bytes[..last.len()].copy_from_slice(last);
+        put(word, &bytes);
+    }
+}
+
+#[inline(always)]
+fn put(word: &AtomicU64, bytes: &[u8; 8]) {
+    word.store(u64::from_le_bytes(*bytes), Ordering::Relaxed);
 }
 
 impl RingReader {
@@ -162,10 +218,10 @@ mod tests {
 
     #[test]
     fn what_fits_comes_out_in_order_and_what_does_not_is_refused() {
-        let (mut writer, mut reader) = ring(256).unwrap();
+        let (mut writer, mut reader) = ring(600).unwrap();
         let (mut next, mut taken, mut refused) = (0_u64, 0_u64, 0);
         for round in 0..1000_u64 {
-            let length = usize::try_from(round * 7 % 41).unwrap();
+            let length = usize::try_from(round * 7 % 151).unwrap();
             let bytes: Vec<u8> = content(next).take(length).collect();
             let head = Head {
                 tag: length as u64,

@@ -37,6 +37,8 @@ pub(super) struct Tape {
     samplers: Vec<SampledBy>,
     /// By channel: the jobs whose values had no room, from one to another one.
     lost: Vec<Vec<(u64, u64)>>,
+    /// Whether there is a buffer that is not closed, and no job is noted as lost.
+    is_sound: bool,
 }
 
 impl Tape {
@@ -49,12 +51,46 @@ impl Tape {
             drain: None,
             samplers: Vec::new(),
             lost: Vec::new(),
+            is_sound: false,
         }
+    }
+
+    /// Records a value where something is lost, or it has no room.
+    #[cold]
+    fn record_or_lose(&mut self, value: &Recorded<'_>, at_ns: u64) {
+        let (channel, job) = (value.channel, value.job);
+        if self.ring.as_ref().is_none_or(RingWriter::is_closed) {
+            return;
+        }
+        // There may be room again.
+        if self.tell_lost(channel, at_ns) && self.put(value, at_ns) {
+            self.is_sound = self.lost.iter().all(Vec::is_empty);
+        } else {
+            self.lose(channel, job);
+        }
+    }
+
+    /// Writes a value into the buffer; `false`: it has no room.
+    #[inline(always)]
+    fn put(&mut self, value: &Recorded<'_>, at_ns: u64) -> bool {
+        let (Some(ring), Some(bytes)) = (&mut self.ring, value.bytes) else {
+            return false;
+        };
+        let tag = Tag::Value {
+            channel: value.channel,
+        };
+        let head = Head {
+            tag: tag.to_word(),
+            job: value.job,
+            at_ns,
+        };
+        ring.put(head, bytes, KEPT_WORDS)
     }
 
     /// Notes that a value is lost.
     #[cold]
     fn lose(&mut self, channel: u16, job: u64) {
+        self.is_sound = false;
         let (Some(ring), Some(runs)) = (&self.ring, self.lost.get_mut(usize::from(channel))) else {
             return;
         };
@@ -79,7 +115,7 @@ impl Tape {
                 job: first,
                 at_ns,
             };
-            if !ring.put(head, &last.to_le_bytes(), KEPT_WORDS) {
+            if !ring.put_seldom(head, &last.to_le_bytes(), KEPT_WORDS) {
                 return false;
             }
             runs.remove(0);
@@ -109,33 +145,14 @@ impl Crossing for Tape {
             .collect();
         let drain = OfTape::new(reader, self.header.clone(), &plan.task_set);
         self.drain = Some(Box::new(drain));
+        self.is_sound = true;
         Ok(())
     }
 
-    fn record(&mut self, value: &Recorded<'_>) {
-        let (channel, job, at_ns) = (value.channel, value.job, value.completed_ns);
-        let Some(ring) = &mut self.ring else {
-            return;
-        };
-        if ring.is_closed() {
-            return;
+    fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
+        if !self.is_sound || !self.put(value, at_ns) {
+            self.record_or_lose(value, at_ns);
         }
-        let is_whole = (self.lost.get(usize::from(channel))).is_none_or(Vec::is_empty);
-        if is_whole && let Some(bytes) = value.bytes {
-            let head = Head {
-                tag: Tag::Value { channel }.to_word(),
-                job,
-                at_ns,
-            };
-            if ring.put(head, bytes, KEPT_WORDS) {
-                return;
-            }
-        } else if !is_whole && value.bytes.is_some() && self.tell_lost(channel, at_ns) {
-            // There may be room for this one again.
-            self.record(value);
-            return;
-        }
-        self.lose(channel, job);
     }
 
     fn happened(&mut self, what: What, happened: &Happened) {
@@ -156,7 +173,8 @@ impl Crossing for Tape {
         let tag = Tag::Event { what, dag, subtask }.to_word();
         let release_ns = release_ns.map(u64::to_le_bytes);
         let bytes = release_ns.as_ref().map_or(&[][..], |bytes| bytes);
-        if !ring.put(Head { tag, job, at_ns }, bytes, 0) {
+        if !ring.put_seldom(Head { tag, job, at_ns }, bytes, 0) {
+            self.is_sound = false;
             ring.close();
         }
     }
@@ -164,7 +182,7 @@ impl Crossing for Tape {
     fn failed(&mut self, instance: Instance, at_ns: u64) {
         let samplers = mem::take(&mut self.samplers);
         give_failed(&samplers, instance, at_ns, &mut |sample| {
-            self.record(sample)
+            self.record(sample, at_ns);
         });
         self.samplers = samplers;
     }

@@ -38,10 +38,10 @@ pub(crate) struct Edge {
     pub(crate) has_results: fn() -> bool,
     /// Takes the recorded topics of a DAG, and the hash of its graph.
     pub(crate) open: fn(DagId, u64, &[Channel]),
-    /// Reports whether there is a replay.
-    pub(crate) replays: fn() -> bool,
     /// Takes a value.
     pub(crate) record: fn(&Recorded<'_>),
+    /// Reports whether there is a replay.
+    pub(crate) replays: fn() -> bool,
     /// Lends a value, if there is one.
     pub(crate) replay: Lend,
 }

@@ -12,9 +12,10 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::any::Any;
 use core::marker::PhantomData;
+use core::mem;
 use core::sync::atomic::{AtomicU16, Ordering};
 
-use recording::{Channel, Encoder, Recordable, Role, Schema};
+use recording::{Channel, Encoder, Full, Recordable, Role, Schema};
 use sched_dag::wcets::graph_hash;
 use sched_dag::{DagId, DagSpec, TopicPort};
 
@@ -189,9 +190,14 @@ struct Line {
 /// The value of an instance that is not complete yet.
 struct Room {
     bytes: Vec<u8>,
-    /// Its job, and how many bytes it has, if it fitted.
-    value: Option<(u64, Option<usize>)>,
+    /// Its job; [`NO_JOB`]: there is none.
+    job: u64,
+    /// How many bytes it has; more than there are: it did not fit.
+    length: usize,
 }
+
+/// Stands where a job's number does, for none: no run gets so far.
+const NO_JOB: u64 = u64::MAX;
 
 impl<T: Recordable> RecordedTopic<T> {
     pub(crate) fn new(topic: &str, edge: &'static Edge) -> Self {
@@ -202,7 +208,8 @@ impl<T: Recordable> RecordedTopic<T> {
                 edge,
                 room: Shared::new(Room {
                     bytes: Vec::new(),
-                    value: None,
+                    job: NO_JOB,
+                    length: 0,
                 }),
             }),
             of: PhantomData,
@@ -282,6 +289,7 @@ struct Tap(Arc<Line>);
 
 impl Tap {
     /// Claims the room. Only the writer's body uses it, which is `&mut` there.
+    #[inline]
     fn change(&self, change: impl FnOnce(&mut Room)) {
         if let Some(mut room) = self.0.room.change() {
             change(&mut room);
@@ -294,7 +302,8 @@ impl<T: Recordable> Stage<T> for Tap {
         self.change(|room| {
             let mut out = Encoder::new(&mut room.bytes);
             value.encode(&mut out);
-            room.value = Some((job, out.finish().ok()));
+            let (Ok(length) | Err(Full { needed: length })) = out.finish();
+            (room.job, room.length) = (job, length);
         });
         true
     }
@@ -303,14 +312,17 @@ impl<T: Recordable> Stage<T> for Tap {
 }
 
 impl Effect for Tap {
+    // Compiled with the app: this crate's own code is compiled for size.
+    #[inline]
     fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
         self.change(|room| {
-            if let Some((job, length)) = room.value.take() {
+            let job = mem::replace(&mut room.job, NO_JOB);
+            if job != NO_JOB {
                 (self.0.edge.record)(&Recorded {
                     channel: self.0.number.load(Ordering::Relaxed),
                     job,
                     completed_ns,
-                    bytes: length.and_then(|length| room.bytes.get(..length)),
+                    bytes: room.bytes.get(..room.length),
                 });
             }
         });

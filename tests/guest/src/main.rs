@@ -26,6 +26,7 @@ mod storm;
 mod unnoticed;
 #[allow(unsafe_code, reason = "registers that the compiler would spill")]
 mod upper_halves;
+mod values;
 
 use faults::crimes::{CRIMES, Unpunished};
 use kernel::{Ending, Machine, json};
@@ -35,7 +36,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 32] = [
+const TESTS: [(&str, Test); 33] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -76,6 +77,7 @@ const TESTS: [(&str, Test); 32] = [
     ("storm", storm::run),
     ("suspend", limits::suspend),
     ("unnoticed", unnoticed::run),
+    ("values", values::run),
 ];
 
 fn main(machine: &Machine) -> Result<(), Ending> {

@@ -79,6 +79,7 @@ impl<T: Recordable, const N: usize> Recordable for [T; N] {
         Schema::Array(Box::new(T::schema()), u32::try_from(N).unwrap_or(u32::MAX))
     }
 
+    #[inline]
     fn encode(&self, out: &mut Encoder<'_>) {
         T::encode_all(self, out);
     }

@@ -37,6 +37,7 @@ impl<'b> Encoder<'b> {
     /// Begins at the start of a buffer.
     ///
     /// See [`Encoder`].
+    #[inline]
     pub const fn new(buffer: &'b mut [u8]) -> Self {
         Self { buffer, written: 0 }
     }
@@ -44,18 +45,21 @@ impl<'b> Encoder<'b> {
     /// Writes bytes as they are.
     ///
     /// See [`Encoder`].
+    #[inline]
     pub fn put(&mut self, bytes: &[u8]) {
-        let places = self.places(bytes.len());
-        if !places.is_empty() {
+        if let Some(places) = self.places(bytes.len()) {
             places.copy_from_slice(bytes);
         }
     }
 
     /// Returns the place of the next so many bytes, to be filled; none if they do not fit.
-    pub(crate) fn places(&mut self, count: usize) -> &mut [u8] {
+    #[inline]
+    pub(crate) fn places(&mut self, count: usize) -> Option<&mut [u8]> {
         let start = self.written;
         self.written = start.saturating_add(count);
-        self.buffer.get_mut(start..self.written).unwrap_or_default()
+        // Cut in this way, the compiler knows its length where it knows `count`.
+        let (places, _) = self.buffer.get_mut(start..)?.split_at_mut_checked(count)?;
+        Some(places)
     }
 
     /// Writes how many elements or bytes follow. More than 2^32 - 1 fit into no buffer.
@@ -73,6 +77,7 @@ impl<'b> Encoder<'b> {
     /// [`Full`] if not all fitted: then what is in the buffer is of no use.
     ///
     /// See [`Encoder`].
+    #[inline]
     pub const fn finish(self) -> Result<usize, Full> {
         match self.written <= self.buffer.len() {
             true => Ok(self.written),

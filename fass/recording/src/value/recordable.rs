@@ -110,15 +110,22 @@ macro_rules! implement_number {
                 Schema::Scalar(Scalar::$scalar)
             }
 
+            #[inline]
             fn encode(&self, out: &mut Encoder<'_>) {
                 out.put(&self.to_le_bytes());
             }
 
+            #[inline]
             fn encode_all(values: &[Self], out: &mut Encoder<'_>) {
-                const BYTES: usize = size_of::<$number>();
-                let places = out.places(values.len().saturating_mul(BYTES));
-                for (place, value) in places.chunks_exact_mut(BYTES).zip(values) {
-                    place.copy_from_slice(&value.to_le_bytes());
+                /// A function, for its parameters are known to be apart: so it is one copy.
+                #[inline]
+                fn fill(places: &mut [[u8; size_of::<$number>()]], values: &[$number]) {
+                    for (place, value) in places.iter_mut().zip(values) {
+                        *place = value.to_le_bytes();
+                    }
+                }
+                if let Some(places) = out.places(size_of_val(values)) {
+                    fill(places.as_chunks_mut().0, values);
                 }
             }
 

@@ -172,10 +172,10 @@ pub fn failed(instance: Instance, at_ns: u64) {
     }
 }
 
-/// Takes a value, on the run's time. The scheduler's lock is held.
-pub fn record(value: &Recorded<'_>) {
+/// Takes a value, and when that was in the time of the run. The scheduler's lock is held.
+pub fn record(value: &Recorded<'_>, at_ns: u64) {
     if let Some(crossing) = CROSSING.lock_uninterrupted().as_mut() {
-        crossing.record(value);
+        crossing.record(value, at_ns);
     }
 }
 

@@ -160,10 +160,7 @@ impl Platform for Kernel {
     }
 
     fn record(&self, value: &Recorded<'_>) {
-        edge::record(&Recorded {
-            completed_ns: execution::since_epoch(value.completed_ns),
-            ..*value
-        });
+        edge::record(value, execution::since_epoch(value.completed_ns));
     }
 
     fn replays(&self) -> bool {

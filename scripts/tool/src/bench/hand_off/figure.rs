@@ -24,6 +24,11 @@ const NAMES: &[(&str, &str)] = &[
     ("return_to_ready", "last return -> successor ready"),
     ("ready_to_start", "ready -> first instruction"),
     ("return_to_start", "last return -> first instruction"),
+    (
+        "return_to_start_recorded",
+        "the same, if the value is recorded",
+    ),
+    ("recording", "recording a value"),
     ("hop", "start -> start, per hop"),
     ("source_to_sink", "source start -> sink start"),
     ("instance", "source start -> sink start, per instance"),

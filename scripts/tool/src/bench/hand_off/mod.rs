@@ -163,7 +163,15 @@ fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, St
 /// Boots once and reads the figures.
 fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     let log = system::new_log("hand-off")?;
-    let outcome = boot(&what.qemu(mode), image, &log, LIMIT, |_| {})?;
+    let recording = log.with_extension("rec");
+    let outcome = if what.is_recorded {
+        let guest = image::build("guest-tests").map_err(|error| error.to_string())?;
+        let mut qemu = what.qemu(mode);
+        qemu.records = Some(recording.clone());
+        boot(&qemu, &guest.path, &log, LIMIT, |_| {})?
+    } else {
+        boot(&what.qemu(mode), image, &log, LIMIT, |_| {})?
+    };
     if let Err(fault) = outcome.judge() {
         return Err(format!(
             "the guest on {} cores, mode {mode}, failed: {}\n{}",
@@ -180,7 +188,8 @@ fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String>
     if figures.is_empty() {
         return Err(format!("the guest printed no figures\n{}", outcome.tail()));
     }
-    // It is ours, and in the way of no one if it cannot be removed.
+    // They are ours, and in the way of no one if they cannot be removed.
     let _ = fs::remove_file(&log);
+    let _ = fs::remove_file(&recording);
     Ok(figures)
 }

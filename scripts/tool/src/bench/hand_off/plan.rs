@@ -26,6 +26,8 @@ pub(super) struct Boot {
     words: String,
     /// Whether its trace tells what was measured, rather than its own figures.
     pub(super) is_traced: bool,
+    /// Whether it is recorded, for that is what is measured, by a guest of the tests.
+    pub(super) is_recorded: bool,
 }
 
 /// Everything that is to be measured.
@@ -164,12 +166,20 @@ fn boots(options: &Parsed) -> Vec<Boot> {
         memory_mib: memory_mib(largest, cores),
         words: format!("part={part} {words} {}", text("append")),
         is_traced: part == "traced",
+        is_recorded: false,
     };
     // A trace shows what it shows in a few jobs.
     let traced = format!("jobs=20 branches={branches} trace=dump");
     vec![
         boot(1, "hand-off", format!("jobs={jobs} {sizes}")),
         boot(1, "traced", traced.clone()),
+        Boot {
+            cores: 1,
+            memory_mib: memory_mib(0, 1),
+            words: format!("test=values jobs={jobs} record=1024 {}", text("append")),
+            is_traced: false,
+            is_recorded: true,
+        },
         boot(2, "elsewhere", format!("jobs={jobs}")),
         boot(2, "traced", traced),
     ]
@@ -184,6 +194,7 @@ impl Boot {
             memory_mib: memory_mib(largest, cores),
             words: format!("part=workloads jobs={jobs} {sizes}"),
             is_traced: false,
+            is_recorded: false,
         }
     }
 

@@ -1,0 +1,106 @@
+//! What recording a value of 64 bytes costs, for `bench hand-off`.
+//!
+//! In a chain every other value is recorded. So hops with a recorded value and hops with one
+//! that is not alternate in one run, and differ in nothing else. It is measured here because an
+//! image with a recorded topic is larger by a fifth, and the app `hand-off` has no room for it.
+
+use alloc::format;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
+use hand_off::{Pen, Stamps};
+use kernel::report::Distribution;
+use kernel::{Ending, Machine, json};
+
+/// The number of subtasks; the hop from number 1 is the first with a recorded value.
+const SUBTASKS: usize = 10;
+
+/// What the edges carry.
+type Value = [u64; 8];
+
+/// Runs the chain, and prints hops of either kind, and the difference between one with a
+/// recorded value and the next one.
+pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    let jobs = machine.options().number("jobs", 2..=100_000, 200)?;
+    machine.options().finish(&["test", "jobs"])?;
+    let (dag, stamps) = build(jobs);
+    finish_create_dags(&[dag])?;
+    let run = machine.run()?;
+    if let Some(violation) = run.violations().next() {
+        return Err(Ending::Failure(format!("{violation}")));
+    }
+    let hop = |(job, from)| {
+        let start = stamps.first(from + 1, job)?;
+        start.checked_sub(stamps.last(from, job)?)
+    };
+    let hops = |is_meant: fn(usize) -> bool| {
+        // The source's hop comes after a release, not after a hop.
+        let from = (1..SUBTASKS - 1).filter(move |&subtask| is_meant(subtask));
+        (0..jobs).flat_map(move |job| from.clone().map(move |from| (job, from)))
+    };
+    let plain = hops(|subtask| !is_recorded(subtask));
+    let recorded = hops(is_recorded);
+    let differences = recorded.clone().filter_map(|(job, from)| {
+        let plain = hop((job, from + 1))?;
+        Some(hop((job, from))?.saturating_sub(plain))
+    });
+    emit("recording", 1, differences);
+    emit("return_to_start", 1, plain.filter_map(hop));
+    emit("return_to_start_recorded", 1, recorded.filter_map(hop));
+    emit("allocations", jobs, [run.allocations()]);
+    Ok(())
+}
+
+/// Prints a figure as the app `hand-off` does.
+fn emit(figure: &str, per: u64, samples: impl IntoIterator<Item = u64>) {
+    let samples = Distribution::new(samples);
+    json::emit("hand_off", |line| {
+        line.text("workload", "64-byte values")
+            .text("figure", figure)
+            .number("per", per)
+            .number("samples", samples.count() as u64)
+            .object("value", |object| samples.describe(object));
+    });
+}
+
+/// Builds the chain, and the place where its bodies leave their times.
+fn build(jobs: u64) -> (Dag, Stamps) {
+    let period = Duration::from_millis(4);
+    let dag = create_dag();
+    dag.name("values").jobs(jobs).in_flight(1);
+    let mut stamps = Stamps::default();
+    let topics: Vec<String> = (1..SUBTASKS).map(|number| format!("t{number}")).collect();
+    let named = |number| SubtaskAttributes::named(&format!("s{number}"));
+    let mut pen = stamps.pen(jobs);
+    let source = move || (stamped([7; 8], &mut pen),);
+    dag.register_periodic_subtask(source, vec![&topics[0]], period, named(0));
+    for (number, ends) in (1..).zip(topics.windows(2)) {
+        let mut pen = stamps.pen(jobs);
+        let between = move |(value,): (Value,)| (stamped(value, &mut pen),);
+        dag.register_subtask(between, vec![&ends[0]], vec![&ends[1]], named(number));
+        if is_recorded(number) {
+            dag.record::<Value>(&ends[1]);
+        }
+    }
+    let mut pen = stamps.pen(jobs);
+    let sink = move |(value,): (Value,)| {
+        stamped(value, &mut pen);
+    };
+    let last = vec![&*topics[SUBTASKS - 2]];
+    dag.register_sink_subtask(sink, last, period, named(SUBTASKS - 1));
+    (dag, stamps)
+}
+
+/// Reports whether a subtask's value is recorded.
+const fn is_recorded(subtask: usize) -> bool {
+    subtask % 2 == 1
+}
+
+fn stamped(value: Value, pen: &mut Pen) -> Value {
+    pen.stamp();
+    pen.stamp();
+    value
+}
