@@ -19,6 +19,7 @@ kernel::entry!(main);
 fn main(machine: &Machine) -> Result<(), Ending> {
     let workload = workload(machine)?;
     let system = workload.build();
+    system.record();
     // Two lidars, and several results that other DAGs sample.
     let construction = ConstructionPolicy {
         sources: Count::Several,
@@ -41,7 +42,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let bounds = Bounds::new(&commit);
     let run = machine.run()?;
     let latencies = Latencies::of(run.task_set(), run.record(), &system.acted_on);
-    report(&run, &latencies, bounds)
+    report(&run, &latencies, bounds, system.digest())
 }
 
 /// Reads the app's words of the command line.
@@ -96,7 +97,7 @@ impl Bounds {
     }
 }
 
-fn report(run: &Run, latencies: &Latencies, bounds: Bounds) -> Result<(), Ending> {
+fn report(run: &Run, latencies: &Latencies, bounds: Bounds, digest: u64) -> Result<(), Ending> {
     let dags = || (0u32..).map(DagId).zip(run.task_set().dags());
     let violations = run
         .violations()
@@ -144,7 +145,8 @@ fn report(run: &Run, latencies: &Latencies, bounds: Bounds) -> Result<(), Ending
             .number("hot_path_bound_ns", bounds.hot_path_ns.unwrap_or(0))
             .number("to_vehicle_bound_ns", bounds.to_vehicle_ns.unwrap_or(0))
             .number("repeated", latencies.repeated)
-            .number("unused", latencies.unused);
+            .number("unused", latencies.unused)
+            .number("digest", digest);
     });
     if violations > 0 {
         return Err(Ending::Failure(format!(
