@@ -17,6 +17,7 @@ pub(crate) mod record;
 pub(crate) mod replaceable;
 pub(crate) mod reset;
 pub(crate) mod sample;
+mod sampling;
 pub(crate) mod signal;
 pub(crate) mod staleness;
 pub(crate) mod subtask;

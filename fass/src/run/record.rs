@@ -26,6 +26,7 @@ use super::latest::{AnyLatest, SharedLatest, Stage};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
 use super::sample::{self, SampleLine, SampledBy};
+use super::sampling;
 use super::topic::{Ports, Publisher, Wiring};
 
 /// A recorded topic while DAGs are built.
@@ -115,7 +116,7 @@ pub(crate) trait AnyRecorded {
         bodies: (DagId, &mut Vec<Body>),
         samplers: &mut Vec<SampledBy>,
     ) {
-        sample::attach(lines, bodies, samplers);
+        sampling::attach(lines, bodies, samplers);
     }
 
     /// Returns the body of a source in a replay, if there is one and the source is recorded.

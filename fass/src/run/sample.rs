@@ -18,7 +18,6 @@ use super::cell::Shared;
 use super::crossing::{Edge, Recorded, room_of};
 use super::effect::Effect;
 use super::latest::{Entry, Probe, SharedLatest, Slot};
-use super::plan::{Body, Subtask};
 
 /// What the probe of a sampling subtask, its body and its completion share.
 pub(crate) struct SampleLine {
@@ -63,6 +62,11 @@ pub(super) fn probe<T: Recordable + Send + 'static>(
 }
 
 impl SampleLine {
+    /// Notes the job whose instance runs.
+    pub(super) fn begin(&self, job: u64) {
+        self.job.store(job, Ordering::Relaxed);
+    }
+
     pub(super) fn set_number(&self, number: u16) {
         self.number.store(number, Ordering::Relaxed);
     }
@@ -151,6 +155,17 @@ pub(crate) struct SampledBy {
     line: Arc<SampleLine>,
 }
 
+impl SampledBy {
+    /// Notes whose line it is.
+    pub(super) fn new(dag: DagId, subtask: usize, line: &Arc<SampleLine>) -> Self {
+        Self {
+            dag,
+            subtask,
+            line: Arc::clone(line),
+        }
+    }
+}
+
 impl fmt::Debug for SampledBy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("SampledBy")
@@ -169,45 +184,4 @@ pub(crate) fn give_failed(
     };
     let samplers = samplers.iter().filter(of_failed);
     samplers.for_each(|sampler| sampler.line.take(at_ns, take));
-}
-
-/// Lets the bodies of sampling subtasks tell their lines which job they run, and notes who they
-/// are.
-pub(crate) fn attach(
-    lines: Vec<(usize, Arc<SampleLine>)>,
-    (dag, bodies): (DagId, &mut Vec<Body>),
-    samplers: &mut Vec<SampledBy>,
-) {
-    samplers.extend(lines.iter().map(|(subtask, line)| SampledBy {
-        dag,
-        subtask: *subtask,
-        line: Arc::clone(line),
-    }));
-    let mut all: Vec<Option<Body>> = core::mem::take(bodies).into_iter().map(Some).collect();
-    for (subtask, line) in lines {
-        all[subtask] = all[subtask].take().map(|body| {
-            let (of, effect) = (Arc::clone(&line), Box::new(line) as Box<dyn Effect>);
-            let mut body = body.wrapped(|subtask| Box::new(Sampling { subtask, line: of }));
-            body.add_effects([effect]);
-            body
-        });
-    }
-    bodies.extend(all.into_iter().flatten());
-}
-
-/// A subtask that samples recorded topics. (None such can be replaced after a fault.)
-struct Sampling {
-    subtask: Box<dyn Subtask>,
-    line: Arc<SampleLine>,
-}
-
-impl Subtask for Sampling {
-    fn take_turn(&mut self, job: u64) {
-        self.line.job.store(job, Ordering::Relaxed);
-        self.subtask.take_turn(job);
-    }
-
-    fn discard(&mut self, job: u64) {
-        self.subtask.discard(job);
-    }
 }

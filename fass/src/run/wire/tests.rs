@@ -1,3 +1,5 @@
+//! Tests of both ways of a wire, one of them on real threads.
+
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
