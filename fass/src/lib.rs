@@ -115,6 +115,7 @@ pub use api::using::Using;
 pub use api::wire::uses::{Packet, Received, Receiving, Sender, Sending};
 pub use api::wire::{Wire, WireCounts, WireOptions};
 pub use commit::answer::{Answer, Placement, SinkAnswer, Unproven, Verdict};
+pub use commit::chains::EndToEnd;
 pub use commit::error::CommitError;
 pub use commit::fault::Fault;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};

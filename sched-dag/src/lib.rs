@@ -67,7 +67,7 @@
 //!    what has happened and when, and carries its [`Decision`]s out: the
 //!    kernel with timers and interrupts, or [`virtual_time`] on the host.
 //! 5. [`journal`]: what happened in a run. [`law`]: its times and statistics, and the rules that it
-//!    is held against.
+//!    is held against. [`chains`]: how long effects take that cross DAGs.
 //!
 //! # What each user may rely on
 //!
@@ -95,6 +95,7 @@
 extern crate alloc;
 
 pub mod analysis;
+pub mod chains;
 mod clusters;
 mod fnv;
 mod ids;

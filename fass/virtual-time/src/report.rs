@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
+use sched_dag::chains::{Chain, Latencies};
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{self, Record, Terms, Violation};
 use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
@@ -123,6 +124,15 @@ impl Report {
         let events = self.events.iter().copied();
         let record = Record::of_events(&self.task_set, true, events);
         record.expect("the report's jobs fit into memory")
+    }
+
+    /// Measures a chain that crosses DAGs: how old its outputs are, and how long it takes to
+    /// react. [`fass::EndToEnd`] has an example.
+    ///
+    /// See [`Report`].
+    #[must_use]
+    pub fn latencies(&self, chain: &Chain) -> Latencies {
+        chain.latencies(&self.task_set, self.events.iter().copied())
     }
 
     /// Checks rules R1 to R5 of the task model over what was recorded, and

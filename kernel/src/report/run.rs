@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 use core::cell::OnceCell;
 
+use sched_dag::chains::{Chain, Latencies};
 use sched_dag::law::{Record, Tally, Violation};
 use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
 
@@ -205,6 +206,22 @@ impl Run {
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
         self.journal()
             .dispatch_violations(self.task_set(), &self.options(), bound_ns)
+    }
+
+    /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,
+    /// and how long it takes to react; of the latest jobs if events are lost.
+    ///
+    /// ```no_run
+    /// /// The longest time for which the motor obeyed what a camera saw.
+    /// fn longest_ns(run: &kernel::Run, commit: &fass::Commit) -> Option<u64> {
+    ///     let ways = commit.chains_between("camera/expose", "motor/drive");
+    ///     let of_way = |way: &fass::EndToEnd| run.latencies(&way.chain).data_age_ns.into_iter().max();
+    ///     ways.iter().filter_map(of_way).max()
+    /// }
+    /// ```
+    #[must_use]
+    pub fn latencies(&self, chain: &Chain) -> Latencies {
+        chain.latencies(self.task_set(), self.journal().events())
     }
 
     /// Returns how often anything, kernel or app, allocated memory between the

@@ -27,7 +27,7 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     } else if is_watched(options) {
         words.push("status=1".into());
     }
-    let wants_graphs = ["dot", "witness", "observe", "prove"]
+    let wants_graphs = ["dot", "trace", "witness", "observe", "prove"]
         .iter()
         .any(|name| options.is_given(name));
     words.extend(wants_graphs.then(|| "graph=dump".into()));

@@ -13,6 +13,8 @@ use sched_dag::journal::Event;
 use sched_dag::law::Terms;
 use sched_dag::{SchedulerOptions, TaskSet};
 
+use super::commit::Committed;
+
 /// One run of one boot.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -27,6 +29,8 @@ pub struct Run {
     pub is_counted: bool,
     /// The DAGs by number.
     pub task_set: TaskSet,
+    /// What the log says of their commit; nothing if it has no such lines.
+    pub committed: Committed,
     /// What happened, in the order of the log.
     pub events: Vec<Event>,
     /// Events, the oldest ones, that had made way before they were printed.

@@ -14,7 +14,7 @@ use sched_dag::{CoreId, DagId, DagSpec, SubtaskId, TaskSet};
 
 use super::line::Line;
 use super::model::Run;
-use super::{bound, dag};
+use super::{bound, commit, dag};
 use crate::json::Value;
 use crate::protocol::read_line;
 use replay::lines::Malformed;
@@ -40,6 +40,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     // A line of a trace that something before its `{` makes one for people.
     let mut spoilt = None;
     let mut is_counted = false;
+    let mut commit = commit::Open::default();
     for (index, text) in log.lines().enumerate() {
         let Some(line) = read_line(index + 1, text) else {
             if text.contains("{\"kind\":\"trace_begin\"") {
@@ -54,6 +55,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
         let line = Line(&line);
         match (line.0.kind.as_str(), &mut open) {
             ("boot", _) => is_counted = bound::is_counted(line.0),
+            ("graph", None) => commit.add(&line)?,
             ("trace_begin", None) => {
                 let run = begin(&line, is_counted)?;
                 if let Some(first) = runs.iter().find(|first| first.number == run.number) {
@@ -72,7 +74,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
             ("trace_dag", Some(open)) => add_dag(&line, open)?,
             ("trace", Some(open)) => add_events(&line, open)?,
             ("trace_end", Some(_)) => {
-                let ended = open.take().map(|open| end(&line, open));
+                let ended = open.take().map(|open| end(&line, open, &commit));
                 runs.extend(ended.transpose()?);
             }
             ("trace_dag" | "trace" | "trace_end", None) => {
@@ -100,6 +102,7 @@ fn begin(line: &Line<'_>, is_counted: bool) -> Result<Run, Malformed> {
         options: dag::options(line)?,
         is_counted,
         task_set: TaskSet::default(),
+        committed: commit::Committed::default(),
         events: Vec::new(),
         lost: 0,
         complete: false,
@@ -160,9 +163,10 @@ fn event(open: &Open, value: &Value) -> Result<Event, String> {
     })
 }
 
-fn end(line: &Line<'_>, open: Open) -> Result<Run, Malformed> {
+fn end(line: &Line<'_>, open: Open, commit: &commit::Open) -> Result<Run, Malformed> {
     let task_set = dag::task_set("trace_dag", open.run.options, &open.dags, &open.lines)?;
     let mut run = open.run;
+    run.committed = commit.of(&task_set);
     run.task_set = task_set;
     let (stated, found) = (line.number("events")?, run.events.len());
     if stated != found as u64 {
