@@ -2,7 +2,8 @@
 //!
 //! An *image* is the freestanding ELF file that a package under `apps/` (or
 //! the guest side of the boot tests) is linked into; it bears the package's
-//! name. Images are always built in release. Cargo itself is asked where the
+//! name. Images that run are built in release, those for a debugger by a profile
+//! of their own. Cargo itself is asked where the
 //! file lies, so no setting of cargo's can make us boot a stale one.
 
 use std::env;
@@ -123,18 +124,41 @@ pub fn check_file(path: &Path) -> Result<Option<String>, String> {
     })
 }
 
-/// Builds the image of a package. Cargo's progress and errors go to standard
+/// How an image is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Profile {
+    /// As small and quick as it runs.
+    Release,
+    /// So that a debugger shows all of it.
+    Gdb,
+}
+
+/// Builds the image of a package, as it runs. Cargo's progress and errors go to standard
 /// error as they come.
 ///
 /// # Errors
 ///
 /// Cargo failed, or the package has no binary of its own name.
 pub fn build(package: &str) -> Result<Image, ImageError> {
+    build_by(package, Profile::Release)
+}
+
+/// Builds the image of a package by a profile, as [`build`] does.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_by(package: &str, profile: Profile) -> Result<Image, ImageError> {
+    let profile = match profile {
+        Profile::Release => "release",
+        Profile::Gdb => "gdb",
+    };
     let failed = |why: String| ImageError::Build(format!("cannot build `{package}`: {why}"));
     let mut command = system::cargo();
     command.args([
         "build",
-        "--release",
+        "--profile",
+        profile,
         "--quiet",
         "-p",
         package,
@@ -143,7 +167,7 @@ pub fn build(package: &str) -> Result<Image, ImageError> {
     ]);
     command.arg("--message-format=json-render-diagnostics");
     command.stdin(Stdio::null()).stdout(Stdio::piped());
-    say_if_cargo_waits();
+    say_if_cargo_waits(profile);
     let mut cargo = command
         .spawn()
         .map_err(|error| failed(format!("cargo: {error}")))?;
@@ -170,9 +194,9 @@ pub fn build(package: &str) -> Result<Image, ImageError> {
 }
 
 /// Says so if another command builds images: cargo would wait for it without a word.
-fn say_if_cargo_waits() {
+fn say_if_cargo_waits(profile: &str) {
     let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
-    let folder = system::workspace().join(target).join("release");
+    let folder = system::workspace().join(target).join(profile);
     if is_locked(&folder.join(".cargo-lock")) {
         let folder = folder.display();
         eprintln!("waiting for another command, which builds in {folder}");

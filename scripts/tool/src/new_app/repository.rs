@@ -110,6 +110,7 @@ fn from_git(url: &str) -> Box<dyn Fn(&str) -> String> {
     let url = url.to_string();
     Box::new(move |text| {
         let mut text = text.replace("\"/workspace/scripts/boot\"", "\"fass-tool\", \"boot\"");
+        text = text.replace("/workspace/scripts/debug", "fass-tool debug");
         for package in PACKAGES {
             let by_path = format!("path = \"{WORKSPACE}/{package}\"");
             text = text.replace(&by_path, &format!("git = \"{url}\""));

@@ -9,7 +9,9 @@
 //! the guest's).
 
 mod boot;
+mod debug;
 mod folder;
+mod gdb;
 mod handed;
 mod loading;
 mod log;
@@ -42,6 +44,7 @@ use recording::Recorded;
 use screen::Screen;
 
 pub use boot::boot;
+pub use debug::debug;
 pub use table::RUN;
 
 /// Why a run ended before the guest did.
@@ -291,7 +294,7 @@ fn describe(
         has_input: options.is_given("console"),
         second: wire::second(options),
         logs_instructions: false,
-        wait_for_debugger: options.is_given("gdb"),
+        debugger: options.is_given("gdb").then(|| "tcp::1234".into()),
     }
 }
 
@@ -320,7 +323,7 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     if let Some(why) = why {
         screen.say(&format!("mode {} because {why}", qemu.mode));
     }
-    if qemu.wait_for_debugger {
+    if qemu.debugger.is_some() {
         screen.say("waiting for a debugger: `gdb IMAGE -ex 'target remote :1234'`");
     }
     screen.say("");
