@@ -32,7 +32,9 @@
 #![deny(unsafe_code)]
 
 mod control;
+mod lead;
 mod level;
+mod look_out;
 mod machine;
 mod platform;
 mod release;
@@ -50,7 +52,7 @@ mod wires;
 mod worker;
 
 pub use control::Control;
-pub use machine::{Linux, Mechanism, StartError};
+pub use machine::{Linux, Mechanism, StartError, processors};
 pub use run::{Counts, Run};
 pub use state::Fault;
 pub use wires::Connection;

@@ -37,6 +37,8 @@ pub struct Fault {
     pub instance: Instance,
     /// Why: a panic's message, or that the budget was exceeded.
     pub cause: String,
+    /// Whether it is the latter.
+    pub is_overrun: bool,
 }
 
 /// The scheduler, the bodies, and who runs what.
@@ -178,8 +180,9 @@ impl State {
     }
 
     /// Ends an instance's DAG because of a fault.
-    pub(crate) fn fail(&mut self, workers: &[Worker], instance: Instance, cause: String) {
-        self.faults.push(Fault { instance, cause });
+    pub(crate) fn fail(&mut self, workers: &[Worker], fault: Fault) {
+        let instance = fault.instance;
+        self.faults.push(fault);
         let handler = self.after_fault[instance.dag.index()];
         self.step(workers, |moment, mut observer| {
             moment.fail(instance, &mut observer);
