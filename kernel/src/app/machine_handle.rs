@@ -258,7 +258,7 @@ impl Machine {
         let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
-        wcet_notes::note(&run);
+        wcet_notes::note(&run, KERNEL.overheads());
         if let Some(line) = LINE.get() {
             line.report();
         }

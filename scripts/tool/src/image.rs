@@ -153,18 +153,53 @@ pub fn build_by(package: &str, profile: Profile) -> Result<Image, ImageError> {
         Profile::Release => "release",
         Profile::Gdb => "gdb",
     };
-    let failed = |why: String| ImageError::Build(format!("cannot build `{package}`: {why}"));
+    build_target(package, profile, ["--bin", package])
+}
+
+/// Makes sure that an app has a program for Linux.
+///
+/// # Errors
+///
+/// One line that names the apps that have one.
+pub fn check_linux(app: &str) -> Result<(), String> {
+    let folder = system::workspace().join("apps");
+    let has_program = |app: &String| {
+        let program = format!("examples/{}.rs", linux_name(app));
+        folder.join(app).join(program).is_file()
+    };
+    if has_program(&app.into()) {
+        return Ok(());
+    }
+    let others: Vec<String> = apps().into_iter().filter(has_program).collect();
+    Err(format!(
+        "app {} has no program for Linux; these have: {}",
+        quoted(app),
+        others.join(", ")
+    ))
+}
+
+/// Returns the name of an app's program for Linux.
+fn linux_name(app: &str) -> String {
+    format!("{app}-linux")
+}
+
+/// Builds an app's program for Linux, as [`build`] does its image.
+///
+/// # Errors
+///
+/// Cargo failed, or the package has no such program.
+pub fn build_linux(app: &str) -> Result<Image, ImageError> {
+    build_target(app, "linux", ["--example", &linux_name(app)])
+}
+
+/// Builds one target of a package, of a kind and a name.
+fn build_target(package: &str, profile: &str, target: [&str; 2]) -> Result<Image, ImageError> {
+    let [_, name] = target;
+    let failed = |why: String| ImageError::Build(format!("cannot build `{name}`: {why}"));
     let mut command = system::cargo();
-    command.args([
-        "build",
-        "--profile",
-        profile,
-        "--quiet",
-        "-p",
-        package,
-        "--bin",
-        package,
-    ]);
+    command
+        .args(["build", "--profile", profile, "--quiet", "-p", package])
+        .args(target);
     command.arg("--message-format=json-render-diagnostics");
     command.stdin(Stdio::null()).stdout(Stdio::piped());
     say_if_cargo_waits(profile);
@@ -175,7 +210,7 @@ pub fn build_by(package: &str, profile: Profile) -> Result<Image, ImageError> {
     let mut path = None;
     if let Some(output) = cargo.stdout.take() {
         for line in BufReader::new(output).lines().map_while(Result::ok) {
-            path = executable(&line, package).or(path);
+            path = executable(&line, name).or(path);
         }
     }
     let status = cargo

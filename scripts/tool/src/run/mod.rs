@@ -15,6 +15,7 @@ mod gdb;
 mod handed;
 mod loading;
 mod log;
+mod on_linux;
 mod prove;
 mod recording;
 mod screen;
@@ -22,6 +23,7 @@ mod seeing;
 mod status;
 mod table;
 mod wire;
+mod written;
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -70,6 +72,7 @@ pub fn run(words: &[OsString]) -> ExitCode {
 }
 
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
+    let options = &on_linux::settle(options)?;
     if options.is_given("json") && options.is_given("plain") {
         let line = "`--json` and `--plain` exclude each other; give one";
         return Err(Refusal::Usage(line.into()));
@@ -143,6 +146,11 @@ fn boot_app(
     shows: bool,
 ) -> Result<Booted, Refusal> {
     let app = choose_app(options, dags.is_some())?;
+    if on_linux::is_asked_for(options) {
+        let booted = on_linux::run_app(options, &app, dags, shows)?;
+        written::write(options, &booted)?;
+        return Ok(booted);
+    }
     let memory_mib = loading::choose_memory(options, dags.as_deref())?;
     let named = options.text("mode").and_then(Mode::from_name);
     loading::check(options, named).map_err(Refusal::Usage)?;
@@ -203,36 +211,20 @@ fn boot_app(
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
-    if let Some(file) = options.path("trace").map(files::place) {
-        screen.say(&format!(
-            "{file}: the log with its trace; `./scripts/check-trace {file}` judges it, \
-             `./scripts/trace {file} -o {file}.json` draws it"
-        ));
-    }
+    written::say_trace(&screen, options);
     if let Some(line) = recorded
         .write(options, &outcome)
         .map_err(Refusal::Failure)?
     {
         screen.say(&line);
     }
-    for written in [
-        seeing::write_dot(options, &outcome),
-        seeing::write_witness(options, &outcome),
-        Ok(wire::warning(options, &outcome)),
-    ] {
-        if outcome.judge().is_err() {
-            // There are worse news.
-            break;
-        }
-        if let Some(line) = written.map_err(Refusal::Failure)? {
-            screen.say(&line);
-        }
-    }
-    Ok(Booted {
+    let booted = Booted {
         outcome,
         log,
         screen,
-    })
+    };
+    written::write(options, &booted)?;
+    Ok(booted)
 }
 
 /// Settles which app runs: the one that the options name, which a given image must be of,
@@ -349,8 +341,13 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
     }
     if fault.status == Status::Usage {
         let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
+        let who = if on_linux::is_asked_for(options) {
+            "app"
+        } else {
+            "guest"
+        };
         let lines = of_file
-            .unwrap_or_else(|| format!("the guest refused its command line: {}", fault.reason));
+            .unwrap_or_else(|| format!("the {who} refused its command line: {}", fault.reason));
         log.restore();
         return RUN.refuse(&lines);
     }

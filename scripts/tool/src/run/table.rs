@@ -26,7 +26,8 @@ const MOST_SUBTASKS: u64 = 16;
 /// The table of `run`.
 pub static RUN: Command = Command {
     invocation: "./scripts/run",
-    about: "Builds an app, boots it on the bare machine in QEMU, and judges the run.",
+    about: "\
+Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and judges the run.",
     positional: None,
     options: &[
         Opt::new(
@@ -36,9 +37,16 @@ pub static RUN: Command = Command {
         )
         .or("fork-join"),
         Opt::new(
+            "on",
+            Takes::OneOf(&["machine", "linux"]),
+            "Where it runs: on the bare machine in QEMU, or as a program of this computer, see \
+             docs/linux.md.",
+        )
+        .or("machine"),
+        Opt::new(
             "cores",
             Takes::number(1..=MOST_CORES),
-            "Processors of the guest.",
+            "Processors of the guest; with --on linux no more than this computer has.",
         )
         .or("8"),
         Opt::new(

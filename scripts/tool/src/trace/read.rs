@@ -39,7 +39,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     let mut open: Option<Open> = None;
     // A line of a trace that something before its `{` makes one for people.
     let mut spoilt = None;
-    let mut is_counted = false;
+    let mut usual_bound_ns = bound::REAL_NS;
     let mut commit = commit::Open::default();
     for (index, text) in log.lines().enumerate() {
         let Some(line) = read_line(index + 1, text) else {
@@ -54,10 +54,10 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
         })?;
         let line = Line(&line);
         match (line.0.kind.as_str(), &mut open) {
-            ("boot", _) => is_counted = bound::is_counted(line.0),
+            ("boot", _) => usual_bound_ns = bound::usual_ns(line.0),
             ("graph", None) => commit.add(&line)?,
             ("trace_begin", None) => {
-                let run = begin(&line, is_counted)?;
+                let run = begin(&line, usual_bound_ns)?;
                 if let Some(first) = runs.iter().find(|first| first.number == run.number) {
                     return Err(line.malformed(format!(
                         "run {} stands here twice, first on line {}; give each boot's log alone",
@@ -95,12 +95,12 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     }
 }
 
-fn begin(line: &Line<'_>, is_counted: bool) -> Result<Run, Malformed> {
+fn begin(line: &Line<'_>, usual_bound_ns: u64) -> Result<Run, Malformed> {
     Ok(Run {
         number: line.number("run")?,
         line: line.0.number,
         options: dag::options(line)?,
-        is_counted,
+        usual_bound_ns,
         task_set: TaskSet::default(),
         committed: commit::Committed::default(),
         events: Vec::new(),
