@@ -69,7 +69,8 @@
 //! - What functions share otherwise is stated and typed: a [`State`] within a DAG, a
 //!   [`Latest`] value between DAGs, a [`Signal`] that releases one. The commit turns
 //!   it into precedence, bounded staleness, or a minimum distance of releases.
-//! - What comes from outside and goes there while DAGs run passes a [`Wire`].
+//! - What comes from outside and goes there while DAGs run passes a [`Wire`], or is a
+//!   [`Parameter`].
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
 //!   locked read-modify-write; states and latest values do one or two a use. (What
 //!   functions and their messages' `clone` do is theirs.)
@@ -106,6 +107,7 @@ mod run;
 
 pub use api::dag::{Dag, create_dag};
 pub use api::latest::{Latest, Sample, Sampling};
+pub use api::parameter::{Parameter, ParameterValue, Reading, Tunable, Unsettable};
 pub use api::replaceable::Replaceable;
 pub use api::signal::{Raiser, Raising, Signal};
 pub use api::state::{Read, State, StateValue, Update};

@@ -119,7 +119,7 @@ pub mod wcets;
 pub use clusters::{Clusters, Why};
 pub use ids::{ClusterId, CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use kept::Journal;
-pub use nearest::nearest;
+pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;
 pub use policy::{
     Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,

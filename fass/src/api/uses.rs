@@ -3,8 +3,8 @@
 //! Values of the same job come along edges, as arguments. What comes from elsewhere
 //! is stated with [`Dag::using`]: a [`State`](crate::State) that subtasks of the DAG
 //! share, the [latest value](crate::Latest) of a topic of any DAG, a
-//! [signal](crate::Signal) that the subtask may raise, a [wire](crate::Wire) for bytes. The
-//! function then gets what it uses as its *first* argument, in front of the inputs:
+//! [signal](crate::Signal) that the subtask may raise, a [wire](crate::Wire) for bytes, a
+//! [parameter](crate::Parameter) that is set from outside. The function then gets what it uses as its *first* argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
 //! |---|---|---|
@@ -14,6 +14,7 @@
 //! | [`Signal::raising`](crate::Signal::raising) | `Raiser` | sporadic release |
 //! | [`Wire::receiving`](crate::Wire::receiving) | `Received<T>` | input |
 //! | [`Wire::sending`](crate::Wire::sending) | `Sender` | output |
+//! | [`Parameter::reading`](crate::Parameter::reading) | `T` | input |
 //!
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
@@ -46,7 +47,7 @@ pub(crate) mod sealed {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is nothing that a subtask uses",
     label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `wire.receiving(decode)` and `wire.sending()`"
+    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `wire.receiving(decode)`, `wire.sending()` and `parameter.reading()`"
 )]
 pub trait Uses: sealed::Sealed {
     /// What the function gets.

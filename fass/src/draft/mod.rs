@@ -13,6 +13,7 @@ pub(crate) mod flaw;
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
@@ -53,6 +54,8 @@ pub(crate) struct Draft {
     /// The latest values that subtasks sample, of whatever DAG, and the number that the subtask
     /// has there.
     pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>, usize)>,
+    /// The names of the parameters that sources read.
+    pub(crate) parameters: Vec<String>,
     /// The signals that subtasks may raise, of whatever DAG.
     pub(crate) raises: Vec<(usize, Arc<Target>)>,
     /// What completions of subtasks do beyond the DAG, latest values apart.

@@ -11,5 +11,6 @@ pub(crate) mod event;
 pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
+mod parameters;
 mod wcet_notes;
 mod wires;

@@ -23,6 +23,7 @@ mod recorded;
 mod sharing;
 mod stalled;
 mod storm;
+mod tuned;
 mod unnoticed;
 #[allow(unsafe_code, reason = "registers that the compiler would spill")]
 mod upper_halves;
@@ -36,7 +37,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 33] = [
+const TESTS: [(&str, Test); 34] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -76,6 +77,7 @@ const TESTS: [(&str, Test); 33] = [
     ("spend_stacks", limits::spend_stacks),
     ("storm", storm::run),
     ("suspend", limits::suspend),
+    ("tuned", tuned::run),
     ("unnoticed", unnoticed::run),
     ("values", values::run),
 ];

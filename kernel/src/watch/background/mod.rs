@@ -18,6 +18,8 @@ mod command;
 mod input;
 mod listener;
 mod load;
+pub(crate) mod more;
+pub(crate) mod parameters;
 mod patience;
 mod progress;
 pub(crate) mod session;

@@ -14,6 +14,7 @@ use sched_dag::{Dag, DagId, TaskSet};
 
 use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
+use super::more;
 use crate::println;
 use executive::machine::serial;
 use executive::run::execution::{self, Control, Snapshot, State};
@@ -126,14 +127,26 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
     let command = match parse(line) {
         Ok(command) => command,
         Err(refusal) => {
-            refuse(line, &refusal);
+            let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+            let mut is_refused = false;
+            let refuse = &mut |why: &dyn Display| {
+                is_refused = true;
+                refuse(line, why);
+            };
+            if !more::all().any(|commands| commands.answer(name, rest.trim(), refuse)) {
+                refuse(&refusal);
+            }
+            if !is_refused {
+                accept(line);
+            }
             return Answer::Given;
         }
     };
     match command {
         Command::Help => {
-            for (command, what) in HELP {
-                println!("  {command:14}{what}");
+            let more = more::all().flat_map(more::Commands::help);
+            for (command, what) in HELP.iter().chain(more) {
+                println!("  {command:15}{what}");
             }
             accept(line);
         }

@@ -16,6 +16,7 @@ mod handed;
 mod loading;
 mod log;
 mod on_linux;
+mod params;
 mod prove;
 mod recording;
 mod screen;
@@ -122,7 +123,10 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
     wire::check(options)?;
-    let mut inputs = options.named(&["dag", "module", "replay", "image", "qemu", "wcets"]);
+    let names = [
+        "dag", "module", "replay", "image", "qemu", "wcets", "params",
+    ];
+    let mut inputs = options.named(&names);
     inputs.extend(wire::input(options));
     let outputs = [
         "serial", "trace", "record", "dot", "witness", "observe", "output",
@@ -158,6 +162,7 @@ fn boot_app(
     install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
 
     let handed = Handed::read(options, dags.is_none())?;
+    let parameters = params::guest_word(options)?;
     let recorded = Recorded::new(options, &app).map_err(Refusal::Failure)?;
     if let Some(dags) = dags.as_deref_mut() {
         dags.write_module(handed.text()).map_err(Refusal::Failure)?;
@@ -167,6 +172,7 @@ fn boot_app(
         let module = dags.and_then(|dags| dags.module.clone());
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
         qemu.guest_words += &handed.guest_words();
+        qemu.guest_words += &parameters;
         qemu.guest_words += recorded.guest_word();
         qemu.records = recorded.raw();
         qemu.module = module.or_else(|| handed.module());

@@ -105,6 +105,16 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
             "Leave this file in the guest's memory, for the app: a recording for gait.",
         ),
         Opt::new(
+            "set",
+            Takes::Text("NAME=VALUE,..."),
+            "Set parameters of the app before it begins; at the console, `params` lists them.",
+        ),
+        Opt::new(
+            "params",
+            Takes::File("FILE"),
+            "Set those of this file, a line NAME=VALUE for each; --set prevails.",
+        ),
+        Opt::new(
             "record",
             Takes::File("FILE"),
             "Write what crosses the edge of the run to this file: the values of the topics that \
