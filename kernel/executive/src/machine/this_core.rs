@@ -9,6 +9,7 @@ use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
+use super::accusation::Accusation;
 use super::context::{Context, Parked, Registers};
 use super::cpu;
 use super::descriptors::{self, TaskState};
@@ -68,6 +69,7 @@ pub struct Core {
     pub timer_interrupts: AtomicU64,
     /// When this core took its last interrupt, by its timer or from another core.
     pub interrupted_ns: AtomicU64,
+    pub(super) accusation: Accusation,
     /// The time between two heartbeats of this core, 0 if it has none.
     pub heartbeat_ns: AtomicU64,
     interrupts_off: Meter,
@@ -101,6 +103,7 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         timer_interrupts: AtomicU64::new(0),
         interrupted_ns: AtomicU64::new(0),
+        accusation: Accusation::new(),
         heartbeat_ns: AtomicU64::new(0),
         interrupts_off: Meter::new(),
         behind_ticks: AtomicU64::new(0),
