@@ -69,6 +69,8 @@
 //! - What functions share otherwise is stated and typed: a [`State`] within a DAG, a
 //!   [`Latest`] value between DAGs, a [`Signal`] that releases one. The commit turns
 //!   it into precedence, bounded staleness, or a minimum distance of releases.
+//! - What a function may change of the run is stated, too: which DAGs rest ([`Switch`]), and
+//!   when it ends ([`Shutdown`]).
 //! - What comes from outside and goes there while DAGs run passes a [`Wire`], or is a
 //!   [`Parameter`].
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
@@ -107,6 +109,7 @@ mod run;
 
 pub use api::dag::{Dag, create_dag};
 pub use api::latest::{Latest, Sample, Sampling};
+pub use api::lifecycle::{Shutdown, ShuttingDown, Switch, Switching, shutting_down};
 pub use api::parameter::{Parameter, ParameterValue, Reading, Tunable, Unsettable};
 pub use api::replaceable::Replaceable;
 pub use api::signal::{Raiser, Raising, Signal};
@@ -136,6 +139,7 @@ pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use run::wire::incoming::Framing;
 pub use sched_dag::analysis::{Overheads, Reason, Test};
+pub use sched_dag::lifecycle::Request;
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{
     ClusterId, Clusters, ConstructionPolicy, Count, FaultLimit, Order, OverrunPolicy, Policy,

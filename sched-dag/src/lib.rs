@@ -102,6 +102,7 @@ mod ids;
 pub mod journal;
 mod kept;
 pub mod law;
+pub mod lifecycle;
 mod nearest;
 mod order;
 pub mod placement;

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+use sched_dag::lifecycle::Requests;
 use sched_dag::{Dag, DagId, Journal, OnFault, Scheduler, SchedulerOptions};
 
 use crate::level::Levels;
@@ -160,12 +161,13 @@ impl Platform for Host {
         let overhead_ns = terms.overheads.of_an_instance_ns(options.preemption);
         (terms.look_at_commit)(&plan, options, overhead_ns);
         let task_set = plan.task_set;
+        let requests = Requests::new(task_set.dags().len(), plan.lifecycle);
         let journal = Journal::new(&task_set, JOURNAL_BYTES, u64::MAX);
         let scheduler = Scheduler::new(task_set, options);
         let state = State::new(
             scheduler,
             plan.bodies,
-            plan.after_fault,
+            (requests, plan.after_fault),
             journal,
             terms.processors,
             terms.levels,

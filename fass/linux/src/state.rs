@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use fass::Body;
 use sched_dag::journal::What;
+use sched_dag::lifecycle::Requests;
 use sched_dag::placement::{Next, Placement};
 use sched_dag::{
     CoreId, DagId, Decision, Instance, Journal, Moment, Observer, Recorder, Scheduler, TaskSet,
@@ -57,7 +58,7 @@ pub(crate) struct State {
     spare: Vec<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
-    pub(crate) signals: Vec<DagId>,
+    pub(crate) requests: Requests,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
     pub(crate) faults: Vec<Fault>,
@@ -86,7 +87,7 @@ impl State {
     pub(crate) fn new(
         scheduler: Scheduler,
         bodies: Vec<Vec<Body>>,
-        after_fault: Vec<Option<DagId>>,
+        (requests, after_fault): (Requests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
         levels: Option<Levels>,
@@ -114,7 +115,7 @@ impl State {
             pinned: vec![None; workers].into_boxed_slice(),
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
-            signals: Vec::with_capacity(dags),
+            requests,
             after_fault,
             faults: Vec::with_capacity(dags),
             called: Vec::with_capacity(2 * cores),
@@ -170,9 +171,7 @@ impl State {
         let mut observer = (&mut self.recorder, discard);
         let mut moment = self.scheduler.at(now_ns);
         event(&mut moment, &mut observer);
-        for dag in self.signals.drain(..) {
-            moment.signal(dag, &mut observer);
-        }
+        self.requests.serve(&mut moment, &mut observer);
         let decisions = moment.release_due(&mut observer).dispatch();
         self.decisions.clear();
         self.decisions.extend_from_slice(decisions);

@@ -220,12 +220,9 @@ impl Team {
         }
         let state_now = &mut *state;
         if outcome.is_ok() && runner.body.has_effects() {
-            let signals = &mut state_now.signals;
-            runner.body.complete(finish_ns, &mut |dag| {
-                if !signals.contains(&dag) {
-                    signals.push(dag);
-                }
-            });
+            let requests = &mut state_now.requests;
+            let keep = &mut |request| requests.keep(request);
+            runner.body.complete(finish_ns, keep);
         }
         let what = match outcome {
             Ok(()) => What::Finish,
@@ -235,7 +232,7 @@ impl Team {
             Some(core) => {
                 state_now.note_at(finish_ns, what, core, vertex);
                 state_now.placement.finish(core.index(), vertex, runner);
-                if outcome.is_ok() && state_now.signals.is_empty() {
+                if outcome.is_ok() && state_now.requests.are_none() {
                     match state_now.hand_off(core, vertex) {
                         HandOff::To(successor, decision) => {
                             if let Some(runner) = state_now.placement.start(core, successor) {

@@ -174,7 +174,7 @@ impl Report {
         let dag = self.dag_name(event.dag);
         let name = match event.instance() {
             Some(instance) => self.subtask_name(instance),
-            None if *what == What::Stopped => return format!("{time_ns} {what} {dag}"),
+            None if what.is_of_dag() => return format!("{time_ns} {what} {dag}"),
             None => dag,
         };
         let mut line = format!("{time_ns} {what} {name}[{job}]");

@@ -173,6 +173,7 @@ impl Tally {
                 }
                 return;
             }
+            what if what.is_of_dag() => return,
             _ => {}
         }
         let Some(place) = dag.place(event.job) else {

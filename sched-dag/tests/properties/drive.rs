@@ -197,7 +197,7 @@ impl Driver<'_> {
                     moment.pause(id, record);
                 }
                 if to_ns == now_ns {
-                    moment.resume(id);
+                    moment.resume(id, record);
                 }
             }
         }

@@ -15,6 +15,7 @@ mod exceeded;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
+mod lifecycle;
 mod limits;
 mod occupation;
 mod overrun;
@@ -37,7 +38,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 34] = [
+const TESTS: [(&str, Test); 35] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -68,6 +69,7 @@ const TESTS: [(&str, Test); 34] = [
     ("exceeded", exceeded::run),
     ("flood", limits::flood),
     ("large", large::run),
+    ("lifecycle", lifecycle::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),

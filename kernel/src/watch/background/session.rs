@@ -74,9 +74,6 @@ impl Session {
             }
             return true;
         }
-        if self.is_shutting_down {
-            end_what_is_idle(&task_set);
-        }
         for _ in 0..MOST_BYTES {
             let Some(byte) = serial::FIRST.receive() else {
                 return false;
@@ -176,23 +173,12 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
         Command::Start(name) => change(line, task_set, name, Control::Resume, "releases jobs"),
         Command::Shutdown => {
             println!("shutting down: nothing more is released; what is in flight goes on");
-            ids(task_set).for_each(|dag| execution::control(Control::Pause(dag)));
+            ids(task_set).for_each(|dag| execution::control(Control::Close(dag)));
             accept(line);
             return Answer::ShutsDown;
         }
     }
     Answer::Given
-}
-
-/// Ends each DAG that has nothing in flight; when all are, the run is over.
-fn end_what_is_idle(task_set: &TaskSet) {
-    for dag in ids(task_set) {
-        let snapshot = execution::snapshot(dag);
-        let is_idle = |of: &Snapshot| of.in_flight == 0 && of.state != State::Ended;
-        if snapshot.as_ref().is_some_and(is_idle) {
-            execution::control(Control::End(dag));
-        }
-    }
 }
 
 /// Begins a list of all DAGs, or of the one that is named.

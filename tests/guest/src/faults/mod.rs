@@ -77,6 +77,7 @@ pub const CASES: &[Case] = &[
     ("latest_of_moved", shared::latest_of_moved),
     ("latest_not_committed", shared::latest_not_committed),
     ("signal_not_committed", shared::signal_not_committed),
+    ("switched_not_committed", shared::switched_not_committed),
     ("not_proven", values::not_proven),
     ("already_committed", graph::already_committed),
 ];

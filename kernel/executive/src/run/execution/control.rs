@@ -18,8 +18,8 @@ pub enum Control {
     Pause(DagId),
     /// The DAG's due jobs are released again.
     Resume(DagId),
-    /// The DAG is ended for good.
-    End(DagId),
+    /// The DAG releases no further job.
+    Close(DagId),
 }
 
 impl Control {
@@ -27,8 +27,8 @@ impl Control {
     pub(super) fn apply(self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
         match self {
             Self::Pause(dag) => moment.pause(dag, observer),
-            Self::Resume(dag) => moment.resume(dag),
-            Self::End(dag) => moment.stop(dag, observer),
+            Self::Resume(dag) => moment.resume(dag, observer),
+            Self::Close(dag) => moment.close(dag, observer),
         }
     }
 }
@@ -40,7 +40,7 @@ pub enum State {
     Running,
     /// It skips them until it is resumed.
     Paused,
-    /// It never will, because of a fault or the end of the run.
+    /// It never will, because of a fault or a shutdown.
     Ended,
     /// All that it had to release has ended.
     Over,
@@ -81,7 +81,7 @@ impl Snapshot {
     /// If there is no such DAG.
     pub fn of(scheduler: &Scheduler, dag: DagId) -> Self {
         let has_limit = scheduler.task_set().dag(dag).jobs().is_some();
-        let state = if scheduler.is_ended(dag) {
+        let state = if scheduler.is_closed(dag) {
             State::Ended
         } else if scheduler.is_over(dag) && has_limit {
             State::Over

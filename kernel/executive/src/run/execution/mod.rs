@@ -118,7 +118,7 @@ pub struct Terms {
 }
 
 /// Prepares a plan to be run. Takes all memory that the run will need.
-pub fn prepare(plan: Plan, options: SchedulerOptions, terms: Terms) -> Result<(), LaunchError> {
+pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Result<(), LaunchError> {
     if EXECUTION.lock().is_some() {
         return Err(LaunchError::new(
             "other DAGs are committed already; run them first, or commit all in one call",
@@ -138,7 +138,7 @@ pub fn prepare(plan: Plan, options: SchedulerOptions, terms: Terms) -> Result<()
              faults, or give the machine more memory"
         ))
     })?;
-    let signals = Signals::new(&plan);
+    let signals = Signals::new(&mut plan);
     let task_set = plan.task_set;
     let runners = runner::runners(&task_set, plan.bodies, terms.budget_factor);
     let others = runner::others(&task_set, plan.others, terms.budget_factor);

@@ -1,36 +1,36 @@
 //! Signals to sporadic DAGs, and what else completions do beyond their DAG.
 //!
-//! A completing instance's latest values show, and its signals are taken, under the
-//! lock and before the scheduler's step; the step passes them on right after the
+//! A completing instance's latest values show, and its requests are taken, signals among them,
+//! under the lock and before the scheduler's step; the step passes them on right after the
 //! completion. A signal from outside makes a step of its own.
 
 use alloc::vec::Vec;
 
-use fass::{Body, Plan};
+use fass::{Body, Plan, Request};
+use sched_dag::lifecycle::Requests;
 use sched_dag::{DagId, Moment, Observer};
 
 use super::{EXECUTION, Event, Execution, status};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, this_core};
 
-/// The signals of a run that are on their way to its scheduler.
+/// The requests of a run that are on their way to its scheduler.
 pub(super) struct Signals {
     /// The number of the plan that runs.
     plan: u64,
     /// Whether the run has begun, so that there is time.
     has_begun: bool,
-    /// The DAGs, each once; there is room for all.
-    raised: Vec<DagId>,
+    requests: Requests,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
 }
 
 impl Signals {
-    pub(super) fn new(plan: &Plan) -> Self {
+    pub(super) fn new(plan: &mut Plan) -> Self {
         Self {
             plan: plan.number,
             has_begun: false,
-            raised: Vec::with_capacity(plan.bodies.len()),
+            requests: Requests::new(plan.bodies.len(), plan.lifecycle.take()),
             after_fault: plan.after_fault.clone(),
         }
     }
@@ -40,30 +40,22 @@ impl Signals {
         self.after_fault.get(ended.index()).copied().flatten()
     }
 
-    /// Publishes what the body has prepared, and takes its signals. Apart, as most
+    /// Publishes what the body has prepared, and takes its requests. Apart, as most
     /// bodies never have any.
     #[inline(never)]
     pub(super) fn take(&mut self, body: &mut Body, completed_ns: u64) {
-        body.complete(completed_ns, &mut |dag| self.keep(dag));
-    }
-
-    /// Keeps a signal until the next step.
-    fn keep(&mut self, dag: DagId) {
-        if !self.raised.contains(&dag) {
-            self.raised.push(dag);
-        }
+        body.complete(completed_ns, &mut |request| self.requests.keep(request));
     }
 
     /// Reports whether none is on its way.
     pub(super) const fn are_none(&self) -> bool {
-        self.raised.is_empty()
+        self.requests.are_none()
     }
 
-    /// Passes the signals taken on.
+    /// Passes on what was taken.
+    #[inline(always)]
     pub(super) fn send(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
-        for dag in self.raised.drain(..) {
-            moment.signal(dag, observer);
-        }
+        self.requests.serve(moment, observer);
     }
 }
 
@@ -110,7 +102,7 @@ pub fn raise_in_interrupt(plan: u64, dag: DagId) {
         return;
     }
     if !execution.signals.has_begun {
-        execution.signals.keep(dag);
+        execution.signals.requests.keep(Request::Signal(dag));
         return;
     }
     let woken = execution.step(clock::now_ns(), Event::Signalled(dag));
