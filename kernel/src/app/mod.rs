@@ -12,5 +12,6 @@ pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
 mod parameters;
+mod topics;
 mod wcet_notes;
 mod wires;

@@ -11,9 +11,10 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let gain = Parameter::new("gain", 0.5, 0.0..=2.0);
     let steps = Parameter::new("steps", 3_u32, 1..=9);
     machine.offer(&[&gain, &steps])?;
+    machine.show_topics();
     machine.options().finish(&["test"])?;
     let (dag, period) = (create_dag(), Duration::from_millis(5));
-    dag.name("loop");
+    dag.name("loop").record::<f64>("gain");
     let named = SubtaskAttributes::named;
     let read = |(gain, steps): (f64, u32)| (gain, steps);
     dag.using((gain.reading(), steps.reading()))

@@ -25,6 +25,7 @@ mod progress;
 pub(crate) mod session;
 mod stall;
 mod status;
+pub(crate) mod topics;
 pub(crate) mod watchdog;
 pub(crate) mod wire;
 

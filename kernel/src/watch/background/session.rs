@@ -74,6 +74,7 @@ impl Session {
             }
             return true;
         }
+        more::all().for_each(more::Commands::step);
         for _ in 0..MOST_BYTES {
             let Some(byte) = serial::FIRST.receive() else {
                 return false;
