@@ -75,12 +75,16 @@ pub struct Switch<'a> {
 impl Switch<'_> {
     /// Pauses the DAG when this instance is complete. In place of a resumption that the same
     /// instance has asked for.
+    ///
+    /// See [`Switch`].
     pub fn pause(&mut self) {
         self.wish.store(STOP, Ordering::Relaxed);
     }
 
     /// Resumes the DAG when this instance is complete. In place of a pause that the same
     /// instance has asked for.
+    ///
+    /// See [`Switch`].
     pub fn resume(&mut self) {
         self.wish.store(GO, Ordering::Relaxed);
     }
@@ -136,6 +140,8 @@ pub struct Shutdown<'a> {
 
 impl Shutdown<'_> {
     /// Ends the run when this instance is complete. It cannot be taken back.
+    ///
+    /// See [`Shutdown`].
     pub fn request(&mut self) {
         self.wish.store(STOP, Ordering::Relaxed);
     }
