@@ -120,6 +120,7 @@ pub use api::using::Using;
 pub use api::wire::uses::{Packet, Received, Receiving, Sender, Sending};
 pub use api::wire::{Wire, WireCounts, WireOptions};
 pub use commit::answer::{Answer, Placement, SinkAnswer, Unproven, Verdict};
+pub use commit::assign::assign_clusters;
 pub use commit::chains::EndToEnd;
 pub use commit::error::CommitError;
 pub use commit::fault::Fault;

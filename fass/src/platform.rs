@@ -77,8 +77,8 @@ pub trait Platform: Sync {
         Clusters::Undivided
     }
 
-    /// Divides the cores for these DAGs, as [`sched_dag::analysis::assign()`] does; a platform
-    /// that does not leave that to the commit does not define this. (So an image that never
+    /// Divides the cores for these DAGs, by [`assign_clusters`](crate::assign_clusters); a platform that does not leave
+    /// that to the commit does not define this. (So an image that never
     /// divides its cores has none of that code.)
     ///
     /// # Errors

@@ -30,7 +30,7 @@ enum Place<Body, Parked> {
     Running,
     /// On the stack of a context that does not run.
     Suspended(Parked),
-    /// Nowhere any more: its instance was ended.
+    /// Not here: its instance was ended, or another scheduler has it.
     Lost,
 }
 
@@ -83,6 +83,16 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
+    /// Makes the places of so many vertices, all without a body until one
+    /// [is put there](Self::replace).
+    #[must_use]
+    pub fn empty(vertices: usize, cores: usize) -> Self {
+        Self {
+            places: (0..vertices).map(|_| Place::Lost).collect(),
+            seats: alloc::vec![EMPTY_SEAT; cores].into_boxed_slice(),
+        }
+    }
+
     /// Notes what the scheduler wants a core to run.
     pub fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
         self.seats[core.index()].target = target.unwrap_or(NOTHING);
@@ -114,7 +124,8 @@ impl<Body, Parked> Placement<Body, Parked> {
         Some(vertex)
     }
 
-    /// Puts another body to rest, in the place of one that was [lost](Self::lose).
+    /// Puts a body to rest where there is none: in the place of one that was
+    /// [lost](Self::lose), or at first.
     pub fn replace(&mut self, vertex: Vertex, body: Body) {
         *self.place(vertex) = Place::Resting(body);
     }

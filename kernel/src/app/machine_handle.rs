@@ -238,7 +238,7 @@ impl Machine {
         let allocations_before = heap::usage().allocations;
         let locks_before = execution::lock_acquisitions();
         console::defer();
-        execution::arm_next_event();
+        execution::arm_all();
         let mut background = Background::begin(self.wishes.with_input(self.input.get()), total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();

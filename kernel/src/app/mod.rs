@@ -6,6 +6,8 @@
 //! gets back are made below, in `report` and `text`.
 
 pub(crate) mod bound_verdict;
+#[cfg(feature = "clusters")]
+mod clusters;
 pub(crate) mod ending;
 pub(crate) mod event;
 pub(crate) mod fault_verdict;

@@ -11,7 +11,10 @@ use executive::run::execution;
 pub(crate) fn latest<const MOST: usize>() -> impl fmt::Display {
     fmt::from_fn(move |f| {
         let mut latest = [None; MOST];
-        execution::try_journal(|journal| journal.copy_back(journal.written(), &mut latest));
+        let first_core = execution::try_journal(|journal, first_core| {
+            journal.copy_back(journal.written(), &mut latest);
+            first_core
+        });
         latest.iter().rev().flatten().try_for_each(|event| {
             let Event {
                 time_ns,
@@ -21,7 +24,7 @@ pub(crate) fn latest<const MOST: usize>() -> impl fmt::Display {
                 job,
                 subtask,
             } = event;
-            let (core, dag) = (core.0, dag.0);
+            let (core, dag) = (first_core.unwrap_or(0) + core.0, dag.0);
             write!(
                 f,
                 "  {time_ns:>12} ns  core {core} {what} dag {dag} job {job}"

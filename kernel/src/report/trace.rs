@@ -14,7 +14,7 @@ const EVENTS_A_LINE: usize = 32;
 /// Prints the model and the events of a run, the `number`th since boot.
 pub(crate) fn dump(run: &Run, number: u64) {
     json::emit("trace_begin", |line| {
-        graph::scheduling(line, &run.options());
+        graph::scheduling(line, &run.options(), run.task_set());
         line.number("run", number);
     });
     for (number, dag) in (0u32..).zip(run.task_set().dags()) {

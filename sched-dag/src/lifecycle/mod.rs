@@ -111,6 +111,12 @@ impl Requests {
         self.kept.is_empty()
     }
 
+    /// Gives away the signals that `take` takes, which are another scheduler's.
+    pub fn give_away(&mut self, mut take: impl FnMut(DagId) -> bool) {
+        self.kept
+            .retain(|request| !matches!(request, Request::Signal(dag) if take(*dag)));
+    }
+
     /// Passes the requests on, after the completions of the instant.
     ///
     /// No pointer to the scheduler leaves this function, so where that is a static, the compiler

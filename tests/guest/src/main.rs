@@ -8,6 +8,8 @@ extern crate alloc;
 mod attacks;
 mod busy;
 mod checksum;
+mod cluster_scale;
+mod clusters;
 mod computing;
 mod deaf;
 mod endless;
@@ -38,7 +40,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 35] = [
+const TESTS: [(&str, Test); 38] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -59,6 +61,9 @@ const TESTS: [(&str, Test); 35] = [
         "exit_port",
         |_| unpunished(kernel_crimes::end_the_machine()),
     ),
+    ("clusters", clusters::run),
+    ("cluster_scale", cluster_scale::run),
+    ("clusters_auto", clusters::auto),
     ("computing", computing::run),
     ("deaf_alone", deaf::alone),
     ("deaf_beside", deaf::beside),

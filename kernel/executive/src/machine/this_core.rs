@@ -5,7 +5,7 @@
 //! [`get`]: everything that changes in it is atomic.
 
 use core::arch::asm;
-use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
@@ -51,6 +51,10 @@ pub struct Core {
     /// The position among the cores: 0 is the boot processor.
     pub index: u32,
     apic_id: u32,
+    /// The group of cores that it is in, a number that the layer above chooses.
+    pub group: AtomicU32,
+    /// Its place in the group, likewise.
+    pub place: AtomicU32,
     exception_stacks: [u64; 4],
     task_state: AtomicPtr<TaskState>,
     /// The context that runs here.
@@ -91,6 +95,8 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         handler_stack: stacks.handler,
         index,
         apic_id,
+        group: AtomicU32::new(0),
+        place: AtomicU32::new(index),
         exception_stacks: stacks.exceptions,
         task_state: AtomicPtr::new(core::ptr::null_mut()),
         context: AtomicPtr::new(

@@ -6,11 +6,12 @@ use core::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Channel, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
+    Channel, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
+    Recorded,
 };
-use sched_dag::{DagId, SchedulerOptions};
+use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
-use super::execution::{self, Terms};
+use super::execution::{self, Division, Terms};
 use super::{edge, occupation};
 use crate::machine::once::Once;
 use crate::machine::{clock, this_core};
@@ -113,6 +114,20 @@ impl Platform for Kernel {
 
     fn cores(&self) -> u32 {
         u32::try_from(this_core::all().len()).unwrap_or(u32::MAX)
+    }
+
+    fn clusters(&self) -> Clusters {
+        match execution::division() {
+            Division::Into(clusters) => clusters,
+            Division::ByCommit => Clusters::Undivided,
+        }
+    }
+
+    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+        match execution::division() {
+            Division::ByCommit => fass::assign_clusters(self, task_set),
+            Division::Into(_) => Ok(()),
+        }
     }
 
     fn overheads(&self) -> Overheads {

@@ -151,13 +151,15 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
         Command::Dags => return list(line, task_set, None, describe),
         Command::Stats(name) => return list(line, task_set, name, count),
         Command::Trace(true)
-            if !execution::with_journal(|journal| journal.has_room()).unwrap_or(false) =>
+            if !execution::with_journal(0, |journal| journal.has_room()).unwrap_or(false) =>
         {
             let why = "there is no room for events; boot without `trace_events=0`";
             refuse(line, &why);
         }
         Command::Trace(on) => {
-            execution::with_journal(|journal| journal.record_events(on));
+            for cluster in 0..execution::clusters() {
+                execution::with_journal(cluster, |journal| journal.record_events(on));
+            }
             let what = if on { "events" } else { "no events" };
             println!("{what} are recorded");
             accept(line);

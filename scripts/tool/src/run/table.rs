@@ -9,6 +9,7 @@ use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
 pub(super) const GUEST_WORDS: &[&str] = &[
     "policy",
     "preemption",
+    "clusters",
     "jobs",
     "latest",
     "seconds",
@@ -69,6 +70,12 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
             "preemption",
             Takes::OneOf(&["on", "off"]),
             "Whether a started instance may lose its core (the kernel's default: on).",
+        ),
+        Opt::new(
+            "clusters",
+            Takes::Text("N,N,...|auto"),
+            "--dag, and apps that offer it: divides the cores into clusters of so many each; auto: \
+             as the commit finds.",
         ),
         Opt::new(
             "subtasks",

@@ -10,7 +10,7 @@
 use std::collections::BTreeMap;
 
 use sched_dag::journal::{Event, What};
-use sched_dag::{CoreId, DagId, DagSpec, SubtaskId, TaskSet};
+use sched_dag::{Clusters, CoreId, DagId, DagSpec, SubtaskId, TaskSet};
 
 use super::line::Line;
 use super::model::Run;
@@ -24,6 +24,8 @@ use replay::shown::quoted;
 struct Open {
     /// Without its model.
     run: Run,
+    /// How its cores are divided.
+    clusters: Clusters,
     dags: Vec<DagSpec>,
     /// The line of each DAG.
     lines: Vec<usize>,
@@ -65,7 +67,13 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
                     )));
                 }
                 let (dags, lines) = (Vec::new(), Vec::new());
-                open = Some(Open { run, dags, lines });
+                let clusters = dag::clusters(&line)?;
+                open = Some(Open {
+                    run,
+                    clusters,
+                    dags,
+                    lines,
+                });
             }
             ("trace_begin", Some(open)) => {
                 let reason = format!("the trace of line {} has not ended yet", open.run.line);
@@ -164,7 +172,8 @@ fn event(open: &Open, value: &Value) -> Result<Event, String> {
 }
 
 fn end(line: &Line<'_>, open: Open, commit: &commit::Open) -> Result<Run, Malformed> {
-    let task_set = dag::task_set("trace_dag", open.run.options, &open.dags, &open.lines)?;
+    let options = (open.run.options, &open.clusters);
+    let task_set = dag::task_set("trace_dag", options, &open.dags, &open.lines)?;
     let mut run = open.run;
     run.committed = commit.of(&task_set);
     run.task_set = task_set;

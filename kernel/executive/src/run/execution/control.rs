@@ -1,13 +1,13 @@
 //! What a person may ask of a run, and change in it, while it goes on.
 //!
-//! To be called by core 0's background. Each question and each change holds the
-//! one lock once, for a bounded time; nothing is allocated.
+//! To be called by core 0's background. Each question and each change holds a
+//! cluster's lock for a bounded time; nothing is allocated.
 
 use alloc::sync::Arc;
 
 use sched_dag::{Dag, DagId, DagStatistics, Moment, Observer, Scheduler, TaskSet};
 
-use super::{EXECUTION, Event};
+use super::{Event, cluster};
 use crate::machine::clock;
 use crate::machine::timer::{self, Alarm};
 
@@ -23,6 +23,12 @@ pub enum Control {
 }
 
 impl Control {
+    const fn dag(self) -> DagId {
+        match self {
+            Self::Pause(dag) | Self::Resume(dag) | Self::Close(dag) => dag,
+        }
+    }
+
     /// Tells the scheduler.
     pub(super) fn apply(self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
         match self {
@@ -61,14 +67,14 @@ pub struct Snapshot {
 
 /// Returns the model of the run, if one goes on.
 pub fn task_set() -> Option<Arc<TaskSet>> {
-    let place = EXECUTION.lock();
+    let place = cluster::nth(0).execution.lock();
     place.as_ref().map(|execution| execution.task_set().clone())
 }
 
 /// Returns how a DAG does, if a run goes on that has it.
 pub fn snapshot(dag: DagId) -> Option<Snapshot> {
-    let place = EXECUTION.lock();
-    let scheduler = place.as_ref()?.scheduler();
+    let place = cluster::of_dag(dag).execution.lock();
+    let scheduler = &place.as_ref()?.scheduler;
     scheduler.task_set().dags().get(dag.index())?;
     Some(Snapshot::of(scheduler, dag))
 }
@@ -115,11 +121,13 @@ pub fn nominal_end_ns() -> Option<u64> {
 
 /// Makes a change, in a step of the scheduler.
 pub fn control(control: Control) {
-    let mut place = EXECUTION.lock();
+    let cluster = cluster::of_dag(control.dag());
+    let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {
         return;
     };
-    let woken = execution.step(clock::now_ns(), Event::Control(control));
+    let event = Event::Control(control);
+    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), event));
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.

@@ -2,17 +2,32 @@
 //!
 //! A completing instance's latest values show, and its requests are taken, signals among them,
 //! under the lock and before the scheduler's step; the step passes them on right after the
-//! completion. A signal from outside makes a step of its own.
+//! completion. A signal from outside makes a step of its own. One to a DAG of another cluster
+//! is a letter ([`cluster`]), which counts once that cluster takes it.
 
+use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::sync::atomic::AtomicU32;
 
 use fass::{Body, Plan, Request};
-use sched_dag::lifecycle::Requests;
-use sched_dag::{DagId, Moment, Observer};
+use sched_dag::lifecycle::{Lifecycle, Requests};
+use sched_dag::{ClusterId, DagId, Moment};
 
-use super::{EXECUTION, Event, Execution, status};
+use super::cluster::MAY_DIVIDE;
+use super::core_set::CoreSet;
+use super::watcher::Watcher;
+use super::{Event, Execution, cluster, divided, status};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, this_core};
+
+/// How many letters there are for each DAG; all clusters have the same ones.
+pub(super) type Letters = Arc<[AtomicU32]>;
+
+/// Makes room for the letters of a run.
+pub(super) fn letters(plan: &Plan) -> Letters {
+    plan.bodies.iter().map(|_| AtomicU32::new(0)).collect()
+}
 
 /// The requests of a run that are on their way to its scheduler.
 pub(super) struct Signals {
@@ -21,16 +36,27 @@ pub(super) struct Signals {
     /// Whether the run has begun, so that there is time.
     has_begun: bool,
     requests: Requests,
+    /// The cluster whose requests these are.
+    pub(super) cluster: ClusterId,
+    /// By DAG, how many letters wait for its cluster.
+    pub(super) letters: Letters,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
 }
 
 impl Signals {
-    pub(super) fn new(plan: &mut Plan) -> Self {
+    pub(super) fn new(
+        plan: &Plan,
+        cluster: ClusterId,
+        letters: &Letters,
+        lifecycle: Option<Box<dyn Lifecycle>>,
+    ) -> Self {
         Self {
             plan: plan.number,
+            cluster,
+            letters: Arc::clone(letters),
             has_begun: false,
-            requests: Requests::new(plan.bodies.len(), plan.lifecycle.take()),
+            requests: Requests::new(plan.bodies.len(), lifecycle),
             after_fault: plan.after_fault.clone(),
         }
     }
@@ -52,10 +78,41 @@ impl Signals {
         self.requests.are_none()
     }
 
-    /// Passes on what was taken.
+    /// Passes on what was taken, and adds the cores that have to take letters.
     #[inline(always)]
-    pub(super) fn send(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
-        self.requests.serve(moment, observer);
+    pub(super) fn send(
+        &mut self,
+        moment: &mut Moment<'_>,
+        watcher: &mut Watcher,
+        woken: &mut CoreSet,
+    ) {
+        if MAY_DIVIDE {
+            self.requests.give_away(|dag| {
+                let there = watcher.task_set.dag(dag).cluster();
+                let is_away = there != self.cluster;
+                if is_away {
+                    divided::send_letter(&self.letters, dag, there, woken);
+                }
+                is_away
+            });
+        }
+        self.requests.serve(moment, watcher);
+    }
+
+    /// Passes one signal on.
+    pub(super) fn pass(
+        &self,
+        dag: DagId,
+        moment: &mut Moment<'_>,
+        watcher: &mut Watcher,
+        woken: &mut CoreSet,
+    ) {
+        let there = watcher.task_set.dag(dag).cluster();
+        if !MAY_DIVIDE || there == self.cluster {
+            moment.signal(dag, watcher);
+        } else {
+            divided::send_letter(&self.letters, dag, there, woken);
+        }
     }
 }
 
@@ -64,7 +121,9 @@ impl Execution {
     pub(super) fn begin_signals(&mut self) {
         self.signals.has_begun = true;
         let mut moment = self.scheduler.at(0);
-        self.signals.send(&mut moment, &mut self.watcher);
+        // What was raised before is to DAGs of this cluster.
+        let mut none = CoreSet::default();
+        self.signals.send(&mut moment, &mut self.watcher, &mut none);
     }
 }
 
@@ -94,7 +153,8 @@ pub fn raise(plan: u64, dag: DagId) {
 /// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
 /// are disabled.
 pub fn raise_in_interrupt(plan: u64, dag: DagId) {
-    let mut place = EXECUTION.lock();
+    let cluster = cluster::of_dag(dag);
+    let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {
         return;
     };
@@ -105,7 +165,8 @@ pub fn raise_in_interrupt(plan: u64, dag: DagId) {
         execution.signals.requests.keep(Request::Signal(dag));
         return;
     }
-    let woken = execution.step(clock::now_ns(), Event::Signalled(dag));
+    let event = Event::Signalled(dag);
+    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), event));
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.
