@@ -24,9 +24,9 @@ use crate::machine::this_core::{self, Core};
 #[repr(align(128))]
 pub(super) struct Cluster {
     pub(super) execution: SpinLock<Option<Execution>>,
-    /// The complement of when the first core's timer shall next step the scheduler, on the
-    /// clock; 0 if never. So the static is all zeros, and takes no room in an image.
-    next_event: AtomicU64,
+    /// When the first core's timer shall next step the scheduler, on the clock;
+    /// `u64::MAX` if never.
+    next_event_ns: AtomicU64,
     /// Whether nothing is left to be done.
     pub(super) is_finished: AtomicBool,
     /// Jobs of DAGs with a limit that have ended in this run.
@@ -69,19 +69,19 @@ impl Cluster {
 
     /// Returns when the timer shall next step the scheduler; `u64::MAX` if never.
     pub(super) fn next_event_ns(&self) -> u64 {
-        !self.next_event.load(Ordering::Acquire)
+        self.next_event_ns.load(Ordering::Acquire)
     }
 
     /// Notes that, and whether nothing is left to be done.
     pub(super) fn publish(&self, at_ns: u64, is_finished: bool) {
-        self.next_event.store(!at_ns, Ordering::Release);
+        self.next_event_ns.store(at_ns, Ordering::Release);
         self.is_finished.store(is_finished, Ordering::Release);
     }
 
     pub(super) const fn new() -> Self {
         Self {
             execution: SpinLock::new(None),
-            next_event: AtomicU64::new(0),
+            next_event_ns: AtomicU64::new(u64::MAX),
             is_finished: AtomicBool::new(false),
             jobs_ended: AtomicU64::new(0),
             has_letters: AtomicBool::new(false),
