@@ -8,7 +8,7 @@ use core::fmt::{self, Display};
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::journal::{Event, What};
-use sched_dag::{DagId, SubtaskId, TaskSet, Topic, nearest_of};
+use sched_dag::{DagId, Journal, SubtaskId, TaskSet, Topic, nearest_of};
 
 use super::more::Commands;
 use crate::println;
@@ -196,12 +196,15 @@ impl Rate {
     /// Looks at the latest events of the journal.
     fn look(dag: DagId, writer: SubtaskId) -> Self {
         let mut rate = Self::default();
-        let written = execution::with_journal(|journal| journal.written());
+        let cluster = |task_set: &TaskSet| task_set.dag(dag).cluster().index();
+        let cluster = execution::task_set().map_or(0, |task_set| cluster(&task_set));
+        let written = execution::with_journal(cluster, |journal| journal.written());
         let mut end = written.unwrap_or(0);
         let last = end.saturating_sub(MOST_EVENTS);
         while end > last {
             let mut buffer = [None; AT_ONCE];
-            let copied = execution::with_journal(|journal| journal.copy_back(end, &mut buffer));
+            let look = |journal: &mut Journal| journal.copy_back(end, &mut buffer);
+            let copied = execution::with_journal(cluster, look);
             let events = buffer.iter().flatten();
             events.for_each(|event| rate.take(event, dag, writer));
             match copied {
