@@ -101,6 +101,35 @@ impl Linux {
             )));
         }
         processors.truncate(cores as usize);
+        Ok(Self::on(processors, mechanism))
+    }
+
+    /// Takes so many cores, of which several share a processor if there are fewer of those.
+    ///
+    /// For what waits and does not compute: a held execution
+    /// ([`Occupation::Hold`](fass::Occupation)) leaves its processor to the others, one that
+    /// computes keeps it from them, whatever the scheduler wants.
+    ///
+    /// # Errors
+    ///
+    /// If none is asked for.
+    ///
+    /// # Panics
+    ///
+    /// As [`new`](Self::new).
+    pub fn sharing(cores: u32, mechanism: Mechanism) -> Result<Self, StartError> {
+        let there = sys::processors();
+        let processors: Vec<u32> = there.iter().copied().cycle().take(cores as usize).collect();
+        match processors.is_empty() {
+            true => Err(StartError(
+                "0 cores are asked for; do ask for 1 or more".to_owned(),
+            )),
+            false => Ok(Self::on(processors, mechanism)),
+        }
+    }
+
+    /// Makes a machine whose cores are these processors.
+    fn on(processors: Vec<u32>, mechanism: Mechanism) -> Self {
         let (mut levels, mut found) = (None, Vec::new());
         if mechanism == Mechanism::Fifo {
             match Levels::take(USUAL_TOP) {
@@ -136,7 +165,7 @@ impl Linux {
             look_at_commit: |_, _, _| (),
             allocations: || 0,
         });
-        Ok(Self { warnings: found })
+        Self { warnings: found }
     }
 
     fn change(self, change: impl FnOnce(&mut Terms)) -> Self {

@@ -12,7 +12,7 @@
 //! Reading that clock is a system call, so no instance does it at its start: this thread
 //! looks often enough, as often as the shortest budget, and begins to count when it
 //! first sees the instance. So an instance ends after its budget, and no later than the
-//! shortest budget of all after that. Its thread cannot be ended: it is demoted for good.
+//! shortest budget of all, and 20 us, after that. Its thread cannot be ended: it is demoted for good.
 
 use std::sync::atomic::Ordering;
 
@@ -80,12 +80,18 @@ impl Budgets {
                 *seen = Seen::default();
                 return Err(core);
             }
-            // Not before it can have used up the rest.
-            let rest_ns = budget_ns - used_ns + 1;
-            next_ns = next_ns.min(now_ns.saturating_add(rest_ns));
+            next_ns = next_ns.min(now_ns.saturating_add(pause_ns(budget_ns - used_ns)));
         }
         Ok(next_ns)
     }
+}
+
+/// Returns how long to sleep between two looks at an instance that has so much of its budget
+/// left: not before it can have used that up, and for a while in any case. This thread may stand
+/// on the instance's own core, and then that uses nothing up until we sleep.
+fn pause_ns(rest_ns: u64) -> u64 {
+    const LEAST_NS: u64 = 20_000;
+    rest_ns.saturating_add(1).max(LEAST_NS)
 }
 
 impl Team {
@@ -187,5 +193,17 @@ impl Team {
             is_overrun: true,
         };
         state.fail(&self.workers, fault);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pause_ns;
+
+    #[test]
+    fn an_instance_at_the_end_of_its_budget_gets_time_to_exceed_it() {
+        // Were it 1 ns, this thread would look for ever, on the core that the instance needs.
+        assert!([0, 1, 100].map(pause_ns).iter().all(|ns| *ns >= 10_000));
+        assert_eq!(pause_ns(5_000_000), 5_000_001);
     }
 }

@@ -230,7 +230,8 @@ impl Team {
         };
         match state_now.seats[me] {
             Some(core) => {
-                state_now.note_at(finish_ns, what, core, vertex);
+                let end_ns = state_now.end_of(me, finish_ns);
+                state_now.note_at(end_ns, what, core, vertex);
                 state_now.placement.finish(core.index(), vertex, runner);
                 if outcome.is_ok() && state_now.requests.are_none() {
                     match state_now.hand_off(core, vertex) {

@@ -54,6 +54,7 @@ pub mod oracle;
 pub mod outcome;
 pub mod places;
 pub mod probe;
+pub mod program;
 pub mod progress;
 pub mod promises;
 pub mod proof;

@@ -80,6 +80,33 @@ fn a_dag_file_is_run_and_a_graph_is_drawn() {
 }
 
 #[test]
+fn the_evaluation_is_repeated_with_its_baselines() {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("on-linux-evaluation");
+    let _ = fs::remove_dir_all(&out);
+    let said = succeed(&format!(
+        "bench join-latency --on linux --subtasks 2 --policies fass,exact --jobs 4 --out {}",
+        out.display()
+    ));
+    assert!(
+        said.contains("2 conditions of 4 jobs; mode linux, 4 cores"),
+        "{said}"
+    );
+    for joins in ["FasS (DAG)", "ExactTime"] {
+        let row = said
+            .lines()
+            .find(|line| line.contains(joins))
+            .expect("a row");
+        let words: Vec<&str> = row.split_whitespace().collect();
+        // All four jobs are joined, each with its own values.
+        assert!(
+            words.windows(3).any(|part| part == ["1.000", "4", "0"]),
+            "{row}"
+        );
+    }
+    assert!(out.join("report.html").is_file());
+}
+
+#[test]
 fn what_is_wrong_has_the_exit_code_and_the_line_that_it_has_on_the_machine() {
     for (words, code, says) in [
         (

@@ -3,6 +3,7 @@
 //! | word | meaning | default |
 //! | --- | --- | --- |
 //! | `cores=N` | how many of the processors that the program may use are its cores | all of them |
+//! | `share=off\|on` | whether several cores share a processor where there are more cores | `off` |
 //! | `mechanism=fifo\|normal` | by which class of Linux's threads run | `fifo` |
 //! | `module=FILE` | a file for the app | |
 //! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
@@ -86,7 +87,14 @@ pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending
         module = parts.map(|(_, rest)| rest).filter(|rest| !rest.is_empty());
     }
     let cores = u32::try_from(cores).unwrap_or(u32::MAX);
-    let machine = Linux::new(cores, mechanism)
+    let make = options.choice(
+        "share",
+        &[
+            ("off", Linux::new as fn(u32, Mechanism) -> _),
+            ("on", Linux::sharing),
+        ],
+    )?;
+    let machine = make(cores, mechanism)
         .map_err(|error| UsageError::new(format!("`cores={cores}`: {error}")))?;
     let mut machine = machine
         .policy(terms.policy)
