@@ -13,9 +13,7 @@
 //! rests in the table, or is with a core, or lies on the stack of a suspended
 //! context.
 //!
-//! Drivers whose cores follow later share it, and call it under their one lock: the
-//! kernel, where a parked body is on the stack of a context, and Linux, where it is with a
-//! thread.
+//! Drivers whose cores follow later share it, under their one lock: the kernel and Linux.
 
 use alloc::boxed::Box;
 
@@ -389,21 +387,14 @@ mod tests {
     }
 
     #[test]
-    fn another_body_takes_the_place_of_a_lost_one() {
-        let mut cores = about_to_preempt();
-        assert_eq!(cores.lose(0), Some(X));
-        cores.replace(X, 'z');
-        cores.decide(1, Some(X));
-        assert_eq!(cores.next(1), Next::Start(X, 'z'));
-    }
-
-    #[test]
-    fn a_lost_instance_is_never_run_again() {
+    fn a_lost_instance_is_never_run_again_but_another_body_takes_its_place() {
         let mut cores = about_to_preempt();
         assert_eq!(cores.lose(0), Some(X));
         cores.decide(1, Some(X));
         assert_eq!(cores.next(1), Next::Nothing);
         assert!(cores.resting(X).is_none());
         assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+        cores.replace(X, 'z');
+        assert_eq!(cores.next(1), Next::Start(X, 'z'));
     }
 }
