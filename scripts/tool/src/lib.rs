@@ -14,6 +14,7 @@
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
 //!   [`output`], [`progress`]: printing without a panic, and while it takes long;
+//!   [`random`]: sets that are drawn;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`markdown`], [`fault_page`], [`promises`]: pages that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
@@ -60,6 +61,7 @@ pub mod promises;
 pub mod proof;
 pub mod protocol;
 pub mod qemu;
+pub mod random;
 pub mod recordings;
 pub mod run;
 pub mod soak;
