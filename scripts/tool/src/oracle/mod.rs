@@ -10,9 +10,13 @@
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline.
+//!
+//! Two kinds read no files: what the analysis accepts of random sets is simulated
+//! (`random_sets`).
 
 pub mod bounds;
 pub mod in_kernel;
+mod random_sets;
 pub mod schedules;
 pub mod synchronizer;
 mod table;
@@ -51,6 +55,16 @@ static ORACLE: Menu = Menu {
                 };
                 run_files(&kind, words)
             },
+        },
+        Choice {
+            name: "phasings",
+            about: "small random sets accepted, next to those that no simulation refutes",
+            work: random_sets::phasings,
+        },
+        Choice {
+            name: "responses",
+            about: "random accepted sets in virtual time, with overheads, against their bounds",
+            work: random_sets::responses,
         },
         Choice {
             name: "schedules",
