@@ -129,7 +129,7 @@ pub use policy::{
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use recorder::{Events, Recorder};
 pub use scheduler::{DagStatistics, Decision, HandOff, Moment, Observer, Released, Scheduler};
-pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort};
+pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{

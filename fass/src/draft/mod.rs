@@ -177,6 +177,7 @@ impl Draft {
             name: attributes.name,
             wcet_ns,
             budget_ns,
+            stack_bytes: attributes.stack_bytes,
             priority: attributes.priority.map(Priority),
             non_preemptive: attributes.non_preemptive,
             ..SubtaskSpec::default()

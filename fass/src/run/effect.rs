@@ -8,6 +8,8 @@
 //! for them as it does for edges, also in virtual time, where a function has run
 //! long before its instance is complete.
 
+use alloc::boxed::Box;
+
 use sched_dag::lifecycle::Request;
 
 /// Something that a function has prepared, perhaps.
@@ -18,4 +20,13 @@ pub(crate) trait Effect: Send {
 
     /// Does what is to be done for an instance that has failed.
     fn fail(&mut self, _failed_ns: u64) {}
+}
+
+/// What a platform does at a completion.
+pub(super) struct Act(pub(super) Box<dyn FnMut() + Send>);
+
+impl Effect for Act {
+    fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        (self.0)();
+    }
 }

@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, TaskSet};
 
-use super::effect::Effect;
+use super::effect::{Act, Effect};
 use super::sample::SampledBy;
 use super::staleness::Staleness;
 
@@ -200,6 +200,19 @@ impl Body {
     ) -> Self {
         self.subtask = wrap(self.subtask);
         self
+    }
+
+    /// Has something done at each completion, after what the subtask itself prepared. As an
+    /// effect it must be short: it keeps the platform from deciding anything meanwhile.
+    ///
+    /// ```
+    /// fn counted(body: &mut fass::Body, count: &'static std::sync::atomic::AtomicU64) {
+    ///     use std::sync::atomic::Ordering::Relaxed;
+    ///     body.on_completion(Box::new(|| drop(count.fetch_add(1, Relaxed))));
+    /// }
+    /// ```
+    pub fn on_completion(&mut self, act: Box<dyn FnMut() + Send>) {
+        self.effects.push(Box::new(Act(act)));
     }
 
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a

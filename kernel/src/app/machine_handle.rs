@@ -265,6 +265,7 @@ impl Machine {
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }
+        report::stacks::dump(&run);
         if self.dumps_times {
             report::times::dump(&run);
         }

@@ -8,6 +8,7 @@
 mod distribution;
 pub(crate) mod latest;
 pub(crate) mod run;
+pub(crate) mod stacks;
 mod time;
 pub(crate) mod times;
 pub(crate) mod trace;

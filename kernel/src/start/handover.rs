@@ -302,9 +302,9 @@ fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u32, Stack
 }
 
 fn stacks(is_boot_processor: bool) -> Result<Stacks, OutOfMemory> {
-    let small = || memory::new_stack(HANDLER_STACK);
+    let small = || memory::new_stack(HANDLER_STACK, 0);
     Ok(Stacks {
-        first_context: contexts::create(is_boot_processor)?,
+        first_context: contexts::create_first(is_boot_processor)?,
         handler: small()?,
         exceptions: [small()?, small()?, small()?, small()?],
     })

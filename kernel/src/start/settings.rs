@@ -15,7 +15,7 @@
 //! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
-//! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
+//! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or how much each subtask uses of its stack | `nothing` |
 //! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
 //! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
@@ -31,7 +31,7 @@ use super::terms::Terms;
 use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
-use executive::run::{edge, worker};
+use executive::run::{edge, stacks, worker};
 use executive::text::graph;
 use executive::text::options::{Options, UsageError};
 
@@ -98,9 +98,12 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     if options.choice("idle", &[("halt", false), ("poll", true)])? {
         worker::watch_when_idle();
     }
-    if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
-        interrupts_off::enable();
-    }
+    let measures: [(_, fn()); 3] = [
+        ("nothing", || ()),
+        ("interrupts", interrupts_off::enable),
+        ("stacks", stacks::enable),
+    ];
+    options.choice("measure", &measures)?();
     // What time means is the host's choice.
     if options.text("mode") == Some("deterministic") {
         counted_time::enable();

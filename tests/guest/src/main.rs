@@ -24,6 +24,7 @@ mod overrun;
 mod preemption;
 mod recorded;
 mod sharing;
+mod stacks;
 mod stalled;
 mod storm;
 mod tuned;
@@ -40,7 +41,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 38] = [
+const TESTS: [(&str, Test); 40] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -80,6 +81,8 @@ const TESTS: [(&str, Test); 38] = [
     ("recorded_crash", recorded::crash),
     ("recorded_long", recorded::long),
     ("sharing", sharing::run),
+    ("stacks", stacks::run),
+    ("stacks_of_chain", stacks::chain),
     ("stalled", stalled::run),
     ("spend_stacks", limits::spend_stacks),
     ("storm", storm::run),

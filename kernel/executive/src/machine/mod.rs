@@ -29,6 +29,7 @@ mod meter;
 pub mod non_maskable;
 pub mod once;
 pub(crate) mod paging;
+pub mod paint;
 pub(crate) mod port;
 pub mod power;
 pub mod processors;

@@ -13,7 +13,7 @@ use sched_dag::analysis::{self, Answer, Settings};
 use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
 use super::execution::{self, Division, Terms};
-use super::{edge, occupation};
+use super::{edge, occupation, stacks};
 use crate::machine::once::Once;
 use crate::machine::{clock, this_core};
 use crate::text::graph;
@@ -193,6 +193,7 @@ impl Platform for Kernel {
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
         edge::launch(&mut plan)?;
+        stacks::watch(&mut plan);
         let options = SchedulerOptions {
             policy: self.policy(),
             preemption: self.preemption(),

@@ -31,7 +31,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
-use sched_dag::{Dag, DagId, Instance, Journal, OnFault, Scheduler};
+use sched_dag::{Dag, DagId, Instance, Journal, OnFault, Preemption, Scheduler};
 use sched_dag::{SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
@@ -127,16 +127,32 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
     let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
     let faults = plan.task_set.dags().iter().map(survived_faults);
     let faults = faults.fold(0, usize::saturating_add);
-    let total = subtasks.saturating_add(cores.saturating_mul(2));
+    let suspended = match options.preemption {
+        Preemption::Enabled => plan.task_set.most_suspended(),
+        Preemption::Disabled => 0,
+    };
+    let total = cores.saturating_mul(2).saturating_add(suspended);
     let total = total.saturating_add(faults);
-    contexts::provide(total).map_err(|_| {
-        let kib = contexts::STACK_BYTES / 1024;
+    let needed = contexts::stack_bytes(&plan.task_set);
+    let kib = needed / 1024;
+    let settled = contexts::settle(needed).and_then(|settled| {
+        contexts::provide(total)?;
+        Ok(settled)
+    });
+    let settled = settled.map_err(|_| {
         LaunchError::new(format!(
             "{subtasks} subtasks, {cores} cores and {faults} survived faults need {total} stacks \
              of {kib} KiB, more than there is memory for; register fewer subtasks, survive fewer \
              faults, or give the machine more memory"
         ))
     })?;
+    if settled < needed {
+        return Err(LaunchError::new(format!(
+            "a subtask states a stack of {kib} KiB, and the first commit has settled {} KiB; \
+             state as much there",
+            settled / 1024
+        )));
+    }
     let mut lifecycle = plan.lifecycle.take();
     if lifecycle.is_some() && plan.task_set.is_divided() {
         return Err(LaunchError::new(
