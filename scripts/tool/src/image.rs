@@ -18,6 +18,7 @@ use replay::shown::quoted;
 use crate::elf;
 use crate::files;
 use crate::json::{self, Value};
+use crate::lasting::Lasting;
 use crate::options::nearest;
 use crate::system;
 
@@ -203,6 +204,7 @@ fn build_target(package: &str, profile: &str, target: [&str; 2]) -> Result<Image
     command.arg("--message-format=json-render-diagnostics");
     command.stdin(Stdio::null()).stdout(Stdio::piped());
     say_if_cargo_waits(profile);
+    let _lasting = Lasting::new(&format!("building `{package}`"));
     let mut cargo = command
         .spawn()
         .map_err(|error| failed(format!("cargo: {error}")))?;

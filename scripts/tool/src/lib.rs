@@ -13,7 +13,7 @@
 //! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
-//!   [`output`], [`progress`]: printing without a panic, and while it takes long;
+//!   [`output`], [`progress`], [`lasting`]: printing without a panic, and while it takes long;
 //!   [`random`]: sets that are drawn;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`markdown`], [`fault_page`], [`promises`]: pages that tests hold to their word;
@@ -47,6 +47,7 @@ pub mod image;
 pub mod install;
 pub mod iso;
 pub mod json;
+pub mod lasting;
 pub mod markdown;
 pub mod medium;
 pub mod new_app;

@@ -29,6 +29,7 @@ use replay::lines::Malformed;
 
 use crate::files;
 use crate::options::{Choice, Command, Menu};
+use crate::progress::Progress;
 
 /// One kind of reference file: how to read its cases and how to check one.
 struct Kind<Case> {
@@ -115,12 +116,17 @@ fn run_files<Case>(kind: &Kind<Case>, words: &[OsString]) -> ExitCode {
         Err(line) => return kind.table.refuse(&line),
     };
     let mut failed = 0_usize;
-    for case in &cases {
-        if let Err(difference) = (kind.check)(case) {
+    let mut progress = Progress::new(cases.len() as u64, "cases");
+    for (over, case) in (1..).zip(&cases) {
+        let checked = (kind.check)(case);
+        progress.show(over);
+        if let Err(difference) = checked {
             failed += 1;
+            progress.end();
             println!("{}: {difference}", (kind.name)(case));
         }
     }
+    progress.end();
     println!("{} passed, {failed} failed", cases.len() - failed);
     ExitCode::from(u8::from(failed > 0))
 }
