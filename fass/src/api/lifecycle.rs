@@ -64,8 +64,8 @@ pub struct Switching {
 ///
 /// let report = machine.run();
 /// assert_eq!(report.violations(), []);
-/// assert_eq!(report.statistics[0].released, 6); // at 0, and from 50 ms on
-/// assert_eq!(report.statistics[0].skips, 4);
+/// assert_eq!(report.statistics[0].released, 5); // at 0, and from 60 ms on
+/// assert_eq!(report.statistics[0].skips, 5);
 /// ```
 #[derive(Debug)]
 pub struct Switch<'a> {
