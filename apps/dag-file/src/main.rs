@@ -48,8 +48,8 @@ struct Wishes {
 }
 
 fn main(machine: &Machine) -> Result<(), Ending> {
-    let wishes = wishes(machine)?;
     machine.offer_clusters()?;
+    let wishes = wishes(machine)?;
     let file = read(machine, wishes.settings.length)?;
     let mut reports = Vec::new();
     for set in &file.sets {
