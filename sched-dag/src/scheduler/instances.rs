@@ -8,7 +8,7 @@
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
-use super::{OWED, Observer, Scheduler, earliest_ns};
+use super::{OWED, Observer, Scheduler};
 use crate::ids::{DagId, Instance};
 use crate::policy::JobOutcome;
 
@@ -211,14 +211,10 @@ impl Scheduler {
     #[inline]
     pub(super) fn set_timer(&mut self, dag: DagId) {
         let model = self.task_set.dag(dag);
-        match self.dags[dag.index()]
-            .jobs
-            .next_event_ns(model, self.now_ns)
-        {
-            Some(event_ns) => self.timers.set(dag.index(), event_ns),
-            None => self.timers.remove(dag.index()),
-        }
-        self.quiet_until_ns = earliest_ns(&self.timers);
+        let jobs = &self.dags[dag.index()].jobs;
+        let event_ns = jobs.next_event_ns(model, self.now_ns);
+        self.timers.set(dag.index(), event_ns);
+        self.quiet_until_ns = self.timers.earliest_ns();
     }
 }
 

@@ -56,6 +56,7 @@ mod pausing;
 mod ready_queue;
 mod signals;
 mod statistics;
+mod timers;
 mod vertices;
 
 use alloc::boxed::Box;
@@ -71,9 +72,9 @@ pub use statistics::DagStatistics;
 
 use cores::Cores;
 use dropping::Survived;
-use heap::IndexedHeap;
 use jobs::Jobs;
 use ready_queue::ReadyQueue;
+use timers::Timers;
 use vertices::Vertices;
 
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
@@ -99,7 +100,7 @@ pub struct Scheduler {
     fresh: u32,
     cores: Cores,
     /// When something happens to each DAG without a completion.
-    timers: IndexedHeap<u64>,
+    timers: Timers,
     /// The least of these times, at hand for each completion; `u64::MAX` also if there
     /// is none.
     quiet_until_ns: u64,
@@ -190,11 +191,9 @@ impl Scheduler {
                 }
             })
             .collect();
-        let mut timers = IndexedHeap::new(dags.len());
+        let mut timers = Timers::new(dags.len());
         for (index, (dag, state)) in dags.iter().zip(&states).enumerate() {
-            if let Some(event_ns) = state.jobs.next_event_ns(dag, 0) {
-                timers.set(index, event_ns);
-            }
+            timers.set(index, state.jobs.next_event_ns(dag, 0));
         }
         let mut vertices = Vertices::new(&task_set, options.preemption);
         Self {
@@ -205,7 +204,7 @@ impl Scheduler {
             fresh: 0,
             vertices,
             cores: Cores::new(options.cores),
-            quiet_until_ns: earliest_ns(&timers),
+            quiet_until_ns: timers.earliest_ns(),
             timers,
             ending: Vec::with_capacity(longest),
             // A dispatch names a core at most twice: to preempt and to start.
@@ -367,10 +366,4 @@ impl Hash for Scheduler {
         (self.now_ns, &self.dags, &self.vertices, &self.ready).hash(state);
         (self.fresh, &self.cores, &self.timers).hash(state);
     }
-}
-
-/// Returns the least time, `u64::MAX` if there is none.
-#[inline]
-fn earliest_ns(timers: &IndexedHeap<u64>) -> u64 {
-    timers.peek().map_or(u64::MAX, |(event_ns, _)| event_ns)
 }
