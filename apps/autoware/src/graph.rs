@@ -58,8 +58,8 @@ const RECORDED: [&[&str]; 6] = [
 ];
 
 impl System {
-    /// Records what a replay needs, and what it compares. Not done by the image, which with all
-    /// that records and replays would be larger by a quarter.
+    /// Records what a replay needs, and what it compares. All that records and replays is a
+    /// quarter of the image.
     pub fn record(&self) {
         for (dag, topics) in self.dags.iter().zip(RECORDED) {
             for topic in topics {

@@ -22,8 +22,7 @@ use crate::system;
 
 /// Returns the most that an app's stripped image may weigh. Two measure, and carry all their
 /// workloads and baselines besides what every image has. The drone has three DAGs and their
-/// mathematics; the other two record and replay,
-/// which takes 120 KiB.
+/// mathematics; the other two record and replay.
 #[must_use]
 pub fn most_stripped_bytes(app: &str) -> u64 {
     match app {
