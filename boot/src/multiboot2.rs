@@ -45,6 +45,10 @@ pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
     }
 }
 
+/// How the name begins that the tool's ISO gives to a module which only keeps the others from
+/// page 0.
+const FILLER: u32 = u32::from_le_bytes(*b"fill");
+
 /// Reads one tag, whose content lies in `start..end`.
 fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info: &mut BootInfo) {
     /// Where a root pointer has its revision (ACPI 5.2.5.3).
@@ -53,9 +57,11 @@ fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info:
         tag::COMMAND_LINE => info.take_command_line(memory, start),
         tag::MODULE => {
             let place = (memory.u32(start), memory.u32(start + 4));
-            if let (Some(start), Some(end)) = place {
+            if let (Some(from), Some(to)) = place
+                && memory.u32(start + 8) != Some(FILLER)
+            {
                 // More than there is room for is more than the kernel uses.
-                let _ = info.add_module(u64::from(start), u64::from(end));
+                let _ = info.add_module(u64::from(from), u64::from(to));
             }
         }
         tag::SCREEN => info.screen = read_screen(memory, start),
@@ -156,6 +162,7 @@ mod tests {
         let memory = list(&[
             (2, b"GRUB 2.06\0".to_vec()),
             (tag::COMMAND_LINE, b"jobs=20 seed=3\0".to_vec()),
+            module(0, 0x1b0, "filler"),
             module(0x14000, 0x2c6a0, "dags"),
             map(
                 24,

@@ -69,7 +69,10 @@
 //! - What functions share otherwise is stated and typed: a [`State`] within a DAG, a
 //!   [`Latest`] value between DAGs, a [`Signal`] that releases one. The commit turns
 //!   it into precedence, bounded staleness, or a minimum distance of releases.
-//! - What comes from outside and goes there while DAGs run passes a [`Wire`].
+//! - What a function may change of the run is stated, too: which DAGs rest ([`Switch`]), and
+//!   when it ends ([`Shutdown`]).
+//! - What comes from outside and goes there while DAGs run passes a [`Wire`], or is a
+//!   [`Parameter`].
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
 //!   locked read-modify-write; states and latest values do one or two a use. (What
 //!   functions and their messages' `clone` do is theirs.)
@@ -106,6 +109,8 @@ mod run;
 
 pub use api::dag::{Dag, create_dag};
 pub use api::latest::{Latest, Sample, Sampling};
+pub use api::lifecycle::{Shutdown, ShuttingDown, Switch, Switching, shutting_down};
+pub use api::parameter::{Parameter, ParameterValue, Reading, Tunable, Unsettable};
 pub use api::replaceable::Replaceable;
 pub use api::signal::{Raiser, Raising, Signal};
 pub use api::state::{Read, State, StateValue, Update};
@@ -115,6 +120,8 @@ pub use api::using::Using;
 pub use api::wire::uses::{Packet, Received, Receiving, Sender, Sending};
 pub use api::wire::{Wire, WireCounts, WireOptions};
 pub use commit::answer::{Answer, Placement, SinkAnswer, Unproven, Verdict};
+pub use commit::assign::assign_clusters;
+pub use commit::chains::EndToEnd;
 pub use commit::error::CommitError;
 pub use commit::fault::Fault;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
@@ -133,6 +140,7 @@ pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use run::wire::incoming::Framing;
 pub use sched_dag::analysis::{Overheads, Reason, Test};
+pub use sched_dag::lifecycle::Request;
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{
     ClusterId, Clusters, ConstructionPolicy, Count, FaultLimit, Order, OverrunPolicy, Policy,

@@ -11,7 +11,7 @@ use core::fmt;
 use core::time::Duration;
 
 use recording::Channel;
-use sched_dag::analysis::Overheads;
+use sched_dag::analysis::{self, Answer, Overheads, Settings};
 use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::edge::Begin;
@@ -77,8 +77,8 @@ pub trait Platform: Sync {
         Clusters::Undivided
     }
 
-    /// Divides the cores for these DAGs, as [`sched_dag::analysis::assign()`] does; a platform
-    /// that does not leave that to the commit does not define this. (So an image that never
+    /// Divides the cores for these DAGs, by [`assign_clusters`](crate::assign_clusters); a platform that does not leave
+    /// that to the commit does not define this. (So an image that never
     /// divides its cores has none of that code.)
     ///
     /// # Errors
@@ -87,6 +87,12 @@ pub trait Platform: Sync {
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
         let _ = task_set;
         Ok(())
+    }
+
+    /// Answers about deadlines. A platform with little room for code and few DAGs has
+    /// [`answer_compact`](sched_dag::analysis::answer_compact) do it, which is slower.
+    fn answer(&self, task_set: &TaskSet, settings: &Settings) -> Answer {
+        analysis::answer(task_set, settings)
     }
 
     /// Returns what the platform's own work costs an instance at most, as

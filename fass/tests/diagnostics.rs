@@ -94,7 +94,7 @@ const CASES: &[Case] = &[
     Case {
         what: "a signal itself instead of a use of it",
         code: "fn main() { let dag = create_dag(); let alarm = dag.sporadic(period()); dag.using(alarm); }",
-        says: &["`Signal` is nothing that a subtask uses"],
+        says: &["Signal` is nothing that a subtask uses"],
     },
     Case {
         what: "a function that can be replaced, of a subtask that samples a latest value",

@@ -11,7 +11,8 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Instant;
 
-use fass::{Plan, Raiser, Sample, SubtaskAttributes, create_dag};
+use fass::{Plan, Raiser, Request, Sample, SubtaskAttributes, create_dag};
+use sched_dag::DagId;
 use support::commit;
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -282,12 +283,12 @@ fn a_signal_is_raised_once_however_often_it_is_completed() {
     let mut plan = commit(&[dag, sporadic]);
     let ask = &mut plan.bodies[0][0];
     let mut raised = Vec::new();
-    ask.complete(0, &mut |dag| raised.push(dag.0));
+    ask.complete(0, &mut |request| raised.push(request));
     assert_eq!(raised, [], "not run yet");
     ask.run(0);
     ask.run(0);
     for _ in 0..3 {
-        ask.complete(0, &mut |dag| raised.push(dag.0));
+        ask.complete(0, &mut |request| raised.push(request));
     }
-    assert_eq!(raised, [1]);
+    assert_eq!(raised, [Request::Signal(DagId(1))]);
 }

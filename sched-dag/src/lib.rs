@@ -67,7 +67,7 @@
 //!    what has happened and when, and carries its [`Decision`]s out: the
 //!    kernel with timers and interrupts, or [`virtual_time`] on the host.
 //! 5. [`journal`]: what happened in a run. [`law`]: its times and statistics, and the rules that it
-//!    is held against.
+//!    is held against. [`chains`]: how long effects take that cross DAGs.
 //!
 //! # What each user may rely on
 //!
@@ -95,12 +95,14 @@
 extern crate alloc;
 
 pub mod analysis;
+pub mod chains;
 mod clusters;
 mod fnv;
 mod ids;
 pub mod journal;
 mod kept;
 pub mod law;
+pub mod lifecycle;
 mod nearest;
 mod order;
 pub mod placement;
@@ -118,7 +120,7 @@ pub mod wcets;
 pub use clusters::{Clusters, Why};
 pub use ids::{ClusterId, CoreId, DagId, Instance, SubtaskId, Vertex};
 pub use kept::Journal;
-pub use nearest::nearest;
+pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;
 pub use policy::{
     Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,
@@ -127,7 +129,7 @@ pub use policy::{
 pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use recorder::{Events, Recorder};
 pub use scheduler::{DagStatistics, Decision, HandOff, Moment, Observer, Released, Scheduler};
-pub use spec::{DagSpec, LatestSpec, StateSpec, StateUser, SubtaskSpec, TopicPort};
+pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{

@@ -5,11 +5,13 @@
 //! the other, no place being changed twice. Names that are too far away are left as
 //! soon as that is certain, so that many of them cost little.
 
-use alloc::vec::Vec;
 use core::mem;
 
 /// The longest name that is compared, in characters: the work grows with the square.
 const LONGEST: usize = 200;
+
+/// The distances of a word to each beginning of another one.
+type Row = [u8; LONGEST + 1];
 
 /// Returns the allowed name nearest to `word`, if one is near enough to be
 /// what was meant: at most a third of its length away, but at least 1.
@@ -20,52 +22,67 @@ const LONGEST: usize = 200;
 /// ```
 #[must_use]
 pub fn nearest<'n>(word: &str, allowed: &[&'n str]) -> Option<&'n str> {
-    let word: Vec<char> = word.chars().take(LONGEST + 1).collect();
-    let near = allowed.iter().filter_map(|&name| {
-        let characters: Vec<char> = name.chars().take(LONGEST + 1).collect();
-        let most = (characters.len() / 3).max(1);
-        Some((distance(&word, &characters, most)?, name))
+    nearest_of(word, &mut allowed.iter().copied())
+}
+
+/// Works like [`nearest`] for names that come one after the other. Allocates nothing, so that a
+/// console can ask during a run.
+///
+/// ```
+/// let names = ["camera", "lidar"].map(String::from);
+/// let near = sched_dag::nearest_of("lidra", &mut names.iter().map(String::as_str));
+/// assert_eq!(near, Some("lidar"));
+/// ```
+#[must_use]
+pub fn nearest_of<'n>(word: &str, allowed: &mut dyn Iterator<Item = &'n str>) -> Option<&'n str> {
+    let near = allowed.filter_map(|name| {
+        let most = (name.chars().count() / 3).max(1);
+        Some((distance(word, name, most)?, name))
     });
     near.min_by_key(|(distance, _)| *distance)
         .map(|(_, name)| name)
 }
 
 /// Returns the distance of two words, if it is at most `most`.
-fn distance(a: &[char], b: &[char], most: usize) -> Option<usize> {
-    if a.len().max(b.len()) > LONGEST || a.len().abs_diff(b.len()) > most {
+fn distance(a: &str, b: &str, most: usize) -> Option<usize> {
+    let lengths = [a, b].map(|word| word.chars().take(LONGEST + 1).count());
+    if lengths[0].max(lengths[1]) > LONGEST || lengths[0].abs_diff(lengths[1]) > most {
         return None;
     }
-    // Of `a[..i]`, `a[..i - 1]` and `a[..i - 2]` to each `b[..j]`.
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    let mut above = Vec::new();
-    for i in 1..=a.len() {
-        let two_above = mem::replace(&mut above, mem::take(&mut row));
-        row.push(i);
-        for j in 1..=b.len() {
-            let replaced = above[j - 1] + usize::from(a[i - 1] != b[j - 1]);
+    let most = u8::try_from(most).unwrap_or(u8::MAX);
+    // Of `a[..i]`, `a[..i - 1]` and `a[..i - 2]` to each `b[..j]`. No word is longer than 200.
+    let mut row: Row = core::array::from_fn(|j| u8::try_from(j).unwrap_or(u8::MAX));
+    let (mut above, mut two_above): (Row, Row) = ([0; LONGEST + 1], [0; LONGEST + 1]);
+    let mut before = None;
+    for (i, of_a) in (1_u8..).zip(a.chars()) {
+        mem::swap(&mut two_above, &mut above);
+        mem::swap(&mut above, &mut row);
+        row[0] = i;
+        let mut left = None;
+        for (j, of_b) in (1..).zip(b.chars()) {
+            let replaced = above[j - 1] + u8::from(of_a != of_b);
             let mut least = replaced.min(row[j - 1] + 1).min(above[j] + 1);
-            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+            if before == Some(of_b) && left == Some(of_a) {
                 least = least.min(two_above[j - 2] + 1);
             }
-            row.push(least);
+            row[j] = least;
+            left = Some(of_b);
         }
         // All rows below are made of these two.
-        if row.iter().chain(&above).all(|&distance| distance > most) {
+        let both = row[..=lengths[1]].iter().chain(&above[..=lengths[1]]);
+        if both.min().is_some_and(|&distance| distance > most) {
             return None;
         }
+        before = Some(of_a);
     }
-    Some(row[b.len()]).filter(|&distance| distance <= most)
+    Some(row[lengths[1]])
+        .filter(|&distance| distance <= most)
+        .map(usize::from)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{LONGEST, nearest};
-    use alloc::vec::Vec;
-
-    fn distance(a: &str, b: &str, most: usize) -> Option<usize> {
-        let [a, b] = [a, b].map(|word| word.chars().collect::<Vec<char>>());
-        super::distance(&a, &b, most)
-    }
+    use super::{LONGEST, distance, nearest};
 
     #[test]
     fn counts_single_character_edits() {

@@ -13,9 +13,7 @@
 //! rests in the table, or is with a core, or lies on the stack of a suspended
 //! context.
 //!
-//! Drivers whose cores follow later share it, and call it under their one lock: the
-//! kernel, where a parked body is on the stack of a context, and Linux, where it is with a
-//! thread.
+//! Drivers whose cores follow later share it, under their one lock: the kernel and Linux.
 
 use alloc::boxed::Box;
 
@@ -30,7 +28,7 @@ enum Place<Body, Parked> {
     Running,
     /// On the stack of a context that does not run.
     Suspended(Parked),
-    /// Nowhere any more: its instance was ended.
+    /// Not here: its instance was ended, or another scheduler has it.
     Lost,
 }
 
@@ -83,6 +81,16 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
+    /// Makes the places of so many vertices, all without a body until one
+    /// [is put there](Self::replace).
+    #[must_use]
+    pub fn empty(vertices: usize, cores: usize) -> Self {
+        Self {
+            places: (0..vertices).map(|_| Place::Lost).collect(),
+            seats: alloc::vec![EMPTY_SEAT; cores].into_boxed_slice(),
+        }
+    }
+
     /// Notes what the scheduler wants a core to run.
     pub fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
         self.seats[core.index()].target = target.unwrap_or(NOTHING);
@@ -114,7 +122,8 @@ impl<Body, Parked> Placement<Body, Parked> {
         Some(vertex)
     }
 
-    /// Puts another body to rest, in the place of one that was [lost](Self::lose).
+    /// Puts a body to rest where there is none: in the place of one that was
+    /// [lost](Self::lose), or at first.
     pub fn replace(&mut self, vertex: Vertex, body: Body) {
         *self.place(vertex) = Place::Resting(body);
     }
@@ -378,21 +387,14 @@ mod tests {
     }
 
     #[test]
-    fn another_body_takes_the_place_of_a_lost_one() {
-        let mut cores = about_to_preempt();
-        assert_eq!(cores.lose(0), Some(X));
-        cores.replace(X, 'z');
-        cores.decide(1, Some(X));
-        assert_eq!(cores.next(1), Next::Start(X, 'z'));
-    }
-
-    #[test]
-    fn a_lost_instance_is_never_run_again() {
+    fn a_lost_instance_is_never_run_again_but_another_body_takes_its_place() {
         let mut cores = about_to_preempt();
         assert_eq!(cores.lose(0), Some(X));
         cores.decide(1, Some(X));
         assert_eq!(cores.next(1), Next::Nothing);
         assert!(cores.resting(X).is_none());
         assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+        cores.replace(X, 'z');
+        assert_eq!(cores.next(1), Next::Start(X, 'z'));
     }
 }

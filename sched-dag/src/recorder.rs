@@ -140,6 +140,18 @@ impl<J: Events> Observer for Recorder<J> {
         self.of_job(What::Stopped, dag, 0);
     }
 
+    fn switched_off(&mut self, dag: DagId) {
+        self.of_job(What::Off, dag, 0);
+    }
+
+    fn switched_on(&mut self, dag: DagId) {
+        self.of_job(What::On, dag, 0);
+    }
+
+    fn closed(&mut self, dag: DagId) {
+        self.of_job(What::Closed, dag, 0);
+    }
+
     fn deadline_missed(&mut self, dag: DagId, job: u64, _: u64) {
         self.of_job(What::Missed, dag, job);
     }

@@ -6,6 +6,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
+use core::ops::RangeInclusive;
 
 use crate::ids::ClusterId;
 use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
@@ -80,6 +81,9 @@ pub struct LatestSpec {
     pub samplers: usize,
 }
 
+/// How large a subtask's stack may be.
+pub const STACK_BYTES: RangeInclusive<u64> = 16 << 10..=1 << 20;
+
 /// A subtask as its app describes it.
 #[derive(Clone, Debug, Default)]
 pub struct SubtaskSpec {
@@ -93,6 +97,8 @@ pub struct SubtaskSpec {
     /// The execution time beyond which an instance is ended as faulty; `None`:
     /// the driver's choice. Enforced by the driver, not by the scheduler.
     pub budget_ns: Option<u64>,
+    /// The stack that it needs, in bytes, of [`STACK_BYTES`]; `None`: the driver's choice.
+    pub stack_bytes: Option<u64>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,
     /// Whether a started instance keeps its core although preemption is on.

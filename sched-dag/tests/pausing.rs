@@ -85,7 +85,7 @@ impl Bench {
     }
 
     fn resume(&mut self, now_ns: u64) -> String {
-        self.at(now_ns, |moment, _| moment.resume(DAG))
+        self.at(now_ns, |moment, log| moment.resume(DAG, log))
     }
 
     /// Completes what runs.

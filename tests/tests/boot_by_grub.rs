@@ -28,7 +28,7 @@ fn four_processors_by_uefi() {
     boots(Loader::Uefi, 4, 256);
 }
 
-/// Under UEFI it lies below 1 MiB.
+/// Under UEFI it lies below 1 MiB, and never at 0, where the firmware reads nothing to.
 #[test]
 fn a_file_on_the_stick_reaches_the_app_by_both() {
     stick::hands_over_a_file(Loader::Bios);

@@ -38,6 +38,7 @@ fn generated(name: &str) -> String {
         unit_ns: 1_000_000,
         graph: None,
         cores: 4,
+        clusters: sched_dag::Clusters::Undivided,
         length: Length::Jobs(20),
     };
     load(&path, &import).expect("it is well formed").to_string()
@@ -87,6 +88,40 @@ fn a_bound_holds_with_the_overheads_stated() {
         .expect("a line");
     let tightness = line.number_at("tightness_permille").expect("a bound");
     assert!((900..=1000).contains(&tightness), "{}", line.text);
+}
+
+#[test]
+fn dags_run_in_the_clusters_that_they_state_or_that_the_commit_finds() {
+    let file = |cluster: fn(u32) -> String| {
+        let dag = |name: &str, number, wcets: [&str; 2]| {
+            let [a, b] = wcets;
+            let cluster = cluster(number);
+            format!("dag {name} period 10ms{cluster}\nsubtask a wcet {a}\nsubtask b wcet {b}\n")
+        };
+        let much = dag("much", 1, ["8ms", "7ms"]);
+        format!("{}{much}end\n", dag("little", 0, ["2ms", "2ms"]))
+    };
+    let stated = file(|cluster| format!(" cluster {cluster}"));
+    let left_out = file(|_| String::new());
+    for (text, division) in [(&stated, "clusters=1,1"), (&left_out, "clusters=auto")] {
+        let words = format!("jobs=20 {division} overheads_ns=1000,10000,4000");
+        let outcome = boot(text.as_bytes(), &words, Status::Success);
+        let rows: Vec<_> = outcome.transcript.of_kind("dag_run").collect();
+        let misses: Vec<_> = rows
+            .iter()
+            .map(|row| row.number_at("deadline_misses"))
+            .collect();
+        match division {
+            // Two subtasks of 15 ms in all, on one core, each 10 ms.
+            "clusters=1,1" => assert_eq!(misses, [Some(0), Some(20)]),
+            _ => assert_eq!(misses, [Some(0), Some(0)], "{}", outcome.tail()),
+        }
+    }
+    let reason = refusal(stated.as_bytes(), "jobs=1");
+    assert!(
+        reason.contains("line 4: dag `much` is in cluster 1"),
+        "{reason}"
+    );
 }
 
 #[test]

@@ -88,6 +88,19 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
         assert!(is_said, "the guide shows `{line}`, the app says:\n{said}");
     }
 
+    // The same lines on Linux, whatever it takes there. Without preemption the bound is another.
+    let said = cargo(
+        &app,
+        "run --profile linux --example first-steps-linux -- jobs=20",
+    );
+    assert!(said.contains("takes at most"), "{said}");
+    let complete = "20 jobs complete, ";
+    assert!(said.lines().any(|line| line.contains(complete)), "{said}");
+    assert!(
+        said.ends_with("{\"kind\":\"verdict\",\"status\":\"success\"}\n"),
+        "{said}"
+    );
+
     // Started on the host by mistake, the image says what to do.
     let image = ours().join("target/debug").join(NAME);
     let output = Command::new(image).output().expect("the host loads it");

@@ -9,6 +9,8 @@ use tool::oracle::schedules::{Case, check, parse};
 
 const PUBLIC: &str = include_str!("../oracle/schedules.txt");
 
+const CLUSTERS: &str = include_str!("../oracle/clusters.txt");
+
 const DISTINCT: &str = include_str!("../oracle/distinct.txt");
 
 /// Ten milliseconds: idle time is skipped, so a long unit costs nothing.
@@ -33,6 +35,16 @@ fn the_machine_reproduces_the_public_schedules() {
     let judged = run(&cases, &texts, &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
     let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
     assert_eq!(judged.len(), 24);
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+#[test]
+fn the_machine_reproduces_the_schedules_of_clusters_and_sink_deadlines() {
+    let cases = parse(CLUSTERS).expect("the file is well formed");
+    let settings = Settings::for_unit(UNIT_US);
+    let judged = run(&cases, &texts_of_cases(CLUSTERS), &settings).expect("QEMU and an image");
+    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
+    assert_eq!(judged.len(), 30);
     assert!(failed.is_empty(), "{failed:#?}");
 }
 

@@ -84,6 +84,9 @@ fn build_dag(
     if let Some(jobs) = spec.in_flight {
         dag.in_flight(jobs);
     }
+    if let Some(cluster) = spec.cluster {
+        dag.cluster(cluster.0);
+    }
     let subtasks = spec.subtasks.iter().zip(&described.subtasks).zip(seeds);
     let subtasks: Vec<Untyped> = subtasks
         .map(|((subtask, more), seed)| {
@@ -170,6 +173,24 @@ mod tests {
         let responses: Vec<_> = responses.flatten().collect();
         assert_eq!(responses.len(), 6);
         assert!(responses.contains(&6_000_000), "{responses:?}");
+    }
+
+    #[test]
+    fn a_dag_runs_in_the_cluster_that_its_file_states() {
+        let text = "
+            dag much period 4ms cluster 1
+            subtask a wcet 3ms
+            subtask b wcet 3ms
+            dag little period 4ms cluster 0
+            subtask c wcet 3ms
+            end";
+        let machine = VirtualTime::new().cores(2).clusters(&[1, 1]);
+        let dags = build(&parse(text).unwrap().sets[0], &WCET, &Epoch::default());
+        finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+        let report = machine.run();
+        assert_eq!(report.violations(), []);
+        let misses = report.statistics.iter().map(|of| of.misses);
+        assert_eq!(misses.collect::<Vec<_>>(), [3, 0]);
     }
 
     #[test]

@@ -10,26 +10,27 @@ use alloc::vec::Vec;
 use replay::lines::Malformed;
 use replay::of_file;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagSpec, Fault, MOST_FAULTS, Policy, SubtaskId,
-    SubtaskLabel, sorted_by_key, verify,
+    CommitOptions, ConstructionPolicy, DagSpec, Fault, MOST_FAULTS, SubtaskId, SubtaskLabel,
+    sorted_by_key, verify,
 };
 
 use crate::build::Length;
 use crate::file::{FileDag, Set};
 
-/// Verifies a set as its commit will, with any shape of graph allowed.
+/// Verifies a set as its commit will on a machine, with any shape of graph allowed.
 ///
 /// # Errors
 ///
 /// Every fault, with its line; of very many the first, and their number.
-pub fn check(set: &Set, policy: Policy, cores: u32, length: Length) -> Result<(), Vec<Malformed>> {
+pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), Vec<Malformed>> {
     let specs = set.dags.iter().map(|dag| DagSpec {
         jobs: Some(length.jobs(&dag.spec)),
         ..dag.spec.clone()
     });
     let specs: Vec<DagSpec> = specs.collect();
-    let options =
-        CommitOptions::new(policy, cores).with_construction(ConstructionPolicy::any_graph());
+    let options = machine
+        .clone()
+        .with_construction(ConstructionPolicy::any_graph());
     let Err(rejected) = verify(&specs, &options) else {
         return Ok(());
     };
@@ -87,6 +88,8 @@ fn line_of(set: &Set, fault: &Fault) -> usize {
         | Fault::ZeroDeadline { dag }
         | Fault::ZeroInFlight { dag }
         | Fault::TimeOverflow { dag, .. }
+        | Fault::NoCluster { dag, .. }
+        | Fault::UnknownCluster { dag, .. }
         | Fault::PrioritiesExhausted { dag } => set.dags.get(dag.id.index()).map(|dag| dag.line),
         _ => None,
     };
@@ -108,10 +111,15 @@ fn edge_line(dag: &FileDag, ends: (Option<&SubtaskLabel>, Option<&SubtaskLabel>)
 mod tests {
     use super::*;
     use crate::parse::parse;
+    use sched_dag::{Clusters, Policy};
+
+    fn machine() -> CommitOptions {
+        CommitOptions::new(Policy::StaticPriority, 2)
+    }
 
     fn faults(text: &str, length: Length) -> Vec<String> {
         let file = parse(text).unwrap();
-        let faults = check(&file.sets[0], Policy::StaticPriority, 2, length).unwrap_err();
+        let faults = check(&file.sets[0], &machine(), length).unwrap_err();
         faults.iter().map(ToString::to_string).collect()
     }
 
@@ -158,6 +166,29 @@ mod tests {
         for words in words {
             assert!(found.contains(words), "{found}");
         }
+    }
+
+    #[test]
+    fn a_cluster_that_is_not_is_told_with_the_line_of_its_dag() {
+        let text = "dag x period 9ms cluster 0\nsubtask a wcet 1ms\n\
+                    dag y period 9ms cluster 2\nsubtask a wcet 1ms\n\
+                    dag z period 9ms\nsubtask a wcet 1ms\nend";
+        let file = parse(text).unwrap();
+        let divided = machine().with_clusters(Clusters::Of(alloc::vec![1, 1]));
+        let found = check(&file.sets[0], &divided, Length::Jobs(1)).unwrap_err();
+        let found: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert!(
+            found[0].starts_with("line 3: dag `y` is in cluster 2"),
+            "{}",
+            found[0]
+        );
+        assert!(
+            found[1].starts_with("line 5: dag `z` is in no cluster"),
+            "{}",
+            found[1]
+        );
+        let found = faults(text, Length::Jobs(1));
+        assert!(found[0].ends_with("leave its cluster out"), "{}", found[0]);
     }
 
     #[test]

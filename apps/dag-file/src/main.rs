@@ -16,14 +16,15 @@ use fass::{ConstructionPolicy, Occupation, finish_create_dags_with};
 use kernel::options::UsageError;
 use kernel::{Ending, Machine, println};
 use replay::{Epoch, Scale};
-use sched_dag::Policy;
+use sched_dag::{CommitOptions, Policy};
 
 use report::Report;
 
 kernel::entry!(main);
 
 /// The app's words of the command line.
-const WORDS: [&str; 8] = [
+const WORDS: [&str; 9] = [
+    "clusters",
     "execution",
     "seed",
     "jobs",
@@ -47,6 +48,7 @@ struct Wishes {
 }
 
 fn main(machine: &Machine) -> Result<(), Ending> {
+    machine.offer_clusters()?;
     let wishes = wishes(machine)?;
     let file = read(machine, wishes.settings.length)?;
     let mut reports = Vec::new();
@@ -92,8 +94,10 @@ fn read(machine: &Machine, length: Length) -> Result<DagFile, Ending> {
     })?;
     let file = parse(text).map_err(|malformed| usage(format!("DAG file, {malformed}")))?;
     // Attributes are needed under static priorities only, so that asks for more.
+    let whole = CommitOptions::new(Policy::StaticPriority, machine.cores());
+    let options = whole.with_clusters(machine.clusters());
     for set in &file.sets {
-        check(set, Policy::StaticPriority, machine.cores(), length).map_err(|faults| {
+        check(set, &options, length).map_err(|faults| {
             let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
             usage(format!("DAG file, {}", faults.join("; ")))
         })?;

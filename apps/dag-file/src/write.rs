@@ -37,6 +37,9 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
     if spec.offset_ns > 0 {
         write!(out, " offset {}", Time(spec.offset_ns))?;
     }
+    if let Some(cluster) = spec.cluster {
+        write!(out, " cluster {}", cluster.0)?;
+    }
     match spec.overrun {
         OverrunPolicy::Queue => {}
         OverrunPolicy::Skip => out.write_str(" overrun skip")?,

@@ -6,7 +6,7 @@ use kernel::{Ending, Machine, Run};
 use sched_dag::law::InstanceRecord;
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use crate::output::Outcome;
+use super::output::Outcome;
 
 const DAG: DagId = DagId(0);
 

@@ -15,7 +15,7 @@ use kernel::{Ending, Event, Lock, Machine, json};
 use pub_sub::executor::{Host, work};
 use pub_sub::graph::Graph;
 
-use crate::output::Outcome;
+use super::output::Outcome;
 
 /// Longer than any run.
 const FOREVER: Duration = Duration::from_secs(1_000_000);

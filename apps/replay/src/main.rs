@@ -80,6 +80,7 @@ fn run(
         )));
     }
     machine.configure(case.policy, case.preemption);
+    machine.divide(case.clusters.sizes());
     let epoch = Epoch::default();
     let dags = build(case, scale, &epoch, computing).map_err(in_case)?;
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;

@@ -28,11 +28,14 @@
 //! - A function whose budget is exceeded is not ended, only its DAG is: its thread goes
 //!   on, as a normal one, until the function returns.
 //! - An instance that waits in mid-function (reads a file, locks a mutex) leaves its core to
-//!   what was demoted there, and to other programs.
+//!   what was demoted there, and to other programs. So does a non-preemptive one, and if what
+//!   was demoted ends meanwhile, R5 counts that as a core that was lost.
 #![deny(unsafe_code)]
 
 mod control;
+mod lead;
 mod level;
+mod look_out;
 mod machine;
 mod platform;
 mod release;
@@ -50,7 +53,7 @@ mod wires;
 mod worker;
 
 pub use control::Control;
-pub use machine::{Linux, Mechanism, StartError};
+pub use machine::{Linux, Mechanism, StartError, processors};
 pub use run::{Counts, Run};
 pub use state::Fault;
 pub use wires::Connection;

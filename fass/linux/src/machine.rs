@@ -1,12 +1,14 @@
 //! The machine as an app sees it: so many cores of this computer.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io;
 use std::os::fd::AsFd;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{Overheads, Policy, Preemption, Signal};
+use fass::{Overheads, Plan, Platform as _, Policy, Preemption, Signal};
+use sched_dag::SchedulerOptions;
 
 use crate::control::Control;
 use crate::level::{Levels, USUAL_TOP};
@@ -69,6 +71,12 @@ impl fmt::Display for StartError {
 
 impl std::error::Error for StartError {}
 
+/// Returns how many processors this program may use.
+#[must_use]
+pub fn processors() -> u32 {
+    u32::try_from(sys::processors().len()).unwrap_or(u32::MAX)
+}
+
 impl Linux {
     /// Takes the first `cores` processors of those that this program may use, and
     /// checks what will hurt ([`warnings`](Self::warnings)).
@@ -93,6 +101,35 @@ impl Linux {
             )));
         }
         processors.truncate(cores as usize);
+        Ok(Self::on(processors, mechanism))
+    }
+
+    /// Takes so many cores, of which several share a processor if there are fewer of those.
+    ///
+    /// For what waits and does not compute: a held execution
+    /// ([`Occupation::Hold`](fass::Occupation)) leaves its processor to the others, one that
+    /// computes keeps it from them, whatever the scheduler wants.
+    ///
+    /// # Errors
+    ///
+    /// If none is asked for.
+    ///
+    /// # Panics
+    ///
+    /// As [`new`](Self::new).
+    pub fn sharing(cores: u32, mechanism: Mechanism) -> Result<Self, StartError> {
+        let there = sys::processors();
+        let processors: Vec<u32> = there.iter().copied().cycle().take(cores as usize).collect();
+        match processors.is_empty() {
+            true => Err(StartError(
+                "0 cores are asked for; do ask for 1 or more".to_owned(),
+            )),
+            false => Ok(Self::on(processors, mechanism)),
+        }
+    }
+
+    /// Makes a machine whose cores are these processors.
+    fn on(processors: Vec<u32>, mechanism: Mechanism) -> Self {
         let (mut levels, mut found) = (None, Vec::new());
         if mechanism == Mechanism::Fifo {
             match Levels::take(USUAL_TOP) {
@@ -124,8 +161,11 @@ impl Linux {
             levels,
             overheads: Overheads::default(),
             budget_factor: 0,
+            wcets: None,
+            look_at_commit: |_, _, _| (),
+            allocations: || 0,
         });
-        Ok(Self { warnings: found })
+        Self { warnings: found }
     }
 
     fn change(self, change: impl FnOnce(&mut Terms)) -> Self {
@@ -145,11 +185,7 @@ impl Linux {
     /// does, whatever is set.
     #[must_use = "the machine itself is returned"]
     pub fn preemption(self, preemption: Preemption) -> Self {
-        self.change(|terms| {
-            if terms.levels.is_some() {
-                terms.preemption = preemption;
-            }
-        })
+        self.change(|terms| terms.prefer(preemption))
     }
 
     /// Sets what commits add to WCETs before they answer, as measured on this computer.
@@ -163,6 +199,34 @@ impl Linux {
     #[must_use = "the machine itself is returned"]
     pub fn budget_factor(self, wcets: u64) -> Self {
         self.change(|terms| terms.budget_factor = wcets)
+    }
+
+    /// Has commits take WCETs from a file's text, as `./scripts/run --observe` writes it.
+    #[must_use = "the machine itself is returned"]
+    pub fn wcets(self, file: impl Into<Cow<'static, str>>) -> Self {
+        self.change(|terms| terms.wcets = Some(file.into()))
+    }
+
+    /// Has each commit looked at: what it hands over, how that is scheduled, and what an
+    /// instance was charged for overheads.
+    #[must_use = "the machine itself is returned"]
+    pub fn at_commit(self, look: fn(&Plan, SchedulerOptions, Option<u64>)) -> Self {
+        self.change(|terms| terms.look_at_commit = look)
+    }
+
+    /// Says how to count what the program has allocated so far, for [`Run::allocations`].
+    #[must_use = "the machine itself is returned"]
+    pub fn allocations(self, count: fn() -> u64) -> Self {
+        self.change(|terms| terms.allocations = count)
+    }
+
+    /// Sets policy and preemption of the commits to come, as [`policy`](Self::policy) and
+    /// [`preemption`](Self::preemption) do.
+    pub fn configure(&self, policy: Policy, preemption: Preemption) {
+        if let Some(terms) = HOST.terms().as_mut() {
+            terms.policy = policy;
+            terms.prefer(preemption);
+        }
     }
 
     /// Has the kernel end this program, by SIGKILL, when one of its threads has run at a
@@ -180,6 +244,12 @@ impl Linux {
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// Returns the number of cores.
+    #[must_use]
+    pub fn cores(&self) -> u32 {
+        HOST.cores()
     }
 
     /// Reports whether started instances may lose their cores.
@@ -217,7 +287,8 @@ impl Linux {
         control.raise_on_input(dag, sys::Arrivals::of(file)?)
     }
 
-    /// Runs the committed DAGs until each has ended all its jobs.
+    /// Runs the committed DAGs until each has ended all its jobs. Releases count from when
+    /// all threads are ready.
     ///
     /// # Errors
     ///
@@ -227,10 +298,24 @@ impl Linux {
     ///
     /// If the system has no more threads.
     pub fn run(&self) -> Result<Run, StartError> {
+        self.run_when(None)
+    }
+
+    /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on the clock of
+    /// [`fass::now_ns`]. If that is past when the threads are ready, releases are late.
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](Self::run).
+    pub fn run_from(&self, epoch_ns: u64) -> Result<Run, StartError> {
+        self.run_when(Some(epoch_ns))
+    }
+
+    fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, StartError> {
         let launched = HOST.take_launched().ok_or_else(|| {
             StartError("nothing is committed; call finish_create_dags first".to_owned())
         })?;
-        let run = run::run(launched);
+        let run = run::run(launched, epoch_ns);
         HOST.forget();
         Ok(run)
     }

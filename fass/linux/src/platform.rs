@@ -1,9 +1,11 @@
 //! Linux as the platform that `fass` runs on: one for the program.
 
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+use sched_dag::lifecycle::Requests;
 use sched_dag::{Dag, DagId, Journal, OnFault, Scheduler, SchedulerOptions};
 
 use crate::level::Levels;
@@ -22,6 +24,18 @@ pub(crate) struct Terms {
     pub(crate) levels: Option<Levels>,
     pub(crate) overheads: Overheads,
     pub(crate) budget_factor: u64,
+    pub(crate) wcets: Option<Cow<'static, str>>,
+    pub(crate) look_at_commit: fn(&Plan, SchedulerOptions, Option<u64>),
+    pub(crate) allocations: fn() -> u64,
+}
+
+impl Terms {
+    /// Chooses whether started instances may lose their cores, where there is a choice.
+    pub(crate) const fn prefer(&mut self, preemption: Preemption) {
+        if self.levels.is_some() {
+            self.preemption = preemption;
+        }
+    }
 }
 
 /// The platform of the program.
@@ -90,6 +104,10 @@ impl Platform for Host {
         self.of_terms(|terms| terms.overheads, Overheads::default())
     }
 
+    fn wcets(&self) -> Option<Cow<'static, str>> {
+        self.of_terms(|terms| terms.wcets.clone(), None)
+    }
+
     #[inline]
     fn now_ns(&self) -> u64 {
         sys::now_ns()
@@ -140,24 +158,28 @@ impl Platform for Host {
             preemption: terms.preemption,
             cores: self.cores(),
         };
+        let overhead_ns = terms.overheads.of_an_instance_ns(options.preemption);
+        (terms.look_at_commit)(&plan, options, overhead_ns);
         let task_set = plan.task_set;
+        let requests = Requests::new(task_set.dags().len(), plan.lifecycle);
         let journal = Journal::new(&task_set, JOURNAL_BYTES, u64::MAX);
         let scheduler = Scheduler::new(task_set, options);
         let state = State::new(
             scheduler,
             plan.bodies,
-            plan.after_fault,
+            (requests, plan.after_fault),
             journal,
             terms.processors,
             terms.levels,
         );
-        let team = Arc::new(Team::new(state, plan.number));
+        let team = Arc::new(Team::new(state, plan.number, terms.allocations));
         if let Ok(mut place) = self.team.write() {
             *place = Some(Arc::clone(&team));
         }
         let launched = Launched {
             team,
             bounds_ns: plan.bounds_ns,
+            sink_bounds_ns: plan.sink_bounds_ns,
             budget_factor: terms.budget_factor,
         };
         let mut place = self.launched.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,8 +1,9 @@
 //! The release thread: the clock of the scheduler.
 //!
 //! It sleeps until the scheduler's next event, at an absolute time, so that releases keep
-//! to the nominal grid whatever one of them was late by. Others wake it earlier with a
-//! request, or if the next event has become an earlier one. It makes the step and calls
+//! to the nominal grid whatever one of them was late by. Idle workers are to be there first
+//! (`look_out`); where all cores are busy it comes in time, and preempts. Others wake it earlier
+//! with a request, or if the next event has become an earlier one. It makes the step and calls
 //! the workers; it runs nothing itself.
 //!
 //! # Budgets
@@ -11,7 +12,7 @@
 //! Reading that clock is a system call, so no instance does it at its start: this thread
 //! looks often enough, as often as the shortest budget, and begins to count when it
 //! first sees the instance. So an instance ends after its budget, and no later than the
-//! shortest budget of all after that. Its thread cannot be ended: it is demoted for good.
+//! shortest budget of all, and 20 us, after that. Its thread cannot be ended: it is demoted for good.
 
 use std::sync::atomic::Ordering;
 
@@ -19,7 +20,7 @@ use sched_dag::journal::What;
 use sched_dag::{CoreId, Vertex};
 
 use crate::level::Role;
-use crate::state::State;
+use crate::state::{Fault, State};
 use crate::sys;
 use crate::team::Team;
 
@@ -79,12 +80,18 @@ impl Budgets {
                 *seen = Seen::default();
                 return Err(core);
             }
-            // Not before it can have used up the rest.
-            let rest_ns = budget_ns - used_ns + 1;
-            next_ns = next_ns.min(now_ns.saturating_add(rest_ns));
+            next_ns = next_ns.min(now_ns.saturating_add(pause_ns(budget_ns - used_ns)));
         }
         Ok(next_ns)
     }
+}
+
+/// Returns how long to sleep between two looks at an instance that has so much of its budget
+/// left: not before it can have used that up, and for a while in any case. This thread may stand
+/// on the instance's own core, and then that uses nothing up until we sleep.
+fn pause_ns(rest_ns: u64) -> u64 {
+    const LEAST_NS: u64 = 20_000;
+    rest_ns.saturating_add(1).max(LEAST_NS)
 }
 
 impl Team {
@@ -94,31 +101,55 @@ impl Team {
         if let Some(levels) = self.levels {
             levels.bring(sys::thread(), Role::Release);
         }
+        self.count_allocations();
         self.say_ready();
-        let mut seen;
         loop {
-            seen = self.alarm.load(Ordering::Acquire);
+            let seen = self.alarm.load(Ordering::Acquire);
             let mut state = self.lock();
-            let is_over = self.step_in_time(&mut state, &mut budgets);
+            let budgets_ns = self.step_in_time(&mut state, &mut budgets);
             self.call(state);
-            if is_over {
-                return;
-            }
-            let looks_at_ns = self.looks_at_ns.load(Ordering::Relaxed);
-            let until_ns = (looks_at_ns < u64::MAX).then_some(looks_at_ns);
-            // Early returns are harmless: the step finds nothing due.
-            if sys::now_ns() < looks_at_ns {
-                sys::wait(&self.alarm, seen, until_ns);
+            match budgets_ns {
+                Some(budgets_ns) => self.sleep(seen, budgets_ns),
+                None => return,
             }
         }
     }
 
-    /// Makes one step, and reports whether all jobs have ended.
-    fn step_in_time(&self, state: &mut State, budgets: &mut Budgets) -> bool {
+    /// Sleeps until it is rung for, or an event or the look at budgets is due. An event that a
+    /// worker has seen to is none.
+    fn sleep(&self, seen: u32, budgets_ns: u64) {
+        while self.alarm.load(Ordering::Acquire) == seen {
+            let looks_at_ns = self.settle_look(budgets_ns);
+            if sys::now_ns() < looks_at_ns {
+                let until_ns = (looks_at_ns < u64::MAX).then_some(looks_at_ns);
+                sys::wait(&self.alarm, seen, until_ns);
+            }
+            let due_ns = self.look_out.next_ns().min(budgets_ns);
+            if due_ns <= sys::now_ns() {
+                return;
+            }
+        }
+    }
+
+    /// Settles when it looks next. Whoever makes the next event an earlier one writes that first
+    /// and then reads when we look; we do it the other way round, so one of us sees the other.
+    fn settle_look(&self, budgets_ns: u64) -> u64 {
+        loop {
+            let next_ns = self.look_out.next_ns();
+            let looks_at_ns = self.look_out.of_release(next_ns).min(budgets_ns);
+            self.looks_at_ns.store(looks_at_ns, Ordering::SeqCst);
+            if self.look_out.next_ns() == next_ns {
+                return looks_at_ns;
+            }
+        }
+    }
+
+    /// Makes one step, and returns when to look at budgets; `None` if all jobs have ended.
+    fn step_in_time(&self, state: &mut State, budgets: &mut Budgets) -> Option<u64> {
         if sys::now_ns() < state.epoch_ns {
             // What is asked for before time 0 is done then.
-            self.looks_at_ns.store(state.epoch_ns, Ordering::Relaxed);
-            return false;
+            self.look_out.announce(state.epoch_ns);
+            return Some(u64::MAX);
         }
         state.step(&self.workers, |moment, mut observer| {
             self.requests.serve(moment, &mut observer);
@@ -129,17 +160,15 @@ impl Team {
                 Err(core) => self.abandon(state, core),
             }
         };
-        let next_ns = state.scheduler.next_event_ns();
-        let next_ns = next_ns.map_or(u64::MAX, |ns| ns.saturating_add(state.epoch_ns));
-        let next_ns = next_ns.min(look_ns);
-        self.looks_at_ns.store(next_ns, Ordering::Relaxed);
-        let is_over = state.scheduler.is_finished();
-        if is_over {
-            self.over.store(1, Ordering::Release);
-            self.workers.iter().for_each(|worker| worker.call());
-            sys::wake(&self.over, i32::MAX);
+        self.announce(state);
+        if !state.scheduler.is_finished() {
+            return Some(look_ns);
         }
-        is_over
+        self.count_allocations();
+        self.over.store(1, Ordering::Release);
+        self.workers.iter().for_each(|worker| worker.call());
+        sys::wake(&self.over, i32::MAX);
+        None
     }
 
     /// Ends a core's instance, which has exceeded its budget, and with it its DAG.
@@ -158,7 +187,23 @@ impl Team {
         state.abandoned.push(number);
         state.replace(core, &self.workers);
         let instance = state.scheduler.instance_of(vertex);
-        let cause = "its budget was exceeded".to_owned();
-        state.fail(&self.workers, instance, cause);
+        let fault = Fault {
+            instance,
+            cause: "its budget was exceeded".to_owned(),
+            is_overrun: true,
+        };
+        state.fail(&self.workers, fault);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pause_ns;
+
+    #[test]
+    fn an_instance_at_the_end_of_its_budget_gets_time_to_exceed_it() {
+        // Were it 1 ns, this thread would look for ever, on the core that the instance needs.
+        assert!([0, 1, 100].map(pause_ns).iter().all(|ns| *ns >= 10_000));
+        assert_eq!(pause_ns(5_000_000), 5_000_001);
     }
 }

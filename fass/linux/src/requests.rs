@@ -57,7 +57,7 @@ impl Requests {
             }
             let bits = place.swap(0, Ordering::Acquire);
             if bits & RESUME != 0 {
-                moment.resume(dag);
+                moment.resume(dag, observer);
             }
             if bits & PAUSE != 0 {
                 moment.pause(dag, observer);

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
 
 use sched_dag::law::{Record, Violation};
-use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, TaskSet};
+use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::release::Budgets;
 use crate::state::Fault;
@@ -22,6 +22,7 @@ const LEAD_NS: u64 = 1_000_000;
 pub(crate) struct Launched {
     pub(crate) team: Arc<Team>,
     pub(crate) bounds_ns: Vec<Option<u64>>,
+    pub(crate) sink_bounds_ns: Vec<Vec<Option<u64>>>,
     pub(crate) budget_factor: u64,
 }
 
@@ -50,18 +51,21 @@ pub struct Run {
     counts: Counts,
     epoch_ns: u64,
     bounds_ns: Vec<Option<u64>>,
+    sink_bounds_ns: Vec<Vec<Option<u64>>>,
+    sink_misses: Vec<Vec<u64>>,
+    allocations: u64,
 }
 
 /// Starts the threads of a committed plan, waits for the end of all its jobs, and
-/// returns what happened.
-pub(crate) fn run(launched: Launched) -> Run {
+/// returns what happened. Releases count from `epoch_ns`, or from right now.
+pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let team = launched.team;
     let threads: Vec<_> = (0..team.workers.len())
         .map(|number| worker(&team, number))
         .collect();
     team.wait_until_ready(threads.len());
     let mut state = team.lock();
-    state.epoch_ns = sys::now_ns() + LEAD_NS;
+    state.epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
     let epoch_ns = state.epoch_ns;
     let budgets = Budgets::new(&state, launched.budget_factor);
     drop(state);
@@ -83,6 +87,14 @@ pub(crate) fn run(launched: Launched) -> Run {
     let statistics = statistics
         .map(|dag| *state.scheduler.statistics(dag))
         .collect();
+    let sink_misses = (0..).map(DagId).zip(task_set.dags());
+    let sink_misses = sink_misses.map(|(dag, model)| {
+        let sinks = model.sinks().iter();
+        sinks
+            .map(|sink| state.scheduler.sink_misses(dag, *sink))
+            .collect()
+    });
+    let sink_misses = sink_misses.collect();
     let counts = Counts {
         hand_offs: team.hand_offs.load(Ordering::Relaxed),
         calls: team.calls.load(Ordering::Relaxed),
@@ -107,6 +119,9 @@ pub(crate) fn run(launched: Launched) -> Run {
         counts,
         epoch_ns,
         bounds_ns: launched.bounds_ns,
+        sink_bounds_ns: launched.sink_bounds_ns,
+        sink_misses,
+        allocations: team.allocations.load(Ordering::Relaxed),
     }
 }
 
@@ -128,7 +143,7 @@ fn join(thread: JoinHandle<()>) {
 impl Run {
     /// Returns the model that was run.
     #[must_use]
-    pub fn task_set(&self) -> &TaskSet {
+    pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
     }
 
@@ -159,6 +174,40 @@ impl Run {
     #[must_use]
     pub fn bound_ns(&self, dag: DagId) -> Option<u64> {
         self.bounds_ns.get(dag.index()).copied().flatten()
+    }
+
+    /// Returns the response time that the commit has proven of a sink, if it has.
+    #[must_use]
+    pub fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
+        let place = self.place_of(dag, sink)?;
+        let of_dag = self.sink_bounds_ns.get(dag.index())?;
+        of_dag.get(place).copied().flatten()
+    }
+
+    /// Returns how many jobs a sink has missed its deadline in; 0 of what is no sink.
+    #[must_use]
+    pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
+        let place = self.place_of(dag, sink);
+        place.map_or(0, |place| self.sink_misses[dag.index()][place])
+    }
+
+    fn place_of(&self, dag: DagId, sink: SubtaskId) -> Option<usize> {
+        let sinks = self.task_set.dag(dag).sinks();
+        sinks.iter().position(|other| *other == sink)
+    }
+
+    /// Returns how the scheduler was told to work.
+    #[must_use]
+    pub const fn options(&self) -> SchedulerOptions {
+        self.options
+    }
+
+    /// Returns how often anything in the program allocated memory between the start of the
+    /// releases and the last completion; 0 if nobody has said how to count that
+    /// ([`Linux::allocations`](crate::Linux::allocations)).
+    #[must_use]
+    pub const fn allocations(&self) -> u64 {
+        self.allocations
     }
 
     /// Returns the faults that have ended DAGs, in their order.

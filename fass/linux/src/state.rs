@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use fass::Body;
 use sched_dag::journal::What;
+use sched_dag::lifecycle::Requests;
 use sched_dag::placement::{Next, Placement};
 use sched_dag::{
     CoreId, DagId, Decision, Instance, Journal, Moment, Observer, Recorder, Scheduler, TaskSet,
@@ -37,6 +38,8 @@ pub struct Fault {
     pub instance: Instance,
     /// Why: a panic's message, or that the budget was exceeded.
     pub cause: String,
+    /// Whether it is the latter.
+    pub is_overrun: bool,
 }
 
 /// The scheduler, the bodies, and who runs what.
@@ -49,13 +52,17 @@ pub(crate) struct State {
     pub(crate) active: Box<[Number]>,
     /// By worker, the core of which it is the active one.
     pub(crate) seats: Box<[Option<CoreId>]>,
-    /// By worker, the processor that it is pinned to.
-    pinned: Box<[Option<u32>]>,
+    /// By worker, the core to whose processor it is pinned.
+    pinned: Box<[Option<CoreId>]>,
+    /// By worker, when its instance last went on after it had lost its core, on the clock.
+    resumed_ns: Box<[u64]>,
+    /// What a worker that reports an end has just taken the processor from.
+    interrupted: Option<(CoreId, Vertex)>,
     /// Workers without a core and without an instance.
     spare: Vec<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
-    pub(crate) signals: Vec<DagId>,
+    pub(crate) requests: Requests,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
     pub(crate) faults: Vec<Fault>,
@@ -84,7 +91,7 @@ impl State {
     pub(crate) fn new(
         scheduler: Scheduler,
         bodies: Vec<Vec<Body>>,
-        after_fault: Vec<Option<DagId>>,
+        (requests, after_fault): (Requests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
         levels: Option<Levels>,
@@ -110,9 +117,11 @@ impl State {
             active: (0..cores).collect(),
             seats,
             pinned: vec![None; workers].into_boxed_slice(),
+            resumed_ns: vec![0; workers].into_boxed_slice(),
+            interrupted: None,
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
-            signals: Vec::with_capacity(dags),
+            requests,
             after_fault,
             faults: Vec::with_capacity(dags),
             called: Vec::with_capacity(2 * cores),
@@ -141,6 +150,12 @@ impl State {
         self.recorder.on_core(what, instance, core);
     }
 
+    /// Returns when the instance of a worker has ended whose function returned at a time. If it
+    /// lost its core and got it back before it could say so, it ends there.
+    pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
+        returned_ns.max(self.resumed_ns[worker])
+    }
+
     /// Writes down that an instance has ended that had lost its core. Right now that core's
     /// processor is with the worker that says so, and what should run there is not.
     pub(crate) fn note_end_of_parked(&mut self, worker: Number, what: What, vertex: Vertex) {
@@ -151,9 +166,8 @@ impl State {
         }
         self.note(What::Resume, core, vertex);
         self.note(what, core, vertex);
-        if let Some(occupant) = occupant {
-            self.note(What::Resume, core, occupant);
-        }
+        // It goes on after the step that the end brings about, and within it nothing does.
+        self.interrupted = occupant.map(|occupant| (core, occupant));
     }
 
     /// Lets the scheduler see what happens now, and decide.
@@ -168,9 +182,7 @@ impl State {
         let mut observer = (&mut self.recorder, discard);
         let mut moment = self.scheduler.at(now_ns);
         event(&mut moment, &mut observer);
-        for dag in self.signals.drain(..) {
-            moment.signal(dag, &mut observer);
-        }
+        self.requests.serve(&mut moment, &mut observer);
         let decisions = moment.release_due(&mut observer).dispatch();
         self.decisions.clear();
         self.decisions.extend_from_slice(decisions);
@@ -178,8 +190,9 @@ impl State {
     }
 
     /// Ends an instance's DAG because of a fault.
-    pub(crate) fn fail(&mut self, workers: &[Worker], instance: Instance, cause: String) {
-        self.faults.push(Fault { instance, cause });
+    pub(crate) fn fail(&mut self, workers: &[Worker], fault: Fault) {
+        let instance = fault.instance;
+        self.faults.push(fault);
         let handler = self.after_fault[instance.dag.index()];
         self.step(workers, |moment, mut observer| {
             moment.fail(instance, &mut observer);
@@ -201,6 +214,12 @@ impl State {
     }
 
     fn carry_out(&mut self, workers: &[Worker]) {
+        if let Some((core, occupant)) = self.interrupted.take() {
+            let now_ns = sys::now_ns();
+            // It may have returned already, and wait for the lock.
+            self.resumed_ns[self.active[core.index()]] = now_ns;
+            self.note_at(now_ns, What::Resume, core, occupant);
+        }
         let mut preempted = None;
         for place in 0..self.decisions.len() {
             let decision = self.decisions[place];
@@ -261,13 +280,13 @@ impl State {
     /// Sees to it that a worker runs on a core's processor.
     pub(crate) fn pin(&mut self, worker: Number, core: CoreId, workers: &[Worker]) {
         let processor = self.processors[core.index()];
-        if self.pinned[worker] != Some(processor)
+        if self.pinned[worker] != Some(core)
             && let Some(thread) = workers[worker].thread()
         {
             // The processor was ours at the start; if it was taken away since, the kernel
             // has chosen another one, and all still holds but who delays whom.
             let _ = sys::pin(thread, processor);
-            self.pinned[worker] = Some(processor);
+            self.pinned[worker] = Some(core);
         }
     }
 
@@ -289,9 +308,7 @@ impl State {
 
     /// Returns the core that a worker is pinned to.
     pub(crate) fn core_of(&self, worker: Number) -> CoreId {
-        let mut cores = (0..).map(CoreId).zip(&self.processors);
-        let own = cores.find(|(_, processor)| self.pinned[worker] == Some(**processor));
-        own.map_or(CoreId(0), |(core, _)| core)
+        self.pinned[worker].unwrap_or(CoreId(0))
     }
 
     /// Finds what a worker without an instance does next: run this, or nothing.
@@ -311,7 +328,8 @@ impl State {
                 self.seat(parked, core, workers);
                 workers[parked].promote(self.levels);
                 if let Some(vertex) = self.placement.current(core.index()) {
-                    self.note(What::Resume, core, vertex);
+                    self.resumed_ns[parked] = sys::now_ns();
+                    self.note_at(self.resumed_ns[parked], What::Resume, core, vertex);
                 }
                 None
             }

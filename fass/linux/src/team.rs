@@ -11,9 +11,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use sched_dag::HandOff;
 use sched_dag::journal::What;
 
+use crate::lead::Lead;
 use crate::level::{Levels, Role};
+use crate::look_out::LookOut;
 use crate::requests::{Request, Requests};
-use crate::state::{Number, Runner, State};
+use crate::state::{Fault, Number, Runner, State};
 use crate::sys;
 use crate::worker::Worker;
 
@@ -37,6 +39,7 @@ pub(crate) struct Team {
     pub(crate) plan: u64,
     /// Changes whenever the release thread is to look at once.
     pub(crate) alarm: AtomicU32,
+    pub(crate) look_out: LookOut,
     /// When the release thread looks of its own accord.
     pub(crate) looks_at_ns: AtomicU64,
     /// 1 when all jobs have ended.
@@ -47,21 +50,28 @@ pub(crate) struct Team {
     pub(crate) hand_offs: AtomicU64,
     /// How often a worker was called, which is a wake of the kernel's.
     pub(crate) calls: AtomicU64,
+    /// Counts what the program has allocated so far.
+    count_allocations: fn() -> u64,
+    /// What it had when the run began; after the run, how much more it was in the end.
+    pub(crate) allocations: AtomicU64,
 }
 
 impl Team {
-    pub(crate) fn new(state: State, plan: u64) -> Self {
+    pub(crate) fn new(state: State, plan: u64, count_allocations: fn() -> u64) -> Self {
         Self {
             workers: state.seats.iter().map(|_| Worker::default()).collect(),
             levels: state.levels,
             requests: Requests::new(state.task_set.dags().len()),
             plan,
             alarm: AtomicU32::new(0),
+            look_out: LookOut::new(),
             looks_at_ns: AtomicU64::new(u64::MAX),
             over: AtomicU32::new(0),
             begun: AtomicU32::new(0),
             hand_offs: AtomicU64::new(0),
             calls: AtomicU64::new(0),
+            count_allocations,
+            allocations: AtomicU64::new(0),
             state: Mutex::new(state),
         }
     }
@@ -92,6 +102,13 @@ impl Team {
         }
     }
 
+    /// Counts allocations from the last call on: for the run's begin and its end.
+    pub(crate) fn count_allocations(&self) {
+        let before = self.allocations.load(Ordering::Relaxed);
+        let now = (self.count_allocations)();
+        self.allocations.store(now - before, Ordering::Relaxed);
+    }
+
     /// Leaves a request to the release thread.
     pub(crate) fn request(&self, dag: sched_dag::DagId, request: Request) {
         self.requests.leave(dag, request);
@@ -110,6 +127,8 @@ impl Team {
         let worker = &self.workers[me];
         worker.begin();
         worker.bring(self.levels, Role::Run);
+        sys::make_timers_exact();
+        let mut lead = Lead::default();
         let mut state = self.lock();
         if let Some(core) = state.seats[me] {
             state.pin(me, core, &self.workers);
@@ -117,13 +136,23 @@ impl Team {
         drop(state);
         self.say_ready();
         loop {
-            worker.wait_for_call();
-            if self.is_over() {
-                return;
-            }
-            let mut state = self.lock();
-            let mut next = state.seats[me].and_then(|_| state.find_work(me, &self.workers));
-            drop(state);
+            let mut next = match self.wait(me, &mut lead) {
+                Woken::ToEnd => return,
+                Woken::ByCall => {
+                    let mut state = self.lock();
+                    let next = state.seats[me].and_then(|_| state.find_work(me, &self.workers));
+                    self.settle(me, &state, next.is_some());
+                    next
+                }
+                Woken::ByTime => {
+                    let mut state = self.lock();
+                    state.step(&self.workers, |_, _| ());
+                    match state.seats[me] {
+                        Some(_) => self.go_on(me, state),
+                        None => None,
+                    }
+                }
+            };
             while let Some(mut runner) = next.take() {
                 let outcome = self.execute(&mut runner);
                 match self.complete(me, runner, outcome) {
@@ -132,6 +161,34 @@ impl Team {
                 }
             }
         }
+    }
+
+    /// Sleeps until there is something to do: work, or, on behalf of its core, an event.
+    fn wait(&self, me: Number, lead: &mut Lead) -> Woken {
+        let (worker, core) = (&self.workers[me], self.workers[me].seat());
+        let woken = loop {
+            let next_ns = core.map_or(u64::MAX, |core| {
+                let next_ns = self.look_out.next_ns();
+                self.look_out.of_worker(core, next_ns)
+            });
+            let was_called = worker.wait_for_call(next_ns, lead);
+            if self.is_over() {
+                break Woken::ToEnd;
+            }
+            if was_called {
+                break Woken::ByCall;
+            }
+            // The event may have been seen to, or another one is to look first.
+            let next_ns = self.look_out.next_ns();
+            let own_ns = core.map_or(u64::MAX, |core| self.look_out.of_worker(core, next_ns));
+            if own_ns <= sys::now_ns() {
+                break Woken::ByTime;
+            }
+        };
+        if let Some(core) = core {
+            self.look_out.leave(core);
+        }
+        woken
     }
 
     /// Calls the function; the error is a panic's message.
@@ -163,12 +220,9 @@ impl Team {
         }
         let state_now = &mut *state;
         if outcome.is_ok() && runner.body.has_effects() {
-            let signals = &mut state_now.signals;
-            runner.body.complete(finish_ns, &mut |dag| {
-                if !signals.contains(&dag) {
-                    signals.push(dag);
-                }
-            });
+            let requests = &mut state_now.requests;
+            let keep = &mut |request| requests.keep(request);
+            runner.body.complete(finish_ns, keep);
         }
         let what = match outcome {
             Ok(()) => What::Finish,
@@ -176,9 +230,10 @@ impl Team {
         };
         match state_now.seats[me] {
             Some(core) => {
-                state_now.note_at(finish_ns, what, core, vertex);
+                let end_ns = state_now.end_of(me, finish_ns);
+                state_now.note_at(end_ns, what, core, vertex);
                 state_now.placement.finish(core.index(), vertex, runner);
-                if outcome.is_ok() && state_now.signals.is_empty() {
+                if outcome.is_ok() && state_now.requests.are_none() {
                     match state_now.hand_off(core, vertex) {
                         HandOff::To(successor, decision) => {
                             if let Some(runner) = state_now.placement.start(core, successor) {
@@ -207,7 +262,15 @@ impl Team {
             Ok(()) => state_now.step(workers, |moment, mut observer| {
                 moment.complete(instance, &mut observer);
             }),
-            Err(cause) => state_now.fail(workers, instance, cause),
+            Err(cause) => {
+                let is_overrun = false;
+                let fault = Fault {
+                    instance,
+                    cause,
+                    is_overrun,
+                };
+                state_now.fail(workers, fault);
+            }
         }
         Ok(self.go_on(me, state))
     }
@@ -215,9 +278,19 @@ impl Team {
     /// Ends a worker's step: finds what it does next, and calls others.
     fn go_on(&self, me: Number, mut state: MutexGuard<'_, State>) -> Option<Box<Runner>> {
         let next = state.find_work(me, &self.workers);
+        self.settle(me, &state, next.is_some());
         self.announce(&state);
         self.call(state);
         next
+    }
+
+    /// Takes note of where a worker sits, and that it looks out there if it has no work.
+    fn settle(&self, me: Number, state: &State, has_work: bool) {
+        let seat = state.seats[me];
+        self.workers[me].sit(seat);
+        if let (Some(core), false) = (seat, has_work) {
+            self.look_out.rest(core);
+        }
     }
 
     /// Gives the lock back, and makes the workers of all cores that should run something
@@ -244,17 +317,27 @@ impl Team {
     /// Sees to it that the release thread looks in time.
     #[inline]
     pub(crate) fn announce(&self, state: &State) {
-        let next_ns = state.scheduler.next_event_ns();
-        let next_ns = match next_ns {
+        let next_ns = match state.scheduler.next_event_ns() {
             Some(next_ns) => next_ns.saturating_add(state.epoch_ns),
             None if state.scheduler.is_finished() => 0,
             None => u64::MAX,
         };
-        if next_ns < self.looks_at_ns.load(Ordering::Relaxed) {
-            self.looks_at_ns.store(next_ns, Ordering::Relaxed);
+        self.look_out.announce(next_ns);
+        if LookOut::is_late(self.looks_at_ns.load(Ordering::SeqCst), next_ns) {
+            self.looks_at_ns.store(next_ns, Ordering::SeqCst);
             self.ring();
         }
     }
+}
+
+/// Why a worker does not sleep any more.
+enum Woken {
+    /// Its core may have work.
+    ByCall,
+    /// An event is due.
+    ByTime,
+    /// All jobs have ended.
+    ToEnd,
 }
 
 /// The most workers that are called before the lock is taken once more.

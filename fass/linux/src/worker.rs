@@ -17,6 +17,9 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
+use sched_dag::CoreId;
+
+use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::sys::{self, ThreadId};
 
@@ -32,6 +35,8 @@ const DEMOTED: u32 = 2;
 pub(crate) struct Worker {
     thread: OnceLock<ThreadId>,
     mode: AtomicU32,
+    /// The number of the core of which it was the active one when it had the lock last, and 1.
+    seat: AtomicU32,
     /// Whether it sleeps until its mode changes.
     holds: AtomicBool,
     /// 1 if it is to look for work.
@@ -56,17 +61,53 @@ impl Worker {
         }
     }
 
+    /// Takes note of the core of which it is the active one. By itself, under the lock.
+    pub(crate) fn sit(&self, core: Option<CoreId>) {
+        let place = core.map_or(0, |core| core.0 + 1);
+        self.seat.store(place, Ordering::Relaxed);
+    }
+
+    /// Returns that core. While it waits, nobody takes that from it.
+    pub(crate) fn seat(&self) -> Option<CoreId> {
+        self.seat.load(Ordering::Relaxed).checked_sub(1).map(CoreId)
+    }
+
     /// Makes it look for work.
     pub(crate) fn call(&self) {
         self.call.store(1, Ordering::Release);
         sys::wake(&self.call, 1);
     }
 
-    /// Sleeps until it is called. By itself.
-    pub(crate) fn wait_for_call(&self) {
+    /// Sleeps until it is called, or until an instant, for which it wakes up a little early. By
+    /// itself. Reports whether it was called.
+    pub(crate) fn wait_for_call(&self, until_ns: u64, lead: &mut Lead) -> bool {
+        let alarm_ns = (until_ns < u64::MAX).then(|| lead.before(until_ns));
         while self.call.swap(0, Ordering::Acquire) == 0 {
-            sys::wait(&self.call, 0, None);
+            if alarm_ns.is_some_and(|alarm_ns| sys::now_ns() >= alarm_ns) {
+                return self.watch(until_ns);
+            }
+            sys::wait(&self.call, 0, alarm_ns);
+            if let Some(alarm_ns) = alarm_ns
+                && self.call.load(Ordering::Relaxed) == 0
+            {
+                let now_ns = sys::now_ns();
+                if now_ns >= alarm_ns {
+                    lead.learn(alarm_ns, now_ns);
+                }
+            }
         }
+        true
+    }
+
+    /// Watches the clock until an instant, or until it is called, and reports whether it was.
+    fn watch(&self, until_ns: u64) -> bool {
+        while sys::now_ns() < until_ns {
+            if self.call.swap(0, Ordering::Acquire) != 0 {
+                return true;
+            }
+            std::hint::spin_loop();
+        }
+        false
     }
 
     /// Takes note that it runs an instance from now on. Under the lock.
@@ -156,7 +197,17 @@ mod tests {
     fn a_call_before_the_wait_is_not_lost() {
         let worker = Worker::default();
         worker.call();
-        worker.wait_for_call();
+        assert!(worker.wait_for_call(u64::MAX, &mut Lead::default()));
         assert_eq!(worker.call.load(Ordering::Relaxed), 0);
+    }
+
+    #[test]
+    fn it_wakes_up_by_itself_and_not_before_the_instant() {
+        let (worker, mut lead) = (Worker::default(), Lead::default());
+        for _ in 0..5 {
+            let instant_ns = sys::now_ns() + 1_000_000;
+            assert!(!worker.wait_for_call(instant_ns, &mut lead));
+            assert!(sys::now_ns() >= instant_ns);
+        }
     }
 }

@@ -170,6 +170,12 @@ impl Platform for HostThreads {
                 endless.name()
             )));
         }
+        if plan.lifecycle.is_some() {
+            return Err(LaunchError::new(
+                "a function may pause dags or end the run, or a dag starts paused, which `Native` \
+                 does not do; run it on the kernel, on Linux or in virtual time",
+            ));
+        }
         let mut place = machine.plan.borrow_mut();
         if place.is_some() {
             return Err(LaunchError::new(

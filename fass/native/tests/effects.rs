@@ -252,3 +252,16 @@ fn a_signal_that_an_instance_uses_twice_is_one() {
         })
     });
 }
+
+#[test]
+fn what_changes_a_run_is_refused_at_the_commit() {
+    let machine = Native::new();
+    let dag = create_dag();
+    dag.jobs(1).period(PERIOD).relative_deadline(PERIOD);
+    dag.starts_paused();
+    dag.register_untyped_subtask(|_job| (), named("tick"));
+    let error = finish_create_dags(&[dag]).expect_err("nothing here would resume it");
+    drop(machine);
+    let text = error.to_string();
+    assert!(text.contains("which `Native` does not do"), "{text}");
+}

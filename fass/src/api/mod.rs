@@ -5,6 +5,8 @@
 
 pub(crate) mod dag;
 pub(crate) mod latest;
+pub(crate) mod lifecycle;
+pub(crate) mod parameter;
 pub(crate) mod record;
 pub(crate) mod replaceable;
 pub(crate) mod signal;

@@ -236,7 +236,7 @@ impl Dag {
     #[track_caller]
     pub(super) fn signal(&self) -> Signal {
         let mut draft = self.open();
-        let target = draft.signal.get_or_insert_with(|| Arc::new(Target::new()));
+        let target = draft.target.get_or_insert_with(|| Arc::new(Target::new()));
         Signal {
             target: Arc::clone(target),
         }

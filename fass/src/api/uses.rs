@@ -3,8 +3,10 @@
 //! Values of the same job come along edges, as arguments. What comes from elsewhere
 //! is stated with [`Dag::using`]: a [`State`](crate::State) that subtasks of the DAG
 //! share, the [latest value](crate::Latest) of a topic of any DAG, a
-//! [signal](crate::Signal) that the subtask may raise, a [wire](crate::Wire) for bytes. The
-//! function then gets what it uses as its *first* argument, in front of the inputs:
+//! [signal](crate::Signal) that the subtask may raise, a [wire](crate::Wire) for bytes, a
+//! [parameter](crate::Parameter) that is set from outside, a DAG that it may
+//! [pause](crate::Switch), the [end](crate::Shutdown) of the run. The function then gets what it
+//! uses as its *first* argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
 //! |---|---|---|
@@ -12,8 +14,11 @@
 //! | [`State::read`](crate::State::read) | `&T` | precedence |
 //! | [`Latest::sample`](crate::Latest::sample) | `Option<Sample<T>>` | bounded staleness |
 //! | [`Signal::raising`](crate::Signal::raising) | `Raiser` | sporadic release |
+//! | [`Dag::switching`] | `Switch` | pauses (P1 to P5) |
+//! | [`shutting_down`](crate::shutting_down) | `Shutdown` | the end (C1 to C5) |
 //! | [`Wire::receiving`](crate::Wire::receiving) | `Received<T>` | input |
 //! | [`Wire::sending`](crate::Wire::sending) | `Sender` | output |
+//! | [`Parameter::reading`](crate::Parameter::reading) | `T` | input |
 //!
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
@@ -46,7 +51,7 @@ pub(crate) mod sealed {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is nothing that a subtask uses",
     label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `wire.receiving(decode)` and `wire.sending()`"
+    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()` and `parameter.reading()`"
 )]
 pub trait Uses: sealed::Sealed {
     /// What the function gets.

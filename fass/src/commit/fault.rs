@@ -130,6 +130,13 @@ pub enum Fault {
         /// The subtask.
         subtask: SubtaskLabel,
     },
+    /// A subtask may pause a DAG that is not in the commit.
+    SwitchedNotCommitted {
+        /// The DAG of the subtask.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+    },
     /// A subtask has a function for after a fault, and a fault ends its DAG.
     ReplacedInVain {
         /// The DAG.
@@ -188,6 +195,7 @@ impl Fault {
             Self::WcetsRefused { .. } => "wcets_refused",
             Self::LatestNotCommitted { .. } => "latest_not_committed",
             Self::SignalNotCommitted { .. } => "signal_not_committed",
+            Self::SwitchedNotCommitted { .. } => "switched_not_committed",
             Self::ReplacedInVain { .. } => "replaced_in_vain",
             Self::NothingReplaceable { .. } => "nothing_replaceable",
             Self::StateWithoutReset { .. } => "state_without_reset",
@@ -313,6 +321,11 @@ impl fmt::Display for Fault {
                 f,
                 "{subtask} of {dag} may raise the signal of a dag that is not in the commit; \
                  commit both dags in one call"
+            ),
+            Self::SwitchedNotCommitted { dag, subtask } => write!(
+                f,
+                "{subtask} of {dag} may pause a dag that is not in the commit; commit both dags in \
+                 one call"
             ),
             Self::ReplacedInVain { dag, subtask } => write!(
                 f,

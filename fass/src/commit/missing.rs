@@ -23,7 +23,7 @@ pub(super) fn others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
     });
     let is_target = |signal: &Arc<Target>, other: &Dag| {
         let other = other.draft.borrow();
-        let own = other.signal.as_ref();
+        let own = other.target.as_ref();
         own.is_some_and(|target| Arc::ptr_eq(signal, target))
     };
     // The fault of any subtask raises the DAG's; the first stands for them.
@@ -35,5 +35,11 @@ pub(super) fn others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
         dag: label.clone(),
         subtask: staleness::label_of(dag, subtask),
     });
-    latest.chain(signals).collect()
+    let switches = draft.switches.iter();
+    let unknown = switches.filter(|(_, target)| !dags.iter().any(|other| is_target(target, other)));
+    let switched = unknown.map(|(subtask, _)| Fault::SwitchedNotCommitted {
+        dag: label.clone(),
+        subtask: staleness::label_of(dag, *subtask),
+    });
+    latest.chain(signals).chain(switched).collect()
 }

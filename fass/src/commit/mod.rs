@@ -13,6 +13,8 @@
 //! 5. *Launch.* The platform takes the plan.
 
 pub(crate) mod answer;
+pub(crate) mod assign;
+pub(crate) mod chains;
 mod count;
 pub(crate) mod error;
 pub(crate) mod fault;

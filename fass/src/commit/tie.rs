@@ -3,11 +3,13 @@
 //! Edges get their rings, functions become bodies, signals learn their DAG, and
 //! latest values get their writers. All has been verified, so nothing can fail.
 
+use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 
+use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{DagId, DagSpec, OnFault, SubtaskSpec, TaskSet};
 
 use super::answer::Answers;
@@ -47,8 +49,8 @@ pub(crate) fn tie(
                     ..DagSpec::default()
                 };
                 let spec = core::mem::replace(&mut draft.spec, named);
-                if let Some(signal) = &draft.signal {
-                    signal.set(number, id);
+                if let Some(target) = &draft.target {
+                    target.set(number, id);
                 }
                 let effects = core::mem::take(&mut draft.effects);
                 let make_bodies = core::mem::take(&mut draft.make_bodies);
@@ -106,9 +108,17 @@ pub(crate) fn tie(
         bounds_ns: answers.bounds_ns(),
         sink_bounds_ns: answers.sink_bounds_ns(),
         after_fault: dags.iter().map(handler).collect(),
+        lifecycle: lifecycle(dags),
         staleness,
         samplers,
     }
+}
+
+/// Returns what serves the requests of the DAGs, if there can be any.
+fn lifecycle(dags: &[Dag]) -> Option<Box<dyn Lifecycle>> {
+    let make = dags.iter().find_map(|dag| dag.draft.borrow().lifecycle)?;
+    let drafts: Vec<_> = dags.iter().map(|dag| Rc::clone(&dag.draft)).collect();
+    Some(make(&drafts))
 }
 
 /// Returns what a DAG's subtasks sample of recorded topics.

@@ -26,6 +26,7 @@ pub struct SubtaskAttributes {
     pub(crate) priority: Option<u32>,
     pub(crate) wcet: Option<Duration>,
     pub(crate) budget: Option<Duration>,
+    pub(crate) stack_bytes: Option<u64>,
     pub(crate) non_preemptive: bool,
 }
 
@@ -86,6 +87,18 @@ impl SubtaskAttributes {
     /// ```
     pub fn budget(mut self, budget: Duration) -> Self {
         self.budget = Some(budget);
+        self
+    }
+
+    /// Sets the stack that the subtask needs, in bytes, from 16 KiB to 1 MiB; another number is
+    /// a fault at commit. Without it the kernel gives 64 KiB. The stacks of a commit are all as
+    /// large as the largest; `measure=stacks` says how much of them each subtask uses.
+    ///
+    /// ```
+    /// let attributes = fass::SubtaskAttributes::named("plan").stack_bytes(256 << 10);
+    /// ```
+    pub fn stack_bytes(mut self, bytes: u64) -> Self {
+        self.stack_bytes = Some(bytes);
         self
     }
 

@@ -13,11 +13,14 @@ pub(crate) mod flaw;
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::cell::RefCell;
 use core::fmt;
 use core::time::Duration;
 
+use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{Activation, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
@@ -32,6 +35,9 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 use crate::run::untyped;
 use attributes::SubtaskAttributes;
 use flaw::Flaw;
+
+/// Makes of all drafts of a commit what serves their requests.
+pub(crate) type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
 
 /// A DAG as registered so far.
 #[derive(Default)]
@@ -53,16 +59,26 @@ pub(crate) struct Draft {
     /// The latest values that subtasks sample, of whatever DAG, and the number that the subtask
     /// has there.
     pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>, usize)>,
+    /// The names of the parameters that sources read.
+    pub(crate) parameters: Vec<String>,
     /// The signals that subtasks may raise, of whatever DAG.
     pub(crate) raises: Vec<(usize, Arc<Target>)>,
+    /// The DAGs that subtasks may pause.
+    pub(crate) switches: Vec<(usize, Arc<Target>)>,
+    /// Whether it is paused at the beginning.
+    pub(crate) starts_paused: bool,
+    /// Whether a subtask may end the run.
+    pub(crate) may_shut_down: bool,
+    /// What makes that which serves requests, if it states something of that kind.
+    pub(crate) lifecycle: Option<MakeLifecycle>,
     /// What completions of subtasks do beyond the DAG, latest values apart.
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// The subtasks whose functions can be replaced.
     pub(crate) replaceable: Vec<usize>,
     /// What provides so many values of a state for after faults.
     pub(crate) resets: BTreeMap<usize, Box<dyn FnOnce(u32)>>,
-    /// What releases this DAG, if it is sporadic.
-    pub(crate) signal: Option<Arc<Target>>,
+    /// Which DAG it is, for others that send it signals, or pause it.
+    pub(crate) target: Option<Arc<Target>>,
     /// The signal that is raised when a fault ends the DAG.
     pub(crate) on_fault: Option<Arc<Target>>,
 }
@@ -161,6 +177,7 @@ impl Draft {
             name: attributes.name,
             wcet_ns,
             budget_ns,
+            stack_bytes: attributes.stack_bytes,
             priority: attributes.priority.map(Priority),
             non_preemptive: attributes.non_preemptive,
             ..SubtaskSpec::default()

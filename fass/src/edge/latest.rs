@@ -239,6 +239,7 @@ mod tests {
             bounds_ns: Vec::new(),
             sink_bounds_ns: Vec::new(),
             after_fault: Vec::new(),
+            lifecycle: None,
             staleness: Vec::new(),
             samplers: Vec::new(),
         };

@@ -2,13 +2,15 @@
 //!
 //! A *tape* takes what happens, from the core that completes: it allocates nothing and waits for
 //! nothing. The *drain* makes the file of it, whenever a core has time. A *replay* lends recorded
-//! values, and compares those that are computed. If neither is asked for, the inputs of the last
+//! values, and compares those that are computed. An *echo* keeps the latest value of a topic for
+//! people to look at. If none of these is asked for, the inputs of the last
 //! jobs may be kept, for the case that one fails.
 //!
 //! A platform reaches all this by what [`Platform::open_channels`](crate::Platform::open_channels)
 //! gives it, so that an image in which no topic is recorded has none of this code.
 
 mod drain;
+mod echo;
 mod guard;
 mod latest;
 mod machine;
@@ -18,8 +20,10 @@ mod tape;
 
 use alloc::boxed::Box;
 use alloc::string::String;
+use alloc::sync::Arc;
+use core::fmt;
 
-use recording::{Channel, DagHeader, Header};
+use recording::{Channel, DagHeader, Header, Schema};
 use sched_dag::journal::What;
 use sched_dag::{DagId, Instance, TaskSet};
 
@@ -49,6 +53,8 @@ pub enum Wish {
         /// How many jobs of each DAG.
         jobs: u32,
     },
+    /// Let people look at it, and do what else is wished.
+    Echo(Option<&'static Wish>),
 }
 
 /// Begins to do what is wished.
@@ -97,6 +103,53 @@ pub trait Crossing: Send {
 
     /// Returns what a replay has found; if the run is over, also a value that it has not computed.
     fn outcome(&self, is_over: bool) -> Option<Outcome>;
+
+    /// Returns what shows values to people, if they can look.
+    fn echo(&mut self) -> Option<&mut dyn Echoing> {
+        None
+    }
+}
+
+/// Shows values of a recorded topic while the run goes on.
+///
+/// See [`Crossing`].
+pub trait Echoing {
+    /// Keeps the latest value of this topic from now on, or nothing. Reports whether the topic is
+    /// recorded.
+    fn watch(&mut self, topic: Option<&str>) -> bool;
+
+    /// Takes the latest value out, if there is one since the last call. Allocates nothing.
+    fn take(&mut self, into: &mut [u8]) -> Option<Seen>;
+}
+
+/// A value of a topic that is watched.
+///
+/// See [`Echoing`].
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// The job that it is of.
+    pub job: u64,
+    /// How many values came since the one that was taken before, and were not.
+    pub left_out: u64,
+    /// How many bytes it has; `None`: more than there was room for.
+    length: Option<usize>,
+    schema: Arc<Schema>,
+    /// What makes its text, which only an image with a recorded topic has.
+    write: fn(&Schema, &[u8], &mut fmt::Formatter<'_>) -> fmt::Result,
+}
+
+impl Seen {
+    /// Returns the value in the buffer that it was taken into, as text. Nothing is allocated.
+    ///
+    /// See [`Echoing`].
+    #[must_use]
+    pub fn shown<'s>(&'s self, buffer: &'s [u8]) -> impl fmt::Display + 's {
+        let bytes = self.length.and_then(|length| buffer.get(..length));
+        fmt::from_fn(move |f| match bytes {
+            Some(bytes) => (self.write)(&self.schema, bytes, f),
+            None => write!(f, "(more than {} bytes)", buffer.len()),
+        })
+    }
 }
 
 /// Makes a file of what is recorded. Allocates nothing but for the header.
@@ -149,6 +202,7 @@ pub(crate) fn begin(wish: Wish) -> Box<dyn Crossing> {
         Wish::Record { app, bytes } => Box::new(tape::Tape::new(app, bytes)),
         Wish::Replay(bytes) => Box::new(machine::OfMachine::new(bytes)),
         Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
+        Wish::Echo(other) => Box::new(echo::Echo::new(other.map(|other| begin(*other)))),
     }
 }
 

@@ -15,6 +15,7 @@ pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod record;
 pub(crate) mod replaceable;
+pub(crate) mod request;
 pub(crate) mod reset;
 pub(crate) mod sample;
 mod sampling;

@@ -6,9 +6,10 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, TaskSet};
 
-use super::effect::Effect;
+use super::effect::{Act, Effect};
 use super::sample::SampledBy;
 use super::staleness::Staleness;
 
@@ -49,6 +50,9 @@ pub struct Plan {
     /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
     /// scheduler.
     pub after_fault: Vec<Option<DagId>>,
+    /// What serves requests other than signals, if a function may make one or a DAG begins
+    /// paused. A platform that takes no such requests refuses the plan.
+    pub lifecycle: Option<Box<dyn Lifecycle>>,
     /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
     /// passes between DAGs, for platforms that show it.
     pub staleness: Vec<Staleness>,
@@ -156,22 +160,22 @@ impl Body {
     }
 
     /// Publishes the effects that the last [`run`](Self::run) prepared outside the DAG:
-    /// its latest values show, and `raise` is called with the DAG of each signal.
+    /// its latest values show, and `ask` is called with each signal and each other request.
     ///
     /// The caller does so once the instance is complete for it, at `completed_ns` on
     /// the clock of [`crate::now_ns`], and not for an instance that failed. It passes
-    /// the signals to the scheduler with the completion. Does not wait, allocate or
+    /// the requests to the scheduler with the completion (`sched_dag::lifecycle` has what for). Does not wait, allocate or
     /// run code of the app; a body that has no such effects returns at once.
     ///
     /// ```
     /// fn completed(body: &mut fass::Body, now_ns: u64) {
-    ///     body.complete(now_ns, &mut |dag| println!("dag {} gets a signal", dag.0));
+    ///     body.complete(now_ns, &mut |request| println!("{request:?}"));
     /// }
     /// ```
     #[inline]
-    pub fn complete(&mut self, completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
+    pub fn complete(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
         for effect in &mut self.effects {
-            effect.happen(completed_ns, raise);
+            effect.happen(completed_ns, ask);
         }
     }
 
@@ -198,13 +202,26 @@ impl Body {
         self
     }
 
+    /// Has something done at each completion, after what the subtask itself prepared. As an
+    /// effect it must be short: it keeps the platform from deciding anything meanwhile.
+    ///
+    /// ```
+    /// fn counted(body: &mut fass::Body, count: &'static std::sync::atomic::AtomicU64) {
+    ///     use std::sync::atomic::Ordering::Relaxed;
+    ///     body.on_completion(Box::new(|| drop(count.fetch_add(1, Relaxed))));
+    /// }
+    /// ```
+    pub fn on_completion(&mut self, act: Box<dyn FnMut() + Send>) {
+        self.effects.push(Box::new(Act(act)));
+    }
+
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
     /// platform to which a clock is dear need not read it for the others.
     ///
     /// ```
-    /// fn completed(body: &mut fass::Body, raise: &mut dyn FnMut(sched_dag::DagId)) {
+    /// fn completed(body: &mut fass::Body, ask: &mut dyn FnMut(fass::Request)) {
     ///     if body.has_effects() {
-    ///         body.complete(fass::now_ns(), raise);
+    ///         body.complete(fass::now_ns(), ask);
     ///     }
     /// }
     /// ```

@@ -16,6 +16,7 @@ use core::mem;
 use core::sync::atomic::{AtomicU16, Ordering};
 
 use recording::{Channel, Encoder, Full, Recordable, Role, Schema};
+use sched_dag::lifecycle::Request;
 use sched_dag::wcets::graph_hash;
 use sched_dag::{DagId, DagSpec, TopicPort};
 
@@ -315,7 +316,7 @@ impl<T: Recordable> Stage<T> for Tap {
 impl Effect for Tap {
     // Compiled with the app: this crate's own code is compiled for size.
     #[inline]
-    fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         self.change(|room| {
             let job = mem::replace(&mut room.job, NO_JOB);
             if job != NO_JOB {

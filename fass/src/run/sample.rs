@@ -12,6 +12,7 @@ use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
 use recording::{Encoder, Recordable, Schema};
+use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Instance};
 
 use super::cell::Shared;
@@ -139,7 +140,7 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
 }
 
 impl Effect for Arc<SampleLine> {
-    fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         self.give(completed_ns);
     }
 

@@ -4,10 +4,12 @@ use alloc::sync::Arc;
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use sched_dag::DagId;
+use sched_dag::lifecycle::Request;
 
 use super::effect::Effect;
 
-/// Which DAG a signal releases, known from the commit on.
+/// Which DAG is meant, by a signal that releases it or a switch: known from the commit on.
+#[derive(Debug)]
 pub(crate) struct Target {
     /// The plan's number, 0 before the commit.
     plan: AtomicU64,
@@ -25,7 +27,12 @@ impl Target {
     /// Returns the plan's number and the DAG, once there are any.
     pub(crate) fn get(&self) -> Option<(u64, DagId)> {
         let plan = self.plan.load(Ordering::Acquire);
-        (plan > 0).then(|| (plan, DagId(self.dag.load(Ordering::Relaxed))))
+        (plan > 0).then(|| (plan, self.dag()))
+    }
+
+    /// Returns the DAG; to be called behind the commit.
+    pub(crate) fn dag(&self) -> DagId {
+        DagId(self.dag.load(Ordering::Relaxed))
     }
 
     /// Tells the signal its DAG.
@@ -48,10 +55,10 @@ impl Raised {
 }
 
 impl Effect for Raised {
-    fn happen(&mut self, _completed_ns: u64, raise: &mut dyn FnMut(DagId)) {
+    fn happen(&mut self, _completed_ns: u64, ask: &mut dyn FnMut(Request)) {
         if self.raised.load(Ordering::Relaxed) {
             self.raised.store(false, Ordering::Relaxed);
-            raise(DagId(self.target.dag.load(Ordering::Relaxed)));
+            ask(Request::Signal(self.target.dag()));
         }
     }
 }

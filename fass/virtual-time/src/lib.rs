@@ -330,7 +330,8 @@ impl VirtualTime {
     }
 
     /// Runs until every job of every DAG has ended, and reports all that
-    /// happened since the commit.
+    /// happened since the commit. (Where DAGs have no last job, that is when a function shuts
+    /// the run down, or never.)
     ///
     /// # Panics
     ///

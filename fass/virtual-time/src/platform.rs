@@ -17,8 +17,7 @@ use fass::{
 };
 
 use recording::Channel;
-use sched_dag::analysis::{self, NotAssigned, Settings};
-use sched_dag::{DagId, DagLabel, SchedulerOptions, TaskSet};
+use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
 use crate::error::RunError;
 use crate::job::JobShown;
@@ -150,19 +149,7 @@ impl Platform for HostPlatform {
         if !current().is_some_and(|machine| machine.assigns.get()) {
             return Ok(());
         }
-        let settings = Settings {
-            policy: self.policy(),
-            preemption: self.preemption(),
-            cores: self.cores(),
-            overheads: self.overheads(),
-        };
-        let assigned = analysis::assign(task_set, &settings);
-        let refused = assigned.map_err(|NotAssigned { dag: id, reason }| {
-            let name = task_set.dag(id).name().to_owned();
-            let dag = DagLabel { id, name };
-            format!("{dag} gets no cores: {reason}")
-        });
-        refused.map_err(LaunchError::new)
+        fass::assign_clusters(self, task_set)
     }
 
     fn overheads(&self) -> Overheads {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
+use sched_dag::chains::{Chain, Latencies};
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{self, Record, Terms, Violation};
 use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
@@ -125,6 +126,15 @@ impl Report {
         record.expect("the report's jobs fit into memory")
     }
 
+    /// Measures a chain that crosses DAGs: how old its outputs are, and how long it takes to
+    /// react. [`fass::EndToEnd`] has an example.
+    ///
+    /// See [`Report`].
+    #[must_use]
+    pub fn latencies(&self, chain: &Chain) -> Latencies {
+        chain.latencies(&self.task_set, self.events.iter().copied())
+    }
+
     /// Checks rules R1 to R5 of the task model over what was recorded, and
     /// returns what breaks them: nothing, unless the scheduler is wrong.
     ///
@@ -164,7 +174,7 @@ impl Report {
         let dag = self.dag_name(event.dag);
         let name = match event.instance() {
             Some(instance) => self.subtask_name(instance),
-            None if *what == What::Stopped => return format!("{time_ns} {what} {dag}"),
+            None if what.is_of_dag() => return format!("{time_ns} {what} {dag}"),
             None => dag,
         };
         let mut line = format!("{time_ns} {what} {name}[{job}]");

@@ -4,12 +4,13 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
 use sched_dag::DagId;
+use sched_dag::lifecycle::Request;
 
 use crate::edge::Edge;
 use crate::silent::Silent;
 use crate::wires::Wires;
 
-/// The time, the signals to come, and what is to become of a panic.
+/// The time, the requests to come, and what is to become of a panic.
 #[derive(Debug, Default)]
 pub(crate) struct Surroundings {
     /// How long calls take that do not say.
@@ -27,8 +28,8 @@ pub(crate) struct Surroundings {
     pub(crate) now_ns: Cell<u64>,
     /// What the running function has executed; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
-    /// The signals to come, by time and in the order of their raising.
-    signals: RefCell<BTreeMap<(u64, usize), DagId>>,
+    /// The requests to come, by time and in the order in which they were made.
+    requests: RefCell<BTreeMap<(u64, usize), Request>>,
 }
 
 impl Surroundings {
@@ -41,34 +42,46 @@ impl Surroundings {
 
     /// Notes a signal that is recorded, or one of a run that is no replay.
     pub(crate) fn signal_of_replay_at(&self, time_ns: u64, dag: DagId) {
-        let mut signals = self.signals.borrow_mut();
-        let mut of_this_time = signals.range((time_ns, 0)..=(time_ns, usize::MAX));
+        self.keep(time_ns, Request::Signal(dag));
+    }
+
+    /// Notes what a completion asks for.
+    pub(crate) fn request_at(&self, time_ns: u64, request: Request) {
+        match request {
+            Request::Signal(dag) => self.signal_at(time_ns, dag),
+            _ => self.keep(time_ns, request),
+        }
+    }
+
+    fn keep(&self, time_ns: u64, request: Request) {
+        let mut requests = self.requests.borrow_mut();
+        let mut of_this_time = requests.range((time_ns, 0)..=(time_ns, usize::MAX));
         let place = of_this_time
             .next_back()
             .map_or(0, |(&(_, last), _)| last + 1);
-        signals.insert((time_ns, place), dag);
+        requests.insert((time_ns, place), request);
     }
 
-    /// Returns the time of the next signal, or of bytes that may raise one.
-    pub(crate) fn next_signal_ns(&self) -> Option<u64> {
-        let signal_ns = self.raised_ns();
-        let times = [signal_ns, self.wires.next_ns()];
+    /// Returns the time of the next request, or of bytes that may raise a signal.
+    pub(crate) fn next_request_ns(&self) -> Option<u64> {
+        let times = [self.requested_ns(), self.wires.next_ns()];
         times.into_iter().flatten().min()
     }
 
-    fn raised_ns(&self) -> Option<u64> {
-        let signals = self.signals.borrow();
-        signals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
+    fn requested_ns(&self) -> Option<u64> {
+        let requests = self.requests.borrow();
+        requests.first_key_value().map(|(&(time_ns, _), _)| time_ns)
     }
 
-    /// Takes the next signal that is due by `now_ns`.
-    pub(crate) fn take_signal(&self, now_ns: u64) -> Option<DagId> {
+    /// Takes the next request that is due by `now_ns`.
+    pub(crate) fn take_request(&self, now_ns: u64) -> Option<Request> {
         while let Some(raised) = self.wires.arrive(now_ns) {
             raised
                 .into_iter()
                 .for_each(|dag| self.signal_at(now_ns, dag));
         }
-        self.raised_ns().filter(|&at_ns| at_ns <= now_ns)?;
-        self.signals.borrow_mut().pop_first().map(|(_, dag)| dag)
+        self.requested_ns().filter(|&at_ns| at_ns <= now_ns)?;
+        let (_, request) = self.requests.borrow_mut().pop_first()?;
+        Some(request)
     }
 }

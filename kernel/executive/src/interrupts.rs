@@ -37,7 +37,7 @@ pub fn wake_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
     let now_ns = clock::now_ns();
     core.interrupted_ns.store(now_ns, Ordering::Relaxed);
-    if core.index == 0 {
+    if execution::keeps_time(core) {
         execution::arm_next_event();
     }
     heartbeat::keep_beating(core);

@@ -6,6 +6,7 @@ use alloc::string::String;
 
 use fass::CommitError;
 
+use executive::text::json;
 use executive::text::options::UsageError;
 
 /// Why an app ends other than by success.
@@ -41,6 +42,42 @@ impl Ending {
             (result, _) => result,
         }
     }
+}
+
+/// How an app has ended, for the program or the machine that ends with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Told {
+    Success,
+    Usage,
+    Failure,
+}
+
+/// Prints how the app ended; the verdict is the last line.
+pub(crate) fn tell(result: &Result<(), Ending>) -> Told {
+    let (told, word) = match result {
+        Ok(()) | Err(Ending::Shutdown) => (Told::Success, "success"),
+        Err(Ending::Usage(_)) => (Told::Usage, "usage"),
+        Err(_) => (Told::Failure, "failure"),
+    };
+    if let Err(Ending::Commit(error)) = result {
+        for fault in error.faults() {
+            json::report("commit_fault", |line| {
+                line.text("fault", fault.code()).text("message", fault);
+            });
+        }
+    }
+    if let Err(ending) = result {
+        crate::println!("{ending}");
+    }
+    json::report("verdict", |line| {
+        line.text("status", word);
+        if let Err(ending) = result
+            && told != Told::Success
+        {
+            line.text("reason", ending);
+        }
+    });
+    told
 }
 
 impl From<UsageError> for Ending {

@@ -238,7 +238,7 @@ impl Machine {
         let allocations_before = heap::usage().allocations;
         let locks_before = execution::lock_acquisitions();
         console::defer();
-        execution::arm_next_event();
+        execution::arm_all();
         let mut background = Background::begin(self.wishes.with_input(self.input.get()), total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();
@@ -258,13 +258,14 @@ impl Machine {
         let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
-        wcet_notes::note(&run);
+        wcet_notes::note(&run, KERNEL.overheads());
         if let Some(line) = LINE.get() {
             line.report();
         }
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }
+        report::stacks::dump(&run);
         if self.dumps_times {
             report::times::dump(&run);
         }

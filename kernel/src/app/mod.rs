@@ -6,10 +6,14 @@
 //! gets back are made below, in `report` and `text`.
 
 pub(crate) mod bound_verdict;
+#[cfg(feature = "clusters")]
+mod clusters;
 pub(crate) mod ending;
 pub(crate) mod event;
 pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
+mod parameters;
+mod topics;
 mod wcet_notes;
 mod wires;

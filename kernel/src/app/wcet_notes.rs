@@ -5,24 +5,22 @@
 //! is named only if its longest call is above its WCET by more than the commit has charged
 //! for that.
 
-use fass::Platform;
+use fass::Overheads;
 use sched_dag::{DagId, Instance, SubtaskId};
 
 use crate::report::Ns;
 use crate::report::run::Run;
-use executive::run::platform::KERNEL;
 use executive::text::json;
 
-/// Names the subtasks of a run whose calls took longer than they may.
-pub(crate) fn note(run: &Run) {
+/// Names the subtasks of a run whose calls took longer than they may. The commit has reckoned
+/// with these overheads.
+pub(crate) fn note(run: &Run, overheads: Overheads) {
     let set = run.task_set();
     let mut subtasks = set.dags().iter().flat_map(|dag| dag.subtasks());
     if !subtasks.any(|subtask| subtask.wcet_ns().is_some()) {
         return;
     }
-    let charged_ns = KERNEL
-        .overheads()
-        .of_an_instance_ns(run.options().preemption);
+    let charged_ns = overheads.of_an_instance_ns(run.options().preemption);
     let (Some(charged_ns), Some(counts)) = (charged_ns, run.counts()) else {
         return;
     };

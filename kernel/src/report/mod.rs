@@ -2,10 +2,13 @@
 //! its statistics, and figures over many samples.
 //!
 //! All of it is computed from the journal, with the words of `text`. Nothing here is called
-//! while a run goes on.
+//! while a run goes on, but `latest` by a panic. `kernel/on-linux` compiles the files that know
+//! no machine a second time.
 
 mod distribution;
+pub(crate) mod latest;
 pub(crate) mod run;
+pub(crate) mod stacks;
 mod time;
 pub(crate) mod times;
 pub(crate) mod trace;

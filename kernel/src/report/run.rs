@@ -3,10 +3,11 @@
 use alloc::vec::Vec;
 use core::cell::OnceCell;
 
+use sched_dag::chains::{Chain, Latencies};
 use sched_dag::law::{Record, Tally, Violation};
 use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
 
-use executive::run::execution::{Execution, Snapshot};
+use executive::run::execution::{Ended, Snapshot};
 
 /// A run that has ended: its model, its times and its counts.
 ///
@@ -31,7 +32,7 @@ use executive::run::execution::{Execution, Snapshot};
 /// }
 /// ```
 pub struct Run {
-    execution: Execution,
+    ended: Ended,
     record: OnceCell<Record>,
     times: OnceCell<Option<Tally>>,
     allocations: u64,
@@ -49,13 +50,13 @@ impl core::fmt::Debug for Run {
 
 impl Run {
     pub(crate) const fn new(
-        execution: Execution,
+        ended: Ended,
         allocations: u64,
         lock_acquisitions: u32,
         epoch_ns: u64,
     ) -> Self {
         Self {
-            execution,
+            ended,
             record: OnceCell::new(),
             times: OnceCell::new(),
             allocations,
@@ -69,7 +70,7 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     pub fn task_set(&self) -> &TaskSet {
-        self.execution.task_set()
+        self.ended.task_set()
     }
 
     /// Returns the times of all jobs and instances, in nanoseconds from the
@@ -103,17 +104,17 @@ impl Run {
     /// ```
     #[must_use]
     pub fn times(&self) -> Option<&Tally> {
-        let tally = || self.journal().statistics(self.execution.task_set());
+        let tally = || self.journal().statistics(self.ended.task_set());
         self.times.get_or_init(tally).as_ref()
     }
 
     /// Returns counts and maxima of all times, as [`times`](Self::times) does, in less memory.
     pub(crate) fn counts(&self) -> Option<Tally> {
-        self.journal().coarse_statistics(self.execution.task_set())
+        self.journal().coarse_statistics(self.ended.task_set())
     }
 
-    pub(crate) const fn journal(&self) -> &Journal {
-        self.execution.journal()
+    pub(crate) fn journal(&self) -> &Journal {
+        self.ended.journal()
     }
 
     /// Returns the instant from which releases count, in nanoseconds since the
@@ -139,7 +140,7 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
-        self.execution.scheduler().statistics(dag)
+        self.ended.scheduler(dag).statistics(dag)
     }
 
     /// Returns how many jobs a sink has missed its deadline in, those included that
@@ -160,27 +161,27 @@ impl Run {
     /// ```
     #[must_use]
     pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
-        self.execution.scheduler().sink_misses(dag, sink)
+        self.ended.scheduler(dag).sink_misses(dag, sink)
     }
 
     /// Returns how the scheduler was told to work.
-    pub(crate) const fn options(&self) -> SchedulerOptions {
-        self.execution.scheduler().options()
+    pub(crate) fn options(&self) -> SchedulerOptions {
+        self.ended.options()
     }
 
     /// Returns the response time that the commit has proven for a sink, if it has.
     pub(crate) fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
-        self.execution.sink_bound_ns(dag, sink)
+        self.ended.sink_bound_ns(dag, sink)
     }
 
     /// Returns the response time that the commit has proven for a DAG, if it has.
     pub(crate) fn bound_ns(&self, dag: DagId) -> Option<u64> {
-        self.execution.bound_ns(dag)
+        self.ended.bound_ns(dag)
     }
 
     /// Returns how a DAG has ended.
     pub(crate) fn snapshot(&self, dag: DagId) -> Snapshot {
-        Snapshot::of(self.execution.scheduler(), dag)
+        Snapshot::of(self.ended.scheduler(dag), dag)
     }
 
     /// Returns every breach of the model's rules R1 to R4, and whether each instance had
@@ -205,6 +206,22 @@ impl Run {
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
         self.journal()
             .dispatch_violations(self.task_set(), &self.options(), bound_ns)
+    }
+
+    /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,
+    /// and how long it takes to react; of the latest jobs if events are lost.
+    ///
+    /// ```no_run
+    /// /// The longest time for which the motor obeyed what a camera saw.
+    /// fn longest_ns(run: &kernel::Run, commit: &fass::Commit) -> Option<u64> {
+    ///     let ways = commit.chains_between("camera/expose", "motor/drive");
+    ///     let of_way = |way: &fass::EndToEnd| run.latencies(&way.chain).data_age_ns.into_iter().max();
+    ///     ways.iter().filter_map(of_way).max()
+    /// }
+    /// ```
+    #[must_use]
+    pub fn latencies(&self, chain: &Chain) -> Latencies {
+        chain.latencies(self.task_set(), self.journal().events())
     }
 
     /// Returns how often anything, kernel or app, allocated memory between the

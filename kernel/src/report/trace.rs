@@ -6,7 +6,6 @@ use sched_dag::journal::Event;
 use sched_dag::{Dag, SubtaskId};
 
 use super::run::Run;
-use executive::run::execution;
 use executive::text::{graph, json};
 
 /// The most events on one line.
@@ -15,7 +14,7 @@ const EVENTS_A_LINE: usize = 32;
 /// Prints the model and the events of a run, the `number`th since boot.
 pub(crate) fn dump(run: &Run, number: u64) {
     json::emit("trace_begin", |line| {
-        graph::scheduling(line, &run.options());
+        graph::scheduling(line, &run.options(), run.task_set());
         line.number("run", number);
     });
     for (number, dag) in (0u32..).zip(run.task_set().dags()) {
@@ -41,32 +40,6 @@ pub(crate) fn dump(run: &Run, number: u64) {
             // A run ends when all its jobs have: nothing is still to come.
             .flag("complete", true);
     });
-}
-
-/// Returns the latest `most` events, a line each, the oldest first; none while the
-/// scheduler is at work.
-pub(crate) fn latest<const MOST: usize>() -> impl fmt::Display {
-    fmt::from_fn(move |f| {
-        let mut latest = [None; MOST];
-        execution::try_journal(|journal| journal.copy_back(journal.written(), &mut latest));
-        latest.iter().rev().flatten().try_for_each(|event| {
-            let Event {
-                time_ns,
-                what,
-                core,
-                dag,
-                job,
-                subtask,
-            } = event;
-            let (core, dag) = (core.0, dag.0);
-            write!(
-                f,
-                "  {time_ns:>12} ns  core {core} {what} dag {dag} job {job}"
-            )?;
-            subtask.map_or(Ok(()), |subtask| write!(f, " subtask {}", subtask.0))?;
-            writeln!(f)
-        })
-    })
 }
 
 fn as_json(event: Event) -> impl fmt::Display {

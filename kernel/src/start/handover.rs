@@ -11,7 +11,7 @@ use boot::{BootInfo, Framebuffer, List, Module};
 
 use super::{probe, settings};
 use crate::app::bound_verdict::BoundVerdict;
-use crate::app::ending::Ending;
+use crate::app::ending::{self, Ending, Told};
 use crate::app::fault_verdict::FaultVerdict;
 use crate::app::machine_handle::Machine;
 use crate::println;
@@ -302,9 +302,9 @@ fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u32, Stack
 }
 
 fn stacks(is_boot_processor: bool) -> Result<Stacks, OutOfMemory> {
-    let small = || memory::new_stack(HANDLER_STACK);
+    let small = || memory::new_stack(HANDLER_STACK, 0);
     Ok(Stacks {
-        first_context: contexts::create(is_boot_processor)?,
+        first_context: contexts::create_first(is_boot_processor)?,
         handler: small()?,
         exceptions: [small()?, small()?, small()?, small()?],
     })
@@ -364,29 +364,11 @@ fn run_app(info: &'static BootInfo, name: &'static str, app: App) -> Result<(), 
 
 /// Prints how the app ended, as the last line, and stops the machine.
 fn end(result: Result<(), Ending>) -> ! {
-    let (status, word) = match &result {
-        Ok(()) | Err(Ending::Shutdown) => (exit::Status::Success, "success"),
-        Err(Ending::Usage(_)) => (exit::Status::Usage, "usage"),
-        Err(_) => (exit::Status::Failure, "failure"),
+    let status = match ending::tell(&result) {
+        Told::Success => exit::Status::Success,
+        Told::Usage => exit::Status::Usage,
+        Told::Failure => exit::Status::Failure,
     };
-    if let Err(Ending::Commit(error)) = &result {
-        for fault in error.faults() {
-            json::report("commit_fault", |line| {
-                line.text("fault", fault.code()).text("message", fault);
-            });
-        }
-    }
-    if let Err(ending) = &result {
-        println!("{ending}");
-    }
-    json::report("verdict", |line| {
-        line.text("status", word);
-        if let Err(ending) = &result
-            && status != exit::Status::Success
-        {
-            line.text("reason", ending);
-        }
-    });
     console::resume();
     exit::exit(status)
 }

@@ -8,5 +8,6 @@
 mod handover;
 mod probe;
 mod settings;
+mod terms;
 
 pub(crate) use handover::start;

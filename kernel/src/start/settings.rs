@@ -15,7 +15,7 @@
 //! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
-//! | `measure=nothing\|interrupts` | whether sections without interrupts are measured | `nothing` |
+//! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or how much each subtask uses of its stack | `nothing` |
 //! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
 //! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
@@ -25,22 +25,15 @@
 //! | `avx=on\|off` | whether functions can use AVX, where the processor has it | `on` |
 //! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left them so, they stay | `off` |
 
-use alloc::format;
-
 use fass::edge::Wish;
-use fass::{Overheads, Policy, Preemption};
 
+use super::terms::Terms;
 use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
-use executive::run::{edge, worker};
+use executive::run::{edge, stacks, worker};
 use executive::text::graph;
 use executive::text::options::{Options, UsageError};
-
-const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
-
-const PREEMPTIONS: [(&str, Preemption); 2] =
-    [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
 
 /// What the words say about tracing and the background; all else is set where it
 /// belongs.
@@ -94,19 +87,23 @@ impl Settings {
 
 /// Takes the kernel's words and does what they say.
 pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
-    KERNEL.set_policy(options.choice("policy", &POLICIES)?);
-    KERNEL.set_preemption(options.choice("preemption", &PREEMPTIONS)?);
-    KERNEL.set_budget_factor(options.number("budget_factor", 0..=1_000_000, 10)?);
-    KERNEL.set_overheads(overheads(options)?);
+    let terms = Terms::read(options)?;
+    KERNEL.set_policy(terms.policy);
+    KERNEL.set_preemption(terms.preemption);
+    KERNEL.set_budget_factor(terms.budget_factor);
+    KERNEL.set_overheads(terms.overheads);
     if options.choice("graph", &[("keep", false), ("dump", true)])? {
         graph::enable();
     }
     if options.choice("idle", &[("halt", false), ("poll", true)])? {
         worker::watch_when_idle();
     }
-    if options.choice("measure", &[("nothing", false), ("interrupts", true)])? {
-        interrupts_off::enable();
-    }
+    let measures: [(_, fn()); 3] = [
+        ("nothing", || ()),
+        ("interrupts", interrupts_off::enable),
+        ("stacks", stacks::enable),
+    ];
+    options.choice("measure", &measures)?();
     // What time means is the host's choice.
     if options.text("mode") == Some("deterministic") {
         counted_time::enable();
@@ -151,20 +148,5 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
             status_ns: status_s * 1_000_000_000,
         },
         judges_bounds: options.text("mode") != Some("threads"),
-    })
-}
-
-fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {
-    let numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
-    let [context_switch_ns, dispatch_ns, interrupt_ns] = numbers[..] else {
-        return Err(UsageError::new(format!(
-            "`overheads_ns` has {} numbers; give three: context switch, dispatch, interrupt",
-            numbers.len()
-        )));
-    };
-    Ok(Overheads {
-        context_switch_ns,
-        dispatch_ns,
-        interrupt_ns,
     })
 }

@@ -88,7 +88,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         write_in_emergency(format_args!("{registers}"));
     }
     if core.is_some() {
-        write_in_emergency(format_args!("{}", report::trace::latest::<EVENTS_SHOWN>()));
+        write_in_emergency(format_args!("{}", report::latest::latest::<EVENTS_SHOWN>()));
     }
     let line = json::line(what, |line| {
         line.number("cpu", index);

@@ -126,6 +126,22 @@ impl Other {
         (count, pieces.map(|piece| piece.value))
     }
 
+    /// Returns the workload on at most `cores` cores if the job waits for the whole window.
+    pub(super) fn while_waiting(&self, window_ns: u64, cores: usize) -> Piece {
+        let times = (window_ns, u64::MAX);
+        let count = cores.min(self.whole.len());
+        self.pieces(times, count, Some(self.of_chains(times)))[1]
+    }
+
+    /// Returns a window of which, as of all longer ones, a job up to a length may wait for as
+    /// long as any of the workloads lasts; `None` if there is none within the limit.
+    pub(super) fn settled_ns(&self, longest_ns: u64, until_ns: u64) -> Option<u64> {
+        let all = || self.whole.iter().chain(&self.rest).chain(&self.chains);
+        let doubled = core::iter::successors(Some(longest_ns.max(1)), |ns| ns.checked_mul(2));
+        let mut windows = doubled.take_while(|&window_ns| window_ns <= until_ns);
+        windows.find(|&window_ns| all().all(|one| one.fits(window_ns, window_ns - longest_ns)))
+    }
+
     fn of_chains(&self, (window_ns, waiting_ns): (u64, u64)) -> Piece {
         self.chains.iter().fold(Piece::NONE, |sum, chain| {
             sum.and(chain.at(window_ns).least(chain.over(waiting_ns)))

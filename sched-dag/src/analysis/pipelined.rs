@@ -42,7 +42,8 @@
 
 use alloc::vec::Vec;
 
-use super::interference::{Other, Shape};
+use super::above::Above;
+use super::interference::Shape;
 use super::non_preemptive::Blocking;
 use super::task::Task;
 use super::workload::Piece;
@@ -136,7 +137,7 @@ impl Figures {
     /// must not exceed the least solution (0 always is right).
     pub(super) fn solve(
         &self,
-        others: &[Other],
+        others: &dyn Above,
         start_ns: u64,
         steps: &mut u64,
     ) -> Result<u64, Unsolved> {
@@ -158,7 +159,7 @@ impl Figures {
     /// jobs before the chain's first can run.
     pub(super) fn windows(
         &self,
-        others: &[Other],
+        others: &dyn Above,
         response_ns: u64,
     ) -> Result<(Vec<u128>, u128), Unsolved> {
         let (mut windows, mut steps) = (Vec::new(), STEP_LIMIT);
@@ -172,7 +173,7 @@ impl Figures {
         &self,
         windows: &mut Vec<u128>,
         response: u128,
-        others: &[Other],
+        others: &dyn Above,
         steps: &mut u64,
     ) -> Result<(), Unsolved> {
         let own = self.other_jobs(self.whole.unwrap_or(response))?;
@@ -214,14 +215,15 @@ impl Figures {
         &self,
         back: u64,
         own: u128,
-        others: &[Other],
+        others: &dyn Above,
         start: u128,
         steps: &mut u64,
     ) -> Result<u128, Unsolved> {
         let back = u128::from(back);
         let limit = self.deadline + back * self.period;
         let cores = self.cores as u128;
-        let mut window = start.max(self.chain(back));
+        let waiting = u128::from(others.least_waiting_ns(self.cores));
+        let mut window = start.max(self.chain(back) + waiting);
         while window <= limit {
             *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
             let length = u64::try_from(window).map_err(|_| Unsolved::Limit)?;
@@ -240,14 +242,11 @@ impl Figures {
     }
 
     /// Returns what the cores execute at most while a chain over `back` releases waits.
-    pub(super) fn busy(&self, back: u128, own: u128, others: &[Other], window_ns: u64) -> Piece {
+    pub(super) fn busy(&self, back: u128, own: u128, others: &dyn Above, window_ns: u64) -> Piece {
         let constant = (back * self.volume + self.last_volume - self.chain(back))
             .saturating_add(own)
             .saturating_add(self.blocking.along_a_chain(self.cores, back));
-        let pieces = others
-            .iter()
-            .map(|other| other.on_all_cores().at(window_ns));
-        let sum = pieces.fold(Piece::NONE, Piece::and);
+        let sum = others.on_all_cores(window_ns);
         let value = sum.value.saturating_add(constant);
         Piece { value, ..sum }
     }

@@ -16,14 +16,28 @@
 //! A DAG that fails takes those with it that it may outrank, since their
 //! workloads would rest on a bound that does not exist; others keep theirs.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
+use super::above::Above;
 use super::interference::{Clip, Other, Shape};
 use super::multi_path::{Equations, alone};
 use super::pipelined::{Figures, STEP_LIMIT, Unsolved};
 use super::refusal::Refusal;
 use super::task::Task;
 use super::workload::Workload;
+
+/// What is above the next DAG of an order in which each may outrank those after it.
+pub(super) trait Front {
+    /// Returns the DAGs so far, or the first in the order of the commit that has no bound.
+    fn among(&self) -> Result<&dyn Above, usize>;
+
+    /// Adds the next DAG of the order.
+    fn push(&mut self, set: &Set<'_>, dag: usize, response_ns: Option<u64>);
+}
+
+/// Makes a front before the first DAG of a set.
+pub(super) type NewFront = fn(&Set<'_>) -> Box<dyn Front>;
 
 /// DAGs with what enters their equations.
 pub(super) struct Set<'a> {
@@ -37,6 +51,8 @@ pub(super) struct Set<'a> {
     pub(super) clip: Clip,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
+    /// How workloads are added up, if they shall be.
+    pub(super) front: Option<NewFront>,
 }
 
 /// What is known about each DAG of a set.
@@ -84,6 +100,7 @@ impl<'a> Set<'a> {
             deadlines_limit: false,
             clip: Clip::Chains,
             known: alloc::vec![None; tasks.len()],
+            front: None,
         }
     }
 
@@ -94,52 +111,86 @@ impl<'a> Set<'a> {
         order: &[usize],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Solution {
-        let mut responses: Vec<Option<u64>> =
-            (0..self.tasks.len()).map(|dag| self.start(dag)).collect();
-        let mut first_failing = None;
-        let mut failures = alloc::vec![None; self.tasks.len()];
+        let mut solution = Solution {
+            responses: (0..self.tasks.len()).map(|dag| self.start(dag)).collect(),
+            first_failing: None,
+            failures: alloc::vec![None; self.tasks.len()],
+        };
         let mut steps = STEP_LIMIT;
-        let mut changed = true;
-        while changed {
-            changed = false;
-            for &dag in order.iter().filter(|&&dag| self.known[dag].is_none()) {
-                let Some(before) = responses[dag] else {
-                    continue;
-                };
-                let after = match self.interference(dag, &responses, &may_outrank) {
-                    Err(other) => Err(Failure::Other(other)),
-                    Ok(others) => self
-                        .respond(dag, &others, before, &mut steps)
-                        .map_err(|why| {
-                            first_failing.get_or_insert((dag, why));
-                            Failure::Own(why)
-                        }),
-                };
-                failures[dag] = after.err();
-                let after = after.ok();
-                changed |= after != responses[dag];
-                responses[dag] = after;
+        if let Some(mut above) = self.above(order, &may_outrank) {
+            for &dag in order {
+                if self.known[dag].is_none() {
+                    self.visit(dag, above.among(), &mut solution, &mut steps);
+                }
+                above.push(self, dag, solution.responses[dag]);
+            }
+        } else {
+            let mut changed = true;
+            while changed {
+                changed = false;
+                for &dag in order.iter().filter(|&&dag| self.known[dag].is_none()) {
+                    if let before @ Some(_) = solution.responses[dag] {
+                        let others = self.interference(dag, &solution.responses, &may_outrank);
+                        let others = others.as_ref().map(|list| list as &dyn Above);
+                        let others = others.map_err(|&other| other);
+                        self.visit(dag, others, &mut solution, &mut steps);
+                        changed |= solution.responses[dag] != before;
+                    }
+                }
             }
         }
-        if let Some((_, Unsolved::Limit)) = first_failing
+        if let Some((_, Unsolved::Limit)) = solution.first_failing
             && let Ok(coarse) = self.down_from_deadlines(&may_outrank)
         {
-            responses = coarse.into_iter().map(Some).collect();
-            first_failing = None;
-            failures.fill(None);
+            solution.responses = coarse.into_iter().map(Some).collect();
+            solution.first_failing = None;
+            solution.failures.fill(None);
         }
-        Solution {
-            responses,
-            first_failing,
-            failures,
-        }
+        solution
+    }
+
+    /// Raises the response time of a DAG among others to what its equations give, if none of
+    /// the others has failed.
+    fn visit(
+        &self,
+        dag: usize,
+        others: Result<&dyn Above, usize>,
+        solution: &mut Solution,
+        steps: &mut u64,
+    ) {
+        let start_ns = solution.responses[dag].unwrap_or(0);
+        let after = match others {
+            Err(other) => Err(Failure::Other(other)),
+            Ok(others) => self.respond(dag, others, start_ns, steps).map_err(|why| {
+                solution.first_failing.get_or_insert((dag, why));
+                Failure::Own(why)
+            }),
+        };
+        solution.failures[dag] = after.err();
+        solution.responses[dag] = after.ok();
+    }
+
+    /// Returns an empty front if each DAG of an order may outrank those after it and no other,
+    /// and workloads shall be added up.
+    ///
+    /// It is enough to look at neighbours: a DAG has its most and its least urgent priority,
+    /// and the order is by the most urgent one.
+    pub(super) fn above(
+        &self,
+        order: &[usize],
+        may_outrank: impl Fn(usize, usize) -> bool,
+    ) -> Option<Box<dyn Front>> {
+        let front = self.front.filter(|_| self.clip == Clip::Chains)?;
+        let goes_down =
+            |pair: &[usize]| may_outrank(pair[0], pair[1]) && !may_outrank(pair[1], pair[0]);
+        order.windows(2).all(goes_down).then(|| front(self))
     }
 
     /// Returns the least response time of a DAG among others, if it is at least `start_ns`.
     pub(super) fn respond(
         &self,
         dag: usize,
-        others: &[Other],
+        others: &dyn Above,
         start_ns: u64,
         steps: &mut u64,
     ) -> Result<u64, Unsolved> {
@@ -235,7 +286,7 @@ impl<'a> Set<'a> {
     }
 
     /// Describes what a DAG with a response-time bound may execute next to another one.
-    fn other(&self, other: usize, response_ns: u64, limit_ns: Option<u64>) -> Other {
+    pub(super) fn other(&self, other: usize, response_ns: u64, limit_ns: Option<u64>) -> Other {
         let (task, shape) = (self.tasks[other], &self.shapes[other]);
         let limit = |workload: Workload| match limit_ns {
             Some(limit_ns) => workload.under_edf(task.least_deadline_ns(), limit_ns),

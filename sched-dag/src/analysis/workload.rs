@@ -132,6 +132,13 @@ impl Workload {
         }
     }
 
+    /// Reports whether what executes in a window fits into some time on its cores; not of jobs
+    /// that overlap, nor under a limit, of which more may be said.
+    pub(super) fn fits(&self, window_ns: u64, time_ns: u64) -> bool {
+        let is_plain = self.lanes == 1 && self.ceiling.is_none();
+        is_plain && self.at(window_ns).value <= self.over(time_ns).value
+    }
+
     /// Returns the closed form for one lane, without the cap.
     fn lane(&self, window: u128) -> Piece {
         let area = self.parallelism * (window + self.response);

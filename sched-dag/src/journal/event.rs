@@ -78,6 +78,15 @@ impl Event {
         [time_ns, subject.job, rest]
     }
 
+    /// Returns the words of an event whose core counts from another one, modulo 2^16.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "a part of a word is meant")]
+    pub(crate) const fn on_core_from([time_ns, job, rest]: [u64; 3], first: u32) -> [u64; 3] {
+        let core = ((rest >> CORE) as u16).wrapping_add(first as u16);
+        let others = rest & !((u16::MAX as u64) << CORE);
+        [time_ns, job, others | (core as u64) << CORE]
+    }
+
     /// Packs the event.
     #[must_use]
     pub fn pack(&self) -> [u64; 3] {

@@ -55,10 +55,17 @@ pub enum What {
     /// The instance was ended by a fault, which has cut its job, and its subtask goes on
     /// with another function.
     Restarted,
+    /// A DAG is paused: it releases no job from now on. As with the two that follow, the
+    /// event's job is 0 and means nothing.
+    Off,
+    /// A DAG is resumed: what is due from now on is released.
+    On,
+    /// A DAG is closed: it releases no further job.
+    Closed,
 }
 
 /// All of it, by number, as it is printed.
-const WORDS: [(What, &str); 19] = [
+const WORDS: [(What, &str); 22] = [
     (What::Released, "released"),
     (What::Queued, "queued"),
     (What::Skipped, "skipped"),
@@ -78,6 +85,9 @@ const WORDS: [(What, &str); 19] = [
     (What::Due, "due"),
     (What::Stopped, "stopped"),
     (What::Restarted, "restarted"),
+    (What::Off, "off"),
+    (What::On, "on"),
+    (What::Closed, "closed"),
 ];
 
 /// A text that is none of the words.
@@ -100,6 +110,12 @@ impl What {
     #[must_use]
     pub const fn word(self) -> &'static str {
         WORDS[self as usize].1
+    }
+
+    /// Reports whether it happens to a DAG as a whole, so that the job means nothing.
+    #[must_use]
+    pub const fn is_of_dag(self) -> bool {
+        matches!(self, Self::Stopped | Self::Off | Self::On | Self::Closed)
     }
 
     /// Reports whether it happens to a job or a DAG, not to an instance.
@@ -150,7 +166,7 @@ mod tests {
             assert_eq!(What::from_number(number), Some(what));
             assert_eq!(what.to_string().parse(), Ok(what));
         }
-        assert_eq!(What::from_number(19), None);
+        assert_eq!(What::from_number(22), None);
         assert_eq!("Start".parse::<What>(), Err(UnknownWord));
     }
 }

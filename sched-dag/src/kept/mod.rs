@@ -1,5 +1,8 @@
 //! The journal that a driver keeps of a run: what happened when, on all cores, in one list.
 //!
+//! (If the cores are divided, each cluster keeps one of its own, and the run's is what they
+//! come to together.)
+//!
 //! Every event but a core's clock is read and written under the scheduler's lock, so
 //! the list is in the order in which the scheduler learnt of things, and needs neither
 //! atomics nor a lock of its own. It is written once a moment and read after the run:
@@ -18,11 +21,12 @@
 //! Times are nanoseconds since the run's epoch.
 
 mod judged;
+mod merged;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use crate::ids::CoreId;
+use crate::ids::{ClusterId, CoreId};
 use crate::journal::{Event, Subject, What};
 use crate::law::Tally;
 use crate::task_set::{Dag, TaskSet};
@@ -53,9 +57,31 @@ pub struct Journal {
 impl Journal {
     /// Takes the memory for a run, of `free_bytes`, and for at most `most_events` events.
     #[must_use]
-    #[inline(never)]
     pub fn new(task_set: &Arc<TaskSet>, free_bytes: usize, most_events: u64) -> Self {
-        let needed = events_of(task_set);
+        Self::of(task_set, None, free_bytes, most_events)
+    }
+
+    /// Takes it likewise for what happens to the DAGs of one cluster.
+    #[must_use]
+    pub fn of_cluster(
+        task_set: &Arc<TaskSet>,
+        cluster: ClusterId,
+        free_bytes: usize,
+        most_events: u64,
+    ) -> Self {
+        Self::of(task_set, Some(cluster), free_bytes, most_events)
+    }
+
+    #[inline(never)]
+    fn of(
+        task_set: &Arc<TaskSet>,
+        cluster: Option<ClusterId>,
+        free_bytes: usize,
+        most_events: u64,
+    ) -> Self {
+        let is_here = |dag: &&Dag| cluster.is_none_or(|cluster| cluster == dag.cluster());
+        let mut here = task_set.dags().iter().filter(is_here);
+        let needed = events_of(here.clone());
         let wished = usize::try_from(most_events).unwrap_or(usize::MAX);
         let affordable = free_bytes / 4 / size_of::<[u64; 3]>();
         let room = needed.unwrap_or(EVENTS_WITHOUT_END);
@@ -66,7 +92,7 @@ impl Journal {
             room /= 2;
         }
         // Nothing says how many signals are dropped.
-        let has_signals = task_set.dags().iter().any(Dag::is_sporadic);
+        let has_signals = here.any(Dag::is_sporadic);
         let is_enough = needed.is_some_and(|needed| needed <= room && !has_signals);
         let tally = (!is_enough && room > 0).then(|| tally(task_set, free_bytes / 8));
         Self {
@@ -160,9 +186,12 @@ impl Journal {
 
     /// Returns the events that are left, in their order.
     pub fn events(&self) -> impl DoubleEndedIterator<Item = Event> + Clone {
+        self.words().filter_map(|words| Event::unpack(*words))
+    }
+
+    fn words(&self) -> impl DoubleEndedIterator<Item = &[u64; 3]> + Clone {
         let (newer, older) = self.events.split_at(self.oldest);
-        let words = older.iter().chain(newer);
-        words.filter_map(|words| Event::unpack(*words))
+        older.iter().chain(newer)
     }
 
     /// Returns how many events were written, and so the number of the next one.
@@ -191,14 +220,13 @@ impl Journal {
 }
 
 /// Returns how many events a run can have; `None` if there is no last job.
-fn events_of(task_set: &TaskSet) -> Option<usize> {
+fn events_of<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> Option<usize> {
     let of_dag = |dag: &Dag| {
         // Released, due, queued or skipped, aborted, missed, completed, signalled.
         let a_job = dag.subtasks().len().checked_mul(6)?.checked_add(7)?;
         let jobs = usize::try_from(dag.jobs()?).ok()?;
         jobs.checked_mul(a_job)?.checked_add(1)
     };
-    let mut dags = task_set.dags().iter();
     dags.try_fold(0usize, |sum, dag| sum.checked_add(of_dag(dag)?))
 }
 

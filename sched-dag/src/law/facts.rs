@@ -34,6 +34,7 @@ impl Record {
                 What::Stopped => {
                     stopped_ns[index].get_or_insert(event.time_ns);
                 }
+                what if what.is_of_dag() => {}
                 _ => match event.instance() {
                     Some(instance) => {
                         record.note_instance(instance, &event);
@@ -136,7 +137,8 @@ fn jobs(
         let of_dag = &mut jobs[event.dag.index()];
         match event.what {
             What::Due => due_ns[event.dag.index()] = event.time_ns,
-            What::Signalled | What::Dropped | What::Stopped => {}
+            What::Signalled | What::Dropped => {}
+            what if what.is_of_dag() => {}
             _ if is_whole => *of_dag = (0, of_dag.1.max(event.job + 1)),
             What::Released => {
                 let model = task_set.dag(event.dag);

@@ -19,7 +19,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 
 use super::Histogram;
-use crate::ids::{DagId, Instance, SubtaskId, Vertex, to_u32};
+use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::journal::{Event, What};
 use crate::task_set::{Dag, TaskSet};
 
@@ -142,6 +142,21 @@ impl Tally {
         &self.subtasks[vertex.index()]
     }
 
+    /// Takes over what another one says of the DAGs of a cluster.
+    pub(crate) fn adopt(&mut self, other: Self, cluster: ClusterId) {
+        let of_dags = self.dags.iter_mut().zip(other.dags);
+        let mut subtasks = self.subtasks.iter_mut().zip(other.subtasks);
+        for (model, (ours, theirs)) in self.task_set.dags().iter().zip(of_dags) {
+            let of_dag = subtasks.by_ref().take(model.subtasks().len());
+            if model.cluster() == cluster {
+                *ours = theirs;
+                of_dag.for_each(|(ours, theirs)| *ours = theirs);
+            } else {
+                of_dag.for_each(drop);
+            }
+        }
+    }
+
     /// Forgets the jobs in flight, because events of them are missing.
     pub fn skip(&mut self) {
         for dag in &mut self.dags {
@@ -173,6 +188,7 @@ impl Tally {
                 }
                 return;
             }
+            what if what.is_of_dag() => return,
             _ => {}
         }
         let Some(place) = dag.place(event.job) else {

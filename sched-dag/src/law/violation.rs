@@ -41,6 +41,8 @@ pub enum Violation {
     NotReleased { event: Event, is_over: bool },
     /// R1: nothing says when a sporadic job was due.
     NotDue { event: Event },
+    /// R1: a job was released of a DAG that was paused or closed.
+    WhileOff { event: Event },
     /// R1: a sporadic job's release is less than one minimum inter-arrival time after
     /// the one before it, or before the offset.
     TooSoon {
@@ -152,6 +154,7 @@ impl Violation {
             | Self::BeforeReleased { .. }
             | Self::NotReleased { .. }
             | Self::NotDue { .. }
+            | Self::WhileOff { .. }
             | Self::TooSoon { .. }
             | Self::OutOfOrder { .. }
             | Self::TooMany { .. }
@@ -190,6 +193,7 @@ impl Violation {
             | Self::BeforeReleased { event, .. }
             | Self::NotReleased { event, .. }
             | Self::NotDue { event }
+            | Self::WhileOff { event }
             | Self::OutOfOrder { event, .. }
             | Self::TooMany { event, .. }
             | Self::Unpunctual { event, .. }

@@ -151,6 +151,7 @@ impl Words<'_> {
                 false => f.write_str(" although its job was never released"),
             },
             Violation::NotDue { .. } => f.write_str(", and nothing says when it was due"),
+            Violation::WhileOff { .. } => f.write_str(" although its DAG is paused or closed"),
             Violation::OutOfOrder { later, .. } => write!(f, " after job {later}"),
             Violation::TooMany { in_flight, .. } => {
                 write!(
@@ -325,6 +326,7 @@ impl fmt::Display for Words<'_> {
             | Violation::BeforeReleased { event, .. }
             | Violation::NotReleased { event, .. }
             | Violation::NotDue { event }
+            | Violation::WhileOff { event }
             | Violation::OutOfOrder { event, .. }
             | Violation::TooMany { event, .. }
             | Violation::Unpunctual { event, .. }

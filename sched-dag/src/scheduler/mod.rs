@@ -38,6 +38,7 @@
 
 mod bits;
 mod by_deadline;
+mod closing;
 mod cores;
 mod decision;
 mod dispatch;
@@ -253,7 +254,7 @@ impl Scheduler {
 
     /// Reports whether nothing of a DAG is left to be done: no job is in flight,
     /// and none is to come. A DAG without a limit of jobs is over only once it
-    /// [is ended](Self::is_ended) and what it had started has ended; but a sporadic
+    /// [is closed](Self::is_closed) and what it had started has ended; but a sporadic
     /// one is over whenever no signal is pending, and may begin again.
     ///
     /// # Panics
@@ -264,6 +265,18 @@ impl Scheduler {
     pub fn is_over(&self, dag: DagId) -> bool {
         let state = &self.dags[dag.index()];
         state.jobs.are_over(self.task_set.dag(dag))
+    }
+
+    /// Reports whether a DAG releases no further job, whatever comes: it was closed by
+    /// [`Moment::close`], or [is ended](Self::is_ended).
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    #[inline]
+    pub fn is_closed(&self, dag: DagId) -> bool {
+        self.dags[dag.index()].jobs.is_closed()
     }
 
     /// Reports whether a DAG was ended by [`Moment::fail`] or [`Moment::stop`].

@@ -78,7 +78,7 @@ impl<'s> Moment<'s> {
 
     /// Pauses a DAG: from now on its due jobs are skipped, and what is in flight
     /// goes on (the module `pausing` states the rules). Does nothing if the DAG
-    /// is ended.
+    /// is closed or ended.
     ///
     /// # Panics
     ///
@@ -94,8 +94,18 @@ impl<'s> Moment<'s> {
     ///
     /// If there is no such DAG.
     #[inline]
-    pub fn resume(&mut self, dag: DagId) {
-        self.scheduler.resume(dag);
+    pub fn resume(&mut self, dag: DagId, observer: &mut impl Observer) {
+        self.scheduler.resume(dag, observer);
+    }
+
+    /// Closes a DAG: it releases no further job, and is over when what is in flight has
+    /// ended (the module `closing` states the rules). Does nothing if it is closed or ended.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    pub fn close(&mut self, dag: DagId, observer: &mut impl Observer) {
+        self.scheduler.close(dag, observer);
     }
 
     /// Takes note of an event that a sporadic DAG waits for. Its next job is due

@@ -62,6 +62,21 @@ pub trait Observer {
         let _ = dag;
     }
 
+    /// The DAG is paused: it releases no job from now on.
+    fn switched_off(&mut self, dag: DagId) {
+        let _ = dag;
+    }
+
+    /// The DAG is resumed: what is due from now on is released.
+    fn switched_on(&mut self, dag: DagId) {
+        let _ = dag;
+    }
+
+    /// The DAG is closed: it releases no further job.
+    fn closed(&mut self, dag: DagId) {
+        let _ = dag;
+    }
+
     /// The deadline of job `job` has passed, and the job is not complete.
     fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
         let _ = (dag, job, deadline_ns);
@@ -105,6 +120,9 @@ pass_on! {
     aborted(dag: DagId, job: u64);
     restarted(instance: Instance);
     ended(dag: DagId);
+    switched_off(dag: DagId);
+    switched_on(dag: DagId);
+    closed(dag: DagId);
     deadline_missed(dag: DagId, job: u64, deadline_ns: u64);
     job_completed(dag: DagId, job: u64, outcome: JobOutcome);
 }

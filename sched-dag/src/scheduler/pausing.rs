@@ -13,7 +13,7 @@
 //! - **P4, resuming.** The first job that is due at the instant of the resumption
 //!   or later is released at its nominal release time.
 //! - **P5, the end.** Skipped jobs count towards the limit of jobs, so a paused
-//!   DAG with a limit comes to its end. An ended DAG is neither paused nor
+//!   DAG with a limit comes to its end. A closed or ended DAG is neither paused nor
 //!   resumed.
 //!
 //! To the other rules a pause is nothing new: a job is skipped as with
@@ -49,12 +49,14 @@ impl Scheduler {
 
     /// Pauses a DAG (P1, P2).
     pub(super) fn pause(&mut self, dag: DagId, observer: &mut impl Observer) {
-        if self.is_ended(dag) {
+        if self.is_closed(dag) {
             return;
         }
         // What was late before the pause is a miss.
         self.judge(dag, None, observer);
-        self.dags[dag.index()].is_paused = true;
+        if !core::mem::replace(&mut self.dags[dag.index()].is_paused, true) {
+            observer.switched_off(dag);
+        }
         while self.waiting(dag) > 0 {
             self.skip_oldest_waiting(dag, observer);
         }
@@ -63,10 +65,11 @@ impl Scheduler {
 
     /// Ends the pause of a DAG (P4).
     #[inline]
-    pub(super) fn resume(&mut self, dag: DagId) {
+    pub(super) fn resume(&mut self, dag: DagId, observer: &mut impl Observer) {
         let state = &mut self.dags[dag.index()];
         if core::mem::take(&mut state.is_paused) {
             state.resumed_ns = self.now_ns;
+            observer.switched_on(dag);
         }
     }
 }

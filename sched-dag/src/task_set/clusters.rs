@@ -66,7 +66,8 @@ impl Dag {
     }
 
     /// Reports whether a cluster is stated, or chosen.
-    pub(crate) const fn states_cluster(&self) -> bool {
+    #[must_use]
+    pub const fn states_cluster(&self) -> bool {
         self.cluster.is_some()
     }
 }

@@ -4,6 +4,7 @@
 //! acyclic graphs, non-zero periods and deadlines, and indices in range.
 
 mod clusters;
+mod suspended;
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -69,6 +70,7 @@ pub struct Subtask {
     pub(crate) wcet_ns: Option<u64>,
     pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
+    pub(crate) stack_bytes: Option<u64>,
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
     pub(crate) relative_deadline_ns: u64,
@@ -318,6 +320,12 @@ impl Subtask {
     #[must_use]
     pub const fn budget_ns(&self) -> Option<u64> {
         self.budget_ns
+    }
+
+    /// Returns the stack that it needs, in bytes, if the app stated one.
+    #[must_use]
+    pub const fn stack_bytes(&self) -> Option<u64> {
+        self.stack_bytes
     }
 
     /// Returns where the WCET is from.

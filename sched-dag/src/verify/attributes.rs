@@ -14,7 +14,7 @@ use super::states::is_shared;
 use super::warning::Warning;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
-use crate::spec::DagSpec;
+use crate::spec::{DagSpec, STACK_BYTES};
 
 /// Checks the numbers of the whole commit.
 pub(super) fn check(specs: &[DagSpec], options: &CommitOptions, findings: &mut Findings) {
@@ -179,6 +179,19 @@ fn check_subtasks(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
                 );
             }
             _ => {}
+        }
+        if let Some(bytes) = subtask.stack_bytes
+            && !STACK_BYTES.contains(&bytes)
+        {
+            let (label, subtask) = label();
+            findings.fault(
+                dag,
+                Fault::StackOutOfRange {
+                    dag: label,
+                    subtask,
+                    bytes,
+                },
+            );
         }
         for (direction, arity) in [
             (Direction::Input, subtask.inputs.len()),

@@ -177,6 +177,12 @@ pub enum Fault {
         wcet_ns: u64,
         relative_deadline_ns: u64,
     },
+    /// A stack that is too small or too large.
+    StackOutOfRange {
+        dag: DagLabel,
+        subtask: SubtaskLabel,
+        bytes: u64,
+    },
     /// A DAG with a limit of 0 jobs.
     ZeroJobs { dag: DagLabel },
     /// A DAG with room for 0 jobs in flight.
@@ -304,6 +310,7 @@ impl Fault {
             Self::SinkDeadlineBeyondDag { .. } => "sink_deadline_beyond_dag",
             Self::DeadlineOfNoSink { .. } => "deadline_of_no_sink",
             Self::WcetExceedsDeadline { .. } => "wcet_exceeds_deadline",
+            Self::StackOutOfRange { .. } => "stack_out_of_range",
             Self::ZeroJobs { .. } => "zero_jobs",
             Self::ZeroInFlight { .. } => "zero_in_flight",
             Self::ZeroFaults { .. } => "zero_faults",

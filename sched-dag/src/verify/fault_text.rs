@@ -9,6 +9,7 @@ use core::time::Duration;
 
 use super::fault::{Direction, Fault, Time};
 use crate::MAX_ARITY;
+use crate::spec::STACK_BYTES;
 
 /// How many subtasks a message lists before it only counts the rest.
 const LISTED: usize = 8;
@@ -144,6 +145,16 @@ impl Display for Fault {
                  shorten it or extend the deadline",
                 Duration::from_nanos(*wcet_ns),
                 Duration::from_nanos(*relative_deadline_ns)
+            ),
+            Self::StackOutOfRange {
+                dag,
+                subtask,
+                bytes,
+            } => write!(
+                f,
+                "{subtask} of {dag} states a stack of {bytes} bytes; give it {} to {}, or leave it out",
+                STACK_BYTES.start(),
+                STACK_BYTES.end()
             ),
             Self::ZeroJobs { dag } => {
                 write!(

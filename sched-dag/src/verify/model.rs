@@ -108,6 +108,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
                 (_, Some(margin_percent)) => WcetSource::Observed { margin_percent },
             },
             budget_ns: subtask.budget_ns,
+            stack_bytes: subtask.stack_bytes,
             priority: match ranks.get(index) {
                 Some(rank) => Priority(priority_base + rank),
                 None => subtask.priority.expect("given to all subtasks of the DAG"),

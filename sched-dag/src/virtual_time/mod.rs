@@ -47,8 +47,9 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::ids::{CoreId, DagId, Instance};
+use crate::lifecycle::{Change, Lifecycle, Request};
 use crate::policy::SchedulerOptions;
-use crate::scheduler::{HandOff, Observer, Scheduler};
+use crate::scheduler::{HandOff, Moment, Observer, Scheduler};
 use crate::task_set::TaskSet;
 use cluster::Cluster;
 
@@ -86,6 +87,12 @@ pub trait Workload: Observer {
     fn take_signal(&mut self, now_ns: u64) -> Option<DagId> {
         let _ = now_ns;
         None
+    }
+
+    /// Returns the next request that has come by now, and forgets it: a signal, unless a
+    /// workload has others. What has finished may make one.
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
+        self.take_signal(now_ns).map(Request::Signal)
     }
 
     /// Reports whether the run is to stop, though jobs are left. Asked before each
@@ -149,6 +156,8 @@ pub struct VirtualTime {
     now_ns: u64,
     /// What fails at the present instant.
     failing: Vec<(Instance, CoreId)>,
+    lifecycle: Option<Box<dyn Lifecycle>>,
+    has_begun: bool,
 }
 
 /// Why a run in virtual time has ended.
@@ -193,7 +202,15 @@ impl VirtualTime {
             failing: Vec::with_capacity(cores.sum()),
             now_ns: 0,
             clusters,
+            lifecycle: None,
+            has_begun: false,
         }
+    }
+
+    /// Takes what serves requests other than signals.
+    #[must_use]
+    pub fn with_lifecycle(self, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
+        Self { lifecycle, ..self }
     }
 
     /// Runs until every job has ended.
@@ -273,18 +290,37 @@ impl VirtualTime {
                 moment.fail(instance, workload);
             }
         }
-        while let Some(dag) = workload.take_signal(now_ns) {
-            let place = place(clusters, dag);
-            let mut moment = clusters[place].scheduler.at(now_ns);
-            moment.signal(dag, workload);
+        if !core::mem::replace(&mut self.has_begun, true) {
+            self.serve(Request::Begin, workload);
         }
-        for Cluster { scheduler, cores } in clusters {
+        while let Some(request) = workload.take_request(now_ns) {
+            self.serve(request, workload);
+        }
+        for Cluster { scheduler, cores } in &mut self.clusters {
             let released = scheduler.at(now_ns).release_due(workload);
             for &decision in released.dispatch() {
                 cores.carry_out(decision, now_ns, workload)?;
             }
         }
         Ok(())
+    }
+
+    /// Serves a request at this instant.
+    fn serve(&mut self, request: Request, workload: &mut impl Workload) {
+        let (clusters, now_ns) = (&mut self.clusters[..], self.now_ns);
+        let mut changes = Vec::new();
+        match (request, &mut self.lifecycle) {
+            (Request::Signal(dag), _) => at(clusters, now_ns, dag).signal(dag, workload),
+            (_, Some(lifecycle)) => lifecycle.serve(request, &mut changes),
+            (_, None) => {}
+        }
+        for change in changes {
+            match change {
+                Change::Pause(dag) => at(clusters, now_ns, dag).pause(dag, workload),
+                Change::Resume(dag) => at(clusters, now_ns, dag).resume(dag, workload),
+                Change::Close(dag) => at(clusters, now_ns, dag).close(dag, workload),
+            }
+        }
     }
 
     /// Completes what finishes at `now_ns`, and notes what fails instead.
@@ -323,6 +359,12 @@ impl VirtualTime {
         }
         None
     }
+}
+
+/// Begins an instant of the cluster that runs a DAG.
+fn at(clusters: &mut [Cluster], now_ns: u64, dag: DagId) -> Moment<'_> {
+    let place = place(clusters, dag);
+    clusters[place].scheduler.at(now_ns)
 }
 
 /// Returns the place of the cluster that runs a DAG.

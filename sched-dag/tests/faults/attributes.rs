@@ -26,6 +26,16 @@ fn periods_deadlines_and_counts() {
         "zero_deadline",
         "dag `drive` has a relative deadline of 0; give it at least 1 ns",
     );
+    for bytes in [0, (16 << 10) - 1, (1 << 20) + 1] {
+        assert_fault(
+            |spec| spec.subtasks[0].stack_bytes = Some(bytes),
+            "stack_out_of_range",
+            &format!(
+                "subtask `camera` of dag `drive` states a stack of {bytes} bytes; give it 16384 to \
+                 1048576, or leave it out"
+            ),
+        );
+    }
     assert_fault(
         |spec| spec.jobs = Some(0),
         "zero_jobs",

@@ -197,7 +197,7 @@ impl Driver<'_> {
                     moment.pause(id, record);
                 }
                 if to_ns == now_ns {
-                    moment.resume(id);
+                    moment.resume(id, record);
                 }
             }
         }
@@ -245,6 +245,13 @@ impl Driver<'_> {
     }
 
     fn compare_cores(&self) -> Result<(), String> {
+        let dags = self.scheduler.task_set().dags();
+        for (id, dag) in (0..).map(DagId).zip(dags) {
+            let suspended = self.left_ns.keys().filter(|of| of.dag == id).count();
+            if suspended > dag.most_suspended() {
+                return Err(format!("{suspended} instances of {id:?} are suspended"));
+            }
+        }
         for (core, place) in (0..).map(CoreId).zip(&self.cores) {
             let running = self.scheduler.running(core);
             if running != place.map(|(instance, _)| instance) {

@@ -78,7 +78,8 @@ fn walk(set: &Set) -> Result<(), String> {
                     }
                     (1, _) if step > 60 => moment.stop(dag, &mut side.log),
                     (2, _) => moment.pause(dag, &mut side.log),
-                    (3 | 4, _) => moment.resume(dag),
+                    (3 | 4, _) => moment.resume(dag, &mut side.log),
+                    (9, _) if step > 60 => moment.close(dag, &mut side.log),
                     (5..9, _) if is_sporadic => moment.signal(dag, &mut side.log),
                     _ => {}
                 }

@@ -52,6 +52,7 @@ enum What {
     Stop(usize),
     Pause(usize),
     Resume(usize),
+    Close(usize),
     Signal(usize),
 }
 
@@ -65,6 +66,7 @@ impl What {
             Self::Stop(_) => "stop",
             Self::Pause(_) => "pause",
             Self::Resume(_) => "resume",
+            Self::Close(_) => "close",
             Self::Signal(_) => "signal",
         }
     }
@@ -159,7 +161,7 @@ fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, What)> {
                 .map(|&place| What::Drop(place)),
         );
         for (dag, model) in world.dags.iter().enumerate() {
-            whats.push(What::Stop(dag));
+            whats.extend([What::Stop(dag), What::Close(dag)]);
             whats.push(match node.facts.dags[dag].is_paused {
                 true => What::Resume(dag),
                 false => What::Pause(dag),
@@ -223,8 +225,12 @@ fn take(node: &mut Node<'_>, time_ns: u64, what: What) -> Result<(), String> {
             facts.pause(dag);
         }
         What::Resume(dag) => {
-            moment.resume(id(dag));
+            moment.resume(id(dag), &mut heard);
             facts.resume(dag);
+        }
+        What::Close(dag) => {
+            moment.close(id(dag), &mut heard);
+            facts.close(dag);
         }
         What::Signal(dag) => {
             moment.signal(id(dag), &mut heard);
@@ -257,6 +263,7 @@ fn compare(node: &Node<'_>) -> Result<(), String> {
             scheduler.statistics(id(dag)),
         )?;
         same("ended", &of_dag.is_ended, &scheduler.is_ended(id(dag)))?;
+        same("closed", &of_dag.is_closed, &scheduler.is_closed(id(dag)))?;
         let waiting = facts.waiting(dag) as u64;
         same("waiting", &waiting, &scheduler.waiting(id(dag)))?;
     }
@@ -303,6 +310,18 @@ impl Observer for Heard {
 
     fn ended(&mut self, dag: DagId) {
         self.0[dag.index()].push(Said::Ended);
+    }
+
+    fn switched_off(&mut self, dag: DagId) {
+        self.0[dag.index()].push(Said::Off);
+    }
+
+    fn switched_on(&mut self, dag: DagId) {
+        self.0[dag.index()].push(Said::On);
+    }
+
+    fn closed(&mut self, dag: DagId) {
+        self.0[dag.index()].push(Said::Closed);
     }
 }
 

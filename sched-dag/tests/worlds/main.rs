@@ -3,8 +3,8 @@
 //! A *world* is a small set of DAGs with its options. From its first state on each step
 //! that a driver may take is taken: time goes on, at once or past what was due (a driver
 //! that comes late); of the instances that have started one or two complete or fail, on
-//! their core or after they have lost it, and a fault may cost the DAG or a job; a DAG is stopped, paused or resumed, or gets a
-//! signal. After each step the scheduler has to be as the rules say (`rules`), which are
+//! their core or after they have lost it, and a fault may cost the DAG or a job; a DAG is stopped, closed, paused or resumed, or
+//! gets a signal. After each step the scheduler has to be as the rules say (`rules`), which are
 //! written here once more, without a queue, a counter or a timer. States are told apart by
 //! the hashes of both, so each is entered once.
 //!
@@ -33,6 +33,6 @@ fn every_order_of_events_is_scheduled_by_the_rules() {
         }
     }
     println!("{counts} of {there_are}");
-    // Time, completions, faults of two kinds, stops, pauses, resumptions, signals.
-    assert_eq!(counts.kinds.len(), 8, "{counts}");
+    // Time, completions, faults of two kinds, stops, closings, pauses, resumptions, signals.
+    assert_eq!(counts.kinds.len(), 9, "{counts}");
 }

@@ -13,6 +13,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use replay::shown::visible;
 
@@ -238,7 +239,10 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
     });
     let why = match there {
         Some((folder, data)) if data.is_dir() => {
-            let probe = folder.join(format!(".trial-{}", std::process::id()));
+            // Two threads may try one folder.
+            static TRIALS: AtomicU64 = AtomicU64::new(0);
+            let (process, trial) = (std::process::id(), TRIALS.fetch_add(1, Ordering::Relaxed));
+            let probe = folder.join(format!(".trial-{process}-{trial}"));
             let trial = Named {
                 path: &probe,
                 ..*output

@@ -2,7 +2,8 @@
 //!
 //! An *image* is the freestanding ELF file that a package under `apps/` (or
 //! the guest side of the boot tests) is linked into; it bears the package's
-//! name. Images are always built in release. Cargo itself is asked where the
+//! name. Images that run are built in release, those for a debugger by a profile
+//! of their own. Cargo itself is asked where the
 //! file lies, so no setting of cargo's can make us boot a stale one.
 
 use std::env;
@@ -17,17 +18,19 @@ use replay::shown::quoted;
 use crate::elf;
 use crate::files;
 use crate::json::{self, Value};
+use crate::lasting::Lasting;
 use crate::options::nearest;
 use crate::system;
 
 /// Returns the most that an app's stripped image may weigh. Two measure, and carry all their
 /// workloads and baselines besides what every image has. The drone has three DAGs and their
-/// mathematics; the other two record and replay.
+/// mathematics; two can divide their cores; three others record and replay. What computes with
+/// images is compiled for speed.
 #[must_use]
 pub fn most_stripped_bytes(app: &str) -> u64 {
     match app {
-        "drone" | "hand-off" | "join-latency" => 576 << 10,
-        "autoware" | "gait" => 640 << 10,
+        "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" => 576 << 10,
+        "autoware" | "gait" | "vision" => 640 << 10,
         _ => 512 << 10,
     }
 }
@@ -122,27 +125,86 @@ pub fn check_file(path: &Path) -> Result<Option<String>, String> {
     })
 }
 
-/// Builds the image of a package. Cargo's progress and errors go to standard
+/// How an image is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Profile {
+    /// As small and quick as it runs.
+    Release,
+    /// So that a debugger shows all of it.
+    Gdb,
+}
+
+/// Builds the image of a package, as it runs. Cargo's progress and errors go to standard
 /// error as they come.
 ///
 /// # Errors
 ///
 /// Cargo failed, or the package has no binary of its own name.
 pub fn build(package: &str) -> Result<Image, ImageError> {
-    let failed = |why: String| ImageError::Build(format!("cannot build `{package}`: {why}"));
+    build_by(package, Profile::Release)
+}
+
+/// Builds the image of a package by a profile, as [`build`] does.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_by(package: &str, profile: Profile) -> Result<Image, ImageError> {
+    let profile = match profile {
+        Profile::Release => "release",
+        Profile::Gdb => "gdb",
+    };
+    build_target(package, profile, ["--bin", package])
+}
+
+/// Makes sure that an app has a program for Linux.
+///
+/// # Errors
+///
+/// One line that names the apps that have one.
+pub fn check_linux(app: &str) -> Result<(), String> {
+    let folder = system::workspace().join("apps");
+    let has_program = |app: &String| {
+        let program = format!("examples/{}.rs", linux_name(app));
+        folder.join(app).join(program).is_file()
+    };
+    if has_program(&app.into()) {
+        return Ok(());
+    }
+    let others: Vec<String> = apps().into_iter().filter(has_program).collect();
+    Err(format!(
+        "app {} has no program for Linux; these have: {}",
+        quoted(app),
+        others.join(", ")
+    ))
+}
+
+/// Returns the name of an app's program for Linux.
+fn linux_name(app: &str) -> String {
+    format!("{app}-linux")
+}
+
+/// Builds an app's program for Linux, as [`build`] does its image.
+///
+/// # Errors
+///
+/// Cargo failed, or the package has no such program.
+pub fn build_linux(app: &str) -> Result<Image, ImageError> {
+    build_target(app, "linux", ["--example", &linux_name(app)])
+}
+
+/// Builds one target of a package, of a kind and a name.
+fn build_target(package: &str, profile: &str, target: [&str; 2]) -> Result<Image, ImageError> {
+    let [_, name] = target;
+    let failed = |why: String| ImageError::Build(format!("cannot build `{name}`: {why}"));
     let mut command = system::cargo();
-    command.args([
-        "build",
-        "--release",
-        "--quiet",
-        "-p",
-        package,
-        "--bin",
-        package,
-    ]);
+    command
+        .args(["build", "--profile", profile, "--quiet", "-p", package])
+        .args(target);
     command.arg("--message-format=json-render-diagnostics");
     command.stdin(Stdio::null()).stdout(Stdio::piped());
-    say_if_cargo_waits();
+    say_if_cargo_waits(profile);
+    let _lasting = Lasting::new(&format!("building `{package}`"));
     let mut cargo = command
         .spawn()
         .map_err(|error| failed(format!("cargo: {error}")))?;
@@ -150,7 +212,7 @@ pub fn build(package: &str) -> Result<Image, ImageError> {
     let mut path = None;
     if let Some(output) = cargo.stdout.take() {
         for line in BufReader::new(output).lines().map_while(Result::ok) {
-            path = executable(&line, package).or(path);
+            path = executable(&line, name).or(path);
         }
     }
     let status = cargo
@@ -169,9 +231,9 @@ pub fn build(package: &str) -> Result<Image, ImageError> {
 }
 
 /// Says so if another command builds images: cargo would wait for it without a word.
-fn say_if_cargo_waits() {
+fn say_if_cargo_waits(profile: &str) {
     let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
-    let folder = system::workspace().join(target).join("release");
+    let folder = system::workspace().join(target).join(profile);
     if is_locked(&folder.join(".cargo-lock")) {
         let folder = folder.display();
         eprintln!("waiting for another command, which builds in {folder}");

@@ -37,6 +37,20 @@ pub static QEMU: Need = Need {
     ],
 };
 
+/// The debugger.
+pub static GDB: Need = Need {
+    name: "gdb",
+    what: "GNU's debugger",
+    parts: &["gdb"],
+    packages: &[
+        ("apt-get", &["gdb"]),
+        ("dnf", &["gdb"]),
+        ("pacman", &["gdb"]),
+        ("zypper", &["gdb"]),
+        ("apk", &["gdb"]),
+    ],
+};
+
 /// What an ISO is made with, for BIOS and for UEFI.
 pub static GRUB: Need = Need {
     name: "GRUB",
@@ -250,7 +264,7 @@ fn is_root() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{BOCHS, GRUB, MANAGERS, MTOOLS, Need, OVMF, QEMU, plan};
+    use super::{BOCHS, GDB, GRUB, MANAGERS, MTOOLS, Need, OVMF, QEMU, plan};
 
     fn lines(programs: &[&str], root: bool) -> Result<Vec<String>, String> {
         lines_of(&QEMU, programs, root)
@@ -307,7 +321,7 @@ mod tests {
 
     #[test]
     fn packages_are_of_managers_that_we_can_run() {
-        for (manager, packages) in [&QEMU, &GRUB, &MTOOLS, &OVMF, &BOCHS]
+        for (manager, packages) in [&QEMU, &GDB, &GRUB, &MTOOLS, &OVMF, &BOCHS]
             .into_iter()
             .flat_map(|n| n.packages)
         {

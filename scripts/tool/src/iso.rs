@@ -82,15 +82,22 @@ fn fill(folder: &Path, image: &Path, words: &str, module: Option<&Path>) -> Resu
 
 /// Returns GRUB's commands. A file is left as it is, compressed or not. A processor without
 /// 64 bits can execute nothing of the image, so it is GRUB that says so.
+///
+/// Under UEFI the first module is put at address 0, where the firmware reads no file to: it takes
+/// the address for a missing one, unless GRUB reads by way of its cache, which depends on where
+/// the file lies. So a small module goes first, which is always read by that way.
 fn commands(words: &str, has_module: bool) -> String {
     let quoted = words.split_whitespace().map(|word| format!(" '{word}'"));
     let quoted: String = quoted.collect();
-    let module = match has_module {
-        true => "module2 --nounzip /boot/module\n",
-        false => "",
+    let boot = match has_module {
+        true => {
+            "module2 /boot/grub/grub.cfg filler\n\
+             if module2 --nounzip /boot/module; then\nboot\nelse\nread\nfi\n"
+        }
+        false => "boot\n",
     };
     format!(
-        "if cpuid -l; then\nmultiboot2 /boot/image{quoted}\n{module}boot\nelse\n\
+        "if cpuid -l; then\nmultiboot2 /boot/image{quoted}\n{boot}else\n\
          echo 'this processor has no 64-bit mode, which the image needs'\nread\nfi\n"
     )
 }
@@ -120,8 +127,9 @@ mod tests {
 
     #[test]
     fn grub_gets_each_word_as_it_is() {
-        let with_module =
-            "multiboot2 /boot/image 'jobs=3' 'a=$x;{}#'\nmodule2 --nounzip /boot/module\nboot\n";
+        let with_module = "multiboot2 /boot/image 'jobs=3' 'a=$x;{}#'\n\
+                           module2 /boot/grub/grub.cfg filler\n\
+                           if module2 --nounzip /boot/module; then\nboot\n";
         assert!(commands("jobs=3  a=$x;{}#", true).contains(with_module));
         assert!(commands("", false).contains("\nmultiboot2 /boot/image\nboot\n"));
     }

@@ -22,6 +22,11 @@ static TOOL: Menu = Menu {
             work: tool::run::run,
         },
         Choice {
+            name: "debug",
+            about: "boot an app in QEMU, under gdb",
+            work: tool::run::debug,
+        },
+        Choice {
             name: "boot",
             about: "boot an image, and run any other program as it is: for cargo",
             work: tool::run::boot,

@@ -76,7 +76,7 @@ pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> 
         loader: Loader::Pvh,
         has_input: false,
         second: None,
-        wait_for_debugger: false,
+        debugger: None,
         ..machine.clone()
     };
     let log = system::new_log("probe")?;

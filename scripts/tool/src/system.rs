@@ -93,6 +93,11 @@ pub fn new_log(name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
 }
 
+/// How the names end of files that only a running process needs.
+const LEAVINGS: [&str; 9] = [
+    "dag", "module", "before", "iso", "img", "log.qemu", "sent", "gdb", "socket",
+];
+
 /// Removes what processes that were ended from outside have left: boot modules, sticks, contents
 /// of logs from before, and logs of guests that were running. The log of a guest that
 /// failed stays, for it was shown to a person.
@@ -108,10 +113,7 @@ fn clear(folder: &Path) {
         let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
         let process = stem.rsplit('-').nth(1).unwrap_or("self");
         let is_process = process.bytes().all(|byte| byte.is_ascii_digit());
-        if !is_process
-            || is_alive(process)
-            || !["dag", "before", "iso", "img", "log.qemu", "sent"].contains(&ending)
-        {
+        if !is_process || is_alive(process) || !LEAVINGS.contains(&ending) {
             continue;
         }
         // It is ours, and in the way of no one if it cannot be removed.
@@ -144,7 +146,7 @@ mod tests {
         let mut gone = Command::new("true").spawn().unwrap();
         let (dead, alive) = (gone.id(), id());
         gone.wait().unwrap();
-        let endings = ["dag", "before", "iso", "img", "log", "log.qemu"];
+        let endings = ["dag", "before", "iso", "img", "log", "log.qemu", "gdb"];
         let names = |process| endings.map(|ending| format!("dag-file-{process}-3.{ending}"));
         let shown = format!("soak-{dead}-7.log");
         let mut all = [names(dead), names(alive)].concat();

@@ -153,3 +153,66 @@ fn that_no_one_reads_the_output_is_no_failure() {
         assert_eq!(status.code(), Some(0), "{subcommand}");
     }
 }
+
+/// `eye`, of period 100, is sampled by `arm`, of period 40. The eye's value of 0 is there at 20;
+/// the arm's outputs of 10 find nothing, those of 55, 90 and 132 go back to 0, that of 170 to 100.
+const CHAIN: &str = r#"
+{"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":0,"name":"eye","bound_ns":[30],"topics":[["seen","u8",0,[],1]],"samples":[]}
+{"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":1,"name":"arm","bound_ns":[20],"topics":[],"samples":[[0,0,0,130]]}
+{"kind":"trace_begin","policy":"edf","preemption":"on","cores":2,"run":0}
+{"kind":"trace_dag","dag":0,"name":"eye","period_ns":100,"relative_deadline_ns":100,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["look",0,0,null]],"edges":[]}
+{"kind":"trace_dag","dag":1,"name":"arm","period_ns":40,"relative_deadline_ns":40,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["move",0,0,null]],"edges":[]}
+{"kind":"trace","events":[[0,"released",0,0,0,-1],[0,"released",0,1,0,-1],[0,"ready",0,0,0,0],[0,"ready",0,1,0,0],[1,"start",0,0,0,0],[1,"start",1,1,0,0],[10,"finish",1,1,0,0],[10,"completed",1,1,0,-1],[20,"finish",0,0,0,0],[20,"completed",0,0,0,-1]]}
+{"kind":"trace","events":[[40,"released",0,1,1,-1],[40,"ready",0,1,1,0],[41,"start",0,1,1,0],[55,"finish",0,1,1,0],[55,"completed",0,1,1,-1],[80,"released",0,1,2,-1],[80,"ready",0,1,2,0],[81,"start",0,1,2,0],[90,"finish",0,1,2,0],[90,"completed",0,1,2,-1]]}
+{"kind":"trace","events":[[100,"released",0,0,1,-1],[100,"ready",0,0,1,0],[101,"start",0,0,1,0],[120,"released",0,1,3,-1],[120,"ready",0,1,3,0],[121,"start",1,1,3,0],[125,"finish",0,0,1,0],[125,"completed",0,0,1,-1],[132,"finish",1,1,3,0],[132,"completed",1,1,3,-1]]}
+{"kind":"trace","events":[[160,"released",0,1,4,-1],[160,"ready",0,1,4,0],[161,"start",0,1,4,0],[170,"finish",0,1,4,0],[170,"completed",0,1,4,-1]]}
+{"kind":"trace_end","events":35,"lost":0}
+"#;
+
+#[test]
+fn a_chain_across_dags_has_the_times_that_a_person_computes() {
+    let path = file("chain.log", CHAIN);
+    let path = path.to_str().unwrap();
+    let output = check_trace(&[path]);
+    let said = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    for line in [
+        "  chain eye/look > arm/move",
+        // Ages 55, 90, 132 and 70; data ages 90, 132 and 170; the reaction to what is seen just
+        // after 0 is the output of 170.
+        "    age of an output              median 0.070 us, p99 0.132 us, max 0.132 us of 4 (bound 0.150 us)",
+        "    data age                      median 0.132 us, p99 0.170 us, max 0.170 us of 3 (bound 0.190 us)",
+        "    reaction time                 median 0.170 us, p99 0.170 us, max 0.170 us of 1 (bound 0.190 us)",
+    ] {
+        assert!(said.lines().any(|found| found == line), "{line}\n{said}");
+    }
+    let json = check_trace(&["--json", path, "--from", "eye/look", "--to", "arm/move"]);
+    let line = text(&json.stdout).lines().nth(1).expect("a second line");
+    let line = read_line(1, line)
+        .expect("a machine line")
+        .expect("well formed");
+    assert_eq!(line.kind, "chain");
+    assert_eq!(line.number_at("reaction_ns.max"), Some(170));
+    assert_eq!(line.number_at("reaction_bound_ns"), Some(190));
+}
+
+#[test]
+fn a_chain_that_is_not_there_is_refused_with_a_hint() {
+    let path = file("no-chain.log", CHAIN);
+    let path = path.to_str().unwrap();
+    for (words, told) in [
+        (
+            ["--from", "eye/lok", "--to", "arm/move"],
+            "did you mean `eye/look`?",
+        ),
+        (
+            ["--from", "arm/move", "--to", "eye/look"],
+            "no edges and samples lead from `arm/move`",
+        ),
+    ] {
+        let output = check_trace(&[&[path], &words[..]].concat());
+        assert_eq!(output.status.code(), Some(2));
+        let said = text(&output.stderr);
+        assert!(said.contains(told), "{said}");
+    }
+}

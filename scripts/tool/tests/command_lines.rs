@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 21] = [
+const COMMANDS: [&str; 23] = [
     "run",
     "boot",
     "test",
@@ -28,6 +28,8 @@ const COMMANDS: [&str; 21] = [
     "bench sizes",
     "oracle",
     "oracle bounds",
+    "oracle phasings",
+    "oracle responses",
     "oracle schedules",
     "oracle schedules --in-kernel",
     "oracle synchronizer",

@@ -60,9 +60,9 @@ pub(crate) fn end_the_machine() -> Unpunished {
     Unpunished
 }
 
-/// Disables interrupts and waits for one.
+/// Disables interrupts and waits for one, again and again.
 pub(crate) fn take_no_interrupts() -> Unpunished {
     // SAFETY: none; another core has to notice it (see the module).
-    unsafe { asm!("cli", "hlt") };
+    unsafe { asm!("cli", "2: hlt", "jmp 2b") };
     Unpunished
 }

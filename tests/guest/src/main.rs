@@ -8,6 +8,8 @@ extern crate alloc;
 mod attacks;
 mod busy;
 mod checksum;
+mod cluster_scale;
+mod clusters;
 mod computing;
 mod deaf;
 mod endless;
@@ -15,14 +17,17 @@ mod exceeded;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
+mod lifecycle;
 mod limits;
 mod occupation;
 mod overrun;
 mod preemption;
 mod recorded;
 mod sharing;
+mod stacks;
 mod stalled;
 mod storm;
+mod tuned;
 mod unnoticed;
 #[allow(unsafe_code, reason = "registers that the compiler would spill")]
 mod upper_halves;
@@ -36,7 +41,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 33] = [
+const TESTS: [(&str, Test); 40] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -57,6 +62,9 @@ const TESTS: [(&str, Test); 33] = [
         "exit_port",
         |_| unpunished(kernel_crimes::end_the_machine()),
     ),
+    ("clusters", clusters::run),
+    ("cluster_scale", cluster_scale::run),
+    ("clusters_auto", clusters::auto),
     ("computing", computing::run),
     ("deaf_alone", deaf::alone),
     ("deaf_beside", deaf::beside),
@@ -67,15 +75,19 @@ const TESTS: [(&str, Test); 33] = [
     ("exceeded", exceeded::run),
     ("flood", limits::flood),
     ("large", large::run),
+    ("lifecycle", lifecycle::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),
     ("recorded_long", recorded::long),
     ("sharing", sharing::run),
+    ("stacks", stacks::run),
+    ("stacks_of_chain", stacks::chain),
     ("stalled", stalled::run),
     ("spend_stacks", limits::spend_stacks),
     ("storm", storm::run),
     ("suspend", limits::suspend),
+    ("tuned", tuned::run),
     ("unnoticed", unnoticed::run),
     ("values", values::run),
 ];

@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use replay::lines::{Line, Lines, Malformed, quoted};
 use replay::repeated;
 use replay::shown::is_seen;
-use sched_dag::{DagSpec, Order, OverrunPolicy, Priority, SubtaskSpec};
+use sched_dag::{ClusterId, DagSpec, Order, OverrunPolicy, Priority, SubtaskSpec};
 
 use keys::Keys;
 
@@ -281,6 +281,7 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
             "period" => spec.period_ns = Some(keys.time_ns(key)?),
             "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
             "offset" => spec.offset_ns = keys.time_ns(key)?,
+            "cluster" => spec.cluster = Some(ClusterId(keys.number(key)?)),
             "in-flight" => spec.in_flight = Some(keys.number(key)?),
             "overrun" => {
                 spec.overrun = match keys.value(key)? {
@@ -310,7 +311,7 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`period`, `deadline`, `offset`, `overrun`, `order`, `in-flight`",
+                    "`period`, `deadline`, `offset`, `cluster`, `overrun`, `order`, `in-flight`",
                 ));
             }
         }

@@ -2,11 +2,14 @@
 
 #![allow(dead_code, reason = "each test program uses its part of it")]
 
+pub(crate) mod sets;
+
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
-use linux::{Linux, Mechanism};
+use fass::{Dag, Occupation, Preemption, SubtaskAttributes, create_dag, execute_for};
+use linux::{Linux, Mechanism, Run};
+use sched_dag::law::Violation;
 
 /// A machine, and the right to be the only one.
 pub(crate) struct Alone {
@@ -16,11 +19,15 @@ pub(crate) struct Alone {
 
 /// Makes the only machine of the program.
 pub(crate) fn alone(cores: u32, mechanism: Mechanism) -> Alone {
+    let cores = cores.min(linux::processors());
+    alone_on(|| Linux::new(cores, mechanism).expect("so many processors are there"))
+}
+
+/// Makes the only machine of the program, in this way.
+pub(crate) fn alone_on(make: impl FnOnce() -> Linux) -> Alone {
     static RIGHT: Mutex<()> = Mutex::new(());
     let right = RIGHT.lock().unwrap_or_else(PoisonError::into_inner);
-    let there = std::thread::available_parallelism().map_or(1, |count| count.get());
-    let cores = cores.min(u32::try_from(there).unwrap_or(1));
-    let machine = Linux::new(cores, mechanism).expect("so many processors are there");
+    let machine = make();
     machine
         .limit_real_time(Duration::from_secs(5))
         .expect("a limit may be set");
@@ -59,4 +66,18 @@ pub(crate) fn ticking(name: &str, jobs: u64, period: Duration, priority: u32, us
     let attributes = SubtaskAttributes::named(name).priority(priority);
     dag.register_untyped_subtask(move |_job| spin(us), attributes);
     dag
+}
+
+/// Returns every breach of R1 to R4, and those of R5 that last for longer than this bound: a
+/// second with SCHED_FIFO, ten without. What should run waits for what Linux and a hypervisor
+/// do, without SCHED_FIFO for other programs besides; and no rule is broken for so long unless
+/// it is broken by us.
+pub(crate) fn breaches(run: &Run) -> Vec<Violation> {
+    let bound_ns = match run.options().preemption {
+        Preemption::Enabled => 1_000_000_000,
+        Preemption::Disabled => 10_000_000_000,
+    };
+    let of_dispatch = run.dispatch_violations(bound_ns);
+    let of_dispatch = of_dispatch.expect("all is recorded");
+    run.violations().chain(of_dispatch).collect()
 }

@@ -318,6 +318,9 @@ impl Replay {
         for dag in (0..).map(DagId).take(task_set.dags().len()) {
             if let Some(jobs) = self.jobs_of(dag) {
                 task_set.replay(dag, jobs);
+                if let Some(lifecycle) = &mut plan.lifecycle {
+                    lifecycle.leave_alone(dag);
+                }
             }
         }
     }

@@ -13,7 +13,8 @@ use core::any::Any;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-use sched_dag::{DagId, TopicPort};
+use sched_dag::TopicPort;
+use sched_dag::lifecycle::Request;
 
 use super::cell::{Looking, SetOnce, Shared};
 use super::effect::Effect;
@@ -185,7 +186,7 @@ impl<T: Send + Sync> Stage<T> for Arc<Triple<T>> {
 }
 
 impl<T: Send + Sync> Effect for Arc<Triple<T>> {
-    fn happen(&mut self, completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         if !self.staged.load(Ordering::Relaxed) {
             return;
         }

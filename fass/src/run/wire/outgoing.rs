@@ -6,7 +6,7 @@
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use sched_dag::DagId;
+use sched_dag::lifecycle::Request;
 
 use super::Counter;
 use super::ring::Ring;
@@ -73,7 +73,7 @@ impl Outgoing {
 pub(crate) struct Departure(pub(crate) Arc<Outgoing>);
 
 impl Effect for Departure {
-    fn happen(&mut self, _completed_ns: u64, _raise: &mut dyn FnMut(DagId)) {
+    fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         let outgoing = &*self.0;
         let staged = outgoing.staged.load(Ordering::Relaxed);
         if outgoing.is_lost.load(Ordering::Relaxed) {

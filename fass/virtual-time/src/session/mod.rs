@@ -29,6 +29,8 @@ pub(crate) struct Session {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
     driver: Driver,
+    /// Whether a function may end the run.
+    may_shut_down: bool,
     bodies: Vec<Vec<Body>>,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
@@ -41,7 +43,8 @@ impl Session {
     pub(crate) fn new(plan: Plan, options: SchedulerOptions) -> Self {
         let task_set = plan.task_set;
         Self {
-            driver: Driver::of_clusters(&task_set, options),
+            may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
+            driver: Driver::of_clusters(&task_set, options).with_lifecycle(plan.lifecycle),
             options,
             recording: Recording {
                 journal: Recorder::new(Arc::clone(&task_set)),
@@ -138,7 +141,9 @@ impl Session {
 
     fn require_end(&self) -> Result<(), RunError> {
         let mut dags = (0..).map(DagId).zip(self.task_set.dags());
-        match dags.find(|(_, dag)| dag.jobs().is_none() && !dag.is_sporadic()) {
+        let is_endless =
+            |dag: &Dag| dag.jobs().is_none() && !dag.is_sporadic() && !self.may_shut_down;
+        match dags.find(|(_, dag)| is_endless(dag)) {
             None => Ok(()),
             Some((dag, _)) => Err(RunError::Endless {
                 dag: self.dag_label(dag),

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use fass::Body;
 use sched_dag::Recorder;
 use sched_dag::journal::What;
+use sched_dag::lifecycle::Request;
 use sched_dag::virtual_time::Workload;
 use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, TaskSet};
 
@@ -154,18 +155,18 @@ impl Workload for Runner<'_> {
     }
 
     fn next_signal_ns(&self) -> Option<u64> {
-        self.machine.next_signal_ns()
+        self.machine.next_request_ns()
     }
 
-    fn take_signal(&mut self, now_ns: u64) -> Option<DagId> {
-        self.machine.take_signal(now_ns)
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
+        self.machine.take_request(now_ns)
     }
 
     fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
         if self.panic.is_none() {
             let machine = self.machine;
-            let raise = &mut |dag| machine.signal_at(now_ns, dag);
-            self.body(instance).complete(now_ns, raise);
+            let ask = &mut |request| machine.request_at(now_ns, request);
+            self.body(instance).complete(now_ns, ask);
             machine.wires.collect();
         }
         self.recording.journal.on_core(What::Finish, instance, core);
@@ -222,6 +223,18 @@ impl Observer for Runner<'_> {
             self.machine
                 .signal_at(self.recording.journal.now_ns, handler);
         }
+    }
+
+    fn switched_off(&mut self, dag: DagId) {
+        self.recording.journal.switched_off(dag);
+    }
+
+    fn switched_on(&mut self, dag: DagId) {
+        self.recording.journal.switched_on(dag);
+    }
+
+    fn closed(&mut self, dag: DagId) {
+        self.recording.journal.closed(dag);
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {

@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "not every test program uses every helper")]
 
+pub(crate) mod lifecycle;
 pub(crate) mod sharing;
 
 use std::time::Duration;

@@ -124,7 +124,7 @@ const _: () = {
 pub struct Context {
     save_area: UnsafeCell<SaveArea>,
     stack_top: u64,
-    stack_bytes: u64,
+    stack_bytes: AtomicU64,
     is_background: bool,
     /// When it was last suspended, and for how long it has been in all before.
     suspended_at_ns: AtomicU64,
@@ -178,8 +178,23 @@ impl Context {
     /// Returns the context's stack if `address` lies in it, or in the guard page below.
     pub(super) fn stack_at(&self, address: u64) -> Option<Range<u64>> {
         let below = self.stack_top.checked_sub(address)?;
-        (below <= self.stack_bytes + super::paging::PAGE)
-            .then_some(self.stack_top - self.stack_bytes..self.stack_top)
+        let stack = self.stack();
+        (below <= self.stack_bytes() + super::paging::PAGE).then_some(stack)
+    }
+
+    /// Returns the context's stack.
+    pub(super) fn stack(&self) -> Range<u64> {
+        self.stack_top - self.stack_bytes()..self.stack_top
+    }
+
+    /// Returns how large the context's stack is.
+    pub fn stack_bytes(&self) -> u64 {
+        self.stack_bytes.load(Ordering::Relaxed)
+    }
+
+    /// Notes that the stack reaches further down from now on.
+    pub fn note_grown(&self, stack_bytes: u64) {
+        self.stack_bytes.store(stack_bytes, Ordering::Relaxed);
     }
 
     /// Reports whether this is what its core does when nothing is assigned to it.
@@ -252,7 +267,7 @@ impl Parked {
         Self(Box::leak(Box::new(Context {
             save_area: UnsafeCell::new(save_area),
             stack_top,
-            stack_bytes,
+            stack_bytes: AtomicU64::new(stack_bytes),
             is_background,
             suspended_at_ns: AtomicU64::new(0),
             suspended_ns: AtomicU64::new(0),

@@ -113,6 +113,10 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
     this_core::get().context().registers()
 }
 
+/// With so many answers in a row at which its interrupts are disabled, an accused core has
+/// disabled them for good.
+const LAST_ANSWER: u32 = 2;
+
 /// Handles one exception and returns the registers to resume, or null for those of the code
 /// that was interrupted.
 extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
@@ -125,9 +129,14 @@ extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
         cpu::halt_forever();
     };
     let mut exception = Exception::new(pushed);
-    if is_message && non_maskable::is_accusation() {
-        if pushed.are_interrupts_enabled() {
-            // The host has not let this core run. It takes its interrupts now.
+    let answers = if is_message {
+        non_maskable::answer()
+    } else {
+        0
+    };
+    if answers > 0 {
+        if pushed.are_interrupts_enabled() || answers < LAST_ANSWER {
+            // The host has not let this core run. It takes its interrupts now, or soon.
             return core::ptr::null_mut();
         }
         exception.name = "interrupts disabled for seconds";

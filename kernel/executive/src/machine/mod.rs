@@ -5,6 +5,7 @@
 //! functions that it is to call. Each module states the invariant that its
 //! SAFETY comments cite.
 
+mod accusation;
 pub mod agreement;
 pub mod avx;
 pub mod backtrace;
@@ -28,6 +29,7 @@ mod meter;
 pub mod non_maskable;
 pub mod once;
 pub(crate) mod paging;
+pub mod paint;
 pub(crate) mod port;
 pub mod power;
 pub mod processors;

@@ -1,6 +1,6 @@
 //! What cores tell each other by the non-maskable interrupt, which no core can put off.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::local_apic;
 use super::this_core::{self, Core};
@@ -8,21 +8,22 @@ use super::this_core::{self, Core};
 /// Whether non-maskable interrupts are this kernel's own signal to stop.
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
-/// The core that has to say why it takes no interrupts: its index, or `NOBODY`.
-static ACCUSED: AtomicU32 = AtomicU32::new(NOBODY);
-const NOBODY: u32 = u32::MAX;
-
-/// Makes a core say why it takes no interrupts, and end the run; or go on, if it does.
+/// Makes a core answer that takes no interrupts. If its interrupts are disabled at several
+/// answers in a row, it ends the run.
 pub fn accuse(core: &Core) {
-    ACCUSED.store(core.index, Ordering::Release);
-    local_apic::send_non_maskable(core.apic_id());
+    if core.accusation.open() {
+        local_apic::send_non_maskable(core.apic_id());
+    }
 }
 
-/// Reports whether this core is accused, and withdraws the accusation.
-pub(super) fn is_accusation() -> bool {
-    let (taken, failed) = (Ordering::AcqRel, Ordering::Relaxed);
-    this_core::is_ready()
-        && (ACCUSED.compare_exchange(this_core::get().index, NOBODY, taken, failed)).is_ok()
+/// Answers if this core is accused: returns how often it has, without an interrupt in between.
+pub(super) fn answer() -> u32 {
+    if !this_core::is_ready() {
+        return 0;
+    }
+    let core = this_core::get();
+    let interrupted_ns = core.interrupted_ns.load(Ordering::Relaxed);
+    core.accusation.answer(interrupted_ns)
 }
 
 /// Stops all other cores, for good.

@@ -5,10 +5,11 @@
 //! [`get`]: everything that changes in it is atomic.
 
 use core::arch::asm;
-use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
+use super::accusation::Accusation;
 use super::context::{Context, Parked, Registers};
 use super::cpu;
 use super::descriptors::{self, TaskState};
@@ -50,6 +51,10 @@ pub struct Core {
     /// The position among the cores: 0 is the boot processor.
     pub index: u32,
     apic_id: u32,
+    /// The group of cores that it is in, a number that the layer above chooses.
+    pub group: AtomicU32,
+    /// Its place in the group, likewise.
+    pub place: AtomicU32,
     exception_stacks: [u64; 4],
     task_state: AtomicPtr<TaskState>,
     /// The context that runs here.
@@ -68,6 +73,7 @@ pub struct Core {
     pub timer_interrupts: AtomicU64,
     /// When this core took its last interrupt, by its timer or from another core.
     pub interrupted_ns: AtomicU64,
+    pub(super) accusation: Accusation,
     /// The time between two heartbeats of this core, 0 if it has none.
     pub heartbeat_ns: AtomicU64,
     interrupts_off: Meter,
@@ -89,6 +95,8 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         handler_stack: stacks.handler,
         index,
         apic_id,
+        group: AtomicU32::new(0),
+        place: AtomicU32::new(index),
         exception_stacks: stacks.exceptions,
         task_state: AtomicPtr::new(core::ptr::null_mut()),
         context: AtomicPtr::new(
@@ -101,6 +109,7 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         timer_interrupts: AtomicU64::new(0),
         interrupted_ns: AtomicU64::new(0),
+        accusation: Accusation::new(),
         heartbeat_ns: AtomicU64::new(0),
         interrupts_off: Meter::new(),
         behind_ticks: AtomicU64::new(0),

@@ -202,23 +202,33 @@ fn take_zeroed(frames: &mut Frames) -> Option<u64> {
     Some(frame)
 }
 
-/// Creates a stack of at least `bytes` with a guard page below it and returns
-/// its top, which is a multiple of 4096.
-pub fn new_stack(bytes: u64) -> Result<u64, OutOfMemory> {
+/// Creates a stack of `bytes`, whole pages, with a guard page below it, and returns its top.
+/// Below that it can grow to `room`.
+pub fn new_stack(bytes: u64, room: u64) -> Result<u64, OutOfMemory> {
     let mut memory = MEMORY.lock();
-    let Memory {
-        frames,
-        table,
-        next_stack,
-    } = memory.as_mut().ok_or(OutOfMemory)?;
-    let pages = bytes.div_ceil(PAGE);
-    let physical = frames.take(pages).ok_or(OutOfMemory)?;
-    let stack: Range<u64> = *next_stack + PAGE..*next_stack + PAGE + pages * PAGE;
-    table.map(stack.clone(), physical, Access::Data, &mut || {
-        take_zeroed(frames)
-    })?;
-    *next_stack = stack.end;
-    Ok(stack.end)
+    let memory = memory.as_mut().ok_or(OutOfMemory)?;
+    let top = memory.next_stack + PAGE + bytes.max(room);
+    memory.map_stack(top - bytes..top)?;
+    memory.next_stack = top;
+    Ok(top)
+}
+
+/// Makes a stack reach down from `from`, where it has room, to `to`.
+pub fn grow_stack(from: u64, to: u64) -> Result<(), OutOfMemory> {
+    let mut memory = MEMORY.lock();
+    memory.as_mut().ok_or(OutOfMemory)?.map_stack(to..from)
+}
+
+impl Memory {
+    /// Puts frames below a part of the window, whole pages.
+    #[inline(never)]
+    fn map_stack(&mut self, part: Range<u64>) -> Result<(), OutOfMemory> {
+        let Memory { frames, table, .. } = self;
+        let pages = (part.end - part.start) / PAGE;
+        let physical = frames.take(pages).ok_or(OutOfMemory)?;
+        table.map(part, physical, Access::Data, &mut || take_zeroed(frames))?;
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -183,6 +183,8 @@ fn report(instance: Instance, fault: &Fault<'_>) {
          at {place}; {consequence}",
         instance.job
     );
+    let context = this_core::get().context();
+    let used = context.stack_top().saturating_sub(spot.stack_pointer);
     json::report("fault", |line| {
         line.text("cause", cause)
             .number("dag", instance.dag.0)
@@ -193,7 +195,9 @@ fn report(instance: Instance, fault: &Fault<'_>) {
             .text("cost", cost)
             .number("cpu", core)
             .text("place", place)
-            .text("message", message);
+            .text("message", message)
+            .number("stack_used_bytes", used)
+            .number("stack_bytes", context.stack_bytes());
         if let Some(address) = address {
             line.text("address", format_args!("{address:#x}"));
         }

@@ -7,16 +7,21 @@
 //! so there is one more for each such fault that there may be. That many are made at
 //! a commit, never later. Contexts are never freed;
 //! the next commit uses them again.
+//!
+//! All stacks are as large as the largest that the first commit states: any context may run any
+//! subtask. Those that the cores begin with have room to grow to that.
 
 use alloc::vec::Vec;
+
+use sched_dag::TaskSet;
 
 use crate::machine::context::Parked;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::{interrupt, this_core};
 use crate::memory::{self, OutOfMemory};
 
-/// The stack of each context, in bytes.
-pub const STACK_BYTES: u64 = 64 * 1024;
+/// The stack of a context for subtasks that state none, in bytes.
+const STACK_BYTES: u64 = 64 * 1024;
 
 /// The stack of the context that runs the app's main function, in bytes. That evaluates
 /// whole runs, also in builds without optimization.
@@ -27,25 +32,62 @@ struct Stock {
     free: Vec<Parked>,
     /// How many there are, free or not.
     total: usize,
+    /// How large their stacks are; 0 before the first commit.
+    stack_bytes: u64,
 }
 
 static STOCK: SpinLock<Stock> = SpinLock::new(Stock {
     free: Vec::new(),
     total: 0,
+    stack_bytes: 0,
 });
 
-/// Makes a context with a stack of its own.
-pub fn create(is_background: bool) -> Result<Parked, OutOfMemory> {
-    let bytes = match is_background {
-        true => MAIN_STACK_BYTES,
-        false => STACK_BYTES,
+/// Makes the context that a core begins with.
+pub fn create_first(is_background: bool) -> Result<Parked, OutOfMemory> {
+    let (bytes, room) = match is_background {
+        true => (MAIN_STACK_BYTES, 0),
+        false => (STACK_BYTES, *sched_dag::STACK_BYTES.end()),
     };
-    Ok(Parked::new(memory::new_stack(bytes)?, bytes, is_background))
+    create(bytes, room, is_background)
+}
+
+fn create(bytes: u64, room: u64, is_background: bool) -> Result<Parked, OutOfMemory> {
+    let top = memory::new_stack(bytes, room)?;
+    Ok(Parked::new(top, bytes, is_background))
+}
+
+/// Returns the size of the stacks that these subtasks can all run on.
+pub fn stack_bytes(task_set: &TaskSet) -> u64 {
+    task_set
+        .largest_stack_bytes(STACK_BYTES)
+        .next_multiple_of(4096)
+}
+
+/// Makes sure that all stacks have so many bytes, which the first call settles; returns how many
+/// they have. No core runs anything of a DAG.
+#[inline(never)]
+pub fn settle(bytes: u64) -> Result<u64, OutOfMemory> {
+    let settled = STOCK.lock().stack_bytes;
+    if settled > 0 {
+        return Ok(settled);
+    }
+    for core in this_core::all() {
+        let (context, own) = (core.context(), core.context().stack_bytes());
+        if own < bytes {
+            let top = context.stack_top();
+            memory::grow_stack(top - own, top - bytes)?;
+            context.note_grown(bytes);
+        }
+    }
+    STOCK.lock().stack_bytes = bytes;
+    Ok(bytes)
 }
 
 /// Makes sure that there are `total` contexts in the stock or in use from it.
 pub fn provide(total: usize) -> Result<(), OutOfMemory> {
-    let existing = STOCK.lock().total;
+    let stock = STOCK.lock();
+    let (existing, bytes) = (stock.total, stock.stack_bytes);
+    drop(stock);
     let missing = total.saturating_sub(existing);
     if missing == 0 {
         return Ok(());
@@ -53,7 +95,7 @@ pub fn provide(total: usize) -> Result<(), OutOfMemory> {
     // Room for all that can ever be free, so that giving back never allocates.
     let mut grown = Vec::with_capacity(total.max(existing));
     for _ in 0..missing {
-        grown.push(create(false)?);
+        grown.push(create(bytes, 0, false)?);
     }
     let mut stock = STOCK.lock();
     grown.append(&mut stock.free);

@@ -9,7 +9,7 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::edge::{Begin, Crossing, Drain, Happened, Outcome, Wish};
+use fass::edge::{Begin, Crossing, Drain, Happened, Outcome, Seen, Wish};
 use fass::{Channel, LaunchError, Plan, Recorded};
 use sched_dag::journal::What;
 use sched_dag::{DagId, Instance};
@@ -21,6 +21,9 @@ use crate::text::json;
 
 /// What the command line says.
 static WISH: Once<Wish> = Once::new();
+
+/// Whether people can look at what crosses.
+static ECHOES: AtomicBool = AtomicBool::new(false);
 
 static CROSSING: SpinLock<Option<Box<dyn Crossing>>> = SpinLock::new(None);
 
@@ -57,35 +60,44 @@ pub fn set_wish(wish: Wish) -> Result<(), &'static str> {
     Ok(())
 }
 
+/// Lets people look at what crosses.
+pub fn let_look() {
+    ECHOES.store(true, Ordering::Relaxed);
+}
+
 /// Reports whether there is a wish.
 pub fn is_wished() -> bool {
-    WISH.get().is_some()
+    WISH.get().is_some() || ECHOES.load(Ordering::Relaxed)
 }
 
 /// Reports whether there are results among what crosses.
 pub fn has_results() -> bool {
-    !matches!(WISH.get(), Some(Wish::Latest { .. }))
+    ECHOES.load(Ordering::Relaxed) || !matches!(WISH.get(), Some(Wish::Latest { .. }))
 }
 
 /// Takes the recorded topics of a DAG.
 pub fn open(dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
-    let Some(wish) = WISH.get() else {
-        return;
+    let wish = match (WISH.get(), ECHOES.load(Ordering::Relaxed)) {
+        (wish, true) => Wish::Echo(wish),
+        (Some(wish), false) => *wish,
+        (None, false) => return,
     };
     let mut crossing = CROSSING.lock();
-    let crossing = crossing.get_or_insert_with(|| begin(*wish));
+    let crossing = crossing.get_or_insert_with(|| begin(wish));
     crossing.open(dag, graph, channels);
 }
 
 /// Makes a plan one that is recorded or replayed, if there is a wish.
 pub fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let Some(wish) = WISH.get() else {
-        return Ok(());
+        let mut place = CROSSING.lock();
+        let launched = place.as_mut().map(|crossing| crossing.launch(plan));
+        return launched.unwrap_or(Ok(())).map_err(LaunchError::new);
     };
     let word = match wish {
         Wish::Record { .. } => "record",
         Wish::Replay(_) => "replay",
-        Wish::Latest { .. } => "latest",
+        Wish::Latest { .. } | Wish::Echo(_) => "latest",
     };
     let is_asked_for = !matches!(wish, Wish::Latest { .. });
     let mut place = CROSSING.lock();
@@ -187,6 +199,20 @@ pub fn happened(what: What, happened: &Happened) {
     {
         crossing.happened(what, happened);
     }
+}
+
+/// Keeps the latest value of a recorded topic from now on, or nothing. Reports whether there is
+/// such a topic.
+pub fn watch(topic: Option<&str>) -> bool {
+    let mut crossing = CROSSING.lock();
+    let echo = crossing.as_mut().and_then(|crossing| crossing.echo());
+    echo.is_some_and(|echo| echo.watch(topic))
+}
+
+/// Takes that value out, if there is one.
+pub fn take_seen(into: &mut [u8]) -> Option<Seen> {
+    let mut crossing = CROSSING.lock();
+    crossing.as_mut()?.echo()?.take(into)
 }
 
 /// Reports whether a replay is wished.

@@ -11,4 +11,5 @@ pub mod execution;
 pub mod heartbeat;
 pub(crate) mod occupation;
 pub mod platform;
+pub mod stacks;
 pub mod worker;

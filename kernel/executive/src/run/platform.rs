@@ -6,12 +6,14 @@ use core::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Channel, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
+    Channel, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
+    Recorded,
 };
-use sched_dag::{DagId, SchedulerOptions};
+use sched_dag::analysis::{self, Answer, Settings};
+use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
-use super::execution::{self, Terms};
-use super::{edge, occupation};
+use super::execution::{self, Division, Terms};
+use super::{edge, occupation, stacks};
 use crate::machine::once::Once;
 use crate::machine::{clock, this_core};
 use crate::text::graph;
@@ -115,6 +117,24 @@ impl Platform for Kernel {
         u32::try_from(this_core::all().len()).unwrap_or(u32::MAX)
     }
 
+    fn clusters(&self) -> Clusters {
+        match execution::division() {
+            Division::Into(clusters) => clusters,
+            Division::ByCommit => Clusters::Undivided,
+        }
+    }
+
+    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+        match execution::division() {
+            Division::ByCommit => fass::assign_clusters(self, task_set),
+            Division::Into(_) => Ok(()),
+        }
+    }
+
+    fn answer(&self, task_set: &TaskSet, settings: &Settings) -> Answer {
+        analysis::answer_compact(task_set, settings)
+    }
+
     fn overheads(&self) -> Overheads {
         let [context_switch_ns, dispatch_ns, interrupt_ns] = self
             .overheads_ns
@@ -173,6 +193,7 @@ impl Platform for Kernel {
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
         edge::launch(&mut plan)?;
+        stacks::watch(&mut plan);
         let options = SchedulerOptions {
             policy: self.policy(),
             preemption: self.preemption(),

@@ -50,8 +50,8 @@ fn run(mut runner: Box<Runner>) -> Work {
     execution::complete(runner, finish_ns)
 }
 
-/// Makes the cores other than core 0 watch for work instead of halting when they
-/// have none.
+/// Makes the cores other than the first of each cluster watch for work instead of halting when
+/// they have none.
 pub fn watch_when_idle() {
     WATCHES.store(true, Ordering::Relaxed);
 }
@@ -61,7 +61,8 @@ static WATCHES: AtomicBool = AtomicBool::new(false);
 /// Sends waiting text and halts in between, until this core is to look for work.
 /// Interrupts are disabled before and after.
 fn rest(core: &Core) {
-    if WATCHES.load(Ordering::Relaxed) {
+    // A core that keeps time has to hear of earlier events and of letters, by an interrupt.
+    if WATCHES.load(Ordering::Relaxed) && !execution::keeps_time(core) {
         watch(core);
     }
     while !core.wake.swap(false, Ordering::AcqRel) {

@@ -8,7 +8,7 @@ use core::fmt;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fass::{OverrunPolicy, Plan, Policy, Preemption};
-use sched_dag::{Dag, DagId, OnFault, SchedulerOptions, SubtaskId};
+use sched_dag::{Dag, DagId, OnFault, SchedulerOptions, SubtaskId, TaskSet};
 
 use super::json::{self, Object};
 
@@ -33,7 +33,7 @@ pub fn dump(plan: &Plan, options: SchedulerOptions, overhead_ns: Option<u64>) {
     for (number, (dag, bound_ns)) in (0u32..).zip(dags) {
         json::emit("graph", |line| {
             line.number("commit", commit);
-            scheduling(line, &options);
+            scheduling(line, &options, &plan.task_set);
             line.list("overhead_ns", overhead_ns.iter())
                 .list("bound_ns", bound_ns.iter());
             describe(line, number, dag);
@@ -48,7 +48,7 @@ pub fn dump(plan: &Plan, options: SchedulerOptions, overhead_ns: Option<u64>) {
 }
 
 /// Says how DAGs are scheduled, by the members that the kinds `graph` and `trace_begin` share.
-pub fn scheduling(line: &mut Object<'_, '_>, options: &SchedulerOptions) {
+pub fn scheduling(line: &mut Object<'_, '_>, options: &SchedulerOptions, task_set: &TaskSet) {
     let policy = match options.policy {
         Policy::StaticPriority => "static",
         Policy::Edf => "edf",
@@ -60,6 +60,10 @@ pub fn scheduling(line: &mut Object<'_, '_>, options: &SchedulerOptions) {
     line.text("policy", policy)
         .text("preemption", preemption)
         .number("cores", options.cores);
+    if task_set.is_divided() {
+        let cores = |cluster| task_set.cores_of(cluster, options.cores).len();
+        line.list("clusters", task_set.clusters().map(cores));
+    }
 }
 
 /// Describes a DAG by the members that the kinds `graph` and `trace_dag` share.
@@ -78,6 +82,9 @@ pub fn describe(line: &mut Object<'_, '_>, number: u32, dag: &Dag) {
         .text("overrun", overrun)
         .list("subtasks", subtasks(dag))
         .list("edges", edges(dag));
+    if dag.states_cluster() {
+        line.number("cluster", dag.cluster().0);
+    }
     if dag.sinks().len() > 1 {
         line.list("sinks", sinks(dag));
     }

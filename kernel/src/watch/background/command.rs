@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use super::more;
+
 /// What a person wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Command<'a> {
@@ -84,6 +86,9 @@ impl fmt::Display for Refusal<'_> {
                 for (index, (command, _)) in HELP.iter().enumerate() {
                     let separator = if index == 0 { "" } else { ", " };
                     write!(f, "{separator}{command}")?;
+                }
+                for (command, _) in more::all().flat_map(more::Commands::help) {
+                    write!(f, ", {command}")?;
                 }
                 Ok(())
             }

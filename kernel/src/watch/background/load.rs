@@ -3,6 +3,7 @@
 //! The events of the time in question are read from the latest one back, a few at a
 //! time: only while they are copied is the scheduler's lock held.
 
+use sched_dag::Journal;
 use sched_dag::journal::{Event, What};
 
 use executive::machine::this_core;
@@ -22,25 +23,46 @@ pub(crate) fn loads_permille(
     to_ns: u64,
     most: u64,
 ) -> impl Iterator<Item = u64> + Clone {
-    let mut loads = Loads::new(from_ns, to_ns);
-    let recorded = execution::with_journal(|journal| {
+    let mut permille = [0; CORES];
+    let mut is_recorded = true;
+    for cluster in 0..execution::clusters() {
+        match of_cluster(cluster, Loads::new(from_ns, to_ns), most) {
+            Some(loads) => {
+                let first = execution::first_core(cluster) as usize;
+                let its = permille.iter_mut().skip(first).zip(0..);
+                // Beyond the cluster's cores it is 0, until the next one is looked at.
+                its.for_each(|(place, core)| *place = loads.permille(core));
+            }
+            None => is_recorded = false,
+        }
+    }
+    let cores = if is_recorded {
+        this_core::all().len()
+    } else {
+        0
+    };
+    permille.into_iter().take(cores)
+}
+
+/// Takes the events of a cluster's journal; nothing if they are not recorded.
+fn of_cluster(cluster: usize, mut loads: Loads, most: u64) -> Option<Loads> {
+    let recorded = execution::with_journal(cluster, |journal| {
         let is_on = journal.is_recording();
         is_on.then(|| journal.written())
     });
-    let recorded = recorded.flatten();
-    let mut end = recorded.unwrap_or(0);
+    let mut end = recorded.flatten()?;
     let last = end.saturating_sub(most);
     while end > last && !loads.is_over {
         let mut buffer = [None; AT_ONCE];
-        let copied = execution::with_journal(|journal| journal.copy_back(end, &mut buffer));
+        let look = |journal: &mut Journal| journal.copy_back(end, &mut buffer);
+        let copied = execution::with_journal(cluster, look);
         buffer.iter().flatten().for_each(|event| loads.take(event));
         match copied {
             Some(oldest) if oldest < end => end = oldest,
             _ => break,
         }
     }
-    let cores = recorded.map_or(0, |_| this_core::all().len());
-    (0..cores).map(move |core| loads.permille(core))
+    Some(loads)
 }
 
 /// The loads, while events are taken from the latest one back.

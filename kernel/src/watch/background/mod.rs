@@ -18,11 +18,14 @@ mod command;
 mod input;
 mod listener;
 mod load;
+pub(crate) mod more;
+pub(crate) mod parameters;
 mod patience;
 mod progress;
 pub(crate) mod session;
 mod stall;
 mod status;
+pub(crate) mod topics;
 pub(crate) mod watchdog;
 pub(crate) mod wire;
 

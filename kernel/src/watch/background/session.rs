@@ -14,6 +14,7 @@ use sched_dag::{Dag, DagId, TaskSet};
 
 use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
+use super::more;
 use crate::println;
 use executive::machine::serial;
 use executive::run::execution::{self, Control, Snapshot, State};
@@ -73,9 +74,7 @@ impl Session {
             }
             return true;
         }
-        if self.is_shutting_down {
-            end_what_is_idle(&task_set);
-        }
+        more::all().for_each(more::Commands::step);
         for _ in 0..MOST_BYTES {
             let Some(byte) = serial::FIRST.receive() else {
                 return false;
@@ -126,27 +125,41 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
     let command = match parse(line) {
         Ok(command) => command,
         Err(refusal) => {
-            refuse(line, &refusal);
+            let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+            let mut is_refused = false;
+            let refuse = &mut |why: &dyn Display| {
+                is_refused = true;
+                refuse(line, why);
+            };
+            if !more::all().any(|commands| commands.answer(name, rest.trim(), refuse)) {
+                refuse(&refusal);
+            }
+            if !is_refused {
+                accept(line);
+            }
             return Answer::Given;
         }
     };
     match command {
         Command::Help => {
-            for (command, what) in HELP {
-                println!("  {command:14}{what}");
+            let more = more::all().flat_map(more::Commands::help);
+            for (command, what) in HELP.iter().chain(more) {
+                println!("  {command:15}{what}");
             }
             accept(line);
         }
         Command::Dags => return list(line, task_set, None, describe),
         Command::Stats(name) => return list(line, task_set, name, count),
         Command::Trace(true)
-            if !execution::with_journal(|journal| journal.has_room()).unwrap_or(false) =>
+            if !execution::with_journal(0, |journal| journal.has_room()).unwrap_or(false) =>
         {
             let why = "there is no room for events; boot without `trace_events=0`";
             refuse(line, &why);
         }
         Command::Trace(on) => {
-            execution::with_journal(|journal| journal.record_events(on));
+            for cluster in 0..execution::clusters() {
+                execution::with_journal(cluster, |journal| journal.record_events(on));
+            }
             let what = if on { "events" } else { "no events" };
             println!("{what} are recorded");
             accept(line);
@@ -163,23 +176,12 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
         Command::Start(name) => change(line, task_set, name, Control::Resume, "releases jobs"),
         Command::Shutdown => {
             println!("shutting down: nothing more is released; what is in flight goes on");
-            ids(task_set).for_each(|dag| execution::control(Control::Pause(dag)));
+            ids(task_set).for_each(|dag| execution::control(Control::Close(dag)));
             accept(line);
             return Answer::ShutsDown;
         }
     }
     Answer::Given
-}
-
-/// Ends each DAG that has nothing in flight; when all are, the run is over.
-fn end_what_is_idle(task_set: &TaskSet) {
-    for dag in ids(task_set) {
-        let snapshot = execution::snapshot(dag);
-        let is_idle = |of: &Snapshot| of.in_flight == 0 && of.state != State::Ended;
-        if snapshot.as_ref().is_some_and(is_idle) {
-            execution::control(Control::End(dag));
-        }
-    }
 }
 
 /// Begins a list of all DAGs, or of the one that is named.

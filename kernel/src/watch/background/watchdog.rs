@@ -4,9 +4,9 @@
 //! a non-maskable interrupt alone, and nothing on it can go on. So core 0 looks at all
 //! others in its heartbeat, and core 1 at core 0. A core that has taken no interrupt for
 //! [`QUIET_NS`] while it runs something is sent one; if it has taken none for
-//! [`SILENT_NS`], it is accused: the non-maskable interrupt makes it report where it is,
-//! and ends the run. If interrupts turn out to be enabled there, it was the host that did
-//! not let it run, and it goes on.
+//! [`SILENT_NS`], it is accused at each look, by a non-maskable interrupt. If interrupts turn
+//! out to be enabled there, it was the host that did not let it run, and it goes on. If they
+//! are disabled at two looks in a row, it reports where it is, and ends the run.
 //!
 //! A machine of one core has nobody to notice.
 

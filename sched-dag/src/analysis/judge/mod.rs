@@ -53,7 +53,8 @@ use super::non_preemptive::Blocking;
 use super::pipelined::Unsolved;
 use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
-use super::set::{Failure, Set, constrained};
+use super::set::{Failure, NewFront, Set, constrained};
+use super::sums::front;
 use super::task::Task;
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
@@ -66,6 +67,17 @@ use crate::task_set::{Dag, TaskSet};
 /// no term: a sporadic DAG counts as if signals came as fast as they may.
 #[must_use]
 pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
+    answer_by(task_set, settings, Some(front))
+}
+
+/// Answers the same as [`answer`] by 6 KB of code less, in time quadratic in the number of
+/// DAGs: for images, which have little room and few DAGs.
+#[must_use]
+pub fn answer_compact(task_set: &TaskSet, settings: &Settings) -> Answer {
+    answer_by(task_set, settings, None)
+}
+
+fn answer_by(task_set: &TaskSet, settings: &Settings, front: Option<NewFront>) -> Answer {
     let dags = task_set.dags();
     let unknown = dags.iter().map(|dag| vec![None; dag.sinks().len()]);
     let mut answer = Answer {
@@ -85,7 +97,7 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
         with_case(
             dags,
             &own,
-            &settings,
+            (&settings, front),
             &mut answer.reasons,
             |case, reasons| {
                 let mut verdict = case.verdict();
@@ -107,7 +119,7 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
 pub(super) fn with_case(
     dags: &[Dag],
     own: &[usize],
-    settings: &Settings,
+    (settings, front): (&Settings, Option<NewFront>),
     reasons: &mut [Option<Reason>],
     work: impl FnOnce(&Case<'_>, &mut [Option<Reason>]),
 ) {
@@ -121,7 +133,8 @@ pub(super) fn with_case(
         .collect();
     let is_only_one = own.len() == 1;
     let relation = relation.among(&members);
-    let case = Case::new(dags, (&members, &tasks), is_only_one, relation, settings);
+    let mut case = Case::new(dags, (&members, &tasks), is_only_one, relation, settings);
+    case.set.front = front;
     work(&case, reasons);
 }
 

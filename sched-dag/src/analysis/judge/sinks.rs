@@ -20,6 +20,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::Case;
+use crate::analysis::above::Above;
 use crate::analysis::answer::{Answer, DagBound, NotProven, Reason};
 use crate::analysis::pipelined::STEP_LIMIT;
 use crate::analysis::relation::Mixture;
@@ -41,12 +42,20 @@ struct Reach {
 pub(super) fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
+    let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+    let mut above = case.set.above(&case.order, may_outrank);
+    for &dag in &case.order {
+        if let Some(whole_ns) = responses[dag] {
+            let front = above.as_ref().map(|above| above.among());
+            bounds[case.members[dag]] = of_dag(case, dag, whole_ns, front, &responses);
+        }
+        if let Some(above) = &mut above {
+            above.push(&case.set, dag, responses[dag]);
+        }
+    }
     for (dag, &number) in case.members.iter().enumerate() {
         let model = case.dag(dag);
         let sinks_ns = &mut bounds[number];
-        if let Some(whole_ns) = responses[dag] {
-            *sinks_ns = of_dag(case, dag, whole_ns, &responses);
-        }
         let unbounded = within_deadlines(model, verdict.bounds[dag], sinks_ns);
         let reason = match (too_far(case.tasks[dag], model), unbounded) {
             (Some((sink, length_ns)), _) if !is_certain(verdict.reasons[dag]) => {
@@ -74,6 +83,7 @@ fn of_dag(
     case: &Case<'_>,
     dag: usize,
     whole_ns: u64,
+    front: Option<Result<&dyn Above, usize>>,
     responses: &[Option<u64>],
 ) -> Vec<Option<u64>> {
     let (set, model) = (&case.set, case.dag(dag));
@@ -94,9 +104,16 @@ fn of_dag(
         )| {
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
             let limit_ns = deadlines_limit.then_some(deadline_ns);
-            let others = set.interference_up_to(dag, limit_ns, responses, may_outrank);
+            let each;
+            let others: &dyn Above = match front {
+                Some(front) => front.ok()?,
+                None => {
+                    each = set.interference_up_to(dag, limit_ns, responses, may_outrank);
+                    each.as_ref().ok()?
+                }
+            };
             let figures = set.figures[dag].of_sink(length_ns, volume_ns, deadline_ns, whole_ns);
-            figures.solve(&others.ok()?, 0, &mut { STEP_LIMIT }).ok()
+            figures.solve(others, 0, &mut { STEP_LIMIT }).ok()
         },
     );
     bound.collect()

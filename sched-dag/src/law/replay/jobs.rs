@@ -144,6 +144,9 @@ impl Replay<'_> {
         if let Some((later, _)) = of_dag.latest.filter(|latest| latest.0 > job) {
             return Some(Violation::OutOfOrder { event, later });
         }
+        if of_dag.is_off {
+            return Some(Violation::WhileOff { event });
+        }
         if of_dag.in_flight >= model.in_flight() {
             let in_flight = of_dag.in_flight;
             return Some(Violation::TooMany { event, in_flight });

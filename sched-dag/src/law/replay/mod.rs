@@ -108,6 +108,8 @@ struct OfDag {
     /// When a job was complete last.
     completed_ns: Option<u64>,
     is_stopped: bool,
+    /// Whether it is paused or closed, and so releases nothing.
+    is_off: bool,
     /// The jobs of the faults after which it went on.
     faults: Vec<u64>,
 }
@@ -144,6 +146,8 @@ impl Replay<'_> {
         match event.what {
             What::Due => self.dag(event.dag).due = Some((event.job, event.time_ns)),
             What::Stopped => self.dag(event.dag).is_stopped = true,
+            What::Off | What::Closed => self.dag(event.dag).is_off = true,
+            What::On => self.dag(event.dag).is_off = false,
             What::Signalled | What::Dropped | What::Request => {}
             What::Released | What::Queued | What::Skipped => self.release(event),
             What::Aborted | What::Missed | What::Completed => self.job(event),

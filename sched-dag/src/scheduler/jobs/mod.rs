@@ -44,6 +44,8 @@ pub(super) struct Jobs {
     /// Whether the DAG is ended: no job is released, and none in flight starts
     /// a further instance.
     ended: bool,
+    /// Whether no further job is due, because the DAG is closed or ended.
+    closed: bool,
     /// The first job that is not due yet.
     pub(super) next_due: u64,
     /// Its nominal release time; `None`: there is no further job, or, of a
@@ -97,6 +99,7 @@ impl Jobs {
             oldest: 0,
             next: 0,
             ended: false,
+            closed: false,
             next_due: 0,
             next_due_ns: due_ns(dag, 0),
             last_due_ns: 0,
@@ -131,7 +134,7 @@ impl Jobs {
     }
 
     /// Reports whether there is neither a job in flight, nor one waiting, nor
-    /// one ahead: the DAG is ended, or has a limit of jobs and is there, or is
+    /// one ahead: the DAG is closed or ended, or has a limit of jobs and is there, or is
     /// sporadic without a limit and has no signal.
     #[inline]
     pub(super) fn are_over(&self, dag: &Dag) -> bool {
@@ -139,7 +142,7 @@ impl Jobs {
             Some(jobs) => self.next_due >= jobs,
             None => dag.is_sporadic() && self.next_due_ns.is_none(),
         };
-        self.oldest == self.next && self.waiting() == 0 && (self.ended || none_ahead)
+        self.oldest == self.next && self.waiting() == 0 && (self.closed || none_ahead)
     }
 
     /// Returns the job that a signal is for, or that one is kept for.
@@ -154,7 +157,7 @@ impl Jobs {
     #[inline]
     pub(super) fn signal(&mut self, dag: &Dag, now_ns: u64) -> Option<u64> {
         let limit_reached = dag.jobs().is_some_and(|jobs| self.next_due >= jobs);
-        if self.ended || limit_reached || self.waiting() > 0 || self.next_due_ns.is_some() {
+        if self.closed || limit_reached || self.waiting() > 0 || self.next_due_ns.is_some() {
             return None;
         }
         let earliest_ns = match self.next_due {
@@ -280,6 +283,19 @@ impl Jobs {
         self.ended
     }
 
+    /// Reports whether no further job will be due.
+    #[inline]
+    pub(super) fn is_closed(&self) -> bool {
+        self.closed
+    }
+
+    /// Drops all that is ahead.
+    #[inline]
+    pub(super) fn close(&mut self) {
+        self.closed = true;
+        self.next_due_ns = None;
+    }
+
     /// Drops all that waits and all that is ahead, and lets those in flight
     /// start no further instance. Returns how many were in flight and not cut,
     /// and how many waited.
@@ -291,7 +307,7 @@ impl Jobs {
         }
         let dropped = self.waiting();
         self.ended = true;
-        self.next_due_ns = None;
+        self.close();
         self.first_waiting = self.next_due;
         (cut_short, dropped)
     }

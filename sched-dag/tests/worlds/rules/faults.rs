@@ -58,10 +58,11 @@ impl Facts<'_> {
         let OfDag {
             jobs,
             is_ended,
+            is_closed,
             statistics,
             ..
         } = &mut self.dags[dag];
-        *is_ended = true;
+        (*is_ended, *is_closed) = (true, true);
         self.said[dag].push(Said::Ended);
         for job in jobs {
             match job.state {

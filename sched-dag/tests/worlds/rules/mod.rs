@@ -22,6 +22,9 @@ pub(crate) enum Said {
     Missed(usize),
     Completed(usize, JobOutcome),
     Ended,
+    Off,
+    On,
+    Closed,
     Restarted(usize),
 }
 
@@ -65,6 +68,7 @@ pub(crate) struct Job {
 pub(crate) struct OfDag {
     pub(crate) jobs: [Job; JOBS],
     pub(crate) is_ended: bool,
+    pub(crate) is_closed: bool,
     pub(crate) is_paused: bool,
     resumed_ns: u64,
     /// The jobs of the faults that were survived.
@@ -97,6 +101,7 @@ impl<'w> Facts<'w> {
         let of_dag = |dag: &Dag| OfDag {
             jobs: std::array::from_fn(|number| job(dag, number)),
             is_ended: false,
+            is_closed: false,
             is_paused: false,
             resumed_ns: 0,
             survived: Vec::new(),

@@ -1,4 +1,4 @@
-//! What is released when: due jobs, those that find no room, signals and pauses.
+//! What is released when: due jobs, those that find no room, signals, pauses, closings.
 
 use sched_dag::OverrunPolicy;
 
@@ -6,11 +6,13 @@ use super::{Facts, Job, Said, State};
 
 impl Facts<'_> {
     pub(crate) fn pause(&mut self, dag: usize) {
-        if self.dags[dag].is_ended {
+        if self.dags[dag].is_closed {
             return;
         }
         self.judge(dag, None);
-        self.dags[dag].is_paused = true;
+        if !std::mem::replace(&mut self.dags[dag].is_paused, true) {
+            self.said[dag].push(Said::Off);
+        }
         while let Some(job) = self.first(dag, State::Waiting) {
             self.skip(dag, job);
         }
@@ -19,7 +21,25 @@ impl Facts<'_> {
     pub(crate) fn resume(&mut self, dag: usize) {
         if std::mem::take(&mut self.dags[dag].is_paused) {
             self.dags[dag].resumed_ns = self.now_ns;
+            self.said[dag].push(Said::On);
         }
+    }
+
+    /// C1 to C5.
+    pub(crate) fn close(&mut self, dag: usize) {
+        if self.dags[dag].is_closed {
+            return;
+        }
+        self.judge(dag, None);
+        self.dags[dag].is_closed = true;
+        self.dags[dag].is_paused = false;
+        self.said[dag].push(Said::Closed);
+        while let Some(job) = self.first(dag, State::Waiting) {
+            self.skip(dag, job);
+        }
+        let ahead = self.dags[dag].jobs.iter_mut();
+        let ahead = ahead.filter(|job| job.state == State::Ahead);
+        ahead.for_each(|job| job.state = State::Over);
     }
 
     pub(crate) fn signal(&mut self, dag: usize) {

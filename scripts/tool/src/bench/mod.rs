@@ -31,6 +31,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use crate::install;
+use crate::lasting::Lasting;
 use crate::options::{Choice, Command, Menu, Parsed};
 
 static BENCH: Menu = Menu {
@@ -82,9 +83,16 @@ static BENCH: Menu = Menu {
     notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
 };
 
+/// The measurements that print nothing before they have a result.
+const SILENT: [&str; 4] = ["bounds", "build", "scheduler", "sizes"];
+
 /// Runs the subcommand.
 #[must_use]
 pub fn bench(words: &[OsString]) -> ExitCode {
+    // The others say themselves how far they are.
+    let is_silent = |word: &OsString| SILENT.iter().any(|silent| word == silent);
+    let of_silent = words.first().is_some_and(is_silent);
+    let _lasting = of_silent.then(|| Lasting::new("measuring"));
     BENCH.run(words)
 }
 

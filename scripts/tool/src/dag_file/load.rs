@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dag_file::{DagFile, Length, Malformed, check, is_name, parse};
 use replay::shown::is_seen;
-use sched_dag::Policy;
+use sched_dag::{Clusters, CommitOptions, Policy};
 
 use super::{rd_gen, stg};
 use crate::files;
@@ -18,6 +18,8 @@ pub struct Import {
     pub graph: Option<String>,
     /// The number of cores that it will run on.
     pub cores: u32,
+    /// How they are divided.
+    pub clusters: Clusters,
     /// For how long it will run.
     pub length: Length,
 }
@@ -100,9 +102,11 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
             "{place}: `--graph {graph}` is for a set of task graphs in JSON; leave it out"
         )]);
     }
+    // Static priorities ask for all that EDF does, and more.
+    let options = CommitOptions::new(Policy::StaticPriority, import.cores)
+        .with_clusters(import.clusters.clone());
     for set in &file.sets {
-        // Static priorities ask for all that EDF does, and more.
-        check(set, Policy::StaticPriority, import.cores, import.length).map_err(located)?;
+        check(set, &options, import.length).map_err(located)?;
     }
     Ok(file)
 }

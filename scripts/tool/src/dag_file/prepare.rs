@@ -8,6 +8,8 @@ use std::path::PathBuf;
 use dag_file::time::parse_ns;
 use dag_file::{DagFile, Execution, FileDag, Length, Set};
 
+use sched_dag::Clusters;
+
 use super::load::{Import, load};
 use super::source_lines;
 use crate::files;
@@ -124,6 +126,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         unit_ns,
         graph: options.text("graph").map(String::from),
         cores: u32::try_from(cores).unwrap_or(u32::MAX),
+        clusters: clusters(options.text("clusters")).map_err(refuse)?,
         length,
     };
     let file = load(path, &import)?;
@@ -165,6 +168,17 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         module: None,
         words,
     }))
+}
+
+/// Reads how the cores are to be divided. Where the commit is to find that, it has not yet.
+fn clusters(text: Option<&str>) -> Result<Clusters, String> {
+    let Some(text) = text.filter(|text| *text != "auto") else {
+        return Ok(Clusters::Undivided);
+    };
+    let sizes: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+    sizes.map(Clusters::Of).map_err(|_| {
+        format!("`--clusters {text}`: give the number of cores of each cluster, as in 2,2, or auto")
+    })
 }
 
 fn length(options: &Parsed) -> Length {
@@ -251,10 +265,20 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST_S, limit_s, memory_mib, prepare};
+    use super::{MOST_S, clusters, limit_s, memory_mib, prepare};
     use crate::run::RUN;
     use crate::system::workspace;
     use dag_file::{DagFile, Length, parse};
+    use sched_dag::Clusters;
+
+    #[test]
+    fn clusters_are_numbers_of_cores_or_left_to_the_commit() {
+        assert_eq!(clusters(None), Ok(Clusters::Undivided));
+        assert_eq!(clusters(Some("auto")), Ok(Clusters::Undivided));
+        assert_eq!(clusters(Some("1,3")), Ok(Clusters::Of(vec![1, 3])));
+        let refused = clusters(Some("1,two")).unwrap_err();
+        assert!(refused.contains("as in 2,2, or auto"), "{refused}");
+    }
 
     fn file(subtasks: usize) -> DagFile {
         let subtasks = (0..subtasks).map(|number| format!("subtask s{number} wcet 1ms\n"));

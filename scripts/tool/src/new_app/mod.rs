@@ -1,8 +1,8 @@
 //! The subcommand `new-app`: an app of one's own, under `apps/` or in a repository of its own.
 //!
 //! The *template* is an app that is complete: a library with the functions and
-//! their DAG, a program that boots it, and a test that runs it on the host in
-//! virtual time. A new app is a copy in which the template's name is replaced.
+//! their DAG, a program that boots it, the same as a program for Linux, and a test that runs
+//! it on the host in virtual time. A new app is a copy in which the template's name is replaced.
 //! Under `apps/` cargo finds it by the workspace's `apps/*`, so nothing else changes. In a
 //! repository it has what the workspace gives otherwise: `repository` adds that.
 //!
@@ -43,6 +43,10 @@ const FILES: &[AppFile] = &[
     ("src/lib.rs", include_str!("../../template/src/lib.rs")),
     ("src/main.rs", include_str!("../../template/src/main.rs")),
     (
+        "examples/app-template-linux.rs",
+        include_str!("../../template/examples/app-template-linux.rs"),
+    ),
+    (
         "tests/virtual_time.rs",
         include_str!("../../template/tests/virtual_time.rs"),
     ),
@@ -77,7 +81,7 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
                 Some(url) => Source::Git(url),
                 None => Source::Folder(system::workspace()),
             };
-            create_repository(out, name, source).map(|()| repository::next_steps(out, source))
+            create_repository(out, name, source).map(|()| repository::next_steps(out, name, source))
         }
     };
     match made {
@@ -143,7 +147,7 @@ fn write_all(
 ) -> Result<(), String> {
     let crate_name = name.replace('-', "_");
     for (place, text) in files {
-        let path = folder.join(place);
+        let path = folder.join(place.replace(PLACEHOLDER.0, name));
         let text = change(text)
             .replace(PLACEHOLDER.0, name)
             .replace(PLACEHOLDER.1, &crate_name);
@@ -156,6 +160,7 @@ fn write_all(
 
 fn next_steps(name: &str) -> String {
     let boot = format!("./scripts/run --app {name}");
+    let linux = format!("{boot} --on linux");
     let test = format!("cargo test -p {name}");
     format!(
         "\
@@ -165,11 +170,12 @@ apps/{name} is there:
   tests/virtual_time.rs  runs it on the host, in virtual time
 
 {boot:width$}  boots it in QEMU
+{linux}  runs it on Linux
 {test:width$}  tests it on the host
 {:width$}  goes on from here
 ",
         "docs/guide.md",
-        width = boot.len()
+        width = linux.len()
     )
 }
 
@@ -184,12 +190,16 @@ mod tests {
         let folder = create(&workspace, "brake-assist").unwrap();
         let mut named = 0;
         for (place, template) in FILES.iter().chain([&MANIFEST]) {
-            let text = fs::read_to_string(folder.join(place)).unwrap();
+            let place = place.replace(PLACEHOLDER.0, "brake-assist");
+            let text = fs::read_to_string(folder.join(&place)).unwrap();
             assert!(!text.contains(PLACEHOLDER.0), "{place}");
             assert!(!text.contains(PLACEHOLDER.1), "{place}");
             named += usize::from(*template != text);
         }
-        assert_eq!(named, 4, "all but build.rs have the app's name");
+        assert_eq!(
+            named, 4,
+            "all but build.rs and the program for Linux have the app's name"
+        );
         let again = create(&workspace, "brake-assist").unwrap_err();
         let NewAppError::Name(line) = again else {
             panic!("{again:?}");

@@ -23,9 +23,10 @@ pub enum Source<'a> {
 const WORKSPACE: &str = "/workspace";
 
 /// The packages that the template depends on, by their folders.
-const PACKAGES: [&str; 5] = [
+const PACKAGES: [&str; 6] = [
     "fass",
     "kernel",
+    "kernel/on-linux",
     "sched-dag",
     "fass/virtual-time",
     "boot/link",
@@ -110,6 +111,7 @@ fn from_git(url: &str) -> Box<dyn Fn(&str) -> String> {
     let url = url.to_string();
     Box::new(move |text| {
         let mut text = text.replace("\"/workspace/scripts/boot\"", "\"fass-tool\", \"boot\"");
+        text = text.replace("/workspace/scripts/debug", "fass-tool debug");
         for package in PACKAGES {
             let by_path = format!("path = \"{WORKSPACE}/{package}\"");
             text = text.replace(&by_path, &format!("git = \"{url}\""));
@@ -119,7 +121,7 @@ fn from_git(url: &str) -> Box<dyn Fn(&str) -> String> {
 }
 
 /// Says what to do in the repository.
-pub(super) fn next_steps(out: &Path, source: Source<'_>) -> String {
+pub(super) fn next_steps(out: &Path, name: &str, source: Source<'_>) -> String {
     let install = match source {
         Source::Folder(_) => String::new(),
         Source::Git(url) => {
@@ -136,6 +138,7 @@ pub(super) fn next_steps(out: &Path, source: Source<'_>) -> String {
 {install}cd {}
 cargo run               # boots it in QEMU
 cargo test              # tests it on the host
+cargo run --profile linux --example {name}-linux   # runs it on Linux, docs/linux.md
 git init                # docs/guide.md goes on from here
 ",
         out.display(),
@@ -166,7 +169,7 @@ mod tests {
         let out = made("from-folder", Source::Folder(workspace()));
         let places = [text(&out, "Cargo.toml"), text(&out, ".cargo/config.toml")].concat();
         let paths = places.split('"').filter(|word| word.starts_with('/'));
-        assert_eq!(paths.clone().count(), 6);
+        assert_eq!(paths.clone().count(), 7);
         for path in paths {
             assert!(Path::new(path).exists(), "{path}");
         }
@@ -182,7 +185,7 @@ mod tests {
         let manifest = text(&out, "Cargo.toml");
         assert_eq!(
             manifest.matches(&format!("{{ git = \"{url}\" }}")).count(),
-            5
+            6
         );
         let runner = text(&out, ".cargo/config.toml");
         assert!(

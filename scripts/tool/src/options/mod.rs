@@ -46,7 +46,7 @@ pub struct Command {
 }
 
 /// One option of a command.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Opt {
     /// The long name without its dashes.
     pub name: &'static str,

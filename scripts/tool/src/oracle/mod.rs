@@ -10,9 +10,13 @@
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline.
+//!
+//! Two kinds read no files: what the analysis accepts of random sets is simulated
+//! (`random_sets`).
 
 pub mod bounds;
 pub mod in_kernel;
+mod random_sets;
 pub mod schedules;
 pub mod synchronizer;
 mod table;
@@ -25,6 +29,7 @@ use replay::lines::Malformed;
 
 use crate::files;
 use crate::options::{Choice, Command, Menu};
+use crate::progress::Progress;
 
 /// One kind of reference file: how to read its cases and how to check one.
 struct Kind<Case> {
@@ -51,6 +56,16 @@ static ORACLE: Menu = Menu {
                 };
                 run_files(&kind, words)
             },
+        },
+        Choice {
+            name: "phasings",
+            about: "small random sets accepted, next to those that no simulation refutes",
+            work: random_sets::phasings,
+        },
+        Choice {
+            name: "responses",
+            about: "random accepted sets in virtual time, with overheads, against their bounds",
+            work: random_sets::responses,
         },
         Choice {
             name: "schedules",
@@ -101,12 +116,17 @@ fn run_files<Case>(kind: &Kind<Case>, words: &[OsString]) -> ExitCode {
         Err(line) => return kind.table.refuse(&line),
     };
     let mut failed = 0_usize;
-    for case in &cases {
-        if let Err(difference) = (kind.check)(case) {
+    let mut progress = Progress::new(cases.len() as u64, "cases");
+    for (over, case) in (1..).zip(&cases) {
+        let checked = (kind.check)(case);
+        progress.show(over);
+        if let Err(difference) = checked {
             failed += 1;
+            progress.end();
             println!("{}: {difference}", (kind.name)(case));
         }
     }
+    progress.end();
     println!("{} passed, {failed} failed", cases.len() - failed);
     ExitCode::from(u8::from(failed > 0))
 }

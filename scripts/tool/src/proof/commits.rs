@@ -1,7 +1,7 @@
 //! The commits of a guest, as its lines of kind `graph` tell them.
 
 use sched_dag::analysis::{self, Overheads, Settings};
-use sched_dag::{DagSpec, SchedulerOptions, TaskSet};
+use sched_dag::{Clusters, DagSpec, SchedulerOptions, TaskSet};
 
 use crate::json::Value;
 use crate::protocol::{MachineLine, Transcript};
@@ -28,6 +28,7 @@ pub struct Commit {
 struct Open {
     number: u64,
     options: SchedulerOptions,
+    clusters: Clusters,
     overhead_ns: u64,
     dags: Vec<DagSpec>,
     lines: Vec<usize>,
@@ -63,6 +64,7 @@ fn add(line: &MachineLine, all: &mut Vec<Open>) -> Result<(), Malformed> {
         all.push(Open {
             number,
             options: dag::options(&line)?,
+            clusters: dag::clusters(&line)?,
             overhead_ns: one(&line, "overhead_ns")?.unwrap_or(u64::MAX),
             dags: Vec::new(),
             lines: Vec::new(),
@@ -96,9 +98,10 @@ fn close(open: Open) -> Result<Commit, Malformed> {
         preemption,
         cores,
     } = open.options;
+    let options = (open.options, &open.clusters);
     Ok(Commit {
         number: open.number,
-        task_set: dag::task_set("graph", open.options, &open.dags, &open.lines)?,
+        task_set: dag::task_set("graph", options, &open.dags, &open.lines)?,
         settings: Settings {
             policy,
             preemption,

@@ -13,6 +13,8 @@ use crate::json::Object;
 /// One DAG of one commit.
 #[derive(Clone, Debug)]
 pub struct Row {
+    /// The file that the DAG is from, if there are several.
+    file: Option<String>,
     commit: u64,
     dag: String,
     bound_ns: Option<u64>,
@@ -37,6 +39,7 @@ pub fn rows(commits: &[Commit], observed: &[OfDag]) -> Result<Vec<Row>, String> 
                 format!("dag `{name}` of commit {commit} has not run")
             })?;
             rows.push(Row {
+                file: None,
                 commit: commit.number,
                 dag: dag.name().into(),
                 bound_ns: commit.bounds_ns[number.index()],
@@ -49,6 +52,27 @@ pub fn rows(commits: &[Commit], observed: &[OfDag]) -> Result<Vec<Row>, String> 
 }
 
 impl Row {
+    /// Names the file that the DAG is from.
+    #[must_use]
+    pub fn of_file(self, name: &str) -> Self {
+        Self {
+            file: Some(name.into()),
+            ..self
+        }
+    }
+
+    fn name(&self) -> String {
+        match &self.file {
+            Some(file) => format!("{file}: {}", self.dag),
+            None => self.dag.clone(),
+        }
+    }
+
+    fn exceeds(&self) -> bool {
+        self.bound_ns
+            .is_some_and(|bound_ns| self.longest_ns > bound_ns)
+    }
+
     /// Returns the longest response in thousandths of the bound.
     fn permille(&self) -> Option<u64> {
         let permille = u128::from(self.longest_ns) * 1000 / u128::from(self.bound_ns?.max(1));
@@ -68,8 +92,11 @@ impl Row {
     /// Returns the row as a machine line.
     #[must_use]
     pub fn line(&self) -> String {
-        let mut line = Object::new()
-            .text("kind", "proof")
+        let mut line = Object::new().text("kind", "proof");
+        if let Some(file) = &self.file {
+            line = line.text("file", file);
+        }
+        line = line
             .number("commit", self.commit)
             .text("dag", &self.dag)
             .number("longest_ns", self.longest_ns);
@@ -90,8 +117,10 @@ impl Row {
 /// Returns the table.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
+    let names = rows.iter().map(|row| row.name().chars().count() + 1);
+    let width = names.max().unwrap_or(0).max(20);
     let mut text = format!(
-        "\n{:<20}{:>12}{:>12}{:>9}   where the bound is from:\n{:<20}{:>12}{:>12}{:>9}",
+        "\n{:<width$}{:>12}{:>12}{:>9}   where the bound is from:\n{:<width$}{:>12}{:>12}{:>9}",
         "", "", "", "", "dag", "bound", "longest", "ratio"
     );
     // Writing into a `String` cannot fail.
@@ -104,8 +133,8 @@ pub fn table(rows: &[Row]) -> String {
         let none = || "-".to_string();
         let _ = write!(
             text,
-            "{:<20}{:>12}{:>12}{:>9}",
-            row.dag,
+            "{:<width$}{:>12}{:>12}{:>9}",
+            row.name(),
             row.bound_ns.map_or("not proven".into(), shown),
             shown(row.longest_ns),
             row.permille().map_or_else(none, ratio)
@@ -118,17 +147,22 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
+/// Returns how many DAGs are proven, and how many responses were above their bounds.
+#[must_use]
+pub fn summary(rows: &[Row]) -> String {
+    let proven = rows.iter().filter(|row| row.bound_ns.is_some()).count();
+    let above = rows.iter().filter(|row| row.exceeds()).count();
+    let dags = rows.len();
+    format!("{proven} of {dags} DAGs proven, {above} responses above a bound")
+}
+
 /// Returns what makes the proof worthless, if anything does: a response above its bound.
 #[must_use]
 pub fn complaint(rows: &[Row]) -> Option<String> {
-    let exceeds = |row: &&Row| {
-        row.bound_ns
-            .is_some_and(|bound_ns| row.longest_ns > bound_ns)
-    };
-    let row = rows.iter().find(exceeds)?;
+    let row = rows.iter().find(|row| row.exceeds())?;
     Some(format!(
         "dag `{}` of commit {} took {}, beyond its bound of {}; a WCET or an overhead is too small",
-        row.dag,
+        row.name(),
         row.commit,
         shown(row.longest_ns),
         shown(row.bound_ns?)
@@ -138,7 +172,7 @@ pub fn complaint(rows: &[Row]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::{commits, observed};
-    use super::{complaint, rows, table};
+    use super::{complaint, rows, summary, table};
     use crate::protocol::Transcript;
 
     fn rows_with(longest_ns: u64) -> Vec<super::Row> {
@@ -159,11 +193,26 @@ mod tests {
                 .line()
                 .contains("\"tightness_permille\":500,\"longest_path_ns\":5000000")
         );
-        let said = complaint(&rows_with(5_002_001)).unwrap();
+        let late = rows_with(5_002_001);
+        let said = complaint(&late).unwrap();
         assert!(
             said.starts_with("dag `demo` of commit 0 took 5.002 ms"),
             "{said}"
         );
+        assert_eq!(
+            summary(&late),
+            "1 of 1 DAGs proven, 1 responses above a bound"
+        );
+    }
+
+    #[test]
+    fn a_dag_of_one_of_several_files_has_its_name() {
+        let row = rows_with(9).remove(0).of_file("a.dag");
+        assert!(
+            row.line()
+                .starts_with("{\"kind\":\"proof\",\"file\":\"a.dag\",\"commit\":0")
+        );
+        assert!(table(&[row]).contains("\na.dag: demo  "));
     }
 
     #[test]

@@ -13,7 +13,7 @@
 //! longest response time is what WCETs are above what calls took.
 
 use sched_dag::analysis::{self, Overheads, Settings};
-use sched_dag::{Dag, DagId, DagSpec, Preemption, SchedulerOptions, SubtaskSpec};
+use sched_dag::{Clusters, Dag, DagId, DagSpec, Preemption, SchedulerOptions, SubtaskSpec};
 
 use super::commits::Commit;
 use crate::trace::dag;
@@ -43,14 +43,22 @@ pub fn of(commit: &Commit, dag: DagId) -> Slack {
             preemption: settings.preemption,
             cores: settings.cores,
         };
+        let options = (options, &Clusters::Undivided);
         let task_set = dag::task_set("graph", options, dags, &[]).ok()?;
         let answer = analysis::answer(&task_set, settings);
         answer.bounds[dag].map(|bound| bound.bound_ns)
     };
-    let mut all: Vec<DagSpec> = commit.task_set.dags().iter().map(spec).collect();
-    let index = dag.index();
-    let full = commit.bounds_ns[index];
+    // What is in other clusters has no part in it.
+    let task_set = &commit.task_set;
+    let cluster = task_set.dag(dag).cluster();
+    let is_here = |(_, model): &(usize, &Dag)| model.cluster() == cluster;
+    let here = || task_set.dags().iter().enumerate().filter(is_here);
+    let mut all: Vec<DagSpec> = here().map(|(_, model)| spec(model)).collect();
+    let index = here().take_while(|(place, _)| *place < dag.index()).count();
+    let full = commit.bounds_ns[dag.index()];
     let mut settings = commit.settings;
+    let cores = task_set.cores_of(cluster, settings.cores).len();
+    settings.cores = u32::try_from(cores).unwrap_or(u32::MAX);
     settings.overheads = Overheads::default();
     let free = bound(&all, &settings, index);
     settings.preemption = Preemption::Enabled;

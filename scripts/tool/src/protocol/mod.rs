@@ -7,17 +7,18 @@
 //! whatever else it printed.
 //!
 //! The reader is strict: a line that begins with `{` and is damaged, or lacks
-//! a member that its kind must have ([`KINDS`]), is a fault with its line
+//! a member that its kind must have (`kinds`), is a fault with its line
 //! number. Kinds that are not listed pass, so that an app may add its own;
 //! `docs/serial-protocol.md` and the pages that it names describe the listed ones for
 //! people.
 
+mod app_kinds;
 mod kinds;
 
 use std::fmt;
 
 use crate::json::{self, Value};
-pub use kinds::KINDS;
+use kinds::kinds;
 
 /// A machine line that was understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -187,7 +188,7 @@ pub fn read_line(number: usize, line: &str) -> Option<Result<MachineLine, Protoc
 }
 
 fn missing_member(kind: &str, value: &Value) -> Option<&'static str> {
-    let (_, members) = KINDS.iter().find(|(name, _)| *name == kind)?;
+    let (_, members) = kinds().find(|(name, _)| *name == kind)?;
     let is_missing = |member: &&&str| {
         let path: Vec<&str> = member.split('.').collect();
         value.at(&path).is_none()
@@ -197,7 +198,7 @@ fn missing_member(kind: &str, value: &Value) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{KINDS, Status, Transcript};
+    use super::{Status, Transcript, kinds};
 
     const GOOD: &str = "\
 hello {\r
@@ -271,7 +272,7 @@ ok
             include_str!("../../../../docs/app-lines.md"),
             include_str!("../../../../docs/trace-format.md"),
         );
-        for (kind, members) in KINDS {
+        for (kind, members) in kinds() {
             let heading = format!("\n### `{kind}`");
             let section = document.split(&heading).nth(1);
             let section = section.unwrap_or_else(|| panic!("no section `{kind}`"));

@@ -141,8 +141,8 @@ pub struct Qemu {
     pub second: Option<Second>,
     /// Write the address of each instruction that is executed to [`Running::log`].
     pub logs_instructions: bool,
-    /// Wait for a debugger on TCP port 1234 before the first instruction.
-    pub wait_for_debugger: bool,
+    /// Wait for a debugger there, before the first instruction: what QEMU's `-gdb` takes.
+    pub debugger: Option<OsString>,
 }
 
 impl Default for Qemu {
@@ -161,7 +161,7 @@ impl Default for Qemu {
             has_input: false,
             second: None,
             logs_instructions: false,
-            wait_for_debugger: false,
+            debugger: None,
         }
     }
 }
@@ -201,8 +201,8 @@ impl Qemu {
         arguments.extend(["-device", exit_device].map(OsString::from));
         arguments.extend(["-nodefaults", "-no-user-config"].map(OsString::from));
         arguments.extend(["-display", "none", "-no-reboot"].map(OsString::from));
-        if self.wait_for_debugger {
-            arguments.extend(["-S", "-gdb", "tcp::1234"].map(OsString::from));
+        if let Some(device) = &self.debugger {
+            arguments.extend(["-S".into(), "-gdb".into(), device.clone()]);
         }
         arguments
     }

@@ -51,6 +51,8 @@ pub enum Ending {
     KvmFailed,
     /// It printed more than a run may and was killed.
     TooMuchOutput,
+    /// It was no QEMU but a program of this computer, and ended as these words say.
+    Program(String),
 }
 
 impl fmt::Display for Ending {
@@ -59,6 +61,7 @@ impl fmt::Display for Ending {
             Ending::Guest(Status::Success) => f.write_str("the guest ended in success"),
             Ending::Guest(Status::Failure) => f.write_str("the guest ended in failure"),
             Ending::Guest(Status::Usage) => f.write_str("the guest refused its command line"),
+            Ending::Program(words) => f.write_str(words),
             Ending::Status(0) => f.write_str(
                 "the machine was reset or shut down without an exit status (a triple fault?)",
             ),

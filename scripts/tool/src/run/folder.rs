@@ -1,9 +1,10 @@
-//! `run --dag FOLDER`: each DAG file of a folder, one boot each, in one table.
+//! `run --dag FOLDER`: each DAG file of a folder, one boot each, in one table; with `--prove`
+//! two boots each.
 
 use std::path::Path;
 use std::process::ExitCode;
 
-use super::{RUN, Refusal, boot_app, conclude, prepare};
+use super::{RUN, Refusal, boot_app, conclude, prepare, prove};
 use crate::dag_file::batch;
 use crate::files;
 use crate::options::Parsed;
@@ -30,6 +31,9 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
         }
     }
     let files = batch::files(folder).map_err(Refusal::Usage)?;
+    if options.is_given("prove") {
+        return prove::of_files(options, &files);
+    }
     let shows_lines = options.is_given("json");
     if !shows_lines {
         println!("{}", batch::heading());

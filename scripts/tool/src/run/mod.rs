@@ -9,10 +9,14 @@
 //! the guest's).
 
 mod boot;
+mod debug;
 mod folder;
+mod gdb;
 mod handed;
 mod loading;
 mod log;
+mod on_linux;
+mod params;
 mod prove;
 mod recording;
 mod screen;
@@ -20,6 +24,7 @@ mod seeing;
 mod status;
 mod table;
 mod wire;
+mod written;
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -42,6 +47,7 @@ use recording::Recorded;
 use screen::Screen;
 
 pub use boot::boot;
+pub use debug::debug;
 pub use table::RUN;
 
 /// Why a run ended before the guest did.
@@ -67,6 +73,7 @@ pub fn run(words: &[OsString]) -> ExitCode {
 }
 
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
+    let options = &on_linux::settle(options)?;
     if options.is_given("json") && options.is_given("plain") {
         let line = "`--json` and `--plain` exclude each other; give one";
         return Err(Refusal::Usage(line.into()));
@@ -116,7 +123,10 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
     wire::check(options)?;
-    let mut inputs = options.named(&["dag", "module", "replay", "image", "qemu", "wcets"]);
+    let names = [
+        "dag", "module", "replay", "image", "qemu", "wcets", "params",
+    ];
+    let mut inputs = options.named(&names);
     inputs.extend(wire::input(options));
     let outputs = [
         "serial", "trace", "record", "dot", "witness", "observe", "output",
@@ -140,6 +150,11 @@ fn boot_app(
     shows: bool,
 ) -> Result<Booted, Refusal> {
     let app = choose_app(options, dags.is_some())?;
+    if on_linux::is_asked_for(options) {
+        let booted = on_linux::run_app(options, &app, dags, shows)?;
+        written::write(options, &booted)?;
+        return Ok(booted);
+    }
     let memory_mib = loading::choose_memory(options, dags.as_deref())?;
     let named = options.text("mode").and_then(Mode::from_name);
     loading::check(options, named).map_err(Refusal::Usage)?;
@@ -147,6 +162,7 @@ fn boot_app(
     install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
 
     let handed = Handed::read(options, dags.is_none())?;
+    let parameters = params::guest_word(options)?;
     let recorded = Recorded::new(options, &app).map_err(Refusal::Failure)?;
     if let Some(dags) = dags.as_deref_mut() {
         dags.write_module(handed.text()).map_err(Refusal::Failure)?;
@@ -156,6 +172,7 @@ fn boot_app(
         let module = dags.and_then(|dags| dags.module.clone());
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
         qemu.guest_words += &handed.guest_words();
+        qemu.guest_words += &parameters;
         qemu.guest_words += recorded.guest_word();
         qemu.records = recorded.raw();
         qemu.module = module.or_else(|| handed.module());
@@ -200,36 +217,20 @@ fn boot_app(
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
     let outcome = outcome.map_err(Refusal::Failure)?;
-    if let Some(file) = options.path("trace").map(files::place) {
-        screen.say(&format!(
-            "{file}: the log with its trace; `./scripts/check-trace {file}` judges it, \
-             `./scripts/trace {file} -o {file}.json` draws it"
-        ));
-    }
+    written::say_trace(&screen, options);
     if let Some(line) = recorded
         .write(options, &outcome)
         .map_err(Refusal::Failure)?
     {
         screen.say(&line);
     }
-    for written in [
-        seeing::write_dot(options, &outcome),
-        seeing::write_witness(options, &outcome),
-        Ok(wire::warning(options, &outcome)),
-    ] {
-        if outcome.judge().is_err() {
-            // There are worse news.
-            break;
-        }
-        if let Some(line) = written.map_err(Refusal::Failure)? {
-            screen.say(&line);
-        }
-    }
-    Ok(Booted {
+    let booted = Booted {
         outcome,
         log,
         screen,
-    })
+    };
+    written::write(options, &booted)?;
+    Ok(booted)
 }
 
 /// Settles which app runs: the one that the options name, which a given image must be of,
@@ -291,7 +292,7 @@ fn describe(
         has_input: options.is_given("console"),
         second: wire::second(options),
         logs_instructions: false,
-        wait_for_debugger: options.is_given("gdb"),
+        debugger: options.is_given("gdb").then(|| "tcp::1234".into()),
     }
 }
 
@@ -320,7 +321,7 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     if let Some(why) = why {
         screen.say(&format!("mode {} because {why}", qemu.mode));
     }
-    if qemu.wait_for_debugger {
+    if qemu.debugger.is_some() {
         screen.say("waiting for a debugger: `gdb IMAGE -ex 'target remote :1234'`");
     }
     screen.say("");
@@ -346,8 +347,13 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
     }
     if fault.status == Status::Usage {
         let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
+        let who = if on_linux::is_asked_for(options) {
+            "app"
+        } else {
+            "guest"
+        };
         let lines = of_file
-            .unwrap_or_else(|| format!("the guest refused its command line: {}", fault.reason));
+            .unwrap_or_else(|| format!("the {who} refused its command line: {}", fault.reason));
         log.restore();
         return RUN.refuse(&lines);
     }

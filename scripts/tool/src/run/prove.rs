@@ -5,12 +5,13 @@
 //! that the first has shown, except for what the person states.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::{Booted, RUN, Refusal, boot_app, check_files, conclude, prepare};
 use crate::files::{self, Temporary};
 use crate::options::Parsed;
+use crate::progress::Progress;
 use crate::proof::observed::{self, OfDag};
 use crate::proof::overheads::{self, Measured};
 use crate::proof::{commits, report, wcets};
@@ -40,32 +41,100 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
             None => ExitCode::FAILURE,
         });
     }
+    let Some(Proven {
+        rows,
+        code,
+        is_well,
+    }) = prove(options)?
+    else {
+        return Ok(ExitCode::FAILURE);
+    };
+    say(
+        options,
+        &report::table(&rows),
+        rows.iter().map(report::Row::line),
+    );
+    match report::complaint(&rows) {
+        Some(complaint) if is_well => Err(Refusal::Failure(complaint)),
+        _ => Ok(code),
+    }
+}
+
+/// Proves the DAGs of each file, one after the other, and says all in one table. A file that is
+/// refused or fails does not keep the others from being proven.
+pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
+    let mut progress = Progress::new(files.len() as u64, "files");
+    let (mut rows, mut refused, mut failed) = (Vec::new(), 0, 0);
+    for (over, file) in (0..).zip(files) {
+        progress.show(over);
+        let one = options.with("dag", file).with("quiet", "yes");
+        // Neither people nor programs want the lines of each run.
+        let one = one.with("json", "yes").with("plain", "yes");
+        match prove(&one) {
+            Ok(Some(proven)) => {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                rows.extend(proven.rows.into_iter().map(|row| row.of_file(&name)));
+                failed += usize::from(!proven.is_well);
+            }
+            Ok(None) => failed += 1,
+            Err(Refusal::Usage(lines)) => {
+                RUN.complain(&lines);
+                refused += 1;
+            }
+            Err(Refusal::Failure(line)) => {
+                RUN.complain(&format!("{}: {line}", files::place(file)));
+                failed += 1;
+            }
+        }
+    }
+    progress.end();
+    say(
+        options,
+        &report::table(&rows),
+        rows.iter().map(report::Row::line),
+    );
+    if !options.is_given("json") {
+        let (count, summary) = (files.len(), report::summary(&rows));
+        println!("{count} files: {refused} refused, {failed} failed; {summary}");
+    }
+    match (refused, failed, report::complaint(&rows)) {
+        (_, _, Some(complaint)) => Err(Refusal::Failure(complaint)),
+        (0, 0, None) => Ok(ExitCode::SUCCESS),
+        (0, _, None) => Ok(ExitCode::FAILURE),
+        _ => Ok(ExitCode::from(2)),
+    }
+}
+
+/// The second run of a proof.
+struct Proven {
+    rows: Vec<report::Row>,
+    code: ExitCode,
+    is_well: bool,
+}
+
+/// Observes a run, commits with what it has shown, and compares; `None` if the first run has
+/// failed, which has been said.
+fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed").map_err(Refusal::Failure)?;
     let own = Temporary(Some(log.with_extension("wcets")));
     let Some(proving) = observe_first(options, own.0.as_deref())? else {
-        return Ok(ExitCode::FAILURE);
+        return Ok(None);
     };
     let mut dags = prepare(&proving)?;
     let booted = boot_app(&proving, dags.as_mut(), true)?;
     let is_well = booted.outcome.judge().is_ok();
     let code = conclude(&booted, dags.as_ref(), &proving);
-    let rows = compare(&booted).map_err(Refusal::Failure);
-    match rows {
+    let rows = match compare(&booted).map_err(Refusal::Failure) {
+        Ok(rows) => rows,
         // There are worse news.
-        Err(_) if !is_well => return Ok(code),
+        Err(_) if !is_well => Vec::new(),
         Err(refusal) => return Err(refusal),
-        Ok(rows) => {
-            say(
-                options,
-                &report::table(&rows),
-                rows.iter().map(report::Row::line),
-            );
-            if let (Some(complaint), true) = (report::complaint(&rows), is_well) {
-                return Err(Refusal::Failure(complaint));
-            }
-        }
-    }
-    Ok(code)
+    };
+    Ok(Some(Proven {
+        rows,
+        code,
+        is_well,
+    }))
 }
 
 /// Observes a run, unless the person states both WCETs and overheads, and returns the command

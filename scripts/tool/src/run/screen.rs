@@ -43,7 +43,7 @@ impl Screen {
             quiet: options.is_given("quiet"),
             // Who wants these in a file does not want megabytes of them here.
             traces: !options.is_given("trace") && !super::prove::is_asked_for(options),
-            graphs: !["dot", "witness", "observe", "prove"]
+            graphs: !["dot", "trace", "witness", "observe", "prove"]
                 .iter()
                 .any(|name| options.is_given(name)),
             times: !super::prove::is_asked_for(options),

@@ -27,11 +27,16 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     } else if is_watched(options) {
         words.push("status=1".into());
     }
-    let wants_graphs = ["dot", "witness", "observe", "prove"]
+    words.extend(graph_word(options));
+    words
+}
+
+/// Returns the word by which commits print their DAGs, if the options ask for what needs them.
+pub(super) fn graph_word(options: &Parsed) -> Option<String> {
+    let wants_graphs = ["dot", "trace", "witness", "observe", "prove"]
         .iter()
         .any(|name| options.is_given(name));
-    words.extend(wants_graphs.then(|| "graph=dump".into()));
-    words
+    wants_graphs.then(|| "graph=dump".into())
 }
 
 /// Reports whether a person watches, and does not talk meanwhile.

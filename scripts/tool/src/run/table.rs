@@ -9,6 +9,7 @@ use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
 pub(super) const GUEST_WORDS: &[&str] = &[
     "policy",
     "preemption",
+    "clusters",
     "jobs",
     "latest",
     "seconds",
@@ -26,7 +27,8 @@ const MOST_SUBTASKS: u64 = 16;
 /// The table of `run`.
 pub static RUN: Command = Command {
     invocation: "./scripts/run",
-    about: "Builds an app, boots it on the bare machine in QEMU, and judges the run.",
+    about: "\
+Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and judges the run.",
     positional: None,
     options: &[
         Opt::new(
@@ -36,9 +38,16 @@ pub static RUN: Command = Command {
         )
         .or("fork-join"),
         Opt::new(
+            "on",
+            Takes::OneOf(&["machine", "linux"]),
+            "Where it runs: on the bare machine in QEMU, or as a program of this computer, see \
+             docs/linux.md.",
+        )
+        .or("machine"),
+        Opt::new(
             "cores",
             Takes::number(1..=MOST_CORES),
-            "Processors of the guest.",
+            "Processors of the guest; with --on linux no more than this computer has.",
         )
         .or("8"),
         Opt::new(
@@ -61,6 +70,12 @@ pub static RUN: Command = Command {
             "preemption",
             Takes::OneOf(&["on", "off"]),
             "Whether a started instance may lose its core (the kernel's default: on).",
+        ),
+        Opt::new(
+            "clusters",
+            Takes::Text("N,N,...|auto"),
+            "--dag, and apps that offer it: divides the cores into clusters of so many each; auto: \
+             as the commit finds.",
         ),
         Opt::new(
             "subtasks",
@@ -95,6 +110,16 @@ pub static RUN: Command = Command {
             "module",
             Takes::File("FILE"),
             "Leave this file in the guest's memory, for the app: a recording for gait.",
+        ),
+        Opt::new(
+            "set",
+            Takes::Text("NAME=VALUE,..."),
+            "Set parameters of the app before it begins; at the console, `params` lists them.",
+        ),
+        Opt::new(
+            "params",
+            Takes::File("FILE"),
+            "Set those of this file, a line NAME=VALUE for each; --set prevails.",
         ),
         Opt::new(
             "record",

@@ -6,6 +6,7 @@ use std::process::Stdio;
 
 use crate::install::{self, Need};
 use crate::json::{self, Value};
+use crate::lasting::Lasting;
 use crate::system;
 
 /// A compiled libtest binary.
@@ -59,6 +60,7 @@ const NEEDS: [(&str, &[&Need]); 4] = [
 
 /// Compiles the tests of all packages. Cargo's errors go to standard error.
 pub(super) fn compile() -> (Vec<TestBinary>, Result<(), String>) {
+    let _lasting = Lasting::new("compiling the tests");
     let mut command = system::cargo();
     command.args([
         "test",

@@ -1,6 +1,7 @@
 //! The checks that are cargo's: formatter, linter, documentation.
 
 use super::own;
+use crate::lasting::Lasting;
 use crate::system;
 
 /// A check: its name, and what runs it.
@@ -40,6 +41,7 @@ fn cargo(words: &str, rest: &str, remedy: &str) -> Result<(), String> {
     }
     command.args(rest.split_whitespace());
     command.env("RUSTDOCFLAGS", "-D warnings");
+    let _lasting = Lasting::new(&format!("cargo {words}"));
     let output = command
         .output()
         .map_err(|error| format!("cannot start cargo: {error}"))?;

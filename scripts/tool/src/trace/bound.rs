@@ -20,17 +20,23 @@ pub const COUNTED_NS: u64 = 50_000;
 /// Where time is real.
 pub const REAL_NS: u64 = 1_000_000;
 
+/// On Linux, where other programs, interrupts and a hypervisor have their time, too.
+pub const LINUX_NS: u64 = 100_000_000;
+
 /// Returns the bound that a person has chosen, or else that of the run's mode.
 pub(super) fn of(run: &Run, options: &Parsed) -> u64 {
     let chosen = options.number("bound-us");
-    let usual_ns = if run.is_counted { COUNTED_NS } else { REAL_NS };
-    chosen.map_or(usual_ns, |bound_us| bound_us.saturating_mul(1000))
+    chosen.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
 }
 
-/// Reports whether a boot's line says that instructions were counted: the tool tells
-/// each guest its mode.
-pub(super) fn is_counted(boot: &MachineLine) -> bool {
+/// Returns the bound of the runs of a boot, by what its line says: the tool tells each guest its
+/// mode, and on Linux the clock is Linux's.
+pub(super) fn usual_ns(boot: &MachineLine) -> u64 {
     let words = boot.text_at("command_line").unwrap_or_default();
     let mode = words.split(' ').find_map(|word| word.strip_prefix("mode="));
-    mode.and_then(Mode::from_name) == Some(Mode::Deterministic)
+    match mode.and_then(Mode::from_name) {
+        Some(Mode::Deterministic) => COUNTED_NS,
+        _ if boot.text_at("clock") == Some("linux") => LINUX_NS,
+        _ => REAL_NS,
+    }
 }

@@ -7,8 +7,9 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
+use super::chains::Measured;
 use super::model::Run;
-use super::{bound, check, read, report};
+use super::{bound, chains, check, read, report};
 use crate::files;
 use crate::options::{Command, Opt, Parsed, Takes};
 
@@ -26,7 +27,8 @@ pub static CHECK_TRACE: Command = Command {
             "bound-us",
             Takes::number(0..=1_000_000_000),
             "Microseconds for which an instance may wait for what it is owed, because a \
-             decision takes effect after an interrupt; 50 in mode deterministic, else 1000.",
+             decision takes effect after an interrupt; 50 in mode deterministic, 100000 on \
+             Linux, else 1000.",
         ),
         Opt::new(
             "show",
@@ -34,6 +36,16 @@ pub static CHECK_TRACE: Command = Command {
             "Breaches of a run to be shown; all are counted.",
         )
         .or("20"),
+        Opt::new(
+            "from",
+            Takes::Text("DAG/SUBTASK"),
+            "Only the chains that begin with this subtask; with --to.",
+        ),
+        Opt::new(
+            "to",
+            Takes::Text("DAG/SUBTASK"),
+            "Only the chains that end with this subtask; with --from.",
+        ),
         Opt::new(
             "json",
             Takes::Nothing,
@@ -50,8 +62,13 @@ rules:
   one life                an instance starts and finishes once, on one core at a time
   one core                a core runs one instance at a time
 
-For each run there is a machine line of kind `trace_check`;
-docs/serial-protocol.md explains it.
+chains: from a source to a sink, from DAG to DAG by samples of latest values
+  age of an output        from the release that it goes back to, to its finish
+  data age                the same, to the finish of the next output
+  reaction time           from what a release just misses to the first output of it
+
+For each run there is a machine line of kind `trace_check`, and one of kind `chain`
+for each chain; docs/trace-format.md explains them.
 
 exit codes: 0 no breach; 1 some; 2 a refused command line, or a file without a
 well-formed trace with events
@@ -78,10 +95,16 @@ pub fn check_trace(words: &[OsString]) -> ExitCode {
             Err(line) => return CHECK_TRACE.refuse(&line),
         }
     }
-    let breaches: usize = runs
-        .iter()
-        .map(|(file, run)| judge(file, run, &options))
-        .sum();
+    // A wrong name is told before anything is shown.
+    let measured = runs.iter().map(|(_, run)| chains::measure(run, &options));
+    let measured: Vec<_> = match measured.collect() {
+        Ok(measured) => measured,
+        Err(line) => return CHECK_TRACE.refuse(&line),
+    };
+    let mut breaches = 0;
+    for ((file, run), chains) in runs.iter().zip(&measured) {
+        breaches += judge(file, run, chains, &options);
+    }
     ExitCode::from(u8::from(breaches > 0))
 }
 
@@ -106,17 +129,21 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<Run>, String> {
 }
 
 /// Checks a run, prints what was found, and returns the number of breaches.
-fn judge(file: &str, run: &Run, options: &Parsed) -> usize {
+fn judge(file: &str, run: &Run, chains: &[Measured], options: &Parsed) -> usize {
     let bound_ns = bound::of(run, options);
     let shown = options.number("show").unwrap_or(u64::MAX);
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
     let findings = check(run, bound_ns);
-    let table = report::table(file, run, &findings, bound_ns, shown);
+    let mut table = report::table(file, run, &findings, bound_ns, shown);
+    table += &chains::table(run, chains, options.is_given("from"));
     if options.is_given("json") {
         eprint!("{table}");
     } else {
         print!("{table}");
     }
     println!("{}", report::machine_line(file, run, &findings));
+    for chain in chains {
+        println!("{}", chains::machine_line(file, run, chain));
+    }
     findings.breaches.len()
 }

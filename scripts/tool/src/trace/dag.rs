@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use sched_dag::{
-    Activation, CommitOptions, ConstructionPolicy, DagSpec, FaultLimit, OnFault, OverrunPolicy,
-    Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec, TaskSet, verify,
+    Activation, ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, FaultLimit,
+    OnFault, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskSpec, TaskSet,
+    verify,
 };
 
 use super::line::Line;
@@ -34,6 +35,24 @@ pub fn options(line: &Line<'_>) -> Result<SchedulerOptions, Malformed> {
     })
 }
 
+/// Reads how the cores are divided; they are not if nothing is said of that.
+///
+/// # Errors
+///
+/// A cluster's cores are no number.
+pub fn clusters(line: &Line<'_>) -> Result<Clusters, Malformed> {
+    if line.0.value.get("clusters").is_none() {
+        return Ok(Clusters::Undivided);
+    }
+    let sizes = line.elements("clusters")?.iter().map(Value::as_u64);
+    let sizes: Option<Vec<u64>> = sizes.collect();
+    let Some(sizes) = sizes else {
+        return Err(line.malformed("`clusters` is a list of the number of cores of each"));
+    };
+    let sizes = sizes.into_iter().map(|cores| line.small(cores));
+    Ok(Clusters::Of(sizes.collect::<Result<_, _>>()?))
+}
+
 /// Reads a DAG.
 ///
 /// # Errors
@@ -58,7 +77,10 @@ pub fn spec(line: &Line<'_>) -> Result<DagSpec, Malformed> {
     let edges = line.elements("edges")?.iter().map(edge);
     let edges: Vec<(usize, usize)> = edges.collect::<Result<_, _>>()?;
     add_sinks(line, &mut subtasks, &edges)?;
+    let is_in_one = line.0.value.get("cluster").is_some();
+    let cluster = is_in_one.then(|| line.small(line.number("cluster")?));
     Ok(DagSpec {
+        cluster: cluster.transpose()?.map(ClusterId),
         name: line.text("name")?.to_string(),
         activation: match line.flag("sporadic")? {
             true => Activation::Sporadic,
@@ -157,12 +179,13 @@ fn add_sinks(
 /// What a commit would say, at the line of the first DAG without which it is right.
 pub fn task_set(
     kind: &str,
-    options: SchedulerOptions,
+    (options, clusters): (SchedulerOptions, &Clusters),
     dags: &[DagSpec],
     lines: &[usize],
 ) -> Result<TaskSet, Malformed> {
     let options = CommitOptions::new(options.policy, options.cores)
         .with_construction(ConstructionPolicy::any_graph())
+        .with_clusters(clusters.clone())
         .with_instance_limit(u32::MAX);
     if dags.is_empty() {
         return Ok(TaskSet::default());

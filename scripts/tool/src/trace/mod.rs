@@ -8,7 +8,7 @@
 //! off, is the reader's affair.
 //!
 //! Here are besides: the [`figures`], from `view`, which puts a run in the order of
-//! time; [`command`], the subcommand, and [`report`], what it prints; and [`viewer`],
+//! time; `chains`, how long effects take from DAG to DAG; [`command`], the subcommand, and [`report`], what it prints; and [`viewer`],
 //! which draws a run instead of judging it.
 //!
 //! If events were lost, they were the oldest, and only what came after the instant of the
@@ -16,7 +16,9 @@
 //! ends breaks no rule, unless the run says that it is complete.
 
 pub mod bound;
+mod chains;
 pub mod command;
+pub mod commit;
 pub mod dag;
 pub mod figures;
 pub mod line;

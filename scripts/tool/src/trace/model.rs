@@ -13,6 +13,8 @@ use sched_dag::journal::Event;
 use sched_dag::law::Terms;
 use sched_dag::{SchedulerOptions, TaskSet};
 
+use super::commit::Committed;
+
 /// One run of one boot.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -23,10 +25,12 @@ pub struct Run {
     /// How ready instances were ordered, whether a started one could lose its core, and
     /// how many cores the scheduler served, at least 1.
     pub options: SchedulerOptions,
-    /// Whether the guest's time was counted, as it is in mode `deterministic`.
-    pub is_counted: bool,
+    /// How long an instance may wait for what the rules owe it, where nobody says otherwise.
+    pub usual_bound_ns: u64,
     /// The DAGs by number.
     pub task_set: TaskSet,
+    /// What the log says of their commit; nothing if it has no such lines.
+    pub committed: Committed,
     /// What happened, in the order of the log.
     pub events: Vec<Event>,
     /// Events, the oldest ones, that had made way before they were printed.

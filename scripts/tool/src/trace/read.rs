@@ -10,11 +10,11 @@
 use std::collections::BTreeMap;
 
 use sched_dag::journal::{Event, What};
-use sched_dag::{CoreId, DagId, DagSpec, SubtaskId, TaskSet};
+use sched_dag::{Clusters, CoreId, DagId, DagSpec, SubtaskId, TaskSet};
 
 use super::line::Line;
 use super::model::Run;
-use super::{bound, dag};
+use super::{bound, commit, dag};
 use crate::json::Value;
 use crate::protocol::read_line;
 use replay::lines::Malformed;
@@ -24,6 +24,8 @@ use replay::shown::quoted;
 struct Open {
     /// Without its model.
     run: Run,
+    /// How its cores are divided.
+    clusters: Clusters,
     dags: Vec<DagSpec>,
     /// The line of each DAG.
     lines: Vec<usize>,
@@ -39,7 +41,8 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     let mut open: Option<Open> = None;
     // A line of a trace that something before its `{` makes one for people.
     let mut spoilt = None;
-    let mut is_counted = false;
+    let mut usual_bound_ns = bound::REAL_NS;
+    let mut commit = commit::Open::default();
     for (index, text) in log.lines().enumerate() {
         let Some(line) = read_line(index + 1, text) else {
             if text.contains("{\"kind\":\"trace_begin\"") {
@@ -53,9 +56,10 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
         })?;
         let line = Line(&line);
         match (line.0.kind.as_str(), &mut open) {
-            ("boot", _) => is_counted = bound::is_counted(line.0),
+            ("boot", _) => usual_bound_ns = bound::usual_ns(line.0),
+            ("graph", None) => commit.add(&line)?,
             ("trace_begin", None) => {
-                let run = begin(&line, is_counted)?;
+                let run = begin(&line, usual_bound_ns)?;
                 if let Some(first) = runs.iter().find(|first| first.number == run.number) {
                     return Err(line.malformed(format!(
                         "run {} stands here twice, first on line {}; give each boot's log alone",
@@ -63,7 +67,13 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
                     )));
                 }
                 let (dags, lines) = (Vec::new(), Vec::new());
-                open = Some(Open { run, dags, lines });
+                let clusters = dag::clusters(&line)?;
+                open = Some(Open {
+                    run,
+                    clusters,
+                    dags,
+                    lines,
+                });
             }
             ("trace_begin", Some(open)) => {
                 let reason = format!("the trace of line {} has not ended yet", open.run.line);
@@ -72,7 +82,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
             ("trace_dag", Some(open)) => add_dag(&line, open)?,
             ("trace", Some(open)) => add_events(&line, open)?,
             ("trace_end", Some(_)) => {
-                let ended = open.take().map(|open| end(&line, open));
+                let ended = open.take().map(|open| end(&line, open, &commit));
                 runs.extend(ended.transpose()?);
             }
             ("trace_dag" | "trace" | "trace_end", None) => {
@@ -93,13 +103,14 @@ pub fn read(log: &str) -> Result<Vec<Run>, Malformed> {
     }
 }
 
-fn begin(line: &Line<'_>, is_counted: bool) -> Result<Run, Malformed> {
+fn begin(line: &Line<'_>, usual_bound_ns: u64) -> Result<Run, Malformed> {
     Ok(Run {
         number: line.number("run")?,
         line: line.0.number,
         options: dag::options(line)?,
-        is_counted,
+        usual_bound_ns,
         task_set: TaskSet::default(),
+        committed: commit::Committed::default(),
         events: Vec::new(),
         lost: 0,
         complete: false,
@@ -160,9 +171,11 @@ fn event(open: &Open, value: &Value) -> Result<Event, String> {
     })
 }
 
-fn end(line: &Line<'_>, open: Open) -> Result<Run, Malformed> {
-    let task_set = dag::task_set("trace_dag", open.run.options, &open.dags, &open.lines)?;
+fn end(line: &Line<'_>, open: Open, commit: &commit::Open) -> Result<Run, Malformed> {
+    let options = (open.run.options, &open.clusters);
+    let task_set = dag::task_set("trace_dag", options, &open.dags, &open.lines)?;
     let mut run = open.run;
+    run.committed = commit.of(&task_set);
     run.task_set = task_set;
     let (stated, found) = (line.number("events")?, run.events.len());
     if stated != found as u64 {

@@ -99,11 +99,11 @@ pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
     )
 }
 
-fn microseconds(ns: u64) -> String {
+pub(super) fn microseconds(ns: u64) -> String {
     format!("{}.{:03} us", ns / 1000, ns % 1000)
 }
 
-fn distribution(of: &Distribution) -> String {
+pub(super) fn distribution(of: &Distribution) -> String {
     if of.count == 0 {
         return "none".into();
     }
@@ -116,7 +116,7 @@ fn distribution(of: &Distribution) -> String {
     )
 }
 
-fn object(of: &Distribution) -> String {
+pub(super) fn object(of: &Distribution) -> String {
     format!(
         "{{\"count\":{},\"median\":{},\"p99\":{},\"max\":{}}}",
         of.count, of.median_ns, of.p99_ns, of.max_ns

@@ -85,7 +85,8 @@ impl<'r> View<'r> {
                 (What::Due, None) => {
                     view.due_ns.insert(of_job, event.time_ns);
                 }
-                (What::Signalled | What::Dropped | What::Stopped, None) => {}
+                (What::Signalled | What::Dropped, None) => {}
+                (what, None) if what.is_of_dag() => {}
                 (_, None) => view.jobs.entry(of_job).or_default().note(event),
             }
         }

@@ -55,6 +55,7 @@ pub const CASES: &[Case] = &[
     ("wcet_exceeds_deadline", values::wcet_exceeds_deadline),
     ("priorities_partly_given", values::priorities_partly_given),
     ("priorities_exhausted", values::priorities_exhausted),
+    ("stack_out_of_range", values::stack_out_of_range),
     ("zero_jobs", values::zero_jobs),
     ("zero_in_flight", values::zero_in_flight),
     ("zero_faults", values::zero_faults),
@@ -77,6 +78,7 @@ pub const CASES: &[Case] = &[
     ("latest_of_moved", shared::latest_of_moved),
     ("latest_not_committed", shared::latest_not_committed),
     ("signal_not_committed", shared::signal_not_committed),
+    ("switched_not_committed", shared::switched_not_committed),
     ("not_proven", values::not_proven),
     ("already_committed", graph::already_committed),
 ];

@@ -3,7 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fass::{Dag, Latest, Raiser, Sample, SubtaskAttributes, Unique, create_dag};
+use fass::{Dag, Latest, Raiser, Sample, SubtaskAttributes, Switch, Unique, create_dag};
 
 use super::{FAULT_LIMIT, PERIOD, named, sound, source};
 
@@ -162,6 +162,17 @@ pub(super) fn signal_not_committed() -> Vec<Dag> {
     dag.using(alarm.raising())
         .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
     vec![dag]
+}
+
+pub(super) fn switched_not_committed() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    let camera = sound("camera", "frames");
+    let attributes = SubtaskAttributes::named("store");
+    let store = |mut camera: Switch<'_>, (_,): (u32,)| camera.pause();
+    dag.using(camera.switching())
+        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+    vec![dag] // without `camera`
 }
 
 /// A DAG of one subtask, which samples.

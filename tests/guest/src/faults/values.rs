@@ -111,6 +111,14 @@ pub(super) fn priorities_exhausted() -> Vec<Dag> {
     vec![given, sound("lidar", "points")]
 }
 
+pub(super) fn stack_out_of_range() -> Vec<Dag> {
+    let dag = named("lidar");
+    let read = SubtaskAttributes::named("read").stack_bytes(4096);
+    dag.register_periodic_subtask(|| (1_u32,), vec!["points"], PERIOD, read);
+    sink(&dag, "store", "points");
+    vec![dag]
+}
+
 pub(super) fn zero_jobs() -> Vec<Dag> {
     let dag = sound("lidar", "points");
     dag.jobs(0);

@@ -1,13 +1,13 @@
 //! What a person may ask of a run, and change in it, while it goes on.
 //!
-//! To be called by core 0's background. Each question and each change holds the
-//! one lock once, for a bounded time; nothing is allocated.
+//! To be called by core 0's background. Each question and each change holds a
+//! cluster's lock for a bounded time; nothing is allocated.
 
 use alloc::sync::Arc;
 
 use sched_dag::{Dag, DagId, DagStatistics, Moment, Observer, Scheduler, TaskSet};
 
-use super::{EXECUTION, Event};
+use super::{Event, cluster, divided};
 use crate::machine::clock;
 use crate::machine::timer::{self, Alarm};
 
@@ -18,17 +18,23 @@ pub enum Control {
     Pause(DagId),
     /// The DAG's due jobs are released again.
     Resume(DagId),
-    /// The DAG is ended for good.
-    End(DagId),
+    /// The DAG releases no further job.
+    Close(DagId),
 }
 
 impl Control {
+    const fn dag(self) -> DagId {
+        match self {
+            Self::Pause(dag) | Self::Resume(dag) | Self::Close(dag) => dag,
+        }
+    }
+
     /// Tells the scheduler.
     pub(super) fn apply(self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
         match self {
             Self::Pause(dag) => moment.pause(dag, observer),
-            Self::Resume(dag) => moment.resume(dag),
-            Self::End(dag) => moment.stop(dag, observer),
+            Self::Resume(dag) => moment.resume(dag, observer),
+            Self::Close(dag) => moment.close(dag, observer),
         }
     }
 }
@@ -40,7 +46,7 @@ pub enum State {
     Running,
     /// It skips them until it is resumed.
     Paused,
-    /// It never will, because of a fault or the end of the run.
+    /// It never will, because of a fault or a shutdown.
     Ended,
     /// All that it had to release has ended.
     Over,
@@ -61,14 +67,14 @@ pub struct Snapshot {
 
 /// Returns the model of the run, if one goes on.
 pub fn task_set() -> Option<Arc<TaskSet>> {
-    let place = EXECUTION.lock();
+    let place = cluster::nth(0).execution.lock();
     place.as_ref().map(|execution| execution.task_set().clone())
 }
 
 /// Returns how a DAG does, if a run goes on that has it.
 pub fn snapshot(dag: DagId) -> Option<Snapshot> {
-    let place = EXECUTION.lock();
-    let scheduler = place.as_ref()?.scheduler();
+    let place = divided::of_dag(dag).execution.lock();
+    let scheduler = &place.as_ref()?.scheduler;
     scheduler.task_set().dags().get(dag.index())?;
     Some(Snapshot::of(scheduler, dag))
 }
@@ -81,7 +87,7 @@ impl Snapshot {
     /// If there is no such DAG.
     pub fn of(scheduler: &Scheduler, dag: DagId) -> Self {
         let has_limit = scheduler.task_set().dag(dag).jobs().is_some();
-        let state = if scheduler.is_ended(dag) {
+        let state = if scheduler.is_closed(dag) {
             State::Ended
         } else if scheduler.is_over(dag) && has_limit {
             State::Over
@@ -115,11 +121,13 @@ pub fn nominal_end_ns() -> Option<u64> {
 
 /// Makes a change, in a step of the scheduler.
 pub fn control(control: Control) {
-    let mut place = EXECUTION.lock();
+    let cluster = divided::of_dag(control.dag());
+    let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {
         return;
     };
-    let woken = execution.step(clock::now_ns(), Event::Control(control));
+    let event = Event::Control(control);
+    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), event));
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.

@@ -1,21 +1,20 @@
 //! What happens on a core, reported by that core: it finds work, starts it,
 //! completes it, is interrupted, or ends it because of a fault.
 //!
-//! Each of these takes the one lock once, makes a step of the scheduler where
+//! Each of these takes the cluster's lock once, makes a step of the scheduler where
 //! there is something to decide, and wakes the other cores after the lock is
 //! free again.
 
 use alloc::boxed::Box;
 
-use sched_dag::CoreId;
 use sched_dag::journal::{Subject, What};
 
 use super::core_set::CoreSet;
 use super::runner::Runner;
 use super::status::note_running;
 use super::step::Ended;
-use super::time::{instance_time_ns, since_epoch};
-use super::{EXECUTION, Event, Work};
+use super::time::{instance_time_ns, seat, since_epoch};
+use super::{Event, Work, cluster};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::{clock, section, this_core, turns};
@@ -24,7 +23,7 @@ use crate::run::edge;
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
 pub fn find_work() -> Work {
     let core = this_core::get();
-    let mut place = EXECUTION.lock_uninterrupted();
+    let mut place = cluster::of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return Work::Rest;
     };
@@ -47,8 +46,8 @@ fn take_turns(core: &Core, work: Work) -> Work {
 /// next. Interrupts are disabled.
 pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     let core = this_core::get();
-    let here = CoreId(core.index);
-    let mut place = EXECUTION.lock_uninterrupted();
+    let here = seat(core);
+    let mut place = finished.cluster().execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return Work::Rest;
     };
@@ -83,18 +82,18 @@ pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
 /// Ends this core's instance because of a fault, and with it its DAG or its job. The
 /// context that ran it must not be resumed. Interrupts are disabled.
 pub fn fail(now_ns: u64) {
-    let mut place = EXECUTION.lock_uninterrupted();
+    let core = this_core::get();
+    let mut place = cluster::of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;
     };
-    let core = this_core::get();
-    let Some(vertex) = execution.watcher.placement.lose(core.index as usize) else {
+    let here = seat(core);
+    let Some(vertex) = execution.watcher.placement.lose(here.index()) else {
         return;
     };
     let instance = execution.scheduler.instance_of(vertex);
     // Not when the interrupt came: a step may have left events since then.
     let ended_ns = since_epoch(clock::now_ns());
-    let here = CoreId(core.index);
     execution
         .watcher
         .journal
@@ -109,18 +108,20 @@ pub fn fail(now_ns: u64) {
 /// Makes a step of the scheduler if `is_event`, and follows its decisions on this
 /// core. In an interrupt handler.
 pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
-    let mut place = EXECUTION.lock_uninterrupted();
+    let core = this_core::get();
+    let cluster = cluster::of(core);
+    let mut place = cluster.execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;
     };
     let mut woken = CoreSet::default();
-    if is_event {
+    if is_event || cluster.may_have_letters() {
         woken = execution.step(now_ns, Event::Time);
     }
-    if !section::puts_off(this_core::get(), now_ns)
+    if !section::puts_off(core, now_ns)
         && let Some(waiting) = execution.follow(interrupted, now_ns)
     {
-        woken.insert(waiting.0);
+        woken.insert(cluster.core(waiting));
     }
     drop(place);
     woken.wake();

@@ -1,15 +1,22 @@
-//! The scheduler with the bodies that it decides about: one per run.
+//! The scheduler with the bodies that it decides about: one for each cluster of a run.
 //!
-//! Every event passes through here, under the one lock: a completion, by the
-//! core that finished, or the timer, on core 0. Each makes one step of the
+//! Every event passes through here, under the cluster's one lock: a completion, by the
+//! core that finished, or the timer, on the cluster's first core. Each makes one step of the
 //! scheduler (completions, releases, one dispatch) and notes what each core is
-//! to run; [`sched_dag::placement`] then brings each core there.
+//! to run; [`sched_dag::placement`] then brings each core there. Where the cores are not
+//! divided, all are one cluster.
+//!
+//! To a scheduler and a placement, a core is its *seat*: its number within the cluster.
 //!
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
+mod cluster;
 mod control;
 mod core_set;
+mod divided;
+mod ended;
 mod events;
+mod letters;
 mod runner;
 mod signals;
 mod status;
@@ -17,7 +24,7 @@ mod step;
 mod time;
 mod watcher;
 
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -25,23 +32,24 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
-use sched_dag::placement::Placement;
-use sched_dag::{Dag, DagId, Instance, Journal, OnFault, Scheduler, SchedulerOptions};
-use sched_dag::{SubtaskId, TaskSet};
+use sched_dag::{Dag, DagId, Instance, Journal, OnFault, Preemption, Scheduler};
+use sched_dag::{SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
-use crate::machine::spinlock::SpinLock;
 use crate::run::contexts;
+pub use cluster::{count as clusters, first_core};
 pub use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
+pub use divided::{Division, division, is_finished, set_division};
+pub use ended::Ended;
 pub use events::{complete, fail, find_work, interrupt};
 pub use runner::Runner;
 use signals::Signals;
 pub use signals::{raise, raise_in_interrupt};
 pub use status::{
-    Cost, budget_ns, cost_of_fault, is_finished, jobs_ended, lock_acquisitions, next_event_ns,
-    running, try_journal, try_names, with_journal,
+    Cost, budget_ns, cost_of_fault, jobs_ended, lock_acquisitions, next_event_ns, running,
+    try_journal, try_names, with_journal,
 };
-pub use time::{arm_next_event, since_epoch};
+pub use time::{arm_all, arm_next_event, keeps_time, since_epoch};
 use watcher::Watcher;
 
 /// What a core is to do next.
@@ -68,8 +76,8 @@ enum Event {
     Control(Control),
 }
 
-/// A run, from its launch until it is taken out.
-pub struct Execution {
+/// A run as one cluster has it, from its launch until it is taken out.
+struct Execution {
     scheduler: Scheduler,
     /// What the scheduler's reports change.
     watcher: Watcher,
@@ -86,25 +94,17 @@ pub struct Execution {
     /// waits.
     may_hand_off: bool,
     signals: Signals,
-    /// What the commit has proven of each DAG.
-    bounds_ns: Box<[Option<u64>]>,
-    sink_bounds_ns: Box<[Vec<Option<u64>>]>,
+    proven: Arc<Proven>,
 }
 
-static EXECUTION: SpinLock<Option<Execution>> = SpinLock::new(None);
+/// What the commit has proven of each DAG, and of each sink.
+struct Proven {
+    bounds_ns: Vec<Option<u64>>,
+    sink_bounds_ns: Vec<Vec<Option<u64>>>,
+}
 
 /// Time 0 of the run, on the clock.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
-
-/// When core 0's timer shall next step the scheduler, on the clock; `u64::MAX`
-/// if never.
-static NEXT_EVENT_NS: AtomicU64 = AtomicU64::new(u64::MAX);
-
-/// Whether all jobs of the run have ended.
-static FINISHED: AtomicBool = AtomicBool::new(false);
-
-/// Jobs of DAGs with a limit that have ended in this run.
-static JOBS_ENDED: AtomicU64 = AtomicU64::new(0);
 
 /// What the platform says about a run, besides the scheduler's options.
 #[derive(Clone, Copy, Debug)]
@@ -118,8 +118,8 @@ pub struct Terms {
 }
 
 /// Prepares a plan to be run. Takes all memory that the run will need.
-pub fn prepare(plan: Plan, options: SchedulerOptions, terms: Terms) -> Result<(), LaunchError> {
-    if EXECUTION.lock().is_some() {
+pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Result<(), LaunchError> {
+    if cluster::nth(0).execution.lock().is_some() {
         return Err(LaunchError::new(
             "other DAGs are committed already; run them first, or commit all in one call",
         ));
@@ -128,48 +128,85 @@ pub fn prepare(plan: Plan, options: SchedulerOptions, terms: Terms) -> Result<()
     let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
     let faults = plan.task_set.dags().iter().map(survived_faults);
     let faults = faults.fold(0, usize::saturating_add);
-    let total = subtasks.saturating_add(cores.saturating_mul(2));
+    let suspended = match options.preemption {
+        Preemption::Enabled => plan.task_set.most_suspended(),
+        Preemption::Disabled => 0,
+    };
+    let total = cores.saturating_mul(2).saturating_add(suspended);
     let total = total.saturating_add(faults);
-    contexts::provide(total).map_err(|_| {
-        let kib = contexts::STACK_BYTES / 1024;
+    let needed = contexts::stack_bytes(&plan.task_set);
+    let kib = needed / 1024;
+    let settled = contexts::settle(needed).and_then(|settled| {
+        contexts::provide(total)?;
+        Ok(settled)
+    });
+    let settled = settled.map_err(|_| {
         LaunchError::new(format!(
             "{subtasks} subtasks, {cores} cores and {faults} survived faults need {total} stacks \
              of {kib} KiB, more than there is memory for; register fewer subtasks, survive fewer \
              faults, or give the machine more memory"
         ))
     })?;
-    let signals = Signals::new(&plan);
-    let task_set = plan.task_set;
-    let runners = runner::runners(&task_set, plan.bodies, terms.budget_factor);
-    let others = runner::others(&task_set, plan.others, terms.budget_factor);
-    let placement = Placement::new(runners, cores);
+    if settled < needed {
+        return Err(LaunchError::new(format!(
+            "a subtask states a stack of {kib} KiB, and the first commit has settled {} KiB; \
+             state as much there",
+            settled / 1024
+        )));
+    }
+    let mut lifecycle = plan.lifecycle.take();
+    if lifecycle.is_some() && plan.task_set.is_divided() {
+        return Err(LaunchError::new(
+            "the cores are divided, and a subtask pauses DAGs or ends the run, which reaches one \
+             cluster only; leave one of the two out",
+        ));
+    }
+    let task_set = &plan.task_set;
+    if cluster::MAY_DIVIDE {
+        divided::divide(task_set);
+    }
+    let letters = letters::room(&plan);
+    let proven = Arc::new(Proven {
+        bounds_ns: plan.bounds_ns.clone(),
+        sink_bounds_ns: plan.sink_bounds_ns.clone(),
+    });
     let heap = crate::memory::heap::usage();
-    let execution = Execution {
-        scheduler: Scheduler::new(Arc::clone(&task_set), options),
-        watcher: Watcher {
-            journal: Journal::new(
-                &task_set,
-                heap.capacity_bytes - heap.in_use_bytes,
-                terms.most_events,
+    // Each cluster's journal gets its share of what is free now.
+    let share = task_set.clusters().count();
+    let free_bytes = (heap.capacity_bytes - heap.in_use_bytes) / share;
+    let most_events = terms.most_events / share as u64;
+    let mut executions: Vec<Execution> = task_set
+        .clusters()
+        .map(|id| Execution {
+            scheduler: Scheduler::of_cluster(Arc::clone(task_set), options, id),
+            watcher: Watcher::new(
+                id,
+                task_set,
+                Journal::of_cluster(task_set, id, free_bytes, most_events),
             ),
-            placement,
-            others,
-            task_set,
-            instant_ns: 0,
-            has_job_news: false,
-            finished: None,
-            finish_ns: 0,
-        },
-        background: None,
-        dispatch_due_ns: None,
-        coincidence_ns: terms.coincidence_ns,
-        budget_factor: terms.budget_factor,
-        may_hand_off: terms.coincidence_ns == 0,
-        signals,
-        bounds_ns: plan.bounds_ns.into(),
-        sink_bounds_ns: plan.sink_bounds_ns.into(),
-    };
-    *EXECUTION.lock() = Some(execution);
+            background: None,
+            dispatch_due_ns: None,
+            coincidence_ns: terms.coincidence_ns,
+            budget_factor: terms.budget_factor,
+            may_hand_off: terms.coincidence_ns == 0,
+            signals: Signals::new(&plan, id, &letters, lifecycle.take()),
+            proven: Arc::clone(&proven),
+        })
+        .collect();
+    let number_of = |runner: &Runner| task_set.dag(runner.instance.dag).cluster().index();
+    for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
+        let watcher = &mut executions[number_of(&runner)].watcher;
+        watcher.placement.replace(runner.vertex, runner);
+    }
+    for others in runner::others(task_set, plan.others, terms.budget_factor) {
+        if let Some(any) = others.first() {
+            let (number, vertex) = (number_of(any), any.vertex.index());
+            executions[number].watcher.others[vertex] = others;
+        }
+    }
+    for (number, execution) in executions.into_iter().enumerate() {
+        *cluster::nth(number).execution.lock() = Some(execution);
+    }
     Ok(())
 }
 
@@ -184,50 +221,27 @@ fn survived_faults(dag: &Dag) -> usize {
 /// Sets time 0 of the prepared run, from which the releases count. Returns the
 /// number of jobs to come, or `None` if nothing is prepared.
 pub fn begin(epoch_ns: u64) -> Option<u64> {
-    let mut place = EXECUTION.lock();
-    let execution = place.as_mut()?;
+    let task_set = task_set()?;
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
-    execution.begin_signals();
-    JOBS_ENDED.store(0, Ordering::Relaxed);
-    execution.publish();
-    let jobs = execution
-        .scheduler
-        .task_set()
-        .dags()
-        .iter()
-        .map(|dag| dag.jobs().unwrap_or(0));
+    for cluster in cluster::all() {
+        cluster.jobs_ended.store(0, Ordering::Relaxed);
+        if let Some(execution) = cluster.execution.lock().as_mut() {
+            execution.begin_signals();
+            execution.publish();
+        }
+    }
+    let jobs = task_set.dags().iter().map(|dag| dag.jobs().unwrap_or(0));
     Some(jobs.sum())
 }
 
 /// Takes the run out when it has ended.
-pub fn end() -> Option<Execution> {
-    EXECUTION.lock().take()
+pub fn end() -> Option<Ended> {
+    let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
+    Ended::of(parts.collect())
 }
 
 impl Execution {
-    /// Returns the scheduler, for its model and its counters.
-    pub const fn scheduler(&self) -> &Scheduler {
-        &self.scheduler
-    }
-
-    /// Returns the response time that is proven of a DAG, if one is.
-    pub fn bound_ns(&self, dag: DagId) -> Option<u64> {
-        self.bounds_ns.get(dag.index()).copied().flatten()
-    }
-
-    /// Returns the response time that is proven of a sink, if one is.
-    pub fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
-        let place = self.task_set().dag(dag).sinks().binary_search(&sink).ok()?;
-        *self.sink_bounds_ns.get(dag.index())?.get(place)?
-    }
-
-    /// Returns what has happened.
-    pub const fn journal(&self) -> &Journal {
-        &self.watcher.journal
-    }
-
-    /// Returns the model.
-    pub const fn task_set(&self) -> &Arc<TaskSet> {
+    const fn task_set(&self) -> &Arc<TaskSet> {
         &self.watcher.task_set
     }
 }

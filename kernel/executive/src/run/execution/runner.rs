@@ -7,6 +7,8 @@ use fass::Body;
 use sched_dag::journal::Subject;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
 
+use super::cluster::{self, Cluster};
+
 /// A subtask's body, and what running an instance of it takes.
 ///
 /// There is one for each subtask, as a subtask has one started instance at a time
@@ -14,6 +16,7 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
 pub struct Runner {
     pub(super) body: Body,
     pub(super) vertex: Vertex,
+    cluster: &'static Cluster,
     /// The time that an instance may execute for, `u64::MAX` if there is no limit.
     pub(super) budget_ns: u64,
     /// The instance that it runs, or ran last.
@@ -23,14 +26,25 @@ pub struct Runner {
 }
 
 impl Runner {
-    /// Makes the runner of a subtask, given any instance of it.
-    pub(super) fn new(body: Body, vertex: Vertex, any: Instance, budget_ns: u64) -> Self {
+    /// Makes the runner of the subtask that an instance is of.
+    fn new(body: Body, task_set: &TaskSet, any: Instance, budget_factor: u64) -> Self {
+        let dag = task_set.dag(any.dag);
         Self {
             body,
-            vertex,
-            budget_ns,
+            vertex: task_set.vertex(any),
+            cluster: cluster::nth(dag.cluster().index()),
+            budget_ns: dag.subtask(any.subtask).most_execution_ns(budget_factor),
             instance: any,
             ids: Subject::of(any).ids,
+        }
+    }
+
+    /// Returns the cluster that runs it.
+    #[inline]
+    pub(super) const fn cluster(&self) -> &'static Cluster {
+        match cluster::MAY_DIVIDE {
+            true => self.cluster,
+            false => &cluster::FIRST,
         }
     }
 
@@ -64,17 +78,17 @@ pub(super) fn runners(
 pub(super) type Others = Box<[Vec<Box<Runner>>]>;
 
 /// Makes a runner for each body that takes the place of another one, by vertex.
+#[allow(clippy::vec_box, reason = "at the fault nothing may be boxed any more")]
 pub(super) fn others(
     task_set: &TaskSet,
     bodies: Vec<Vec<Vec<Body>>>,
     budget_factor: u64,
-) -> Others {
-    let of_subtask = |(any, bodies): (Instance, Vec<Body>)| {
+) -> impl Iterator<Item = Vec<Box<Runner>>> {
+    by_subtask(bodies).map(move |(any, bodies): (Instance, Vec<Body>)| {
         let bodies = bodies.into_iter();
         let runners = bodies.map(|body| runner(task_set, any, body, budget_factor));
         runners.collect()
-    };
-    by_subtask(bodies).map(of_subtask).collect()
+    })
 }
 
 /// Returns what there is of each subtask, with any instance of that.
@@ -96,7 +110,5 @@ fn by_subtask<T>(of_dags: Vec<Vec<T>>) -> impl Iterator<Item = (Instance, T)> {
 }
 
 fn runner(task_set: &TaskSet, any: Instance, body: Body, budget_factor: u64) -> Box<Runner> {
-    let model = task_set.dag(any.dag).subtask(any.subtask);
-    let budget_ns = model.most_execution_ns(budget_factor);
-    Box::new(Runner::new(body, task_set.vertex(any), any, budget_ns))
+    Box::new(Runner::new(body, task_set, any, budget_factor))
 }

@@ -1,36 +1,54 @@
 //! Signals to sporadic DAGs, and what else completions do beyond their DAG.
 //!
-//! A completing instance's latest values show, and its signals are taken, under the
-//! lock and before the scheduler's step; the step passes them on right after the
-//! completion. A signal from outside makes a step of its own.
+//! A completing instance's latest values show, and its requests are taken, signals among them,
+//! under the lock and before the scheduler's step; the step passes them on right after the
+//! completion. A signal from outside makes a step of its own. One to a DAG of another cluster
+//! is a letter ([`letters`]), which counts once that cluster takes it.
 
+use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use fass::{Body, Plan};
-use sched_dag::{DagId, Moment, Observer};
+use fass::{Body, Plan, Request};
+use sched_dag::lifecycle::{Lifecycle, Requests};
+use sched_dag::{ClusterId, DagId, Moment};
 
-use super::{EXECUTION, Event, Execution, status};
+use super::cluster::MAY_DIVIDE;
+use super::core_set::CoreSet;
+use super::letters::{self, Letters};
+use super::watcher::Watcher;
+use super::{Event, Execution, cluster, divided, status};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, this_core};
 
-/// The signals of a run that are on their way to its scheduler.
+/// The requests of a run that are on their way to its scheduler.
 pub(super) struct Signals {
     /// The number of the plan that runs.
     plan: u64,
     /// Whether the run has begun, so that there is time.
     has_begun: bool,
-    /// The DAGs, each once; there is room for all.
-    raised: Vec<DagId>,
+    requests: Requests,
+    /// The cluster whose requests these are.
+    pub(super) cluster: ClusterId,
+    /// By DAG, how many letters wait for its cluster.
+    pub(super) letters: Letters,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
 }
 
 impl Signals {
-    pub(super) fn new(plan: &Plan) -> Self {
+    pub(super) fn new(
+        plan: &Plan,
+        cluster: ClusterId,
+        letters: &Letters,
+        lifecycle: Option<Box<dyn Lifecycle>>,
+    ) -> Self {
         Self {
             plan: plan.number,
+            cluster,
+            letters: Arc::clone(letters),
             has_begun: false,
-            raised: Vec::with_capacity(plan.bodies.len()),
+            requests: Requests::new(plan.bodies.len(), lifecycle),
             after_fault: plan.after_fault.clone(),
         }
     }
@@ -40,29 +58,52 @@ impl Signals {
         self.after_fault.get(ended.index()).copied().flatten()
     }
 
-    /// Publishes what the body has prepared, and takes its signals. Apart, as most
+    /// Publishes what the body has prepared, and takes its requests. Apart, as most
     /// bodies never have any.
     #[inline(never)]
     pub(super) fn take(&mut self, body: &mut Body, completed_ns: u64) {
-        body.complete(completed_ns, &mut |dag| self.keep(dag));
-    }
-
-    /// Keeps a signal until the next step.
-    fn keep(&mut self, dag: DagId) {
-        if !self.raised.contains(&dag) {
-            self.raised.push(dag);
-        }
+        body.complete(completed_ns, &mut |request| self.requests.keep(request));
     }
 
     /// Reports whether none is on its way.
     pub(super) const fn are_none(&self) -> bool {
-        self.raised.is_empty()
+        self.requests.are_none()
     }
 
-    /// Passes the signals taken on.
-    pub(super) fn send(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
-        for dag in self.raised.drain(..) {
-            moment.signal(dag, observer);
+    /// Passes on what was taken, and adds the cores that have to take letters.
+    #[inline(always)]
+    pub(super) fn send(
+        &mut self,
+        moment: &mut Moment<'_>,
+        watcher: &mut Watcher,
+        woken: &mut CoreSet,
+    ) {
+        if MAY_DIVIDE {
+            self.requests.give_away(|dag| {
+                let there = watcher.task_set.dag(dag).cluster();
+                let is_away = there != self.cluster;
+                if is_away {
+                    letters::send(&self.letters, dag, there, woken);
+                }
+                is_away
+            });
+        }
+        self.requests.serve(moment, watcher);
+    }
+
+    /// Passes one signal on.
+    pub(super) fn pass(
+        &self,
+        dag: DagId,
+        moment: &mut Moment<'_>,
+        watcher: &mut Watcher,
+        woken: &mut CoreSet,
+    ) {
+        let there = watcher.task_set.dag(dag).cluster();
+        if !MAY_DIVIDE || there == self.cluster {
+            moment.signal(dag, watcher);
+        } else {
+            letters::send(&self.letters, dag, there, woken);
         }
     }
 }
@@ -72,7 +113,9 @@ impl Execution {
     pub(super) fn begin_signals(&mut self) {
         self.signals.has_begun = true;
         let mut moment = self.scheduler.at(0);
-        self.signals.send(&mut moment, &mut self.watcher);
+        // What was raised before is to DAGs of this cluster.
+        let mut none = CoreSet::default();
+        self.signals.send(&mut moment, &mut self.watcher, &mut none);
     }
 }
 
@@ -102,7 +145,8 @@ pub fn raise(plan: u64, dag: DagId) {
 /// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
 /// are disabled.
 pub fn raise_in_interrupt(plan: u64, dag: DagId) {
-    let mut place = EXECUTION.lock();
+    let cluster = divided::of_dag(dag);
+    let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {
         return;
     };
@@ -110,10 +154,11 @@ pub fn raise_in_interrupt(plan: u64, dag: DagId) {
         return;
     }
     if !execution.signals.has_begun {
-        execution.signals.keep(dag);
+        execution.signals.requests.keep(Request::Signal(dag));
         return;
     }
-    let woken = execution.step(clock::now_ns(), Event::Signalled(dag));
+    let event = Event::Signalled(dag);
+    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), event));
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.

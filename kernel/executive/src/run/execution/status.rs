@@ -5,36 +5,33 @@ use core::sync::atomic::Ordering;
 use sched_dag::journal::Subject;
 use sched_dag::{Instance, Journal};
 
-use super::{EXECUTION, FINISHED, JOBS_ENDED, NEXT_EVENT_NS};
-use crate::machine::this_core::Core;
+use super::cluster::{self, FIRST_SEAT};
+use crate::machine::this_core::{self, Core};
 
 /// Stands where the ids of an instance do, for none.
 const NOTHING: u64 = u64::MAX;
 
-/// Reports whether all jobs of the run have ended.
-pub fn is_finished() -> bool {
-    FINISHED.load(Ordering::Acquire)
-}
-
 /// Returns how many jobs have ended in this run, of DAGs with a limit of jobs.
 pub fn jobs_ended() -> u64 {
-    JOBS_ENDED.load(Ordering::Relaxed)
+    let counts = cluster::all().map(|cluster| cluster.jobs_ended.load(Ordering::Relaxed));
+    counts.sum()
 }
 
-/// Returns how often the scheduler's lock has been taken since boot, modulo 2^32.
+/// Returns how often the schedulers' locks have been taken since boot, modulo 2^32.
 pub fn lock_acquisitions() -> u32 {
-    EXECUTION.acquisitions()
+    let counts = cluster::all().map(|cluster| cluster.execution.acquisitions());
+    counts.fold(0, u32::wrapping_add)
 }
 
-/// Returns when core 0's timer shall next step the scheduler.
+/// Returns when core 0's timer shall next step its scheduler.
 pub fn next_event_ns() -> u64 {
-    NEXT_EVENT_NS.load(Ordering::Acquire)
+    cluster::nth(0).next_event_ns()
 }
 
 /// Calls `with` with the names of an instance's DAG and subtask, if they can be
 /// had without waiting.
 pub fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
-    let place = EXECUTION.try_lock();
+    let place = cluster::nth(0).execution.try_lock();
     let Some(execution) = place.as_ref().and_then(|execution| execution.as_ref()) else {
         return;
     };
@@ -60,9 +57,9 @@ pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
     core.note_running([ids, job]);
 }
 
-/// Returns how long an instance may execute for, `u64::MAX` if there is no limit.
+/// Returns how long an instance that runs here may execute for, `u64::MAX` if there is no limit.
 pub fn budget_ns(instance: Instance) -> u64 {
-    let place = EXECUTION.lock();
+    let place = cluster::of(this_core::get()).execution.lock();
     place.as_ref().map_or(u64::MAX, |execution| {
         let dag = execution.task_set().dag(instance.dag);
         let subtask = dag.subtask(instance.subtask);
@@ -81,10 +78,10 @@ pub enum Cost {
     Degraded,
 }
 
-/// Returns what a fault of an instance costs if it comes now. Of two faults of a DAG at
+/// Returns what a fault of an instance that runs here costs if it comes now. Of two faults of a DAG at
 /// one moment, either may take what is left to be survived; the journal tells.
 pub fn cost_of_fault(instance: Instance) -> Cost {
-    let place = EXECUTION.lock();
+    let place = cluster::of(this_core::get()).execution.lock();
     let Some(execution) = place.as_ref() else {
         return Cost::Dag;
     };
@@ -97,19 +94,25 @@ pub fn cost_of_fault(instance: Instance) -> Cost {
     }
 }
 
-/// Looks at the journal of the run, or changes what it records, if a run goes on. To
-/// be done shortly: nothing is completed meanwhile.
-pub fn with_journal<R>(look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
-    let mut place = EXECUTION.lock();
+/// Looks at the journal of a cluster, by its number, or changes what it records, if a run goes
+/// on. Its cores count from [`first_core`](super::first_core). To be done shortly: nothing is
+/// completed there meanwhile.
+pub fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+    let mut place = cluster::nth(cluster).execution.lock();
     place
         .as_mut()
         .map(|execution| look(&mut execution.watcher.journal))
 }
 
-/// Looks at the journal of the run, if there is one and nobody is at work on it.
-pub fn try_journal<R>(look: impl FnOnce(&Journal) -> R) -> Option<R> {
-    let place = EXECUTION.try_lock()?;
+/// Looks at the journal of this core's cluster, if there is one and nobody is at work on it.
+/// Its cores count from the second argument of `look`.
+pub fn try_journal<R>(look: impl FnOnce(&Journal, u32) -> R) -> Option<R> {
+    let cluster = match this_core::is_ready() {
+        true => cluster::of(this_core::get()),
+        false => cluster::nth(0),
+    };
+    let place = cluster.execution.try_lock()?;
     place
         .as_ref()
-        .map(|execution| look(&execution.watcher.journal))
+        .map(|execution| look(&execution.watcher.journal, cluster.core(FIRST_SEAT)))
 }

@@ -8,11 +8,12 @@ use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Next;
 use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
 
+use super::cluster::{FIRST_SEAT, MAY_DIVIDE};
 use super::core_set::CoreSet;
 use super::runner::Runner;
-use super::status::{is_finished, note_running};
-use super::time::{arm_next_event, here, instance_time_ns, since_epoch};
-use super::{EPOCH_NS, Event, Execution, FINISHED, NEXT_EVENT_NS, Work};
+use super::status::note_running;
+use super::time::{here, instance_time_ns, seat, since_epoch};
+use super::{EPOCH_NS, Event, Execution, Work, letters};
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
@@ -38,8 +39,8 @@ impl Execution {
     /// the core the next one at once if nothing else is to be decided.
     #[inline]
     pub(super) fn hand_off(&mut self, core: &Core, vertex: Vertex) -> Ended {
-        let here = CoreId(core.index);
         let watcher = &mut self.watcher;
+        let here = seat(core);
         let finish_ns = watcher.finish_ns;
         // Another core's completion may have been later and come first.
         let instant_ns = finish_ns.max(self.scheduler.now_ns());
@@ -93,6 +94,10 @@ impl Execution {
             signals,
             ..
         } = self;
+        let has_letters = watcher.cluster().may_have_letters();
+        // Nothing that they bring about was before they came.
+        let now_ns = if has_letters { clock::now_ns() } else { now_ns };
+        let mut woken = CoreSet::default();
         let instant_ns = since_epoch(now_ns);
         watcher.instant_ns = instant_ns.max(scheduler.now_ns());
         let is_survived = match event {
@@ -106,7 +111,7 @@ impl Execution {
             Event::Time => {}
             Event::Completed(instance) => {
                 moment.complete(instance, watcher);
-                signals.send(&mut moment, watcher);
+                signals.send(&mut moment, watcher, &mut woken);
             }
             Event::Failed(instance) if is_survived => {
                 moment.fail_replaceable(instance, watcher);
@@ -114,11 +119,14 @@ impl Execution {
             Event::Failed(instance) => {
                 moment.fail(instance, watcher);
                 if let Some(dag) = signals.after_fault(instance.dag) {
-                    moment.signal(dag, watcher);
+                    signals.pass(dag, &mut moment, watcher, &mut woken);
                 }
             }
             Event::Signalled(dag) => moment.signal(dag, watcher),
             Event::Control(control) => control.apply(&mut moment, watcher),
+        }
+        if has_letters {
+            letters::take(&signals.letters, signals.cluster, &mut moment, watcher);
         }
         // What happens before time 0 releases nothing yet.
         let waits_until_ns = now_ns.saturating_add(*coincidence_ns);
@@ -126,11 +134,11 @@ impl Execution {
         let due_ns = *dispatch_due_ns.get_or_insert(waits_until_ns.max(epoch_ns));
         if now_ns < due_ns {
             self.may_hand_off = false;
-            return self.announce();
+            woken.insert_all(&self.announce());
+            return woken;
         }
         *dispatch_due_ns = None;
         *may_hand_off = *coincidence_ns == 0;
-        let mut woken = CoreSet::default();
         let mut preempted = None;
         for decision in moment.release_due(watcher).dispatch() {
             let (core, instance) = (decision.core(), decision.instance());
@@ -147,7 +155,7 @@ impl Execution {
                 }
             }
             if core != here {
-                woken.insert(core.0);
+                woken.insert(watcher.cluster().core(core));
             }
         }
         watcher.has_job_news = false;
@@ -155,71 +163,80 @@ impl Execution {
         woken
     }
 
-    /// Publishes the next event, and sees to it that core 0 waits for it: returns
-    /// it if it has to be woken for that.
+    /// Publishes the next event, and sees to it that the first core waits for it: returns
+    /// it if it has to be woken for that, and core 0 if nothing is left to be done here.
     pub(super) fn announce(&self) -> CoreSet {
         let mut woken = CoreSet::default();
-        let earlier = NEXT_EVENT_NS.load(Ordering::Relaxed);
+        let cluster = self.watcher.cluster();
+        let earlier_ns = cluster.next_event_ns();
         self.publish();
-        if this_core::get().index == 0 {
-            arm_next_event();
-        } else if NEXT_EVENT_NS.load(Ordering::Relaxed) < earlier || is_finished() {
+        let is_over = || cluster.is_finished.load(Ordering::Relaxed);
+        if here() == FIRST_SEAT {
+            timer::set(Alarm::Schedule, cluster.next_event_ns());
+        } else if cluster.next_event_ns() < earlier_ns || is_over() {
+            woken.insert(cluster.core(FIRST_SEAT));
+        }
+        if MAY_DIVIDE && is_over() {
             woken.insert(0);
         }
         woken
     }
 
-    /// Shows all cores when the next event is, and whether there is any.
+    /// Shows all cores when the next event is, and whether nothing is left to be done.
     pub(super) fn publish(&self) {
         let next = self.scheduler.next_event_ns();
         let next = next.map_or(u64::MAX, |next| {
             next.saturating_add(EPOCH_NS.load(Ordering::Relaxed))
         });
-        let next = self.dispatch_due_ns.unwrap_or(next);
-        NEXT_EVENT_NS.store(next, Ordering::Release);
-        FINISHED.store(self.scheduler.is_finished(), Ordering::Release);
+        let next_ns = self.dispatch_due_ns.unwrap_or(next);
+        let is_finished = self.scheduler.is_finished();
+        self.watcher.cluster().publish(next_ns, is_finished);
     }
 
     /// Finds what this core, which runs nothing, is to do.
     pub(super) fn find_work(&mut self, core: &Core) -> Work {
-        let here = core.index as usize;
-        match self.watcher.placement.next(here) {
+        let here = seat(core);
+        match self.watcher.placement.next(here.index()) {
             Next::Start(vertex, mut runner) => {
                 runner.instance.job = self.scheduler.instance_of(vertex).job;
                 note_running(core, Some(runner.subject()));
                 let start_ns = begin(core, &runner);
                 let subject = runner.subject();
-                (self.watcher.journal).write(CoreId(core.index), What::Start, start_ns, subject);
+                (self.watcher.journal).write(here, What::Start, start_ns, subject);
                 Work::Run(runner)
             }
             Next::Continue(context) => {
                 self.note_resumed(core, &context, clock::now_ns());
-                note_running(core, self.current(here).map(Subject::of));
+                note_running(core, self.current(here.index()).map(Subject::of));
                 Work::Continue(context)
             }
             // Only core 0 has a background, and only while it does other work.
             Next::Nothing => {
                 note_running(core, None);
-                let background = self.background.take_if(|_| here == 0);
+                let background = self.background.take_if(|_| core.index == 0);
                 background.map_or(Work::Rest, Work::Continue)
             }
         }
     }
 
-    /// Returns the instance that a core has.
-    pub(super) fn current(&self, core: usize) -> Option<Instance> {
-        let vertex = self.watcher.placement.current(core)?;
+    /// Returns the instance that a core has, by its seat.
+    fn current(&self, seat: usize) -> Option<Instance> {
+        let vertex = self.watcher.placement.current(seat)?;
         Some(self.scheduler.instance_of(vertex))
     }
 
     /// Makes the core whose interrupt is being handled leave what it should no
-    /// longer run. Returns the core that waits for that, if there is one.
+    /// longer run. Returns the seat of the core that waits for that, if there is one.
     pub(super) fn follow(&mut self, interrupted: &mut Interrupted, now_ns: u64) -> Option<CoreId> {
         let core = this_core::get();
-        let here = core.index as usize;
+        let here = seat(core).index();
         let is_background = core.context().is_background();
         let leaves_background = is_background && self.watcher.placement.is_wanted(here);
         if !self.watcher.placement.must_suspend(here) && !leaves_background {
+            // One that rests has no background, unless it is core 0: it is to look for work.
+            if MAY_DIVIDE && self.watcher.placement.is_wanted(here) {
+                core.wake.store(true, Ordering::Relaxed);
+            }
             return None;
         }
         let suspended = self.watcher.placement.detach(here);
@@ -227,12 +244,9 @@ impl Execution {
             // Not when the interrupt came: its step has left events since then.
             let time_ns = since_epoch(clock::now_ns());
             let instance = self.scheduler.instance_of(vertex);
-            self.watcher.journal.write(
-                CoreId(core.index),
-                What::Suspend,
-                time_ns,
-                Subject::of(instance),
-            );
+            self.watcher
+                .journal
+                .write(seat(core), What::Suspend, time_ns, Subject::of(instance));
             // The hold, or the turn, was the instance's.
             turns::leave(core);
             timer::set(Alarm::Hold, u64::MAX);
@@ -263,7 +277,7 @@ impl Execution {
         context.note_resumed(now_ns);
         timer::set_no_later(core, Alarm::Budget, context.budget_end_ns());
         turns::join(core);
-        let here = CoreId(core.index);
+        let here = seat(core);
         if let Some(instance) = self.current(here.index()) {
             let time_ns = since_epoch(clock::now_ns());
             self.watcher

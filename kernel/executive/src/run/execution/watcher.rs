@@ -4,22 +4,27 @@ use core::sync::atomic::Ordering;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use fass::edge::Happened;
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Placement;
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, Journal, Observer, TaskSet, Vertex};
+use sched_dag::{ClusterId, CoreId, DagId, Instance, JobOutcome, Journal, Observer};
+use sched_dag::{TaskSet, Vertex};
 
+use super::Runner;
+use super::cluster::{self, Cluster};
 use super::runner::Others;
 use super::time::here;
-use super::{JOBS_ENDED, Runner};
 use crate::machine::context::Parked;
+use crate::machine::this_core;
 use crate::run::edge;
 
 /// Writes what the scheduler reports into the journal, with the time of the instant that
 /// the scheduler is told of: at a completion when the function returned, so a join's
 /// latency includes the wait for the lock.
 pub(super) struct Watcher {
+    cluster: &'static Cluster,
     pub(super) journal: Journal,
     /// The bodies, and which core has which.
     pub(super) placement: Placement<Box<Runner>, Parked>,
@@ -35,6 +40,38 @@ pub(super) struct Watcher {
 }
 
 impl Watcher {
+    /// Makes one of a cluster, without a body.
+    pub(super) fn new(id: ClusterId, task_set: &Arc<TaskSet>, journal: Journal) -> Self {
+        let all = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
+        let cores = task_set.cores_of(id, all);
+        Self {
+            cluster: cluster::nth(id.index()),
+            journal,
+            placement: Placement::empty(task_set.vertices(), cores.len()),
+            others: (0..task_set.vertices()).map(|_| Vec::new()).collect(),
+            task_set: Arc::clone(task_set),
+            instant_ns: 0,
+            has_job_news: false,
+            finished: None,
+            finish_ns: 0,
+        }
+    }
+
+    /// Returns the cluster that it reports of.
+    #[inline]
+    pub(super) const fn cluster(&self) -> &'static Cluster {
+        match cluster::MAY_DIVIDE {
+            true => self.cluster,
+            false => &cluster::FIRST,
+        }
+    }
+
+    /// Takes the journal out; what is left records nothing.
+    pub(super) fn take_journal(&mut self) -> Journal {
+        let empty = Journal::new(&self.task_set, 0, 0);
+        core::mem::replace(&mut self.journal, empty)
+    }
+
     /// Notes that this core has just finished something.
     #[inline]
     pub(super) fn note_finish(&mut self, finished: Box<Runner>, finish_ns: u64) {
@@ -126,6 +163,18 @@ impl Observer for Watcher {
         self.of_job(What::Stopped, dag, 0);
     }
 
+    fn switched_off(&mut self, dag: DagId) {
+        self.of_job(What::Off, dag, 0);
+    }
+
+    fn switched_on(&mut self, dag: DagId) {
+        self.of_job(What::On, dag, 0);
+    }
+
+    fn closed(&mut self, dag: DagId) {
+        self.of_job(What::Closed, dag, 0);
+    }
+
     fn deadline_missed(&mut self, dag: DagId, job: u64, _: u64) {
         self.of_job(What::Missed, dag, job);
     }
@@ -156,7 +205,7 @@ impl Observer for Watcher {
         self.of_job(What::Completed, dag, job);
         // The jobs of a DAG without end are no progress.
         if self.task_set.dag(dag).jobs().is_some() {
-            JOBS_ENDED.fetch_add(1, Ordering::Relaxed);
+            self.cluster().jobs_ended.fetch_add(1, Ordering::Relaxed);
         }
     }
 }

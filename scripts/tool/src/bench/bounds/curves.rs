@@ -7,8 +7,9 @@ use sched_dag::analysis::{
 };
 use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, verify};
 
-use super::draw::{Random, set};
+use super::draw::set;
 use crate::oracle::bounds::older::{Width, long_paths, melani_edf, melani_fp};
+use crate::random::Random;
 
 /// The policies, in the order of [`Point::proven`].
 const POLICIES: [Policy; 2] = [Policy::StaticPriority, Policy::Edf];

@@ -123,10 +123,21 @@ fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
     for &subtasks in &scale.subtasks {
         by_subtasks.push((subtasks, count(1, subtasks, &scale::sizes(subtasks))?));
     }
+    let mut by_clusters = Vec::new();
+    for clusters in scale::CLUSTERS {
+        let boot = Boot::of_clusters(clusters, scale.jobs);
+        let figures = measure(&boot, Mode::Deterministic, &image.path)?;
+        for figure in &figures {
+            println!("{}", figure.machine_line(Mode::Deterministic));
+        }
+        by_clusters.push((clusters, figures));
+    }
     println!("medians of the instructions that all cores together executed:");
     print!("{}", scale::by_cores(&by_cores));
     println!("layered random graphs on one core:");
     print!("{}", scale::by_subtasks(&by_subtasks));
+    println!("a layered random graph in each cluster of 4 cores:");
+    print!("{}", scale::by_clusters(&by_clusters)?);
     Ok(())
 }
 
@@ -164,10 +175,10 @@ fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, St
 fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     let log = system::new_log("hand-off")?;
     let recording = log.with_extension("rec");
-    let outcome = if what.is_recorded {
+    let outcome = if what.is_recorded || what.is_divided {
         let guest = image::build("guest-tests").map_err(|error| error.to_string())?;
         let mut qemu = what.qemu(mode);
-        qemu.records = Some(recording.clone());
+        qemu.records = what.is_recorded.then(|| recording.clone());
         boot(&qemu, &guest.path, &log, LIMIT, |_| {})?
     } else {
         boot(&what.qemu(mode), image, &log, LIMIT, |_| {})?

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::baseline;
 use super::figure::Figure;
+use super::scale;
 use crate::files::{self, Named};
 use crate::options::Parsed;
 use crate::qemu::{Mode, Qemu};
@@ -28,6 +29,8 @@ pub(super) struct Boot {
     pub(super) is_traced: bool,
     /// Whether it is recorded, for that is what is measured, by a guest of the tests.
     pub(super) is_recorded: bool,
+    /// Whether its cores are divided, in which that guest can, too.
+    pub(super) is_divided: bool,
 }
 
 /// Everything that is to be measured.
@@ -167,6 +170,7 @@ fn boots(options: &Parsed) -> Vec<Boot> {
         words: format!("part={part} {words} {}", text("append")),
         is_traced: part == "traced",
         is_recorded: false,
+        is_divided: false,
     };
     // A trace shows what it shows in a few jobs.
     let traced = format!("jobs=20 branches={branches} trace=dump");
@@ -179,6 +183,7 @@ fn boots(options: &Parsed) -> Vec<Boot> {
             words: format!("test=values jobs={jobs} record=1024 {}", text("append")),
             is_traced: false,
             is_recorded: true,
+            is_divided: false,
         },
         boot(2, "elsewhere", format!("jobs={jobs}")),
         boot(2, "traced", traced),
@@ -195,6 +200,25 @@ impl Boot {
             words: format!("part=workloads jobs={jobs} {sizes}"),
             is_traced: false,
             is_recorded: false,
+            is_divided: false,
+        }
+    }
+
+    /// Returns a boot that runs a layered graph in each of so many clusters.
+    pub(super) fn of_clusters(clusters: u64, jobs: u64) -> Boot {
+        let cores = clusters * scale::CORES_OF_A_CLUSTER;
+        let sizes = (0..clusters).map(|_| scale::CORES_OF_A_CLUSTER.to_string());
+        let sizes: Vec<String> = sizes.collect();
+        Boot {
+            cores,
+            memory_mib: memory_mib(clusters * scale::OF_A_CLUSTER, cores),
+            words: format!(
+                "test=cluster_scale jobs={jobs} clusters={}",
+                sizes.join(",")
+            ),
+            is_traced: false,
+            is_recorded: false,
+            is_divided: true,
         }
     }
 

@@ -74,8 +74,8 @@ pub(super) fn summary_json(plan: &Plan, provenance: &Provenance, measured: &Meas
     let _ = writeln!(text, "  \"qemu\": {},", quoted(&provenance.qemu));
     let _ = writeln!(text, "  \"commit\": {},", quoted(&provenance.commit));
     let _ = writeln!(text, "  \"image\": {},", quoted(&provenance.image));
-    let _ = writeln!(text, "  \"mode\": {},", quoted(plan.mode.name()));
-    let _ = writeln!(text, "  \"time\": {},", quoted(plan.mode.meaning()));
+    let _ = writeln!(text, "  \"mode\": {},", quoted(plan.mode_name()));
+    let _ = writeln!(text, "  \"time\": {},", quoted(plan.meaning()));
     let _ = writeln!(text, "  \"cores\": {},", plan.cores);
     let _ = writeln!(text, "  \"memory_mib\": {},", plan.memory_mib);
     let _ = writeln!(text, "  \"jobs\": {},", plan.jobs);

@@ -26,7 +26,7 @@ mod times;
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{ExitCode, Stdio};
 use std::time::Duration;
 
 use condition::Condition;
@@ -39,7 +39,7 @@ use progress::Progress;
 use super::on_machine;
 use crate::outcome::boot;
 use crate::qemu::Mode;
-use crate::{image, probe, system};
+use crate::{image, probe, program, system};
 
 /// Runs `bench join-latency` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
@@ -50,23 +50,32 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 
 /// Measures what is not there yet, and writes all results.
 fn measure_all(plan: &Plan) -> Result<(), String> {
-    let image = image::build("join-latency").map_err(|error| error.to_string())?;
-    let machine = plan.qemu(&plan.conditions[0]);
-    let (mode, why) = probe::choose(plan.named, Mode::Deterministic, &machine, &image.path)?;
+    let built = match plan.on_linux {
+        true => image::build_linux("join-latency"),
+        false => image::build("join-latency"),
+    };
+    let image = built.map_err(|error| error.to_string())?;
+    let (mode, why) = match plan.on_linux {
+        true => (plan.mode, None),
+        false => {
+            let machine = plan.qemu(&plan.conditions[0]);
+            probe::choose(plan.named, Mode::Deterministic, &machine, &image.path)?
+        }
+    };
     let plan = &Plan {
         mode,
         ..plan.clone()
     };
-    let provenance = Provenance::of(&image.path);
+    let provenance = Provenance::of(&image.path, plan.on_linux);
     println!(
         "{} conditions of {} jobs; mode {}, {} cores; {}",
         plan.conditions.len(),
         plan.jobs,
-        plan.mode,
+        plan.mode_name(),
         plan.cores,
         provenance.qemu
     );
-    println!("time: {}", plan.mode.meaning());
+    println!("time: {}", plan.meaning());
     if let Some(why) = why {
         println!("mode {mode} because {why}");
     }
@@ -125,7 +134,8 @@ fn measure(
     let mut seen = Vec::new();
     while seen.len() < MOST_BOOTS {
         let samples = boot_once(plan, condition, image, progress)?;
-        let is_sure = plan.mode != Mode::Deterministic || plan.once || seen.contains(&samples);
+        let is_sure =
+            plan.mode_name() != Mode::Deterministic.name() || plan.once || seen.contains(&samples);
         if is_sure {
             if seen.len() > 1 {
                 progress.note(&format!("{} boots until two agreed", seen.len() + 1));
@@ -149,8 +159,15 @@ fn boot_once(
 ) -> Result<Samples, String> {
     let log = system::new_log("join-latency")?;
     let limit = Duration::from_secs(120 + plan.jobs);
-    let qemu = plan.qemu(condition);
-    let outcome = boot(&qemu, image, &log, limit, |line| progress.follow(line))?;
+    let mut follow = |line: &str| progress.follow(line);
+    let outcome = match plan.on_linux {
+        true => {
+            let words = plan.linux_words(condition);
+            let words: Vec<OsString> = words.split(' ').map(OsString::from).collect();
+            program::run(image, &words, Stdio::null(), &log, limit, &mut follow)?
+        }
+        false => boot(&plan.qemu(condition), image, &log, limit, follow)?,
+    };
     if let Err(fault) = outcome.judge() {
         return Err(format!(
             "{condition} failed: {}\n{}",

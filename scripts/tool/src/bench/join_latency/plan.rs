@@ -22,6 +22,8 @@ pub(super) struct Plan {
     pub(super) queue: u64,
     pub(super) cores: u64,
     pub(super) memory_mib: u64,
+    /// Whether the conditions are programs of this computer.
+    pub(super) on_linux: bool,
     /// The mode that was named; which one it is, the built image settles.
     pub(super) named: Option<Mode>,
     pub(super) mode: Mode,
@@ -37,6 +39,21 @@ impl Plan {
     /// What the options ask for cannot be: one line that says why.
     pub(super) fn new(options: &Parsed) -> Result<Plan, String> {
         let number = |name| options.number(name).unwrap_or(1);
+        let on_linux = options.text("on") == Some("linux");
+        let of_guests = ["mode", "deterministic", "once"].into_iter();
+        if let Some(name) = of_guests
+            .filter(|_| on_linux)
+            .find(|name| options.is_given(name))
+        {
+            return Err(format!(
+                "`--{name}` is for guests; leave it or `--on linux` out"
+            ));
+        }
+        let usual = match on_linux {
+            true => "target/join-latency-on-linux",
+            false => options.text("out").unwrap_or_default(),
+        };
+        let out = options.path("out").filter(|_| options.is_given("out"));
         (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
         let policies = Policy::list(options.text("policies").unwrap_or_default())?;
         let mut subtasks: Vec<usize> = Vec::new();
@@ -85,7 +102,7 @@ impl Plan {
             ));
         }
         Ok(Plan {
-            out: options.path("out").unwrap_or(Path::new("")).into(),
+            out: out.unwrap_or(Path::new(usual)).into(),
             conditions,
             policies,
             subtasks,
@@ -95,10 +112,33 @@ impl Plan {
             cores,
             // The kernel records each instance, and the app its joins: half a KiB.
             memory_mib: 64 + (jobs * least_cores).div_ceil(2048),
+            on_linux,
             named,
             mode: named.unwrap_or(Mode::Deterministic),
             once: options.is_given("once"),
         })
+    }
+
+    /// Returns the words of a condition's program on Linux.
+    pub(super) fn linux_words(&self, condition: &Condition) -> String {
+        let words = condition.guest_words(self.jobs, self.queue);
+        format!("cores={} share=on {words}", self.cores)
+    }
+
+    /// Names what time means.
+    pub(super) fn mode_name(&self) -> &'static str {
+        match self.on_linux {
+            true => "linux",
+            false => self.mode.name(),
+        }
+    }
+
+    /// Says in one sentence what a time is worth.
+    pub(super) fn meaning(&self) -> &'static str {
+        match self.on_linux {
+            true => "real nanoseconds on real processors, whatever else this computer does",
+            false => self.mode.meaning(),
+        }
     }
 
     /// Describes the guest of a condition.
@@ -135,7 +175,7 @@ fn named_mode(options: &Parsed) -> Result<Option<Mode>, String> {
 /// What is measured with: versions, for the record.
 #[derive(Debug)]
 pub(super) struct Provenance {
-    /// QEMU's version.
+    /// QEMU's version, or Linux's.
     pub(super) qemu: String,
     /// The commit, with a mark if the tree differs from it.
     pub(super) commit: String,
@@ -145,9 +185,13 @@ pub(super) struct Provenance {
 
 impl Provenance {
     /// Finds out.
-    pub(super) fn of(image: &Path) -> Provenance {
+    pub(super) fn of(image: &Path, on_linux: bool) -> Provenance {
         let first_line = |text: String| text.lines().next().unwrap_or("unknown").to_string();
-        let qemu = output(PROGRAM, &["--version"]).map_or("unknown".into(), first_line);
+        let version = match on_linux {
+            true => output("uname", &["-sr"]),
+            false => output(PROGRAM, &["--version"]),
+        };
+        let qemu = version.map_or("unknown".into(), first_line);
         let commit = output("git", &["rev-parse", "--short=12", "HEAD"]);
         let changes = output("git", &["status", "--porcelain"]);
         let commit = match (commit, changes) {
@@ -165,6 +209,10 @@ impl Provenance {
 
     /// States everything that a condition's times depend on.
     pub(super) fn statement(&self, plan: &Plan, condition: &Condition) -> String {
+        if plan.on_linux {
+            let words = plan.linux_words(condition);
+            return format!("{}; program {}; {words}", self.qemu, self.image);
+        }
         let qemu = plan.qemu(condition);
         format!(
             "{}; image {}; machine {}, {} cores, {} MiB; {}",
@@ -193,7 +241,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Plan, checksum};
+    use super::{Path, Plan, checksum};
     use crate::bench::join_latency::table::TABLE;
 
     fn plan(line: &str) -> Result<Plan, String> {
@@ -213,6 +261,16 @@ mod tests {
         assert!(refusal("--cores 7 --deterministic").contains("need 8"));
         assert!(refusal("--subtasks 2,2 --deterministic").contains("twice"));
         assert!(refusal("--mode threads --deterministic").contains("exclude"));
+        assert!(refusal("--on linux --once").contains("`--once` is for guests"));
+    }
+
+    #[test]
+    fn on_linux_results_have_a_folder_of_their_own() {
+        let out = |line: &str| plan(line).unwrap().out;
+        assert_eq!(out(""), Path::new("target/join-latency"));
+        let on_linux = "target/join-latency-on-linux";
+        assert_eq!(out("--on linux"), Path::new(on_linux));
+        assert_eq!(out("--on linux --out x"), Path::new("x"));
     }
 
     #[test]

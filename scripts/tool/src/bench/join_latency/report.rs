@@ -207,8 +207,8 @@ fn reading() -> String {
 fn conditions(plan: &Plan, provenance: &Provenance, measured: &Measured) -> String {
     let seeds: Vec<String> = plan.seeds.iter().map(u64::to_string).collect();
     let rows = [
-        ("mode", format!("{}: {}", plan.mode, plan.mode.meaning())),
-        ("machine", format!("{}, microvm", provenance.qemu)),
+        ("mode", format!("{}: {}", plan.mode_name(), plan.meaning())),
+        ("machine", provenance.qemu.clone()),
         (
             "cores, memory",
             format!("{} cores, {} MiB", plan.cores, plan.memory_mib),

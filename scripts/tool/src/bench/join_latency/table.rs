@@ -61,6 +61,14 @@ pub(super) static TABLE: Command = Command {
             help: "Runs of each condition, with this seed and the ones after it.",
         },
         Opt {
+            name: "on",
+            short: None,
+            takes: Takes::OneOf(&["machine", "linux"]),
+            default: "machine",
+            help: "Where: on the machine in QEMU, or on this computer's processors, which cores \
+                   share if there are fewer; then DIR is target/join-latency-on-linux.",
+        },
+        Opt {
             name: "cores",
             short: None,
             takes: Takes::Number {

@@ -1,4 +1,4 @@
-//! What the scheduler's own work costs.
+//! What the scheduler's own work costs, and the answer at commit.
 //!
 //! Two ratios are the same on every host that is idle: a commit costs at most 20 times
 //! a plain depth-first walk of the same graph, and the cost of a dispatched instance
@@ -8,6 +8,7 @@
 
 mod commit;
 mod dispatch;
+mod sets;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -19,7 +20,7 @@ const MOST_WALKS: f64 = 20.0;
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench scheduler",
-    about: "Measures the commit of a large DAG, and the cost of a dispatched instance.",
+    about: "Measures the commit of a large DAG and of many, and the cost of a dispatched instance.",
     positional: None,
     options: &[],
     notes: "\
@@ -63,6 +64,8 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
             dispatch.ready, dispatch.nanoseconds, dispatch.growth, dispatch.log_growth
         );
     }
+    let sets = sets::measure();
+    print!("{}", sets::table(&sets));
     for commit in &commits {
         println!(
             "{{\"kind\":\"bench\",\"name\":\"commit\",\"what\":\"{}\",\"subtasks\":{},\"edges\":{},\
@@ -81,6 +84,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
             dispatch.ready, dispatch.nanoseconds, dispatch.growth, dispatch.log_growth
         );
     }
+    sets.iter().for_each(|set| println!("{}", set.line()));
     for remark in remarks(&commits, &dispatches) {
         println!("{remark}; on an idle host it does not");
     }

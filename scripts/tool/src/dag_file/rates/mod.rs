@@ -25,7 +25,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check, is_name, no_name, quoted};
-use sched_dag::{DagSpec, Policy, SubtaskSpec};
+use sched_dag::{CommitOptions, DagSpec, Policy, SubtaskSpec};
 
 /// A graph in which each subtask may have a timer.
 #[derive(Clone, Debug, Default)]
@@ -321,7 +321,7 @@ fn refuse_cycles(graph: &Graph, name: &str) -> Result<(), Vec<Malformed>> {
         name: String::new(),
         dags,
     };
-    check(&set, Policy::Edf, 1, Length::Jobs(1))
+    check(&set, &CommitOptions::new(Policy::Edf, 1), Length::Jobs(1))
 }
 
 #[cfg(test)]

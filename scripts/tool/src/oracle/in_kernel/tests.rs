@@ -1,6 +1,5 @@
 //! The comparison on the host: what is near, what is not, and what is missing.
 
-use super::boots::runs_there;
 use super::compare::compare;
 use super::transcript::{Ran, read};
 use super::{Deviation, Settings};
@@ -100,17 +99,4 @@ fn a_run_that_is_not_all_there_is_none() {
     assert_eq!(ran("[0,0,0,4990000,1],", ""), None);
     assert_eq!(ran("[0,1,0,5010000,", "[0,0,0,5010000,"), None);
     assert_eq!(ran("[0,1,0,5010000,", "[0,1,0,null,"), None);
-}
-
-#[test]
-fn divided_cores_are_refused_before_any_boot() {
-    let divided = "clusters 1 1\ndag 4 4 0 2 2 1\nin 0";
-    let text = CASE
-        .replace("small 1 0", "small 2 0")
-        .replace("dag 4 4 0 2 2 1", divided);
-    let case = parse(&text).expect("well formed").remove(0);
-    let settings = Settings::for_unit(1000);
-    let why = "the kernel does not divide its cores; leave `--in-kernel` out";
-    assert_eq!(runs_there(&case, &settings), Err(why.to_owned()));
-    assert_eq!(runs_there(&self::case(), &settings), Ok(()));
 }

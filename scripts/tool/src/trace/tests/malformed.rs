@@ -267,15 +267,16 @@ fn a_chain_of_many_subtasks_is_no_cycle() {
 }
 
 #[test]
-fn a_log_says_whether_its_time_was_counted() {
-    let of_mode = |words: &str| {
-        let boot = r#"{"kind":"boot","version":"1","app":"a","cpus":2,"memory_kib":1,"clock":"c""#;
-        read(&format!("{boot},\"command_line\":\"{words}\"}}\n{GOOD}"))
-            .unwrap()
-            .remove(0)
-            .is_counted
+fn a_log_says_how_strictly_it_is_judged() {
+    use crate::trace::bound::{COUNTED_NS, LINUX_NS, REAL_NS};
+    let of = |clock: &str, words: &str| {
+        let boot = r#"{"kind":"boot","version":"1","app":"a","cpus":2,"memory_kib":1"#;
+        let rest = format!("\"clock\":\"{clock}\",\"command_line\":\"{words}\"}}");
+        let mut runs = read(&format!("{boot},{rest}\n{GOOD}")).unwrap();
+        runs.remove(0).usual_bound_ns
     };
-    assert!(of_mode("policy=edf mode=deterministic"));
-    assert!(!of_mode("mode=threads"));
-    assert!(!read(GOOD).unwrap().remove(0).is_counted);
+    assert_eq!(of("pit", "policy=edf mode=deterministic"), COUNTED_NS);
+    assert_eq!(of("pit", "mode=threads"), REAL_NS);
+    assert_eq!(of("linux", "policy=edf"), LINUX_NS);
+    assert_eq!(read(GOOD).unwrap().remove(0).usual_bound_ns, REAL_NS);
 }

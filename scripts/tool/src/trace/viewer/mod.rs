@@ -16,8 +16,8 @@
 //! - if the trace breaks a rule, a group `breaches` that says where.
 //!
 //! Flows lead along each edge of the graph from an instance's finish to the
-//! start of its successor in the same job, once between cores and once between
-//! subtasks (`flows`).
+//! start of its successor in the same job, and from an instance's finish to the start of
+//! each one that samples its value; once between cores and once between subtasks (`flows`).
 //!
 //! It guarantees that slices of one track nest, and that each flow has both its
 //! ends. Each time is the trace's, in microseconds with three decimals. All runs

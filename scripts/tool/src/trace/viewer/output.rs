@@ -8,6 +8,7 @@
 
 use std::fmt::Write;
 
+use super::flows::Flow;
 use crate::json::{Object, quoted};
 
 /// All that is shown.
@@ -136,15 +137,13 @@ impl Track {
     }
 
     /// Lets a flow leave the slice that is open, at the time drawn last.
-    pub(super) fn flow_out(&mut self, flow: u64) {
-        let rest = format!(",\"name\":\"precedes\",\"cat\":\"precedence\",\"id\":{flow}");
-        self.draw('s', self.latest_ns, &rest);
+    pub(super) fn flow_out(&mut self, flow: Flow) {
+        self.draw('s', self.latest_ns, &described(flow));
     }
 
     /// Lets a flow arrive at the slice that is open, at the time drawn last.
-    pub(super) fn flow_in(&mut self, flow: u64) {
-        let rest =
-            format!(",\"name\":\"precedes\",\"cat\":\"precedence\",\"id\":{flow},\"bp\":\"e\"");
+    pub(super) fn flow_in(&mut self, flow: Flow) {
+        let rest = format!("{},\"bp\":\"e\"", described(flow));
         self.draw('f', self.latest_ns, &rest);
     }
 
@@ -161,4 +160,14 @@ impl Track {
         );
         self.drawn.push((time_ns, event));
     }
+}
+
+/// The members that both ends of a flow have.
+fn described(flow: Flow) -> String {
+    let Flow { number, is_sample } = flow;
+    let (name, category) = match is_sample {
+        true => ("sampled by", "sample"),
+        false => ("precedes", "precedence"),
+    };
+    format!(",\"name\":\"{name}\",\"cat\":\"{category}\",\"id\":{number}")
 }

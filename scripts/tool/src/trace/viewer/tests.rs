@@ -230,6 +230,21 @@ fn an_arrow_leads_along_each_edge_whose_ends_ran() {
 }
 
 #[test]
+fn an_arrow_leads_from_a_value_to_each_instance_that_samples_it() {
+    // `b/x` samples what `a/s` writes.
+    let graph = r#"
+{"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":0,"name":"a","bound_ns":[],"topics":[["t","u8",0,[1,2],1]],"samples":[]}
+{"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":1,"name":"\"b\"","bound_ns":[9],"topics":[],"samples":[[0,0,0,null]]}"#;
+    let events = events(&convert(&[run_of(&format!("{graph}{HEADER}"), EVENTS)], 10));
+    assert_eq!(flows(&events).len(), 14);
+    let of_samples = |event: &&Value| text(event, "name") == "sampled by";
+    let ends = events.iter().filter(of_samples);
+    let ends: Vec<_> = ends.map(|event| (text(event, "ph"), ns(event))).collect();
+    let once = [("s", 90), ("f", 152)];
+    assert_eq!(ends, [once, once].concat());
+}
+
+#[test]
 fn breaches_are_shown_where_they_are() {
     let group = |text: &str| {
         names(&events(text))

@@ -1,0 +1,58 @@
+//! Runs that their own functions change, on Linux: orders and counts.
+
+mod support;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use fass::{Shutdown, SubtaskAttributes, Switch, create_dag, finish_create_dags, shutting_down};
+use linux::Mechanism;
+use sched_dag::DagId;
+use sched_dag::journal::What;
+use support::{alone, ms};
+
+#[test]
+fn functions_pause_and_resume_a_dag_and_shut_the_run_down() {
+    for (cores, mechanism) in [(1, Mechanism::Normal), (2, Mechanism::Fifo)] {
+        let alone = alone(cores, mechanism);
+        let named = SubtaskAttributes::named;
+        let ticks = create_dag();
+        ticks
+            .name("ticks")
+            .period(ms(1))
+            .relative_deadline(ms(1))
+            .starts_paused();
+        let ticked = Arc::new(AtomicU64::new(0));
+        let count = Arc::clone(&ticked);
+        let tick = move |_job| _ = count.fetch_add(1, Relaxed);
+        ticks.register_untyped_subtask(tick, named("tick").priority(1));
+        let asks = create_dag();
+        asks.name("asks").period(ms(10)).relative_deadline(ms(10));
+        let mut step = 0;
+        let ask = move |(mut ticks, mut shutdown): (Switch<'_>, Shutdown<'_>), _job| {
+            match step {
+                0 => ticks.resume(),
+                // However slow this computer is.
+                1 if ticked.load(Relaxed) < 3 => return,
+                1 => ticks.pause(),
+                _ => shutdown.request(),
+            }
+            step += 1;
+        };
+        asks.using((ticks.switching(), shutting_down()))
+            .register_untyped_subtask(ask, named("ask").priority(0));
+        finish_create_dags(&[ticks, asks]).unwrap();
+
+        let run = alone.machine.run().unwrap();
+        assert_eq!(run.violations().count(), 0);
+        let [ticks, asks] = [0, 1].map(|dag| *run.statistics(DagId(dag)));
+        assert!(ticks.released >= 3 && ticks.skips > 0, "{ticks:?}");
+        assert_eq!(ticks.released, ticks.completed);
+        assert!(asks.completed >= 3, "{asks:?}");
+        let of_life = |what: &What| matches!(what, What::Off | What::On | What::Closed);
+        let whats = run.journal().events().map(|event| event.what);
+        let changes: Vec<What> = whats.filter(of_life).collect();
+        let expected = [What::Off, What::On, What::Off, What::Closed, What::Closed];
+        assert_eq!(changes, expected);
+    }
+}

@@ -1,0 +1,120 @@
+//! Random sets of DAGs, with all that a run has to bear: preemption, overload, panics, exceeded
+//! budgets, and a thread that pauses, resumes and stops DAGs meanwhile.
+
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use fass::{
+    ConstructionPolicy, Dag, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag,
+    execute_for, finish_create_dags_with,
+};
+use linux::{Control, Linux, Run};
+use sched_dag::DagId;
+
+use super::{ms, spin};
+
+/// SplitMix64 (doi 10.1145/2660193.2660195).
+#[derive(Clone)]
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ (mixed >> 31)) % limit
+    }
+
+    fn small(&mut self, limit: u64) -> u32 {
+        u32::try_from(self.below(limit)).unwrap_or(0)
+    }
+
+    fn one_in(&mut self, count: u64) -> bool {
+        self.below(count) == 0
+    }
+}
+
+/// Draws the policy of a set and the number of its cores.
+pub(crate) fn terms(random: &mut Random) -> (Policy, u32) {
+    let policy = [Policy::StaticPriority, Policy::Edf][usize::from(random.one_in(2))];
+    (policy, 1 + random.small(2))
+}
+
+/// Commits a drawn set on the machine and runs it. Returns how often a DAG was stopped, too.
+pub(crate) fn run(machine: &Linux, random: &mut Random) -> (Run, u64) {
+    let dags: Vec<Dag> = (0..1 + random.below(4))
+        .map(|number| dag(number, random))
+        .collect();
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the set is sound");
+    let control = machine.control().expect("it is committed");
+    let meddler = meddle(control, dags.len() as u64, random.clone());
+    let run = machine.run().expect("it is committed");
+    (run, meddler.join().expect("it does not panic"))
+}
+
+fn dag(number: u64, random: &mut Random) -> Dag {
+    let dag = create_dag();
+    let period = ms(2 + random.below(9));
+    dag.name(&format!("dag {number}"))
+        .jobs(5 + random.below(20));
+    dag.period(period).relative_deadline(period);
+    dag.in_flight(1 + random.small(3));
+    let overruns = [
+        OverrunPolicy::Queue,
+        OverrunPolicy::Skip,
+        OverrunPolicy::Abort,
+    ];
+    dag.overrun(overruns[random.small(3) as usize]);
+    let faulty = random.one_in(8).then(|| random.below(10));
+    let subtasks: Vec<_> = (0..1 + random.below(6))
+        .map(|subtask| {
+            let us = random.below(1_500);
+            let mut attributes =
+                SubtaskAttributes::named(&format!("subtask {subtask}")).priority(random.small(10));
+            let keeps_core = random.one_in(5);
+            if keeps_core {
+                attributes = attributes.non_preemptive();
+            }
+            if random.one_in(20) {
+                // Sometimes it is exceeded.
+                attributes = attributes.budget(ms(1));
+            }
+            // While it waits, what was preempted there may end on its core, which it is to keep.
+            let holds = random.one_in(4) && !keeps_core;
+            let function = move |job| {
+                match holds {
+                    true => execute_for(Duration::from_micros(us), Occupation::Hold),
+                    false => spin(us),
+                }
+                assert!(subtask > 0 || faulty != Some(job), "meant");
+            };
+            dag.register_untyped_subtask(function, attributes)
+        })
+        .collect();
+    for (place, later) in subtasks.iter().enumerate().skip(1) {
+        let earlier = usize::try_from(random.below(place as u64)).unwrap_or(0);
+        dag.precede(&subtasks[earlier], later);
+    }
+    dag
+}
+
+/// Pauses, resumes and stops DAGs for a while. Returns how often it has stopped one.
+fn meddle(control: Control, dags: u64, mut random: Random) -> JoinHandle<u64> {
+    thread::spawn(move || {
+        let mut stops = 0;
+        for _ in 0..random.below(8) {
+            thread::sleep(ms(1 + random.below(8)));
+            let dag = DagId(random.small(dags));
+            match random.below(10) {
+                0 => {
+                    control.stop(dag);
+                    stops += 1;
+                }
+                1..5 => control.pause(dag),
+                _ => control.resume(dag),
+            }
+        }
+        stops
+    })
+}

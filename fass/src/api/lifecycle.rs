@@ -1,0 +1,265 @@
+//! The life of a run, as functions change it: DAGs that rest, and the end.
+//!
+//! A subtask that may change what runs says so at its registration, as one that raises a signal
+//! does. What its function asks for takes effect when its instance is complete (R3); the rules L1
+//! to L6 are in `sched-dag/src/lifecycle/`.
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicU8, Ordering};
+
+use sched_dag::DagId;
+use sched_dag::lifecycle::{Changes, Lifecycle};
+
+use super::dag::Dag;
+use super::uses::{Uses, sealed};
+use crate::draft::Draft;
+use crate::run::request::{Asked, GO, STOP, Wish, wish};
+use crate::run::signal::Target;
+
+/// The use of a DAG by a subtask that may pause and resume it: the function gets a [`Switch`].
+/// Made by [`Dag::switching`].
+///
+/// See [`Switch`].
+#[derive(Debug)]
+pub struct Switching {
+    target: Arc<Target>,
+}
+
+/// What a function pauses and resumes a DAG with.
+///
+/// A paused DAG releases no job: those that become due are skipped, and keep their numbers and
+/// their places on the grid. What is in flight when it is paused goes on to its end.
+///
+/// # Examples
+///
+/// A camera that rests while nothing moves:
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, Switch, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let (ms, named) = (Duration::from_millis, SubtaskAttributes::named);
+///
+/// let camera = create_dag();
+/// camera.name("camera").jobs(10).relative_deadline(ms(10));
+/// camera.register_periodic_subtask(|| (), vec![], ms(10), named("look"));
+///
+/// let motion = create_dag(); // every 50 ms
+/// motion.name("motion").jobs(2).relative_deadline(ms(50));
+/// let mut moves = [false, true].into_iter();
+/// let feel = move |mut camera: Switch<'_>| match moves.next() {
+///     Some(true) => camera.resume(),
+///     _ => camera.pause(), // takes effect when this instance is complete
+/// };
+/// motion
+///     .using(camera.switching())
+///     .register_periodic_subtask(feel, vec![], ms(50), named("feel"));
+/// finish_create_dags(&[camera, motion]).unwrap();
+///
+/// let report = machine.run();
+/// assert_eq!(report.violations(), []);
+/// assert_eq!(report.statistics[0].released, 5); // at 0, and from 60 ms on
+/// assert_eq!(report.statistics[0].skips, 5);
+/// ```
+#[derive(Debug)]
+pub struct Switch<'a> {
+    wish: &'a AtomicU8,
+}
+
+impl Switch<'_> {
+    /// Pauses the DAG when this instance is complete. In place of a resumption that the same
+    /// instance has asked for.
+    ///
+    /// See [`Switch`].
+    pub fn pause(&mut self) {
+        self.wish.store(STOP, Ordering::Relaxed);
+    }
+
+    /// Resumes the DAG when this instance is complete. In place of a pause that the same
+    /// instance has asked for.
+    ///
+    /// See [`Switch`].
+    pub fn resume(&mut self) {
+        self.wish.store(GO, Ordering::Relaxed);
+    }
+}
+
+/// The use of the run by a subtask that may end it: the function gets a [`Shutdown`]. Made by
+/// [`shutting_down`].
+///
+/// See [`Shutdown`].
+#[derive(Debug)]
+pub struct ShuttingDown(());
+
+/// What a function ends the run with, in order: nothing more is released, and what is in flight
+/// comes to its end.
+///
+/// # Examples
+///
+/// A robot that runs until it has arrived:
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Shutdown, SubtaskAttributes, create_dag, finish_create_dags, shutting_down};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let drive = create_dag(); // without a last job
+/// drive.name("drive");
+/// let period = Duration::from_millis(10);
+/// let mut distance = 5;
+/// let step = move || {
+///     distance -= 1;
+///     (distance,)
+/// };
+/// let named = SubtaskAttributes::named;
+/// drive.register_periodic_subtask(step, vec!["distance"], period, named("step"));
+/// drive.using(shutting_down()).register_sink_subtask(
+///     |mut shutdown: Shutdown<'_>, (distance,): (i32,)| {
+///         if distance == 0 {
+///             shutdown.request(); // takes effect when this instance is complete
+///         }
+///     },
+///     vec!["distance"],
+///     period,
+///     named("arrive"),
+/// );
+/// finish_create_dags(&[drive]).unwrap();
+/// assert_eq!(machine.run().statistics[0].completed, 5);
+/// ```
+#[derive(Debug)]
+pub struct Shutdown<'a> {
+    wish: &'a AtomicU8,
+}
+
+impl Shutdown<'_> {
+    /// Ends the run when this instance is complete. It cannot be taken back.
+    ///
+    /// See [`Shutdown`].
+    pub fn request(&mut self) {
+        self.wish.store(STOP, Ordering::Relaxed);
+    }
+}
+
+/// Returns the use of a subtask that may end the run.
+///
+/// See [`Shutdown`].
+#[must_use = "a use has no effect until a subtask is registered with it"]
+pub const fn shutting_down() -> ShuttingDown {
+    ShuttingDown(())
+}
+
+impl Dag {
+    /// Returns the use of a subtask, of any DAG, that may pause and resume this one.
+    ///
+    /// The commit must have this DAG, too. See [`Switch`].
+    #[track_caller]
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    pub fn switching(&self) -> Switching {
+        let mut draft = self.open();
+        let target = draft.target.get_or_insert_with(|| Arc::new(Target::new()));
+        Switching {
+            target: Arc::clone(target),
+        }
+    }
+
+    /// Lets the DAG be paused from the start of scheduling on, until a [`Switch`], or a person
+    /// at the console, resumes it.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// let machine = virtual_time::VirtualTime::new();
+    /// let (dag, period) = (create_dag(), Duration::from_millis(10));
+    /// dag.jobs(3).period(period).relative_deadline(period).starts_paused();
+    /// dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
+    /// finish_create_dags(&[dag]).unwrap();
+    /// assert_eq!(machine.run().statistics[0].skips, 3);
+    /// ```
+    #[track_caller]
+    pub fn starts_paused(&self) -> &Self {
+        let mut draft = self.open();
+        draft.starts_paused = true;
+        draft.lifecycle = Some(lifecycle);
+        drop(draft);
+        self
+    }
+}
+
+/// Makes what serves the requests of DAGs. Only what is stated here names it, so an app that
+/// states nothing of that kind has no code for it.
+fn lifecycle(dags: &[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle> {
+    let drafts = || (0..).map(DagId).zip(dags);
+    let paused = drafts().filter(|(_, draft)| draft.borrow().starts_paused);
+    let paused: Vec<DagId> = paused.map(|(dag, _)| dag).collect();
+    let may_shut_down = drafts().any(|(_, draft)| draft.borrow().may_shut_down);
+    let count = u32::try_from(dags.len()).unwrap_or(u32::MAX);
+    Box::new(Changes::new(count, may_shut_down).with_paused(paused))
+}
+
+impl sealed::Sealed for Switching {}
+impl sealed::Sealed for ShuttingDown {}
+
+impl Uses for Switching {
+    type Borrowed<'a> = Switch<'a>;
+    type Held = Wish;
+    type Guard<'a> = &'a AtomicU8;
+
+    fn is_of(&self, _dag: &Dag) -> bool {
+        true
+    }
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        let mut draft = dag.draft.borrow_mut();
+        draft.switches.push((subtask, Arc::clone(&self.target)));
+        ask(&mut draft, subtask, Some(self.target))
+    }
+
+    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+        held
+    }
+
+    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+        Switch { wish: guard }
+    }
+}
+
+impl Uses for ShuttingDown {
+    type Borrowed<'a> = Shutdown<'a>;
+    type Held = Wish;
+    type Guard<'a> = &'a AtomicU8;
+
+    fn is_of(&self, _dag: &Dag) -> bool {
+        true
+    }
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        let mut draft = dag.draft.borrow_mut();
+        draft.may_shut_down = true;
+        ask(&mut draft, subtask, None)
+    }
+
+    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+        held
+    }
+
+    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+        Shutdown { wish: guard }
+    }
+}
+
+/// Notes that completions of a subtask may ask for something.
+fn ask(draft: &mut Draft, subtask: usize, target: Option<Arc<Target>>) -> Wish {
+    draft.lifecycle = Some(lifecycle);
+    let wish = wish();
+    let asked = Asked::new(Arc::clone(&wish), target);
+    draft.effects.push((subtask, Box::new(asked)));
+    wish
+}

@@ -1,0 +1,369 @@
+//! Parameters: numbers that a person, a file or a test sets while DAGs run.
+//!
+//! A parameter is like a [latest value](crate::Latest) that is written from outside. It has a
+//! name, a type and a range. A *source* reads it when it starts, and sends it along edges to
+//! whom it concerns. So a job has one value, whatever happens meanwhile.
+//!
+//! # What is guaranteed
+//!
+//! - A job's value is the one that was set last before its source started. It does not change
+//!   during the job: in each DAG one source reads a parameter, and what others get of it comes
+//!   along edges.
+//! - No value out of the range is ever set, nor one that is no number.
+//! - Nobody waits: reading is one load.
+//! - It is recorded and replayed by what the source returns, as all that sources read. In a
+//!   replay what is set meanwhile has no effect.
+
+use alloc::format;
+use alloc::string::String;
+use alloc::sync::Arc;
+use core::fmt;
+use core::marker::PhantomData;
+use core::ops::RangeInclusive;
+use core::str::FromStr;
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use super::dag::Dag;
+use super::uses::{Uses, sealed};
+
+/// A number, or a truth value, that can be set while DAGs run. A handle; clones are the same one.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let period = Duration::from_millis(10);
+/// let gain = Parameter::new("gain", 0.5, 0.0..=2.0);
+/// let dag = create_dag();
+/// dag.name("loop").jobs(4);
+/// dag.using(gain.reading()).register_periodic_subtask(
+///     |gain: f64| (gain,),
+///     vec!["gain"],
+///     period,
+///     SubtaskAttributes::named("measure"),
+/// );
+/// dag.register_sink_subtask(
+///     |(gain,): (f64,)| assert!((0.0..=2.0).contains(&gain)),
+///     vec!["gain"],
+///     period,
+///     SubtaskAttributes::named("control"),
+/// );
+/// finish_create_dags(&[dag]).unwrap();
+///
+/// machine.run_for(2 * period);
+/// gain.set(1.5).unwrap(); // for the jobs to come
+/// assert_eq!(
+///     gain.set(3.0).unwrap_err().to_string(),
+///     "`gain=3`: parameter `gain` takes f64 from 0 to 2"
+/// );
+/// machine.run();
+/// assert_eq!(gain.value(), 1.5);
+/// ```
+pub struct Parameter<T>(Arc<Shared<T>>);
+
+struct Shared<T> {
+    name: String,
+    /// The value, as bits.
+    bits: AtomicU64,
+    initial: T,
+    range: RangeInclusive<T>,
+}
+
+/// The use of a [`Parameter`]: the function gets its value. Made by [`Parameter::reading`].
+///
+/// See [`Parameter`].
+#[derive(Debug)]
+pub struct Reading<T>(Parameter<T>);
+
+/// A value that is not within a parameter's range, or is no number of its type. It says so in one
+/// line, with the type and the range.
+///
+/// See [`Parameter`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unsettable(String);
+
+impl fmt::Display for Unsettable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl core::error::Error for Unsettable {}
+
+/// A type that a parameter can have: `bool`, `i64`, `u64`, `f64` and the shorter ones `i32`, `u32`,
+/// `f32`.
+///
+/// ```
+/// fn name<T: fass::ParameterValue>(_: T) -> &'static str {
+///     T::NAME
+/// }
+/// assert_eq!(name(0.5), "f64");
+/// ```
+pub trait ParameterValue:
+    sealed::Sealed + Copy + PartialOrd + fmt::Display + FromStr + Send + Sync + 'static
+{
+    /// The type's name.
+    const NAME: &'static str;
+
+    #[doc(hidden)]
+    fn to_bits(self) -> u64;
+
+    #[doc(hidden)]
+    fn from_bits(bits: u64) -> Self;
+}
+
+macro_rules! implement_value {
+    ($($Value:ident: $to:expr, $from:expr;)*) => {$(
+        impl sealed::Sealed for $Value {}
+
+        impl ParameterValue for $Value {
+            const NAME: &'static str = stringify!($Value);
+
+            fn to_bits(self) -> u64 {
+                $to(self)
+            }
+
+            fn from_bits(bits: u64) -> Self {
+                $from(bits)
+            }
+        }
+    )*};
+}
+
+implement_value! {
+    bool: u64::from, |bits| bits != 0;
+    u32: u64::from, |bits: u64| u32::try_from(bits).unwrap_or(u32::MAX);
+    u64: |value| value, |bits| bits;
+    i32: |value: i32| i64::from(value).cast_unsigned(),
+        |bits: u64| i32::try_from(bits.cast_signed()).unwrap_or(i32::MAX);
+    i64: i64::cast_unsigned, u64::cast_signed;
+    f32: |value: f32| f64::from(value).to_bits(), narrowed;
+    f64: f64::to_bits, f64::from_bits;
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "it was an `f32` before")]
+fn narrowed(bits: u64) -> f32 {
+    f64::from_bits(bits) as f32
+}
+
+/// A parameter of whatever type, for a platform that lets people set it.
+///
+/// ```
+/// use fass::{Parameter, Tunable};
+///
+/// let all: [&dyn Tunable; 2] = [
+///     &Parameter::new("gain", 0.5, 0.0..=2.0),
+///     &Parameter::new("lights", true, false..=true),
+/// ];
+/// assert!(all[1].set_text("false"));
+/// let shown: Vec<String> = all.iter().map(|of| format!("{} = {}", of.name(), of.shown())).collect();
+/// assert_eq!(
+///     shown,
+///     ["gain = 0.5 (f64 from 0 to 2, at first 0.5)", "lights = false (bool, at first true)"]
+/// );
+/// ```
+pub trait Tunable: Send + Sync {
+    /// Returns its name.
+    fn name(&self) -> &str;
+
+    /// Sets it to what a text says, if that is a value within the range; else `false`.
+    #[must_use = "`false`: it is not set"]
+    fn set_text(&self, text: &str) -> bool;
+
+    /// Writes its type and its range.
+    ///
+    /// # Errors
+    ///
+    /// Those of `f`.
+    fn write_allowed(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
+
+    /// Writes its value, and what it can be.
+    ///
+    /// # Errors
+    ///
+    /// Those of `f`.
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
+
+    /// Returns another handle of it.
+    fn share(&self) -> Arc<dyn Tunable>;
+}
+
+impl dyn Tunable + '_ {
+    /// Returns its value and what it can be, as text. Nothing is allocated.
+    ///
+    /// See [`Tunable`].
+    #[must_use]
+    pub fn shown(&self) -> impl fmt::Display {
+        fmt::from_fn(|f| self.write(f))
+    }
+
+    /// Returns what to say of a text that it cannot be set to. Nothing is allocated.
+    ///
+    /// See [`Tunable`].
+    #[must_use]
+    pub fn refusal(&self, text: &str) -> impl fmt::Display {
+        let name = self.name();
+        fmt::from_fn(move |f| {
+            write!(f, "`{name}={text}`: parameter `{name}` takes ")?;
+            self.write_allowed(f)
+        })
+    }
+}
+
+impl<T: ParameterValue> Parameter<T> {
+    /// Makes a parameter with a value to begin with.
+    ///
+    /// # Panics
+    ///
+    /// If that is not within the range, or the name is empty or has a blank, `=` or `,` in it, so
+    /// that nobody could type it.
+    ///
+    /// See [`Parameter`].
+    #[must_use]
+    #[track_caller]
+    pub fn new(name: &str, initial: T, range: RangeInclusive<T>) -> Self {
+        let is_typed = |c: char| !(c.is_whitespace() || c.is_control() || "=,".contains(c));
+        assert!(
+            !name.is_empty() && name.chars().all(is_typed),
+            "`{name}` cannot be a parameter's name; give one without blanks, `=` and `,`"
+        );
+        let (least, most) = (range.start(), range.end());
+        assert!(
+            range.contains(&initial),
+            "parameter `{name}` begins with {initial}, which is not from {least} to {most}; \
+             change one of them"
+        );
+        Self(Arc::new(Shared {
+            name: name.into(),
+            bits: AtomicU64::new(initial.to_bits()),
+            initial,
+            range,
+        }))
+    }
+
+    /// Returns the value for the jobs to come.
+    ///
+    /// See [`Parameter`].
+    #[must_use]
+    pub fn value(&self) -> T {
+        T::from_bits(self.0.bits.load(Ordering::Relaxed))
+    }
+
+    /// Sets the value for the jobs to come.
+    ///
+    /// # Errors
+    ///
+    /// If it is not within the range; then nothing has changed.
+    ///
+    /// See [`Parameter`].
+    pub fn set(&self, value: T) -> Result<(), Unsettable> {
+        if self.store(value) {
+            return Ok(());
+        }
+        let this: &dyn Tunable = self;
+        Err(Unsettable(format!("{}", this.refusal(&format!("{value}")))))
+    }
+
+    /// Returns the use of a source that reads it.
+    ///
+    /// See [`Parameter`].
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    pub fn reading(&self) -> Reading<T> {
+        Reading(self.clone())
+    }
+
+    fn store(&self, value: T) -> bool {
+        let is_within = self.0.range.contains(&value);
+        if is_within {
+            self.0.bits.store(value.to_bits(), Ordering::Relaxed);
+        }
+        is_within
+    }
+}
+
+impl<T: ParameterValue> Tunable for Parameter<T> {
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    fn set_text(&self, text: &str) -> bool {
+        text.parse().is_ok_and(|value| self.store(value))
+    }
+
+    fn write_allowed(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (least, most) = (self.0.range.start(), self.0.range.end());
+        f.write_str(T::NAME)?;
+        match T::NAME {
+            // The words of its range are all that it has.
+            "bool" if least != most => Ok(()),
+            _ => write!(f, " from {least} to {most}"),
+        }
+    }
+
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} (", self.value())?;
+        self.write_allowed(f)?;
+        write!(f, ", at first {})", self.0.initial)
+    }
+
+    fn share(&self) -> Arc<dyn Tunable> {
+        Arc::new(self.clone())
+    }
+}
+
+impl<T> Clone for Parameter<T> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<T> fmt::Debug for Parameter<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Parameter").field(&self.0.name).finish()
+    }
+}
+
+impl<T> sealed::Sealed for Reading<T> {}
+
+impl<T: ParameterValue> Uses for Reading<T> {
+    type Borrowed<'a> = T;
+    type Held = Parameter<T>;
+    type Guard<'a> = (T, PhantomData<&'a ()>);
+
+    fn is_of(&self, _dag: &Dag) -> bool {
+        true
+    }
+
+    fn hold(self, dag: &Dag, _subtask: usize) -> Self::Held {
+        let mut draft = dag.draft.borrow_mut();
+        let name = self.0.0.name.as_str();
+        assert!(
+            !draft.parameters.iter().any(|read| read == name),
+            "another source of the DAG reads parameter `{name}`, and a job has one value; let one \
+             source read it, and send it along edges"
+        );
+        draft.parameters.push(name.into());
+        drop(draft);
+        self.0
+    }
+
+    fn follows(held: &Self::Held) {
+        panic!(
+            "a subtask with inputs reads parameter `{}`; let a source read it, and send it along \
+             an edge",
+            held.0.name
+        );
+    }
+
+    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+        (held.value(), PhantomData)
+    }
+
+    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+        guard.0
+    }
+}

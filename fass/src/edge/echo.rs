@@ -1,0 +1,232 @@
+//! What a person sees of a recorded topic while the run goes on: its latest value.
+//!
+//! Where people can look, this stands in front of what else is done with what crosses. Of the
+//! topic that is watched, a completion copies the value into one room, and the next one takes its
+//! place: a person reads slower than a DAG writes. Whoever shows it takes it out, and makes its
+//! text in its own time.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+
+use recording::{Channel, Role, Schema, Shown};
+use sched_dag::journal::What;
+use sched_dag::{DagId, Instance};
+
+use super::replay::Outcome;
+use super::{Crossing, Drain, Echoing, Happened, Seen};
+use crate::run::crossing::Recorded;
+use crate::run::plan::Plan;
+
+/// The longest value that is shown, in bytes.
+const ROOM: usize = 512;
+
+/// Keeps the latest value of a topic, and passes on all that crosses.
+pub(super) struct Echo {
+    inner: Option<Box<dyn Crossing>>,
+    /// By channel: the topic and its type; none of what is sampled.
+    topics: Vec<Option<(String, Arc<Schema>)>>,
+    /// Whether the topics are those of a plan that is launched.
+    is_launched: bool,
+    watched: Option<u16>,
+    room: Box<[u8]>,
+    /// The value in the room: its job, and its length if it fits.
+    kept: Option<(u64, Option<usize>)>,
+    left_out: u64,
+}
+
+impl Echo {
+    pub(super) fn new(inner: Option<Box<dyn Crossing>>) -> Self {
+        Self {
+            inner,
+            topics: Vec::new(),
+            is_launched: false,
+            watched: None,
+            room: vec![0; ROOM].into(),
+            kept: None,
+            left_out: 0,
+        }
+    }
+}
+
+impl Echoing for Echo {
+    fn watch(&mut self, topic: Option<&str>) -> bool {
+        let named = |of: &Option<(String, _)>| {
+            let name = of.as_ref().map(|(name, _)| name.as_str());
+            topic.is_some() && name == topic
+        };
+        let place = self.topics.iter().position(named);
+        self.watched = place.and_then(|place| u16::try_from(place).ok());
+        (self.kept, self.left_out) = (None, 0);
+        self.watched.is_some()
+    }
+
+    fn take(&mut self, into: &mut [u8]) -> Option<Seen> {
+        let watched = usize::from(self.watched?);
+        let (_, schema) = self.topics.get(watched)?.as_ref()?;
+        let (job, length) = self.kept.take()?;
+        let length = length.and_then(|length| {
+            into.get_mut(..length)?
+                .copy_from_slice(self.room.get(..length)?);
+            Some(length)
+        });
+        Some(Seen {
+            job,
+            length,
+            left_out: core::mem::take(&mut self.left_out),
+            schema: Arc::clone(schema),
+            write: |schema, bytes, f| fmt::Display::fmt(&Shown { schema, bytes }, f),
+        })
+    }
+}
+
+impl Crossing for Echo {
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) {
+        if core::mem::take(&mut self.is_launched) {
+            self.topics.clear();
+            self.watch(None);
+        }
+        self.topics.extend(channels.iter().map(|channel| {
+            let schema = || Arc::new(channel.schema.clone());
+            (channel.role != Role::Sample).then(|| (channel.topic.clone(), schema()))
+        }));
+        if let Some(inner) = &mut self.inner {
+            inner.open(dag, graph, channels);
+        }
+    }
+
+    fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
+        self.is_launched = true;
+        self.inner
+            .as_mut()
+            .map_or(Ok(()), |inner| inner.launch(plan))
+    }
+
+    fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
+        if self.watched == Some(value.channel) {
+            self.left_out += u64::from(self.kept.is_some());
+            let length = value.bytes.and_then(|bytes| {
+                let room = self.room.get_mut(..bytes.len())?;
+                room.copy_from_slice(bytes);
+                Some(bytes.len())
+            });
+            self.kept = Some((value.job, length));
+        }
+        if let Some(inner) = &mut self.inner {
+            inner.record(value, at_ns);
+        }
+    }
+
+    fn happened(&mut self, what: What, happened: &Happened) {
+        if let Some(inner) = &mut self.inner {
+            inner.happened(what, happened);
+        }
+    }
+
+    fn failed(&mut self, instance: Instance, at_ns: u64) {
+        if let Some(inner) = &mut self.inner {
+            inner.failed(instance, at_ns);
+        }
+    }
+
+    fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        if let Some(inner) = &self.inner {
+            inner.lend(channel, job, take);
+        }
+    }
+
+    fn drain(&mut self) -> Option<Box<dyn Drain>> {
+        self.inner.as_mut()?.drain()
+    }
+
+    fn flush(&mut self) -> bool {
+        self.inner.as_mut().is_none_or(|inner| inner.flush())
+    }
+
+    fn outcome(&self, is_over: bool) -> Option<Outcome> {
+        self.inner.as_ref()?.outcome(is_over)
+    }
+
+    fn echo(&mut self) -> Option<&mut dyn Echoing> {
+        Some(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::string::ToString;
+    use recording::Recordable;
+
+    fn open(echo: &mut Echo, topics: &[(&str, Role)]) {
+        let channels = topics.iter().map(|(topic, role)| Channel {
+            dag: 0,
+            subtask: 0,
+            role: *role,
+            topic: (*topic).into(),
+            schema: u32::schema(),
+        });
+        echo.open(DagId(0), 0, &channels.collect::<Vec<_>>());
+    }
+
+    fn record(echo: &mut Echo, channel: u16, job: u64, bytes: &[u8]) {
+        let bytes = Some(bytes);
+        let value = Recorded {
+            channel,
+            job,
+            completed_ns: 0,
+            bytes,
+        };
+        echo.record(&value, 0);
+    }
+
+    /// The job, the value as text, and how many were left out.
+    fn take(echo: &mut Echo) -> Option<(u64, String, u64)> {
+        let mut buffer = [0; ROOM];
+        let seen = echo.take(&mut buffer)?;
+        let text = seen.shown(&buffer).to_string();
+        Some((seen.job, text, seen.left_out))
+    }
+
+    #[test]
+    fn the_latest_value_is_seen_and_others_are_counted() {
+        let mut echo = Echo::new(None);
+        open(
+            &mut echo,
+            &[
+                ("pose", Role::Sample),
+                ("speed", Role::Source),
+                ("pose", Role::Result),
+            ],
+        );
+        record(&mut echo, 2, 0, &[1, 0, 0, 0]);
+        assert!(!echo.watch(Some("poes")) && echo.watch(Some("pose")));
+        assert_eq!(take(&mut echo), None, "what was complete before");
+        for job in 1..=3_u8 {
+            record(&mut echo, 1, job.into(), &[9, 0, 0, 0]);
+            record(&mut echo, 2, job.into(), &[job, 0, 0, 0]);
+        }
+        assert_eq!(take(&mut echo), Some((3, "3".into(), 2)));
+        assert_eq!(take(&mut echo), None);
+        record(&mut echo, 2, 4, &[7; ROOM + 1]);
+        let (job, text, left_out) = take(&mut echo).expect("a value");
+        assert_eq!((job, &*text, left_out), (4, "(more than 512 bytes)", 0));
+        echo.watch(None);
+        record(&mut echo, 2, 5, &[5, 0, 0, 0]);
+        assert_eq!(take(&mut echo), None);
+    }
+
+    #[test]
+    fn topics_of_another_commit_take_the_place_of_those_before() {
+        let mut echo = Echo::new(None);
+        open(&mut echo, &[("old", Role::Source)]);
+        echo.is_launched = true;
+        open(&mut echo, &[("new", Role::Source)]);
+        assert!(!echo.watch(Some("old")) && echo.watch(Some("new")));
+        record(&mut echo, 0, 1, &[1, 0, 0, 0]);
+        assert_eq!(take(&mut echo), Some((1, "1".into(), 0)));
+    }
+}

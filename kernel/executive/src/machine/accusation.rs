@@ -1,0 +1,78 @@
+//! What a core has to answer that takes no interrupts.
+//!
+//! Another core opens an accusation and sends a non-maskable interrupt, by which the accused
+//! answers. Each accusation is of its own core and is open until that has answered, so each
+//! such interrupt has an accusation, however late the host lets the core run.
+//!
+//! That interrupts are disabled at an answer proves little: the host may have stopped the core
+//! within a few instructions of the kernel that disable them. By the next answer it has left
+//! these, and has taken an interrupt. So it counts how often a core has answered without
+//! having taken one.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+
+/// The accusations of one core.
+#[derive(Debug)]
+pub(super) struct Accusation {
+    is_open: AtomicBool,
+    /// When the core had taken its last interrupt, as of its last answer.
+    interrupted_ns: AtomicU64,
+    /// How often it has answered since.
+    answers: AtomicU32,
+}
+
+impl Accusation {
+    pub(super) const fn new() -> Self {
+        Self {
+            is_open: AtomicBool::new(false),
+            interrupted_ns: AtomicU64::new(u64::MAX),
+            answers: AtomicU32::new(0),
+        }
+    }
+
+    /// Opens one, and reports whether none was open.
+    pub(super) fn open(&self) -> bool {
+        !self.is_open.swap(true, Ordering::AcqRel)
+    }
+
+    /// Answers on the accused core, which took its last interrupt at `interrupted_ns`: returns
+    /// how often it has answered since then; 0 if it is not accused.
+    pub(super) fn answer(&self, interrupted_ns: u64) -> u32 {
+        if !self.is_open.swap(false, Ordering::AcqRel) {
+            return 0;
+        }
+        let before = self.interrupted_ns.swap(interrupted_ns, Ordering::Relaxed);
+        let answers = match before == interrupted_ns {
+            true => self.answers.load(Ordering::Relaxed).saturating_add(1),
+            false => 1,
+        };
+        self.answers.store(answers, Ordering::Relaxed);
+        answers
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_core_answers_each_accusation_once() {
+        let accusation = Accusation::new();
+        assert_eq!(accusation.answer(5), 0);
+        assert!(accusation.open());
+        assert!(!accusation.open(), "one is enough");
+        assert_eq!(accusation.answer(5), 1);
+        assert_eq!(accusation.answer(5), 0);
+    }
+
+    #[test]
+    fn answers_count_from_the_last_interrupt() {
+        let accusation = Accusation::new();
+        let answer = |interrupted_ns| {
+            accusation.open();
+            accusation.answer(interrupted_ns)
+        };
+        assert_eq!([answer(0), answer(0), answer(0)], [1, 2, 3]);
+        assert_eq!([answer(7), answer(7), answer(9)], [1, 2, 1]);
+    }
+}

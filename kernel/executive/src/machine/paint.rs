@@ -1,0 +1,40 @@
+//! How deep a stack has been used, by paint.
+//!
+//! A stack's *paint* is a word that code does not write by chance, in every place below what is
+//! in use. What lies between the lowest place without paint and the top has been used.
+
+use super::this_core;
+
+/// The paint.
+const PAINT: u64 = 0x5ac4_71ed_0f00_d1e5;
+
+/// What the code that paints may use itself of the stack that it is on, the red zone included.
+const OWN_BYTES: u64 = 1024;
+
+/// Returns how much of the running context's stack has been used since the last call, in bytes,
+/// and paints it again: `None` if it was not painted, so at the first call on a stack.
+///
+/// It calls nothing that would need much of that stack.
+pub fn take_used_bytes() -> Option<u64> {
+    let local = 0_u64;
+    let stack = this_core::get().context().stack();
+    let end = (&raw const local) as u64 / 8 * 8 - OWN_BYTES;
+    let mut lowest = stack.start;
+    let was_painted = is_painted(lowest);
+    while was_painted && lowest < end && is_painted(lowest) {
+        lowest += 8;
+    }
+    let mut word = lowest;
+    while word < end {
+        // SAFETY: the word is of this context's own stack, and below what is in use of it:
+        // interrupts run on other stacks.
+        unsafe { (word as *mut u64).write_volatile(PAINT) };
+        word += 8;
+    }
+    was_painted.then(|| stack.end - lowest)
+}
+
+fn is_painted(word: u64) -> bool {
+    // SAFETY: the caller passes a word of its own stack, which can be read as a number.
+    unsafe { (word as *const u64).read_volatile() == PAINT }
+}

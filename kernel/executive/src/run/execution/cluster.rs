@@ -1,0 +1,144 @@
+//! The clusters that the cores are divided into: what each has for itself.
+//!
+//! Whatever happens on a core takes its cluster's lock, steps its cluster's scheduler and
+//! writes into its cluster's journal; so the hot path of one cluster touches no word of
+//! another's. The first core of a cluster keeps its time.
+//!
+//! Where the cores are not divided there is one cluster, which has no others to look for; what
+//! only divided cores need is in [`divided`](super::divided).
+
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
+
+use sched_dag::CoreId;
+
+use super::Execution;
+use crate::machine::once::Once;
+use crate::machine::spinlock::SpinLock;
+use crate::machine::this_core::{self, Core};
+
+/// What a cluster has for itself, on cache lines of its own.
+#[repr(align(128))]
+pub(super) struct Cluster {
+    pub(super) execution: SpinLock<Option<Execution>>,
+    /// When the first core's timer shall next step the scheduler, on the clock;
+    /// `u64::MAX` if never.
+    next_event_ns: AtomicU64,
+    /// Whether nothing is left to be done.
+    pub(super) is_finished: AtomicBool,
+    /// Jobs of DAGs with a limit that have ended in this run.
+    pub(super) jobs_ended: AtomicU64,
+    /// Whether there may be a letter.
+    pub(super) has_letters: AtomicBool,
+    pub(super) first_core: AtomicU32,
+}
+
+/// Whether this image can divide its cores. One that cannot has one cluster at an address that
+/// is known to the linker, which is worth some instructions of each hop.
+pub(super) const MAY_DIVIDE: bool = cfg!(feature = "clusters");
+
+/// Cluster 0: of all cores, if they are not divided.
+pub(super) static FIRST: Cluster = Cluster::new();
+
+/// The other ones that there can be, made when cores are divided for the first time.
+pub(super) static OTHERS: Once<alloc::boxed::Box<[Cluster]>> = Once::new();
+
+/// How many there are besides cluster 0.
+pub(super) static BESIDES: AtomicUsize = AtomicUsize::new(0);
+
+/// The seat of a cluster's first core.
+pub(super) const FIRST_SEAT: CoreId = CoreId(0);
+
+impl Cluster {
+    /// Returns the number of the core in a seat among all cores.
+    pub(super) fn core(&self, seat: CoreId) -> u32 {
+        match MAY_DIVIDE {
+            true => self.first_core.load(Ordering::Relaxed) + seat.0,
+            false => seat.0,
+        }
+    }
+
+    /// Reports whether there may be a letter.
+    #[inline]
+    pub(super) fn may_have_letters(&self) -> bool {
+        MAY_DIVIDE && self.has_letters.load(Ordering::Relaxed)
+    }
+
+    /// Returns when the timer shall next step the scheduler; `u64::MAX` if never.
+    pub(super) fn next_event_ns(&self) -> u64 {
+        self.next_event_ns.load(Ordering::Acquire)
+    }
+
+    /// Notes that, and whether nothing is left to be done.
+    pub(super) fn publish(&self, at_ns: u64, is_finished: bool) {
+        self.next_event_ns.store(at_ns, Ordering::Release);
+        self.is_finished.store(is_finished, Ordering::Release);
+    }
+
+    pub(super) const fn new() -> Self {
+        Self {
+            execution: SpinLock::new(None),
+            next_event_ns: AtomicU64::new(u64::MAX),
+            is_finished: AtomicBool::new(false),
+            jobs_ended: AtomicU64::new(0),
+            has_letters: AtomicBool::new(false),
+            first_core: AtomicU32::new(0),
+        }
+    }
+}
+
+/// Returns all clusters of the run.
+pub(super) fn all() -> impl Iterator<Item = &'static Cluster> {
+    (0..count()).map(nth)
+}
+
+/// Returns how many there are.
+pub fn count() -> usize {
+    match MAY_DIVIDE {
+        true => BESIDES.load(Ordering::Relaxed) + 1,
+        false => 1,
+    }
+}
+
+/// Reports whether there are several.
+pub(super) fn are_divided() -> bool {
+    count() > 1
+}
+
+/// Returns a cluster; cluster 0 if there is no such one.
+#[inline]
+pub(super) fn nth(number: usize) -> &'static Cluster {
+    match number {
+        1.. if MAY_DIVIDE => another(number),
+        _ => &FIRST,
+    }
+}
+
+#[inline(never)]
+fn another(number: usize) -> &'static Cluster {
+    let others = OTHERS.get().map_or(&[][..], |others| others);
+    others.get(number - 1).unwrap_or(&FIRST)
+}
+
+/// Returns the cluster that a core is in.
+#[inline]
+pub(super) fn of(core: &Core) -> &'static Cluster {
+    nth(core.group.load(Ordering::Relaxed) as usize)
+}
+
+/// Returns the number of a cluster's first core; those in its journal count from that.
+pub fn first_core(number: usize) -> u32 {
+    nth(number).core(FIRST_SEAT)
+}
+
+/// Does something as if this core were one of another cluster, whose lock is held: where it has
+/// a seat, if it has one there at all, is counted from that cluster's first core.
+pub(super) fn among<R>(cluster: &Cluster, what: impl FnOnce() -> R) -> R {
+    let core = this_core::get();
+    let own = core.place.load(Ordering::Relaxed);
+    // As journals have it, and back in the number that it is added to.
+    let seat = (core.index.wrapping_sub(cluster.core(FIRST_SEAT))) & u32::from(u16::MAX);
+    core.place.store(seat, Ordering::Relaxed);
+    let result = what();
+    core.place.store(own, Ordering::Relaxed);
+    result
+}

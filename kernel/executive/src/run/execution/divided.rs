@@ -1,0 +1,100 @@
+//! What only divided cores need: an image without the feature `clusters` has none of it.
+
+use core::sync::atomic::Ordering;
+
+use sched_dag::{ClusterId, Clusters, DagId, TaskSet};
+
+use super::cluster::{BESIDES, Cluster, MAY_DIVIDE, OTHERS, nth};
+use super::{Execution, cluster};
+use crate::machine::spinlock::SpinLock;
+use crate::machine::this_core;
+
+/// How cores are divided.
+#[derive(Clone, Debug)]
+pub enum Division {
+    /// So.
+    Into(Clusters),
+    /// As the commit finds.
+    ByCommit,
+}
+
+static DIVISION: SpinLock<Division> = SpinLock::new(Division::Into(Clusters::Undivided));
+
+/// Chooses how the cores are divided in the commits to come.
+pub fn set_division(division: Division) {
+    let before = core::mem::replace(&mut *DIVISION.lock(), division);
+    drop(before);
+}
+
+/// Returns how the cores are divided in the commits to come.
+pub fn division() -> Division {
+    match MAY_DIVIDE {
+        true => DIVISION.lock().clone(),
+        false => Division::Into(Clusters::Undivided),
+    }
+}
+
+/// Divides the cores as a task set says. None of them runs anything.
+pub(super) fn divide(task_set: &TaskSet) {
+    let cores = this_core::all();
+    let count = task_set.clusters().count();
+    if count > 1 && OTHERS.get().is_none() {
+        // Each has a core at least; and the cores that no cluster has are one, too.
+        let _ = OTHERS.set((1..cores.len()).map(|_| Cluster::new()).collect());
+    }
+    BESIDES.store(count - 1, Ordering::Relaxed);
+    let mut rest = cores.iter();
+    let all = u32::try_from(cores.len()).unwrap_or(u32::MAX);
+    for (id, group) in task_set.clusters().zip(0..) {
+        let its = task_set.cores_of(id, all);
+        let cluster = nth(id.index());
+        cluster.first_core.store(its.start, Ordering::Relaxed);
+        for (core, seat) in rest.by_ref().take(its.len()).zip(0..) {
+            core.group.store(group, Ordering::Relaxed);
+            core.place.store(seat, Ordering::Relaxed);
+        }
+    }
+    let none = u32::try_from(count).unwrap_or(u32::MAX);
+    rest.for_each(|core| core.group.store(none, Ordering::Relaxed));
+}
+
+/// Returns the cluster of a DAG; cluster 0 if there is no run that has it.
+pub(super) fn of_dag(dag: DagId) -> &'static Cluster {
+    if !cluster::are_divided() {
+        return nth(0);
+    }
+    let place = nth(0).execution.lock();
+    let task_set = place.as_ref().map(Execution::task_set);
+    let dag = task_set.and_then(|task_set| task_set.dags().get(dag.index()));
+    nth(dag.map_or(0, |dag| dag.cluster().index()))
+}
+
+/// Reports whether all jobs of the run have ended. What each cluster says of itself is a sign
+/// only: while one is looked at, a letter from it may make another go on. So all are then
+/// looked at once more while none of them can do anything.
+pub fn is_finished() -> bool {
+    cluster::all().all(|cluster| cluster.is_finished.load(Ordering::Acquire))
+        && (!cluster::are_divided() || rest(0))
+}
+
+/// Reports whether the clusters from a place on are at rest, at one moment for all.
+fn rest(place: usize) -> bool {
+    if place == cluster::count() {
+        return true;
+    }
+    let cluster = nth(place);
+    let execution = cluster.execution.lock();
+    let scheduler = execution.as_ref().map(|execution| &execution.scheduler);
+    scheduler.is_none_or(|scheduler| scheduler.is_finished())
+        && !cluster.has_letters.load(Ordering::Acquire)
+        && rest(place + 1)
+}
+
+/// Has the first journal take over what the others hold.
+pub(super) fn merge(first: &mut Execution, others: &mut [Execution]) {
+    for (id, other) in (1..).map(ClusterId).zip(others) {
+        let journal = other.watcher.take_journal();
+        let first_core = cluster::first_core(id.index());
+        first.watcher.journal.absorb(journal, id, first_core);
+    }
+}

@@ -1,0 +1,121 @@
+//! The words of the command line that Linux takes, and those that it has no use for.
+//!
+//! | word | meaning | default |
+//! | --- | --- | --- |
+//! | `cores=N` | how many of the processors that the program may use are its cores | all of them |
+//! | `share=off\|on` | whether several cores share a processor where there are more cores | `off` |
+//! | `mechanism=fifo\|normal` | by which class of Linux's threads run | `fifo` |
+//! | `module=FILE` | a file for the app | |
+//! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
+//! | `input=-` | what comes on standard input arrives on the app's wire | |
+//! | `output=FILE` | what the app sends on its wire goes there | |
+//! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
+//!
+//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `trace`, `times` and `graph`
+//! mean what they mean on the machine.
+
+use std::fs;
+use std::time::Duration;
+
+use linux::{Linux, Mechanism};
+
+use super::ending::Ending;
+use super::terms::Terms;
+use crate::text::graph;
+use crate::text::options::{Options, UsageError};
+
+/// The kernel's words that are about its machine, or about what Linux does not do yet.
+const FOREIGN: [(&str, &str); 14] = [
+    ("trace_events", "the journal takes what memory it needs"),
+    ("measure", "interrupts are Linux's"),
+    ("idle", "idle cores are Linux's"),
+    ("console", "there is no console"),
+    ("status", "there is no console"),
+    ("mode", "time is real"),
+    ("probe", "there is no machine to look at"),
+    ("end", "the program ends, and Linux goes on"),
+    ("clock", "the clock is Linux's"),
+    ("avx", "Linux saves all registers"),
+    ("x2apic", "interrupts are Linux's"),
+    ("record", "recordings are made on the machine"),
+    (
+        "replay",
+        "recordings are replayed on the machine and in virtual time",
+    ),
+    ("latest", "recordings are made on the machine"),
+];
+
+/// What the words say, besides what the machine was made with.
+pub(crate) struct Words {
+    pub(crate) terms: Terms,
+    pub(crate) module: Option<&'static [u8]>,
+    pub(crate) dumps_trace: bool,
+    pub(crate) dumps_times: bool,
+}
+
+/// Takes the words, and makes the machine that they describe.
+pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending> {
+    if let Some((word, why)) = FOREIGN
+        .iter()
+        .find(|(word, _)| options.text(word).is_some())
+    {
+        let line = format!("`{word}` is for the bare machine: on Linux {why}; leave it out");
+        return Err(UsageError::new(line).into());
+    }
+    let terms = Terms::read(options)?;
+    let mechanisms = [("fifo", Mechanism::Fifo), ("normal", Mechanism::Normal)];
+    let mechanism = options.choice("mechanism", &mechanisms)?;
+    let cores = options.number("cores", 1..=1024, u64::from(linux::processors()))?;
+    let limit_ms = options.number("limit_ms", 0..=86_400_000, 0)?;
+    let wcet_bytes = options.number("wcets", 0..=1 << 32, 0)?;
+    if options.choice("graph", &[("keep", false), ("dump", true)])? {
+        graph::enable();
+    }
+    let words = Words {
+        terms,
+        module: None,
+        dumps_trace: options.choice("trace", &[("keep", false), ("dump", true)])?,
+        dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,
+    };
+    let mut module = options.text("module").map(read).transpose()?;
+    let mut wcets = None;
+    if wcet_bytes > 0 {
+        let bytes = usize::try_from(wcet_bytes).unwrap_or(usize::MAX);
+        let parts = module.and_then(|file| file.split_at_checked(bytes));
+        let text = parts.and_then(|(wcets, _)| str::from_utf8(wcets).ok());
+        wcets = Some(text.ok_or_else(|| UsageError::new("`wcets`: the module is no such text"))?);
+        module = parts.map(|(_, rest)| rest).filter(|rest| !rest.is_empty());
+    }
+    let cores = u32::try_from(cores).unwrap_or(u32::MAX);
+    let make = options.choice(
+        "share",
+        &[
+            ("off", Linux::new as fn(u32, Mechanism) -> _),
+            ("on", Linux::sharing),
+        ],
+    )?;
+    let machine = make(cores, mechanism)
+        .map_err(|error| UsageError::new(format!("`cores={cores}`: {error}")))?;
+    let mut machine = machine
+        .policy(terms.policy)
+        .preemption(terms.preemption)
+        .budget_factor(terms.budget_factor)
+        .overheads(terms.overheads)
+        .at_commit(graph::dump)
+        .allocations(crate::heap::allocations);
+    if let Some(wcets) = wcets {
+        machine = machine.wcets(wcets);
+    }
+    if limit_ms > 0 {
+        let limited = machine.limit_real_time(Duration::from_millis(limit_ms));
+        limited.map_err(|why| UsageError::new(format!("`limit_ms={limit_ms}`: {why}")))?;
+    }
+    Ok((machine, Words { module, ..words }))
+}
+
+/// Reads the file for the app. It stays as long as the program, as the loader's does.
+fn read(path: &str) -> Result<&'static [u8], UsageError> {
+    let bytes = fs::read(path);
+    let bytes = bytes.map_err(|why| UsageError::new(format!("`module={path}`: {why}")))?;
+    Ok(bytes.leak())
+}

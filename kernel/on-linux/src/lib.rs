@@ -1,0 +1,81 @@
+//! What an app sees of the kernel, with Linux below it.
+//!
+//! An app's `main.rs` names `kernel`: the machine that it is lent, the words of its command
+//! line, what it prints, the run that it gets back. This crate offers the same by the same
+//! names, and `linux` does the work. So the file that is an image is a program of Linux, too:
+//!
+//! ```ignore
+//! extern crate kernel_on_linux as kernel;
+//!
+//! #[path = "../src/main.rs"]
+//! mod image;
+//!
+//! fn main() -> std::process::ExitCode {
+//!     image::program()
+//! }
+//! ```
+//!
+//! What the kernel has above its executive knows of neither interrupts nor threads: how a line
+//! is written, how words are read, how a run is told of and judged. Those files are compiled a
+//! second time here (`text`, `report`, `app`), so that both say the same by the same lines. The
+//! crate is its own `executive` for them.
+//!
+//! # What is guaranteed
+//!
+//! - Lines, verdict and the words of the command line are those of the machine.
+//! - A word that means nothing on Linux is refused; none is ignored.
+//!
+//! # What is not
+//!
+//! - Bounds are not judged (`bound_exceeded` is said, and the verdict leaves it): Linux states
+//!   no worst case for what it does itself.
+//! - Nothing is recorded and nothing replayed; there is no console.
+
+#![deny(unsafe_code)]
+
+extern crate alloc;
+extern crate self as executive;
+
+mod app;
+#[doc(hidden)]
+pub mod entry;
+#[allow(unsafe_code, reason = "an allocator that counts")]
+mod heap;
+pub mod report;
+#[doc(hidden)]
+pub mod text;
+
+pub use app::ending::Ending;
+pub use app::event::Event;
+pub use app::lock::Lock;
+pub use app::machine_handle::{Machine, Resources};
+#[doc(hidden)]
+pub use heap::Heap;
+pub use report::run::Run;
+
+/// Text on the standard output.
+pub mod console {
+    #[doc(inline)]
+    pub use crate::text::console::write;
+}
+
+/// Machine lines: lines of JSON on the standard output, for programs that read it.
+pub mod json {
+    #[doc(inline)]
+    pub use crate::text::json::{Object, emit, line, quoted};
+}
+
+/// The words of the command line.
+pub mod options {
+    #[doc(inline)]
+    pub use crate::text::options::{Options, UsageError};
+}
+
+/// Reports whether functions may use AVX: the processor has it.
+#[must_use]
+pub fn has_avx() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return std::is_x86_feature_detected!("avx");
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}

@@ -1,0 +1,15 @@
+//! What is told of a run when it is over, by the kernel's own files; the [`Run`](crate::Run) is
+//! that of Linux.
+
+#[path = "../../../src/report/distribution.rs"]
+mod distribution;
+pub(crate) mod run;
+#[path = "../../../src/report/time.rs"]
+mod time;
+#[path = "../../../src/report/times.rs"]
+pub(crate) mod times;
+#[path = "../../../src/report/trace.rs"]
+pub(crate) mod trace;
+
+pub use distribution::Distribution;
+pub use time::Ns;

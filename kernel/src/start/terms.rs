@@ -1,0 +1,50 @@
+//! The words that say how DAGs are scheduled, and what a commit reckons with. They are the same
+//! wherever an app runs.
+
+use alloc::format;
+
+use fass::{Overheads, Policy, Preemption};
+
+use executive::text::options::{Options, UsageError};
+
+const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
+
+const PREEMPTIONS: [(&str, Preemption); 2] =
+    [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
+
+/// What these words say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Terms {
+    pub(crate) policy: Policy,
+    pub(crate) preemption: Preemption,
+    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
+    pub(crate) budget_factor: u64,
+    pub(crate) overheads: Overheads,
+}
+
+impl Terms {
+    /// Takes the words.
+    pub(crate) fn read(options: &Options<'_>) -> Result<Self, UsageError> {
+        Ok(Self {
+            policy: options.choice("policy", &POLICIES)?,
+            preemption: options.choice("preemption", &PREEMPTIONS)?,
+            budget_factor: options.number("budget_factor", 0..=1_000_000, 10)?,
+            overheads: overheads(options)?,
+        })
+    }
+}
+
+fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {
+    let numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
+    let [context_switch_ns, dispatch_ns, interrupt_ns] = numbers[..] else {
+        return Err(UsageError::new(format!(
+            "`overheads_ns` has {} numbers; give three: context switch, dispatch, interrupt",
+            numbers.len()
+        )));
+    };
+    Ok(Overheads {
+        context_switch_ns,
+        dispatch_ns,
+        interrupt_ns,
+    })
+}

@@ -1,0 +1,301 @@
+//! Topics at the console: `echo TOPIC` shows values as they are completed, `hz TOPIC` how often.
+//!
+//! Values are those of topics that the app records (`Dag::record`). One is shown every
+//! [`BETWEEN_NS`] at most, the latest, with the number of those that were left out. How often a
+//! topic is written the journal knows, of any topic.
+
+use core::fmt::{self, Display};
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use sched_dag::journal::{Event, What};
+use sched_dag::{DagId, Journal, SubtaskId, TaskSet, Topic, nearest_of};
+
+use super::more::Commands;
+use crate::println;
+use executive::machine::clock;
+use executive::run::{edge, execution};
+use executive::text::excerpt::Excerpt;
+use executive::text::json;
+
+/// The least time between two values that are shown.
+const BETWEEN_NS: u64 = 100_000_000;
+
+/// The longest value that is shown, in bytes.
+const MOST_BYTES: usize = 512;
+
+/// How much of its text is shown.
+const MOST_TEXT_BYTES: usize = 200;
+
+/// How many events of the journal are looked at.
+const MOST_EVENTS: u64 = 2048;
+
+/// How many events are copied under the lock at a time.
+const AT_ONCE: usize = 64;
+
+/// Stands for no topic.
+const NONE: u64 = u64::MAX;
+
+/// The commands, and the topic that is echoed. Only the session uses it, a slice at a time.
+pub(crate) struct Topics {
+    /// The topic: its DAG, and its place there in the lower half; or [`NONE`].
+    echoed: AtomicU64,
+    /// When a value was shown last.
+    shown_ns: AtomicU64,
+}
+
+impl Topics {
+    pub(crate) const fn new() -> Self {
+        Self {
+            echoed: AtomicU64::new(NONE),
+            shown_ns: AtomicU64::new(0),
+        }
+    }
+
+    /// Begins to echo a topic, or tells why not.
+    fn echo(&self, name: &str, task_set: &TaskSet, refuse: &mut dyn FnMut(&dyn Display)) {
+        let Some((dag, place)) = find(name, task_set, refuse) else {
+            return;
+        };
+        if !edge::watch(Some(name)) {
+            return refuse(&format_args!(
+                "topic `{name}` is not recorded; let the app name it by `Dag::record`"
+            ));
+        }
+        println!("`{name}` is shown as it is completed; `echo off` ends that");
+        let echoed = u64::from(dag.0) << 32 | place as u64;
+        self.echoed.store(echoed, Ordering::Relaxed);
+        self.shown_ns.store(0, Ordering::Relaxed);
+    }
+
+    /// Shows the latest value of a topic, if there is one and it is time.
+    fn show(&self, topic: &Topic) {
+        let now_ns = clock::now_ns();
+        let shown_ns = self.shown_ns.load(Ordering::Relaxed);
+        if now_ns.saturating_sub(shown_ns) < BETWEEN_NS {
+            return;
+        }
+        let mut buffer = [0; MOST_BYTES];
+        let Some(seen) = edge::take_seen(&mut buffer) else {
+            return;
+        };
+        self.shown_ns.store(now_ns, Ordering::Relaxed);
+        let (name, shown) = (
+            &topic.name,
+            Excerpt::<MOST_TEXT_BYTES>::of(seen.shown(&buffer)),
+        );
+        match seen.left_out {
+            0 => println!("  {name}[{}] = {shown}", seen.job),
+            count => println!("  {name}[{}] = {shown} ({count} left out)", seen.job),
+        }
+        json::emit("echo", |line| {
+            line.text("topic", name)
+                .number("job", seen.job)
+                .text("value", &shown)
+                .number("left_out", seen.left_out);
+        });
+    }
+}
+
+impl Commands for Topics {
+    fn help(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            (
+                "echo TOPIC",
+                "show values of a recorded topic as they are completed",
+            ),
+            ("echo off", "show them no more"),
+            ("hz TOPIC", "say how often a topic was written lately"),
+        ]
+    }
+
+    fn answer(&self, name: &str, rest: &str, refuse: &mut dyn FnMut(&dyn Display)) -> bool {
+        let Some(task_set) = execution::task_set() else {
+            return false;
+        };
+        match (name, rest) {
+            ("echo", "") => refuse(&"`echo` wants the name of a topic, or `off`"),
+            ("echo", "off") => {
+                edge::watch(None);
+                self.echoed.store(NONE, Ordering::Relaxed);
+            }
+            ("echo", topic) => self.echo(topic, &task_set, refuse),
+            ("hz", "") => refuse(&"`hz` wants the name of a topic"),
+            ("hz", topic) => hz(topic, &task_set, refuse),
+            _ => return false,
+        }
+        true
+    }
+
+    fn step(&self) {
+        let echoed = self.echoed.load(Ordering::Relaxed);
+        if echoed == NONE {
+            return;
+        }
+        let Some(task_set) = execution::task_set() else {
+            return;
+        };
+        let (dag, place) = (echoed >> 32, echoed & u64::from(u32::MAX));
+        let at = |number| usize::try_from(number).unwrap_or(usize::MAX);
+        let model = task_set.dags().get(at(dag));
+        if let Some(topic) = model.and_then(|model| model.topics().get(at(place))) {
+            self.show(topic);
+        }
+    }
+}
+
+/// Says how often a topic was written lately, or why it cannot.
+fn hz(name: &str, task_set: &TaskSet, refuse: &mut dyn FnMut(&dyn Display)) {
+    let Some((dag, topic)) = find(name, task_set, refuse) else {
+        return;
+    };
+    let writer = task_set.dag(dag).topics()[topic].writer;
+    let rate = Rate::look(dag, writer);
+    let Some(mean_ns) = rate.mean_ns() else {
+        return refuse(&format_args!(
+            "of topic `{name}` there are {} values among the latest {MOST_EVENTS} events; \
+             a rate takes two",
+            rate.values
+        ));
+    };
+    let millihertz = 1_000_000_000_000 / mean_ns;
+    println!(
+        "  {name}: {}.{:03} Hz of {} values; from one to the next {} to {}, jitter {}",
+        millihertz / 1000,
+        millihertz % 1000,
+        rate.values,
+        microseconds(rate.least_ns),
+        microseconds(rate.most_ns),
+        microseconds(rate.most_ns - rate.least_ns)
+    );
+    json::emit("hz", |line| {
+        line.text("topic", name)
+            .number("values", rate.values)
+            .number("mean_ns", mean_ns)
+            .number("least_ns", rate.least_ns)
+            .number("most_ns", rate.most_ns);
+    });
+}
+
+/// Writes a time; nothing is allocated.
+fn microseconds(ns: u64) -> impl Display {
+    fmt::from_fn(move |f| write!(f, "{}.{:03} us", ns / 1000, ns % 1000))
+}
+
+/// The completions of a subtask, taken from the latest one back.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rate {
+    values: u64,
+    last_ns: u64,
+    first_ns: u64,
+    /// From one to the next.
+    least_ns: u64,
+    most_ns: u64,
+}
+
+impl Rate {
+    /// Looks at the latest events of the journal.
+    fn look(dag: DagId, writer: SubtaskId) -> Self {
+        let mut rate = Self::default();
+        let cluster = |task_set: &TaskSet| task_set.dag(dag).cluster().index();
+        let cluster = execution::task_set().map_or(0, |task_set| cluster(&task_set));
+        let written = execution::with_journal(cluster, |journal| journal.written());
+        let mut end = written.unwrap_or(0);
+        let last = end.saturating_sub(MOST_EVENTS);
+        while end > last {
+            let mut buffer = [None; AT_ONCE];
+            let look = |journal: &mut Journal| journal.copy_back(end, &mut buffer);
+            let copied = execution::with_journal(cluster, look);
+            let events = buffer.iter().flatten();
+            events.for_each(|event| rate.take(event, dag, writer));
+            match copied {
+                Some(oldest) if oldest < end => end = oldest,
+                _ => break,
+            }
+        }
+        rate
+    }
+
+    fn take(&mut self, event: &Event, dag: DagId, writer: SubtaskId) {
+        if (event.what, event.dag, event.subtask) != (What::Finish, dag, Some(writer)) {
+            return;
+        }
+        let between_ns = self.first_ns.saturating_sub(event.time_ns);
+        match self.values {
+            0 => self.last_ns = event.time_ns,
+            1 => (self.least_ns, self.most_ns) = (between_ns, between_ns),
+            _ => {
+                self.least_ns = self.least_ns.min(between_ns);
+                self.most_ns = self.most_ns.max(between_ns);
+            }
+        }
+        self.first_ns = event.time_ns;
+        self.values += 1;
+    }
+
+    /// Returns the mean time from one value to the next, if there are two at two times.
+    fn mean_ns(&self) -> Option<u64> {
+        let span_ns = self.last_ns - self.first_ns;
+        span_ns
+            .checked_div(self.values.checked_sub(1)?)
+            .filter(|mean_ns| *mean_ns > 0)
+    }
+}
+
+/// Finds a topic of any DAG, or tells that there is none: its DAG, and its place there.
+fn find(
+    name: &str,
+    task_set: &TaskSet,
+    refuse: &mut dyn FnMut(&dyn Display),
+) -> Option<(DagId, usize)> {
+    let dags = || (0..).map(DagId).zip(task_set.dags());
+    let found = dags().find_map(|(dag, model)| {
+        let place = model.topics().iter().position(|topic| topic.name == name)?;
+        Some((dag, place))
+    });
+    if found.is_none() {
+        let topics = || dags().flat_map(|(_, model)| model.topics());
+        refuse(&fmt::from_fn(|f| {
+            write!(f, "there is no topic `{name}`")?;
+            let names = &mut topics().map(|topic| topic.name.as_str());
+            match nearest_of(name, names) {
+                Some(near) => write!(f, "; did you mean `{near}`?"),
+                None => {
+                    f.write_str("; there are")?;
+                    let mut topics = topics().take(16);
+                    topics.try_for_each(|topic| write!(f, " `{}`", topic.name))
+                }
+            }
+        }));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use sched_dag::CoreId;
+
+    use super::*;
+
+    #[test]
+    fn a_rate_is_that_of_the_completions_of_the_writer() {
+        let mut rate = Rate::default();
+        let finish = |time_ns, subtask| Event {
+            time_ns,
+            what: What::Finish,
+            core: CoreId(0),
+            dag: DagId(1),
+            job: 0,
+            subtask: Some(SubtaskId(subtask)),
+        };
+        // From the latest one back; another subtask writes between.
+        for (time_ns, subtask) in [(1040, 2), (1035, 0), (1030, 2), (1018, 2), (1010, 2)] {
+            rate.take(&finish(time_ns, subtask), DagId(1), SubtaskId(2));
+        }
+        assert_eq!((rate.values, rate.mean_ns()), (4, Some(10)));
+        assert_eq!((rate.least_ns, rate.most_ns), (8, 12));
+        let mut one = Rate::default();
+        one.take(&finish(7, 2), DagId(1), SubtaskId(2));
+        assert_eq!((one.values, one.mean_ns()), (1, None));
+        assert_eq!(Rate::default().mean_ns(), None);
+    }
+}

@@ -1,0 +1,142 @@
+//! Chains that cross DAGs by latest values: how long an effect takes from end to end.
+//!
+//! Within a DAG the response time says all. From the DAG of a sensor to that of a motor values
+//! pass by *sampling*: a subtask takes the latest value that is complete when it starts. Such a
+//! path of subtasks is what the literature calls a *cause-effect chain*, with *implicit
+//! communication* (N. Feiertag et al., A Compositional Framework for End-to-End Path Delay
+//! Calculation of Automotive Systems under Different Path Semantics, CRTS 2008; M. Günzel et al.,
+//! Timing Analysis of Asynchronized Distributed Cause-Effect Chains, RTAS 2021,
+//! doi:10.1109/RTAS52030.2021.00012).
+//!
+//! # Words
+//!
+//! - A chain has *segments*: in each DAG that it passes, the subtask at which it enters and the
+//!   one at which it leaves. The last subtask of the last segment makes the *outputs*.
+//! - An output *goes back* to one job of the first DAG: the one whose value was sampled by the
+//!   job whose value was sampled ... by the job of the output. (An *immediate backward chain*.)
+//! - *Age of an output*: from the nominal release of the job that it goes back to, to its finish.
+//!   RTAS 2021 calls its maximum the *reduced* data age.
+//! - *Data age*: the same to the finish of the next output, for so long the old one is in force.
+//!   (*Last to last* of CRTS 2008.)
+//! - *Reaction time* to what happens just after a job of the first DAG has been released, and is
+//!   too late for it: from there to the finish of the first output that goes back to a later job.
+//!   (*First to first.*) The longest reaction time is the longest data age, but for what the end
+//!   of a run cuts off (M. Günzel et al., On the Equivalence of Maximum Reaction Time and Maximum
+//!   Data Age for Cause-Effect Chains, ECRTS 2023, doi:10.4230/LIPIcs.ECRTS.2023.10).
+//!
+//! The first subtask counts as reading its sensor at the nominal release. It starts later, so
+//! what it reads is younger, and none of the times is longer than stated here.
+//!
+//! # Parts
+//!
+//! [`Chain::all`] and [`Chain::between`] find chains, [`Chain::latencies`] measures one in the
+//! events of a run, [`Chain::output_age_bound_ns`] and [`Chain::reaction_bound_ns`] bound it.
+
+mod bound;
+mod find;
+mod latencies;
+mod sampled;
+
+use alloc::vec::Vec;
+use core::fmt;
+
+use crate::ids::{DagId, SubtaskId};
+use crate::task_set::{Dag, Subtask, TaskSet};
+
+pub use latencies::Latencies;
+pub use sampled::SampledJobs;
+
+/// A subtask of a DAG.
+pub type Place = (DagId, SubtaskId);
+
+/// The sampling of a topic: who writes it, and who samples it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Sampling {
+    /// The subtask that writes the topic.
+    pub writer: Place,
+    /// The subtask that samples it.
+    pub reader: Place,
+}
+
+/// The part of a chain that lies in one DAG.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// The DAG.
+    pub dag: DagId,
+    /// Where the chain enters: a sampling subtask, or where it begins.
+    pub entry: SubtaskId,
+    /// Where it leaves: the writer of what is sampled next, or of the outputs.
+    pub exit: SubtaskId,
+}
+
+/// A path from a subtask to another one, along edges within DAGs and samplings between them. It
+/// passes no DAG twice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chain {
+    /// At least one.
+    segments: Vec<Segment>,
+}
+
+impl Chain {
+    /// Returns its parts, one for each DAG.
+    #[must_use]
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
+    #[must_use]
+    pub fn place(task_set: &TaskSet, name: &str) -> Option<Place> {
+        // Names may have a `/` in them.
+        let splits = name
+            .match_indices('/')
+            .map(|(at, _)| (&name[..at], &name[at + 1..]));
+        splits.into_iter().find_map(|(dag, subtask)| {
+            let dags = task_set.dags().iter().map(Dag::name);
+            let dag = DagId(number_of(dags, dag)?);
+            let subtasks = task_set.dag(dag).subtasks().iter().map(Subtask::name);
+            Some((dag, SubtaskId(number_of(subtasks, subtask)?)))
+        })
+    }
+
+    /// Returns the names of the subtasks at which it enters and leaves DAGs, in its order, as
+    /// `dag/subtask`.
+    pub fn names<'t>(&'t self, task_set: &'t TaskSet) -> impl Iterator<Item = impl fmt::Display> {
+        self.segments.iter().flat_map(move |segment| {
+            let Segment { dag, entry, exit } = *segment;
+            let exit = (exit != entry).then_some(exit);
+            let of_segment = [Some(entry), exit].into_iter().flatten();
+            of_segment.map(move |subtask| Named(task_set, (dag, subtask)))
+        })
+    }
+}
+
+/// Returns the position of what has this name, or else the number that is written there.
+fn number_of<'n>(names: impl Iterator<Item = &'n str> + Clone, wanted: &str) -> Option<u32> {
+    let named = (0..).zip(names.clone()).find(|(_, name)| *name == wanted);
+    let number = || {
+        wanted
+            .parse()
+            .ok()
+            .filter(|number| (0..).zip(names).any(|(at, _)| at == *number))
+    };
+    named.map(|(at, _)| at).or_else(number)
+}
+
+/// A subtask as `dag/subtask`; what has no name has its number.
+struct Named<'t>(&'t TaskSet, Place);
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(task_set, (dag, subtask)) = self;
+        let model = task_set.dag(*dag);
+        match model.name() {
+            "" => write!(f, "{}/", dag.0)?,
+            name => write!(f, "{name}/")?,
+        }
+        match model.subtask(*subtask).name() {
+            "" => write!(f, "{}", subtask.0),
+            name => f.write_str(name),
+        }
+    }
+}

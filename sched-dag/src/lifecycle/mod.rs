@@ -1,0 +1,142 @@
+//! What functions ask of a run as a whole, and how it comes about.
+//!
+//! A function may ask for more than values: that a sporadic DAG gets a signal, that a DAG rests
+//! or goes on, that the run ends. As all that a function does, a *request* takes effect with
+//! the completion of its instance (R3), never before. The rules, whose tests in `tests/lifecycle.rs`
+//! bear their numbers:
+//!
+//! - **L1, when.** A request takes effect at the instant of the completion, after all completions
+//!   and faults of that instant and before its releases. An instance that fails has asked for
+//!   nothing.
+//! - **L2, in which order.** Requests of one instant are served in the order of their
+//!   completions, those of one instance in the order in which its subtask states what it uses.
+//! - **L3, pausing.** A DAG that is paused or resumed follows P1 to P5: what is in flight goes
+//!   on, due jobs are skipped, the grid stays. A DAG may pause itself: the job in hand goes on.
+//! - **L4, the beginning.** A DAG may be paused from time 0 on, before its first release.
+//! - **L5, the end.** A shutdown closes every DAG (C1 to C5) at one instant, so the run is over
+//!   when nothing is in flight any more. Of what is asked for later nothing comes.
+//! - **L6, replays.** What came of a request to a DAG whose inputs are recorded is in the recording:
+//!   the jobs that were skipped. In a replay requests do not touch such a DAG.
+//!
+//! A driver has [`Requests`], which keeps them from a completion to the scheduler's step, and
+//! the plan's [`Lifecycle`], which serves all but signals. It is behind a trait so that an
+//! image none of whose functions asks for such a thing has no code for it.
+
+mod changes;
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::fmt;
+
+use crate::ids::DagId;
+use crate::scheduler::{Moment, Observer};
+pub use changes::Changes;
+
+/// What takes effect with a completion, besides values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// A sporadic DAG gets a signal.
+    Signal(DagId),
+    /// A DAG releases no jobs until it is resumed.
+    Pause(DagId),
+    /// A paused DAG releases jobs again.
+    Resume(DagId),
+    /// The run ends: no DAG releases a further job.
+    ShutDown,
+    /// The run begins. No function asks for that, but a driver, before all else.
+    Begin,
+}
+
+/// What a request comes to, in a scheduler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// A DAG is paused (P1 to P5).
+    Pause(DagId),
+    /// A DAG's pause ends.
+    Resume(DagId),
+    /// A DAG is closed (C1 to C5).
+    Close(DagId),
+}
+
+/// Serves requests other than signals.
+pub trait Lifecycle: fmt::Debug + Send {
+    /// Says what a request comes to. There is room for a change of each DAG.
+    fn serve(&mut self, request: Request, changes: &mut Vec<Change>);
+
+    /// Leaves a DAG alone from now on (L6).
+    fn leave_alone(&mut self, dag: DagId);
+
+    /// Reports whether a function may ask for the end of the run.
+    fn may_shut_down(&self) -> bool;
+}
+
+/// The requests of a run that are on their way to its scheduler.
+#[derive(Debug)]
+pub struct Requests {
+    /// Each once; there is room for all.
+    kept: Vec<Request>,
+    lifecycle: Option<Box<dyn Lifecycle>>,
+    changes: Vec<Change>,
+}
+
+impl Requests {
+    /// Takes room for the requests of a plan of so many DAGs.
+    #[must_use]
+    pub fn new(dags: usize, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
+        // A signal, a pause and a resumption of each, and those that there are one of.
+        let (kept, changes) = match lifecycle {
+            None => (dags, 0),
+            Some(_) => (dags.saturating_mul(3).saturating_add(2), dags),
+        };
+        let mut kept = Vec::with_capacity(kept);
+        kept.extend(lifecycle.as_ref().map(|_| Request::Begin));
+        Self {
+            kept,
+            lifecycle,
+            changes: Vec::with_capacity(changes),
+        }
+    }
+
+    /// Keeps a request until the next step.
+    pub fn keep(&mut self, request: Request) {
+        if !self.kept.contains(&request) {
+            self.kept.push(request);
+        }
+    }
+
+    /// Reports whether none is on its way: then a completion may be all of a step.
+    #[inline]
+    #[must_use]
+    pub const fn are_none(&self) -> bool {
+        self.kept.is_empty()
+    }
+
+    /// Gives away the signals that `take` takes, which are another scheduler's.
+    pub fn give_away(&mut self, mut take: impl FnMut(DagId) -> bool) {
+        self.kept
+            .retain(|request| !matches!(request, Request::Signal(dag) if take(*dag)));
+    }
+
+    /// Passes the requests on, after the completions of the instant.
+    ///
+    /// No pointer to the scheduler leaves this function, so where that is a static, the compiler
+    /// knows its address in all of the scheduler's code, which is 4 % of a release.
+    #[inline(always)]
+    pub fn serve(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
+        for request in self.kept.drain(..) {
+            match (request, &mut self.lifecycle) {
+                (Request::Signal(dag), _) => moment.signal(dag, observer),
+                (_, Some(lifecycle)) => lifecycle.serve(request, &mut self.changes),
+                // Without it nothing is asked for.
+                (_, None) => {}
+            }
+            for change in self.changes.drain(..) {
+                match change {
+                    Change::Pause(dag) => moment.pause(dag, observer),
+                    Change::Resume(dag) => moment.resume(dag, observer),
+                    Change::Close(dag) => moment.close(dag, observer),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Closing a DAG: its last jobs come to their end.
+//!
+//! This is how a machine is stopped in order: nothing more begins, and what has begun is
+//! finished. The rules, whose tests in `tests/closing.rs` bear their numbers:
+//!
+//! - **C1, no release.** A closed DAG releases no job any more, at the very instant of the
+//!   closing neither, since closings come before releases. No further job is due, so none is
+//!   skipped either; a signal that is kept for one is forgotten.
+//! - **C2, no backlog.** Releases that wait for an older job are skipped at the closing, the
+//!   oldest first.
+//! - **C3, in flight.** What was released goes on as ever, to its end, and may be late.
+//! - **C4, over.** The DAG is over when nothing of it is in flight. Signals to it are dropped,
+//!   and counted.
+//! - **C5, finality.** It is neither paused nor resumed any more. A fault, or a stop, ends it
+//!   as any other (E1 to E8).
+//!
+//! To the other rules a closing is nothing new: it is a limit of jobs that is there already.
+
+use super::Scheduler;
+use crate::ids::DagId;
+use crate::scheduler::Observer;
+
+impl Scheduler {
+    /// Closes a DAG (C1, C2).
+    pub(super) fn close(&mut self, dag: DagId, observer: &mut impl Observer) {
+        if self.is_closed(dag) {
+            return;
+        }
+        self.judge(dag, None, observer);
+        let state = &mut self.dags[dag.index()];
+        state.jobs.close();
+        state.is_paused = false;
+        observer.closed(dag);
+        while self.waiting(dag) > 0 {
+            self.skip_oldest_waiting(dag, observer);
+        }
+        self.set_timer(dag);
+    }
+}

@@ -1,0 +1,210 @@
+//! Chains on a journal by hand: which there are, and their times as they are computed by hand.
+
+use sched_dag::chains::{Chain, Latencies, SampledJobs, Sampling};
+use sched_dag::journal::{Event, What};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, Instance, Policy, SubtaskId,
+    SubtaskSpec, TaskSet, verify,
+};
+
+/// `camera` (period 100, `expose` before `detect`), `plan` (period 60), `motor` (period 20):
+/// `plan` samples what `detect` writes, `motor/drive` what `plan` writes.
+fn model() -> (TaskSet, [Sampling; 2]) {
+    let subtask = |name: &str| SubtaskSpec {
+        name: name.into(),
+        wcet_ns: Some(10),
+        ..SubtaskSpec::default()
+    };
+    let dag = |name: &str, period_ns, subtasks: &[&str]| DagSpec {
+        name: name.into(),
+        period_ns: Some(period_ns),
+        relative_deadline_ns: Some(period_ns),
+        subtasks: subtasks.iter().map(|name| subtask(name)).collect(),
+        edges: (1..subtasks.len()).map(|at| (at - 1, at)).collect(),
+        ..DagSpec::default()
+    };
+    let dags = [
+        dag("camera", 100, &["expose", "detect"]),
+        dag("plan", 60, &["plan"]),
+        dag("motor", 20, &["drive"]),
+    ];
+    let options = CommitOptions::new(Policy::Edf, 2)
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_instance_limit(u32::MAX);
+    let samplings = [
+        Sampling {
+            writer: place(0, 1),
+            reader: place(1, 0),
+        },
+        Sampling {
+            writer: place(1, 0),
+            reader: place(2, 0),
+        },
+    ];
+    let verified = verify(&dags, &options).expect("a sound set");
+    (verified.task_set, samplings)
+}
+
+fn place(dag: u32, subtask: u32) -> (DagId, SubtaskId) {
+    (DagId(dag), SubtaskId(subtask))
+}
+
+fn events(lines: &str) -> Vec<Event> {
+    let event = |line: &str| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let number = |at: usize| words[at].parse().expect("a number");
+        let small = |at: usize| u32::try_from(number(at)).expect("small");
+        Event {
+            time_ns: number(0),
+            what: words[1].parse().expect("an event's word"),
+            core: CoreId(0),
+            dag: DagId(small(2)),
+            job: number(3),
+            subtask: (words.len() > 4).then(|| SubtaskId(small(4))),
+        }
+    };
+    lines
+        .lines()
+        .filter(|line| !line.is_empty())
+        .map(event)
+        .collect()
+}
+
+/// Time, event, DAG, job, subtask. `detect` finishes at 30 and 145; `plan` starts at 5, 65, 125,
+/// 185 and so finds nothing, job 0, job 0 and job 1; it finishes at 15, 75, 135 and 195.
+const RUN: &str = "
+0 released 0 0
+0 released 1 0
+0 released 2 0
+5 start 1 0 0
+10 start 2 0 0
+12 finish 2 0 0
+15 finish 1 0 0
+20 finish 0 0 0
+30 finish 0 0 1
+60 released 1 1
+60 released 2 3
+62 start 2 3 0
+64 finish 2 3 0
+65 start 1 1 0
+75 finish 1 1 0
+75 start 2 4 0
+80 released 2 4
+82 finish 2 4 0
+100 released 0 1
+100 released 2 5
+101 start 2 5 0
+103 finish 2 5 0
+120 released 1 2
+125 start 1 2 0
+135 finish 1 2 0
+140 released 2 7
+141 start 2 7 0
+143 finish 2 7 0
+145 finish 0 1 1
+180 released 1 3
+180 released 2 9
+185 start 1 3 0
+195 finish 1 3 0
+200 released 0 2
+200 released 2 10
+201 start 2 10 0
+204 finish 2 10 0
+";
+
+#[test]
+fn the_times_of_a_small_run_are_those_computed_by_hand() {
+    let (task_set, samplings) = model();
+    let chains = Chain::all(&task_set, &samplings);
+    let [chain] = &chains[..] else {
+        panic!("{chains:?}");
+    };
+    let names: Vec<String> = chain
+        .names(&task_set)
+        .map(|name| name.to_string())
+        .collect();
+    let expected = ["camera/expose", "camera/detect", "plan/plan", "motor/drive"];
+    assert_eq!(names, expected);
+    let latencies = chain.latencies(&task_set, events(RUN).iter().copied());
+    let expected = Latencies {
+        // The outputs at 12 and 64 go back to no image: `plan` 0 had found none. Those at 82, 103
+        // and 143 go back to the image of 0, that at 204 to the one of 100.
+        output_age_ns: vec![82, 103, 143, 104],
+        // Each up to the next output.
+        data_age_ns: vec![103, 143, 204],
+        // What happens just after 0 is in the image of 100, and first seen in the output of 204.
+        reaction_ns: vec![204],
+    };
+    assert_eq!(latencies, expected);
+    let sampled = SampledJobs::new(&samplings, events(RUN).into_iter());
+    let plan = |job| Instance {
+        dag: DagId(1),
+        job,
+        subtask: SubtaskId(0),
+    };
+    let images = [0, 1, 2, 3].map(|job| sampled.job(plan(job), place(0, 1)));
+    assert_eq!(images, [None, Some(0), Some(0), Some(1)]);
+}
+
+#[test]
+fn what_finishes_at_the_very_start_counts_by_its_place_in_the_journal() {
+    let (task_set, samplings) = model();
+    let mut swapped = events(RUN);
+    let at = swapped.iter().position(|event| event.time_ns == 75);
+    let at = at.expect("a finish of `plan`");
+    assert_eq!(swapped[at + 1].what, What::Start);
+    swapped.swap(at, at + 1);
+    let chain = &Chain::all(&task_set, &samplings)[0];
+    let latencies = chain.latencies(&task_set, swapped.into_iter());
+    assert_eq!(latencies.output_age_ns, [103, 143, 104]);
+}
+
+#[test]
+fn outputs_behind_the_end_of_a_dag_do_not_count() {
+    let (task_set, samplings) = model();
+    // The camera has one job: the next one would have been due at 100.
+    let mut ended = events(RUN);
+    ended.retain(|event| event.dag != DagId(0) || event.job == 0);
+    let chain = &Chain::all(&task_set, &samplings)[0];
+    let latencies = chain.latencies(&task_set, ended.into_iter());
+    assert_eq!(latencies.output_age_ns, [82]);
+    assert!(latencies.data_age_ns.is_empty() && latencies.reaction_ns.is_empty());
+}
+
+#[test]
+fn bounds_are_sums_and_name_the_dag_that_has_none() {
+    let (task_set, samplings) = model();
+    let chain = &Chain::all(&task_set, &samplings)[0];
+    let responses_ns = [Some(50), Some(20), Some(5)];
+    assert_eq!(
+        chain.output_age_bound_ns(&task_set, &responses_ns),
+        Ok(150 + 80 + 5)
+    );
+    assert_eq!(
+        chain.reaction_bound_ns(&task_set, &responses_ns),
+        Ok(150 + 80 + 25)
+    );
+    let lacking = [Some(50), None, Some(5)];
+    assert_eq!(chain.reaction_bound_ns(&task_set, &lacking), Err(DagId(1)));
+}
+
+#[test]
+fn chains_between_two_subtasks_are_found_by_name_and_pass_no_dag_twice() {
+    let (task_set, mut samplings) = model();
+    let find = |name| Chain::place(&task_set, name).expect(name);
+    assert_eq!(find("camera/1"), place(0, 1));
+    assert_eq!(Chain::place(&task_set, "camera/focus"), None);
+    let ways = |samplings: &[Sampling], from, to| {
+        Chain::between(&task_set, samplings, find(from), find(to)).len()
+    };
+    assert_eq!(ways(&samplings, "camera/detect", "motor/drive"), 1);
+    assert_eq!(ways(&samplings, "camera/expose", "camera/detect"), 1);
+    assert_eq!(ways(&samplings, "motor/drive", "camera/detect"), 0);
+    // The plan also depends on what the motor does: a circle of DAGs.
+    samplings[0] = Sampling {
+        writer: place(2, 0),
+        reader: place(1, 0),
+    };
+    assert_eq!(ways(&samplings, "motor/drive", "plan/plan"), 1);
+    assert_eq!(Chain::all(&task_set, &samplings), []);
+}

@@ -1,0 +1,176 @@
+//! A machine in virtual time whose own work takes time.
+//!
+//! The scheduler is that of the project; what it costs is drawn, up to what is charged:
+//!
+//! - a timer interrupt is late, so a release is, unless a completion's step comes first;
+//! - an instance that starts keeps its core for the decision and two switches more;
+//! - one that is resumed keeps it for an interrupt more, which the one that preempted it pays.
+//!
+//! What is observed is the response of each job, from its nominal release on.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use sched_dag::analysis::Overheads;
+use sched_dag::{
+    DagId, Decision, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions, TaskSet,
+};
+
+use crate::random::Random;
+
+/// What the platform's own work takes at most.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Costs {
+    pub(super) switch_ns: u64,
+    pub(super) dispatch_ns: u64,
+    pub(super) interrupt_ns: u64,
+    /// From a nominal release to the interrupt for it.
+    pub(super) late_ns: u64,
+}
+
+/// How long things take, of what they may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Takes {
+    /// All of it.
+    Most,
+    /// A drawn part.
+    Drawn,
+}
+
+impl Costs {
+    /// Returns what an analysis is to charge.
+    pub(super) fn overheads(self) -> Overheads {
+        Overheads {
+            context_switch_ns: self.switch_ns,
+            dispatch_ns: self.dispatch_ns + self.late_ns,
+            interrupt_ns: self.interrupt_ns,
+        }
+    }
+}
+
+/// Runs a set of DAGs with WCETs until some time, and returns each DAG's longest response, that
+/// of a job in flight at the end as far as it is known.
+pub(super) fn longest_responses_ns(
+    task_set: &Arc<TaskSet>,
+    options: SchedulerOptions,
+    costs: Costs,
+    takes: Takes,
+    until_ns: u64,
+    random: &mut Random,
+) -> Vec<u64> {
+    let dags = task_set.dags().len();
+    let mut machine = Machine {
+        scheduler: Scheduler::new(Arc::clone(task_set), options),
+        cores: vec![None; options.cores as usize],
+        left_ns: BTreeMap::new(),
+        costs,
+        takes,
+        random,
+    };
+    let mut watch = Watch {
+        now_ns: 0,
+        flying: vec![Vec::new(); dags],
+        longest_ns: vec![0; dags],
+    };
+    machine.run(until_ns, &mut watch);
+    for (longest_ns, flying) in watch.longest_ns.iter_mut().zip(&watch.flying) {
+        let ages = flying
+            .iter()
+            .map(|(_, release_ns)| until_ns.saturating_sub(*release_ns));
+        *longest_ns = ages.fold(*longest_ns, u64::max);
+    }
+    watch.longest_ns
+}
+
+struct Machine<'r> {
+    scheduler: Scheduler,
+    /// What each core executes, and when it finishes.
+    cores: Vec<Option<(Instance, u64)>>,
+    /// What is left of each preempted instance.
+    left_ns: BTreeMap<Instance, u64>,
+    costs: Costs,
+    takes: Takes,
+    random: &'r mut Random,
+}
+
+impl Machine<'_> {
+    fn run(&mut self, until_ns: u64, watch: &mut Watch) {
+        // The scheduler's next event, and when its interrupt comes.
+        let mut alarm: Option<(u64, u64)> = None;
+        loop {
+            let due_ns = self.scheduler.next_event_ns();
+            if alarm.map(|(due_ns, _)| due_ns) != due_ns {
+                alarm = due_ns.map(|due_ns| (due_ns, due_ns + self.draw(self.costs.late_ns)));
+            }
+            let finish_ns = self.cores.iter().flatten().map(|(_, finish_ns)| *finish_ns);
+            let interrupt_ns = alarm.map(|(_, at_ns)| at_ns.max(watch.now_ns));
+            let next_ns = finish_ns.chain(interrupt_ns).min();
+            let Some(now_ns) = next_ns.filter(|next_ns| *next_ns <= until_ns) else {
+                return;
+            };
+            watch.now_ns = now_ns;
+            for core in &mut self.cores {
+                if let Some((instance, _)) = core.take_if(|(_, finish_ns)| *finish_ns <= now_ns) {
+                    self.scheduler.at(now_ns).complete(instance, watch);
+                }
+            }
+            let released = self.scheduler.at(now_ns).release_due(watch);
+            let decisions = released.dispatch().to_vec();
+            for decision in decisions {
+                self.carry_out(decision, now_ns);
+            }
+        }
+    }
+
+    fn carry_out(&mut self, decision: Decision, now_ns: u64) {
+        let (core, instance) = (decision.core().index(), decision.instance());
+        let takes_ns = match decision {
+            Decision::Preempt { .. } => {
+                if let Some((instance, finish_ns)) = self.cores[core].take() {
+                    self.left_ns.insert(instance, finish_ns - now_ns);
+                }
+                return;
+            }
+            Decision::Resume { .. } => {
+                let left_ns = self.left_ns.remove(&instance).unwrap_or(0);
+                left_ns + self.draw(self.costs.interrupt_ns)
+            }
+            Decision::Start { .. } => {
+                let dag = self.scheduler.task_set().dag(instance.dag);
+                let wcet_ns = dag.subtask(instance.subtask).wcet_ns().unwrap_or(0);
+                let own_ns = self.costs.dispatch_ns + 2 * self.costs.switch_ns;
+                self.draw(wcet_ns).max(1) + self.draw(own_ns)
+            }
+        };
+        self.cores[core] = Some((instance, now_ns + takes_ns));
+    }
+
+    fn draw(&mut self, most_ns: u64) -> u64 {
+        match self.takes {
+            Takes::Most => most_ns,
+            Takes::Drawn => self.random.within(0, most_ns),
+        }
+    }
+}
+
+struct Watch {
+    now_ns: u64,
+    /// The jobs in flight of each DAG: number and nominal release.
+    flying: Vec<Vec<(u64, u64)>>,
+    longest_ns: Vec<u64>,
+}
+
+impl Observer for Watch {
+    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.flying[dag.index()].push((job, release_ns));
+    }
+
+    fn job_completed(&mut self, dag: DagId, job: u64, _: JobOutcome) {
+        let flying = &mut self.flying[dag.index()];
+        if let Some(place) = flying.iter().position(|(other, _)| *other == job) {
+            let (_, release_ns) = flying.swap_remove(place);
+            let longest_ns = &mut self.longest_ns[dag.index()];
+            *longest_ns = (*longest_ns).max(self.now_ns - release_ns);
+        }
+    }
+}

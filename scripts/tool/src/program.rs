@@ -1,0 +1,101 @@
+//! A program of this computer that is run and judged as a guest is: an app on Linux.
+//!
+//! Its standard output is the log. Its exit code is one of two witnesses, as QEMU's status is.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{ExitStatus, Stdio};
+use std::time::Duration;
+
+use crate::child::{Child, Waited, bound_to_us};
+use crate::outcome::Outcome;
+use crate::protocol::{Status, Transcript};
+use crate::qemu::Ending;
+use crate::system;
+use crate::tail::Tail;
+
+/// Runs a program until its end, or for `limit`, with its output in `log`, and shows each whole
+/// line to `show` as it comes.
+///
+/// # Errors
+///
+/// In words: it could not be started, or the log could not be written or read.
+pub fn run(
+    program: &Path,
+    words: &[OsString],
+    stdin: Stdio,
+    log: &Path,
+    limit: Duration,
+    show: &mut impl FnMut(&str),
+) -> Result<Outcome, String> {
+    let place = log.display();
+    let file = File::create(log)
+        .map_err(|error| format!("cannot write `{place}`: {error}; name a file elsewhere"))?;
+    let mut command = bound_to_us(program);
+    command.args(words).stdin(stdin).stdout(file);
+    let mut child = Child::start(&mut command)
+        .map_err(|error| format!("cannot start `{}`: {error}", program.display()))?;
+    let mut tail = Tail::new(log);
+    let waited = child.wait(limit, || {
+        tail.follow(show);
+        true
+    });
+    tail.finish(show);
+    let bytes = fs::read(log).map_err(|error| format!("cannot read `{place}`: {error}"))?;
+    let serial = String::from_utf8_lossy(&bytes).into_owned();
+    let transcript = Transcript::read(&serial);
+    let ending = match waited {
+        Waited::Ended(status) => ending_of(status, &transcript),
+        Waited::TimedOut | Waited::GivenUp => Ending::Program(format!(
+            "no end within {} s, the program was killed; {}; `--timeout SECONDS` gives it longer",
+            limit.as_secs(),
+            system::host_load()
+        )),
+    };
+    Ok(Outcome {
+        ending,
+        transcript,
+        serial,
+        log: log.to_path_buf(),
+        image: program.to_path_buf(),
+        elapsed: child.elapsed(),
+        complaints: String::new(),
+    })
+}
+
+fn ending_of(status: ExitStatus, transcript: &Transcript) -> Ending {
+    let has_verdict = transcript.of_kind("verdict").next().is_some();
+    match status.code().filter(|_| has_verdict) {
+        Some(0) => Ending::Guest(Status::Success),
+        Some(1) => Ending::Guest(Status::Failure),
+        Some(2) => Ending::Guest(Status::Usage),
+        _ => Ending::Program(format!(
+            "the program gave no verdict and ended with {status}"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::process::ExitStatusExt as _;
+    use std::process::ExitStatus;
+
+    use super::ending_of;
+    use crate::protocol::{Status, Transcript};
+    use crate::qemu::Ending;
+
+    #[test]
+    fn without_a_verdict_no_exit_code_counts() {
+        let verdict = "{\"kind\":\"verdict\",\"status\":\"success\"}\n";
+        let of = |wait_status, text| {
+            ending_of(ExitStatus::from_raw(wait_status), &Transcript::read(text))
+        };
+        assert_eq!(of(0, verdict), Ending::Guest(Status::Success));
+        assert_eq!(of(2 << 8, verdict), Ending::Guest(Status::Usage));
+        for wait_status in [0, 9, 101 << 8] {
+            assert!(matches!(of(wait_status, ""), Ending::Program(_)));
+        }
+        assert!(matches!(of(9, verdict), Ending::Program(_)));
+    }
+}

@@ -1,0 +1,86 @@
+//! `debug` as a person uses it: gdb stops in a subtask and shows what is there.
+
+use std::fs;
+use std::io::{Write, stderr};
+use std::process::{Command, Output};
+
+use tool::image::{self, Profile};
+use tool::{install, system};
+
+/// Calls the tool, and returns its output with what it said.
+fn tool(words: &[&str]) -> (Output, String) {
+    let mut tool = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
+    let output = tool.args(words).output().expect("the tool can be started");
+    let said = [&output.stdout[..], &output.stderr[..]].concat();
+    (output, String::from_utf8_lossy(&said).into_owned())
+}
+
+/// Reports whether there is a gdb, or one can be installed; says so if not, past the test's
+/// captured output.
+fn is_gdb_here() -> bool {
+    let ensured = install::ensure(&install::GDB);
+    if let Err(why) = &ensured {
+        let _ = writeln!(stderr(), "skipped, a test without gdb: {why}");
+    }
+    ensured.is_ok()
+}
+
+#[test]
+fn a_breakpoint_in_a_subtask_shows_locals_and_callers() {
+    if !is_gdb_here() {
+        return;
+    }
+    let commands = system::new_log("commands").expect("a folder for logs");
+    let lines = "next\nnext\ninfo locals\nprint goal[2]\nbacktrace 2\nkill\n";
+    fs::write(&commands, lines).expect("a file in it");
+    let words = ["debug", "--app=drone", "--break=control", "--cores=2"];
+    let file = commands.to_str().expect("a path of text");
+    let (output, said) = tool(&[&words[..], &["--commands", file]].concat());
+    let _ = fs::remove_file(&commands);
+    assert!(output.status.success(), "{said}");
+    for shown in [
+        "drone::attitude::control (estimate=",
+        "apps/drone/src/attitude.rs:",
+        "\nwanted = [0, 0]\n",
+        "\n$1 = 3\n",
+        "drone::dags::{impl#0}::register_attitude::{closure#2}",
+        // What the guest prints for people stands between, and no machine line does.
+        "dag `attitude` takes at most ",
+    ] {
+        assert!(said.contains(shown), "no `{shown}` in:\n{said}");
+    }
+    assert!(!said.contains("{\"kind\""), "{said}");
+}
+
+#[test]
+fn a_place_that_is_not_there_is_refused() {
+    if !is_gdb_here() {
+        return;
+    }
+    for (place, remedy) in [
+        ("contrl", "; did you mean `control`?"),
+        ("attitude.rs:9999", "no code of that line; name a file"),
+    ] {
+        let (output, said) = tool(&["debug", "--app=drone", "--break", place]);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(place) && said.contains(remedy), "{said}");
+    }
+}
+
+#[test]
+fn without_optimization_the_stacks_hold() {
+    for (app, words, result) in [
+        ("fork-join", "jobs=2 work=compute", "\"kind\":\"fork_join\""),
+        ("drone", "seconds=1", "\"kind\":\"drone\""),
+    ] {
+        let image = image::build_by(app, Profile::Gdb).expect("it builds").path;
+        let image = image.to_str().expect("a path of text");
+        let words = format!("budget_factor=0 {words}");
+        let run = ["run", "--mode=deterministic", "--cores=4", "--image", image];
+        let (_, said) = tool(&[&run[..], &["--append", &words]].concat());
+        assert!(said.contains(result), "{said}");
+        for never in ["fault:", "panic", "\"kind\":\"fault\""] {
+            assert!(!said.contains(never), "{said}");
+        }
+    }
+}

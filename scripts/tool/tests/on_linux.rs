@@ -1,0 +1,143 @@
+//! Apps as programs of this computer, by `run --on linux`: the lines, the verdict and the exit
+//! code are those of a guest, and the trace is judged and drawn as a guest's.
+//!
+//! By SCHED_FIFO where the host allows it, and without preemption where it does not.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use tool::protocol::Transcript;
+use tool::system::workspace;
+
+fn tool(words: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
+    command.current_dir(workspace()).stdin(Stdio::null());
+    let output = command.args(words.split_whitespace()).output();
+    output.expect("the tool can be started")
+}
+
+/// Runs the tool, which must succeed, and returns its standard output.
+fn succeed(words: &str) -> String {
+    let output = tool(words);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{words}:\n{said}{complaint}");
+    said
+}
+
+/// A file of ours that is not there yet.
+fn fresh(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_file(&path);
+    path
+}
+
+#[test]
+fn fork_join_says_what_it_says_on_the_machine_and_its_trace_is_judged_and_drawn() {
+    let trace = fresh("on-linux.log");
+    let trace = trace.display();
+    let said = succeed(&format!(
+        "run --app fork-join --on linux --subtasks 2,4 --longest 3 --jobs 10 --trace {trace}"
+    ));
+    let transcript = Transcript::read(&said);
+    assert!(transcript.faults.is_empty(), "{:?}", transcript.faults);
+    let lines: Vec<_> = transcript.of_kind("fork_join").collect();
+    assert_eq!(lines.len(), 2, "{said}");
+    for (line, subtasks) in lines.into_iter().zip([2, 4]) {
+        for (member, value) in [
+            ("subtasks", subtasks),
+            ("jobs", 10),
+            ("joins", 10),
+            ("violations", 0),
+            ("allocations", 0),
+        ] {
+            assert_eq!(line.number_at(member), Some(value), "{}", line.text);
+        }
+    }
+    assert!(said.contains("N = 4: 10 jobs, 10 joins, 0 semantic violations"));
+    // The bound is for a host that has much else to do.
+    let judged = succeed(&format!("check-trace --bound-us 5000000 {trace}"));
+    let checks = Transcript::read(&judged);
+    assert_eq!(checks.of_kind("trace_check").count(), 2, "{judged}");
+    let drawing = fresh("on-linux.json");
+    succeed(&format!("trace {trace} -o {}", drawing.display()));
+    assert!(drawing.is_file());
+}
+
+#[test]
+fn a_dag_file_is_run_and_a_graph_is_drawn() {
+    let dot = fresh("on-linux.dot");
+    let said = succeed(&format!(
+        "run --dag apps/dag-file/examples/demo.dag --on linux --jobs 5 --dot {}",
+        dot.display()
+    ));
+    let transcript = Transcript::read(&said);
+    assert_eq!(transcript.of_kind("dag_run").count(), 2, "{said}");
+    assert_eq!(transcript.of_kind("verdict").count(), 1, "{said}");
+    let drawn = fs::read_to_string(dot).expect("it is written");
+    assert!(drawn.starts_with("digraph"), "{drawn}");
+}
+
+#[test]
+fn the_evaluation_is_repeated_with_its_baselines() {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("on-linux-evaluation");
+    let _ = fs::remove_dir_all(&out);
+    let said = succeed(&format!(
+        "bench join-latency --on linux --subtasks 2 --policies fass,exact --jobs 4 --out {}",
+        out.display()
+    ));
+    assert!(
+        said.contains("2 conditions of 4 jobs; mode linux, 4 cores"),
+        "{said}"
+    );
+    for joins in ["FasS (DAG)", "ExactTime"] {
+        let row = said
+            .lines()
+            .find(|line| line.contains(joins))
+            .expect("a row");
+        let words: Vec<&str> = row.split_whitespace().collect();
+        // All four jobs are joined, each with its own values.
+        assert!(
+            words.windows(3).any(|part| part == ["1.000", "4", "0"]),
+            "{row}"
+        );
+    }
+    assert!(out.join("report.html").is_file());
+}
+
+#[test]
+fn what_is_wrong_has_the_exit_code_and_the_line_that_it_has_on_the_machine() {
+    for (words, code, says) in [
+        (
+            "run --app fork-join --on linux --append sed=3",
+            2,
+            "the app refused its command line: `sed` is no option; there are longest, ",
+        ),
+        (
+            "run --app fork-join --on linux --cores 64",
+            2,
+            "`cores=64`: 64 cores are asked for, and this program may use ",
+        ),
+        (
+            "run --app faults --on linux",
+            2,
+            "app `faults` has no program for Linux; these have: autoware, ",
+        ),
+        (
+            "run --app gait --on linux",
+            2,
+            "no recording; give one by `./scripts/run --app gait --module FILE`",
+        ),
+        (
+            "run --app fork-join --on linux --mode threads",
+            2,
+            "`--mode` is for the bare machine; leave it or `--on linux` out",
+        ),
+    ] {
+        let output = tool(words);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{words}: {said}");
+        assert!(said.contains(says), "{words}: {said}");
+    }
+}
