@@ -12,6 +12,7 @@ pub(crate) mod stacks;
 mod time;
 pub(crate) mod times;
 pub(crate) mod trace;
+pub(crate) mod wire;
 
 pub use distribution::Distribution;
 pub use time::Ns;

@@ -3,11 +3,10 @@
 use std::fs::File;
 use std::io::{self, Read, Write};
 
-use fass::{Wire, WireCounts};
+use fass::Wire;
 use linux::{Connection, Linux};
 
 use super::ending::Ending;
-use crate::text::json;
 use crate::text::options::UsageError;
 
 /// The ends of an app's wire: where bytes come from, and where they go.
@@ -36,27 +35,5 @@ impl Ends {
         };
         let connected = machine.connect(&self.wire, input, output);
         connected.map_err(|why| Ending::Failure(format!("wire `{}`: {why}", self.wire.name())))
-    }
-
-    /// Says what the wire has counted.
-    pub(crate) fn report(&self) {
-        let WireCounts {
-            packets,
-            bytes,
-            lost_packets,
-            malformed,
-            sent_bytes,
-            unsent_bytes,
-            ..
-        } = self.wire.counts();
-        json::emit("wire", |line| {
-            line.text("name", self.wire.name())
-                .number("packets", packets)
-                .number("bytes", bytes)
-                .number("lost_packets", lost_packets)
-                .number("malformed", malformed)
-                .number("sent_bytes", sent_bytes)
-                .number("unsent_bytes", unsent_bytes);
-        });
     }
 }

@@ -175,7 +175,7 @@ impl Machine {
         self.bound_verdict.note(&run);
         wcet_notes::note(&run, self.overheads);
         if let Some(ends) = &*ends {
-            ends.report();
+            report::wire::report(&ends.wire);
         }
         if self.dumps_times {
             report::times::dump(&run);

@@ -10,6 +10,8 @@ mod time;
 pub(crate) mod times;
 #[path = "../../../src/report/trace.rs"]
 pub(crate) mod trace;
+#[path = "../../../src/report/wire.rs"]
+pub(crate) mod wire;
 
 pub use distribution::Distribution;
 pub use time::Ns;

@@ -12,15 +12,15 @@
 
 use alloc::boxed::Box;
 
-use fass::{Wire, WireCounts};
+use fass::Wire;
 
 use super::{LINE, Line};
+use crate::report;
 use executive::machine::serial::{Port, SECOND};
 use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core;
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
-use executive::text::json;
 
 /// The time between two looks at the port.
 pub(super) const PERIOD_NS: u64 = 1_000_000;
@@ -139,29 +139,7 @@ impl Line for Connection {
     }
 
     fn report(&self) {
-        let WireCounts {
-            packets,
-            bytes,
-            lost_packets,
-            malformed,
-            sent_bytes,
-            unsent_bytes,
-            ..
-        } = self.wire.counts();
-        executive::println!(
-            "wire `{}`: {packets} packets came, {lost_packets} were lost, {malformed} malformed; \
-             {sent_bytes} bytes sent, {unsent_bytes} lost",
-            self.wire.name()
-        );
-        json::emit("wire", |line| {
-            line.text("name", self.wire.name())
-                .number("packets", packets)
-                .number("bytes", bytes)
-                .number("lost_packets", lost_packets)
-                .number("malformed", malformed)
-                .number("sent_bytes", sent_bytes)
-                .number("unsent_bytes", unsent_bytes);
-        });
+        report::wire::report(&self.wire);
     }
 }
 
