@@ -126,7 +126,6 @@ pub use policy::{
     Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,
     Priority, SchedulerOptions,
 };
-pub use priorities::{longest_remaining_path_first, remaining_paths_ns};
 pub use recorder::{Events, Recorder};
 pub use scheduler::{DagStatistics, Decision, HandOff, Moment, Observer, Released, Scheduler};
 pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};

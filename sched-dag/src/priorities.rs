@@ -21,37 +21,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::sorted_by_key;
-use crate::policy::Priority;
-use crate::task_set::{Adjacency, Dag};
-
-/// Returns each subtask's remaining path in nanoseconds, in the order of
-/// registration, or `None` if a WCET is unknown.
-#[must_use]
-pub fn remaining_paths_ns(dag: &Dag) -> Option<Vec<u64>> {
-    let wcets_ns: Option<Vec<u64>> = dag
-        .subtasks()
-        .iter()
-        .map(|subtask| subtask.wcet_ns())
-        .collect();
-    Some(remaining_paths(
-        &wcets_ns?,
-        &dag.successors,
-        &dag.topological_order,
-    ))
-}
-
-/// Returns priorities from 0 on, the longest remaining path first, in the order
-/// of registration; all are different.
-#[must_use]
-pub fn longest_remaining_path_first(dag: &Dag) -> Vec<Priority> {
-    let wcets_ns: Vec<Option<u64>> = dag
-        .subtasks()
-        .iter()
-        .map(|subtask| subtask.wcet_ns())
-        .collect();
-    let ranks = ranks(&wcets_ns, &dag.successors, &dag.topological_order);
-    ranks.into_iter().map(Priority).collect()
-}
+use crate::task_set::Adjacency;
 
 /// Returns each subtask's position in the order of remaining paths.
 pub(crate) fn ranks(

@@ -17,7 +17,6 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::task::Task;
-use crate::order::sorted_by_key;
 
 impl Task {
     /// Returns the bottom level of each subtask.
@@ -43,16 +42,6 @@ impl Task {
             levels[subtask] = self.wcets_ns()[subtask].saturating_add(rest);
         }
         levels
-    }
-
-    /// Returns the subtasks by descending bottom level, ties by position: the
-    /// HLF order, in which every predecessor with a positive WCET comes first.
-    #[must_use]
-    pub fn by_bottom_level(&self) -> Vec<usize> {
-        let levels = self.bottom_levels();
-        sorted_by_key(self.subtask_count(), |subtask| {
-            core::cmp::Reverse(levels[subtask])
-        })
     }
 
     /// Returns a longest path for the given weights; ties go to the smallest

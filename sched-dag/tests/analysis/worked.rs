@@ -34,7 +34,6 @@ fn e1_and_e11_one_fork_join() {
         [21, 15, 12, 9].map(Some)
     );
     assert_eq!(task.bottom_levels(), [9, 7, 6, 5, 4, 1]);
-    assert_eq!(task.by_bottom_level(), [0, 1, 2, 3, 4, 5]);
     assert_eq!(multi_path(&task, 0), None);
 }
 
