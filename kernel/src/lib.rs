@@ -100,7 +100,7 @@ pub fn timer_interrupts() -> u64 {
 /// Reports whether functions may use AVX: the processor has it, and the word `avx=off` is
 /// not given.
 ///
-/// A function that uses it bears `#[target_feature(enable = "avx")]`, and whoever calls it has
+/// A function that uses it bears `#[target_feature(enable = "avx")]`, and its caller has
 /// asked. What else it names, such as `avx2`, is asked of the processor
 /// (`core::arch::x86_64::__cpuid`) besides; its state is AVX's.
 ///

@@ -1,6 +1,6 @@
 //! What safe code cannot do to others: use up what all share, keep the serial line, forge
 //! what a run is judged by, misuse a lock. The guest is the image `guest-tests`, which
-//! commits one attack in a boot, beside a healthy DAG (`attack=NAME`).
+//! commits one attack in a boot, next to a healthy DAG (`attack=NAME`).
 
 use harness::Guest;
 use tool::Outcome;

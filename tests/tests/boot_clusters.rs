@@ -70,7 +70,7 @@ fn letters_pass_where_cores_really_run_side_by_side() {
     for words in ["clusters=2,2", "clusters=1,2"] {
         for idle in ["idle=halt", "idle=poll"] {
             let guest = clusters("test=clusters").word(words).word(idle);
-            // Who runs when is the host's affair, so R5 is not asked for.
+            // Which instance runs when is the host's affair, so R5 is not asked for.
             hold(&guest.in_real_time().boot());
         }
     }

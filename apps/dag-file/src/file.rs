@@ -1,6 +1,6 @@
 //! What a DAG file says.
 //!
-//! The DAGs themselves are specs of `sched-dag`. Beside each stands what only the
+//! The DAGs themselves are specs of `sched-dag`. Next to each stands what only the
 //! file knows: the lines, for messages, and the samples of execution times.
 
 use alloc::string::String;

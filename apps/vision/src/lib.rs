@@ -2,7 +2,7 @@
 //!
 //! | DAG | released | subtasks |
 //! |---|---|---|
-//! | `stereo` | every 40 ms | `expose`, then `left`, `smooth_left`, `features_left` beside the same of the right, then `fuse` |
+//! | `stereo` | every 40 ms | `expose`, then `left`, `smooth_left`, `features_left` in parallel with the same of the right, then `fuse` |
 //! | `drive` | every 10 ms | `decide`, `move` |
 //!
 //! The road is simulated, within `left`, `right` and `move`; all else is what would drive. Each

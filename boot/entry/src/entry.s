@@ -84,7 +84,7 @@ pvh_entry:
 # processor (Intel SDM volume 3, 10.8.5). No-execute pages are turned on where there are
 # any: where a firmware has put them away, the kernel says so.
 #
-# Nothing is taken over from whoever ran before: a firmware may leave five-level paging
+# Nothing is taken over from what ran before: a firmware may leave five-level paging
 # on, and after INIT a processor has its caches off (CD, NW).
 enable_long_mode:
     mov eax, (1 << 5) | (1 << 9) | (1 << 10)    # PAE, OSFXSR, OSXMMEXCPT

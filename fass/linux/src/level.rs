@@ -1,4 +1,4 @@
-//! The levels of SCHED_FIFO that the program's threads are at, and who is at which.
+//! The levels of SCHED_FIFO that the program's threads are at, and which thread is at which.
 //!
 //! | level | threads |
 //! |---|---|

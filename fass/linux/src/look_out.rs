@@ -1,4 +1,4 @@
-//! Who looks at the scheduler's next event when it is due.
+//! Which thread looks at the scheduler's next event when it is due.
 //!
 //! A core without work has a thread that sleeps. It sleeps until the next event, and so makes the
 //! step that releases a job on the core where that job mostly begins: the scheduler takes the
@@ -9,7 +9,7 @@
 //! - those of the other idle cores a little later, in case the first was taken meanwhile;
 //! - the release thread last, or at the event if no core is idle. Then it preempts.
 //!
-//! Whoever comes first makes the step. The others find no event due and sleep on, without the
+//! The first that comes makes the step. The others find no event due and sleep on, without the
 //! scheduler's lock.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -24,7 +24,7 @@ const PATIENCE_NS: u64 = 15_000;
 pub(crate) struct LookOut {
     /// When the scheduler has its next event, on the clock; `u64::MAX`: never, 0: all is over.
     next_ns: AtomicU64,
-    /// The idle cores, as bits. What is beyond them has nobody who looks out.
+    /// The idle cores, as bits. No thread looks out for cores beyond them.
     idle: AtomicU64,
     /// The core that has become idle last.
     last: AtomicU32,

@@ -131,7 +131,7 @@ impl Team {
         }
     }
 
-    /// Settles when it looks next. Whoever makes the next event an earlier one writes that first
+    /// Settles when it looks next. A thread that makes the next event an earlier one writes that first
     /// and then reads when we look; we do it the other way round, so one of us sees the other.
     fn settle_look(&self, budgets_ns: u64) -> u64 {
         loop {

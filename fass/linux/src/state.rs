@@ -2,7 +2,7 @@
 //!
 //! The scheduler decides at one instant what each core runs; [`Placement`] keeps what
 //! each core has, and what it should have. A core that has too much loses it here, by
-//! whoever makes the step; a core that has nothing and should have something is *called*:
+//! the thread that makes the step; a core that has nothing and should have something is *called*:
 //! its worker comes and looks.
 
 use std::sync::Arc;
@@ -42,7 +42,7 @@ pub struct Fault {
     pub is_overrun: bool,
 }
 
-/// The scheduler, the bodies, and who runs what.
+/// The scheduler, the bodies, and which worker runs what.
 pub(crate) struct State {
     pub(crate) scheduler: Scheduler,
     pub(crate) recorder: Recorder<Journal>,
@@ -284,7 +284,7 @@ impl State {
             && let Some(thread) = workers[worker].thread()
         {
             // The processor was ours at the start; if it was taken away since, the kernel
-            // has chosen another one, and all still holds but who delays whom.
+            // has chosen another one, and all still holds but for which thread delays which.
             let _ = sys::pin(thread, processor);
             self.pinned[worker] = Some(core);
         }

@@ -7,8 +7,8 @@
 //! # Demoted workers and the scheduler's lock
 //!
 //! A worker that is at a low level must not hold the scheduler's lock: its core would
-//! compute something more urgent, and all others wait. So nobody who is demoted takes it:
-//! a worker that has finished first says so in its mode. If it was demoted before, it
+//! compute something more urgent, and all others wait. So no demoted worker takes it:
+//! one that has finished first says so in its mode. If it was demoted before, it
 //! raises itself above all that compute. If it is to be demoted just then, by the
 //! lock's owner, that one sees the mode and lets it be. The two may cross; then the owner
 //! raises it again, before it gives the lock back. On the way of an instance that is not

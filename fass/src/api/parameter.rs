@@ -2,7 +2,7 @@
 //!
 //! A parameter is like a [latest value](crate::Latest) that is written from outside. It has a
 //! name, a type and a range. A *source* reads it when it starts, and sends it along edges to
-//! whom it concerns. So a job has one value, whatever happens meanwhile.
+//! the subtasks that need it. So a job has one value, whatever happens meanwhile.
 //!
 //! # What is guaranteed
 //!

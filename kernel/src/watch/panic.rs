@@ -1,4 +1,4 @@
-//! The end of a kernel that cannot go on: what happened, where, to whom.
+//! The end of a kernel that cannot go on: what happened, where, on which core.
 //!
 //! The core that panics stops all others first, so the report is not torn
 //! apart and nothing runs on with broken data. A panic during the report ends

@@ -49,7 +49,7 @@ pub use sampled::SampledJobs;
 /// A subtask of a DAG.
 pub type Place = (DagId, SubtaskId);
 
-/// The sampling of a topic: who writes it, and who samples it.
+/// The sampling of a topic: the subtask that writes it, and the one that samples it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Sampling {
     /// The subtask that writes the topic.

@@ -2,7 +2,7 @@
 //!
 //! The items are `0..capacity`, each in the heap at most once, so that an item
 //! can be found and removed, or get another key, in logarithmic time (Williams,
-//! Communications of the ACM 7, 1964, with a table of positions beside it). All
+//! Communications of the ACM 7, 1964, with a table of positions next to it). All
 //! memory is taken when the heap is made.
 
 use alloc::boxed::Box;

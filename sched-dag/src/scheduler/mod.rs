@@ -24,7 +24,7 @@
 //!   job is released, skipped, or dropped with its DAG's end, exactly once.
 //! - Bounded steps: a release costs the sources of its DAG, a completion the
 //!   successors of its subtask, a decision the logarithm of the number of
-//!   subtasks. Beside that a job that is cut costs its
+//!   subtasks. Besides, a job that is cut costs its
 //!   instances, once; at one instant that is at most the DAG's
 //!   subtasks and edges times the jobs that may be in flight. After a
 //!   pause of the driver, each release and each deadline that has passed
@@ -109,7 +109,7 @@ pub struct Scheduler {
     decisions: Vec<Decision>,
 }
 
-/// Stands beside a count of instances: a dispatch is owed.
+/// Stands next to a count of instances: a dispatch is owed.
 const OWED: u32 = 1 << 31;
 
 /// The state of one DAG.

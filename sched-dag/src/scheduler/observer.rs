@@ -1,4 +1,4 @@
-//! What the scheduler reports beside its decisions.
+//! What the scheduler reports besides its decisions.
 //!
 //! Every report happens at the instant that the driver has given to
 //! [`Scheduler::at`](crate::Scheduler::at), so none carries a "now".

@@ -4,8 +4,8 @@
 //! is a *vertex*. What the way from a completion to its successors needs of a
 //! vertex lies together, in one cache line.
 //!
-//! Jobs in flight are known by *sequence number*: the how-manieth released job
-//! of its DAG it is. Skipped jobs have none, so the sequence has no gaps, and
+//! Jobs in flight are known by *sequence number*: their position among the released jobs
+//! of their DAG, from 0. Skipped jobs have none, so the sequence has no gaps, and
 //! the job before the one with number s is the one with number s - 1. A job's
 //! *slot* is its sequence number modulo the number of slots of its DAG.
 //!

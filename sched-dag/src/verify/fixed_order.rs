@@ -9,7 +9,7 @@
 //!
 //! The edges are added if that length is below the bound of one job alone without them.
 //! Among others the DAG is delayed by the work of others at most, as none of its own work is
-//! beside its chains (`docs/multi-path-bound.md`, with j one less than the width).
+//! besides its chains (`docs/multi-path-bound.md`, with j one less than the width).
 //!
 //! An edge goes from an earlier finish to a later start of the schedule, so none closes a cycle.
 

@@ -55,7 +55,7 @@ use cluster::Cluster;
 
 /// What instances do and how long it takes them.
 ///
-/// Beside [`execute`](Self::execute), the methods report what happens in the
+/// Besides [`execute`](Self::execute), the methods report what happens in the
 /// order in which it happens, those of [`Observer`] among them.
 pub trait Workload: Observer {
     /// Returns the execution time of an instance in nanoseconds. Called once

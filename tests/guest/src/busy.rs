@@ -1,4 +1,4 @@
-//! A DAG of 1 kHz without end beside one of ten jobs, for a person at the console to
+//! A DAG of 1 kHz without end next to one of ten jobs, for a person at the console to
 //! end.
 
 use alloc::vec;

@@ -1,7 +1,7 @@
 //! Functions that compute, on all cores at once, next to one that is soon done.
 //!
 //! Every core is to have a function that never waits: no halt, no `pause`, no look at the
-//! clock. Beside them a DAG of 1 ms period has an empty function, and the highest priority.
+//! clock. Next to them a DAG of 1 ms period has an empty function, and the highest priority.
 //! The word `innocent=yes` gives each computing function a budget that it does not use up
 //! by itself, but would if it had to answer for the time in which others compute.
 

@@ -15,7 +15,7 @@ use executive::run::execution;
 /// The most bytes that are taken at a time: the port may not end to have some.
 const MOST_BYTES: usize = 256;
 
-/// Whom bytes are for.
+/// The DAG that bytes are for.
 #[derive(Debug)]
 pub(super) struct Listener {
     plan: u64,

@@ -47,7 +47,7 @@ pub struct Prepared {
     pub module: Option<PathBuf>,
     /// The least memory for it, in MiB.
     pub memory_mib: u64,
-    /// Words for the guest beside those that options become.
+    /// Words for the guest besides those that options become.
     pub words: Vec<String>,
     /// A limit that is generous also where a job takes its real time, in seconds.
     pub limit_s: u64,
@@ -345,7 +345,7 @@ mod tests {
         let samples = vec!["1us"; 2_000_000].join(",");
         let text = format!("dag x period 1s\nsubtask a wcet 1ms samples {samples}\nend");
         let many = memory_mib(&parse(&text).unwrap(), Length::Jobs(1), 8);
-        // Measured: a heap of 34 MB at its peak, beside the text of 8 MB.
+        // Measured: a heap of 34 MB at its peak, besides the text of 8 MB.
         assert!((64..512).contains(&many), "{many}");
     }
 }

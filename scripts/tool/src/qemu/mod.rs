@@ -244,7 +244,7 @@ impl Qemu {
         ))
     }
 
-    /// Starts the guest. QEMU's own complaints go to a file beside `serial`.
+    /// Starts the guest. QEMU's own complaints go to a file next to `serial`.
     ///
     /// # Errors
     ///

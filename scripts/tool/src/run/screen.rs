@@ -41,7 +41,7 @@ impl Screen {
             machine: !options.is_given("plain")
                 && (options.is_given("json") || !options.is_given("console")),
             quiet: options.is_given("quiet"),
-            // Who wants these in a file does not want megabytes of them here.
+            // A person who wants these in a file does not want megabytes of them here.
             traces: !options.is_given("trace") && !super::prove::is_asked_for(options),
             graphs: !["dot", "trace", "witness", "observe", "prove"]
                 .iter()

@@ -1,4 +1,4 @@
-//! What a person sees of a run beside its lines, and says to it.
+//! What a person sees of a run besides its lines, and says to it.
 //!
 //! The console's input comes from standard input, byte by byte; the terminal
 //! itself shows and edits the line. The status is asked for only where a person

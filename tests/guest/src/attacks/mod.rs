@@ -1,6 +1,6 @@
-//! What safe code can do to harm others, beside a DAG that must not notice.
+//! What safe code can do to harm others, next to a DAG that must not notice.
 //!
-//! As in the app `faults`, a healthy DAG runs beside a doomed one, whose middle
+//! As in the app `faults`, a healthy DAG runs next to a doomed one, whose middle
 //! subtask commits a *crime* in one of its jobs. These crimes are against what all
 //! share: the heap, the serial line, locks. Each is committed in a boot of its own,
 //! since what it uses up stays so. (`test=attack attack=NAME`.)

@@ -4,8 +4,8 @@
 //! plain or in quotes; the empty `{}` and `[]`; comments; and the marks `---` and
 //! `...` around the one document. Whatever else YAML has (anchors, aliases, tags,
 //! block scalars, filled flow collections, tabs) is refused with its line, as are
-//! keys that stand twice. Nothing is guessed: a scalar stays text, and who wants a
-//! number reads one.
+//! keys that stand twice. Nothing is guessed: a scalar stays text, and a caller that
+//! wants a number reads one.
 
 use std::collections::HashSet;
 

@@ -1,4 +1,4 @@
-//! R5: who runs, and for how long someone else should have.
+//! R5: which instance runs, and for how long another one should have.
 
 use super::*;
 
