@@ -7,7 +7,7 @@ use alloc::sync::Arc;
 
 use sched_dag::{Dag, DagId, DagStatistics, Moment, Observer, Scheduler, TaskSet};
 
-use super::{Event, cluster, divided};
+use super::{Occasion, cluster, divided};
 use crate::machine::clock;
 use crate::machine::timer::{self, Alarm};
 
@@ -126,8 +126,8 @@ pub fn control(control: Control) {
     let Some(execution) = place.as_mut() else {
         return;
     };
-    let event = Event::Control(control);
-    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), event));
+    let occasion = Occasion::Control(control);
+    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), occasion));
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.

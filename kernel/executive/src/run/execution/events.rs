@@ -14,7 +14,7 @@ use super::runner::Runner;
 use super::status::note_running;
 use super::step::Ended;
 use super::time::{instance_time_ns, seat, since_epoch};
-use super::{Event, Work, cluster};
+use super::{Occasion, Work, cluster};
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::{clock, section, this_core, turns};
@@ -62,14 +62,14 @@ pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     if execution.may_hand_off && execution.signals.are_none() {
         match execution.hand_off(core, vertex) {
             Ended::HandedOff(successor) => return Work::Run(successor),
-            Ended::Open => woken = Some(execution.step(finish_ns, Event::Time)),
+            Ended::Open => woken = Some(execution.step(finish_ns, Occasion::Time)),
             Ended::WithNews => woken = Some(execution.announce()),
             Ended::Quiet => {}
         }
     } else {
         execution.watcher.settle(here);
         let instance = execution.scheduler.instance_of(vertex);
-        woken = Some(execution.step(finish_ns, Event::Completed(instance)));
+        woken = Some(execution.step(finish_ns, Occasion::Completed(instance)));
     }
     let work = execution.find_work(core);
     drop(place);
@@ -100,7 +100,7 @@ pub fn fail(now_ns: u64) {
         .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
     edge::failed(instance, ended_ns);
-    let woken = execution.step(now_ns, Event::Failed(instance));
+    let woken = execution.step(now_ns, Occasion::Failed(instance));
     drop(place);
     woken.wake();
 }
@@ -116,7 +116,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     };
     let mut woken = CoreSet::default();
     if is_event || cluster.may_have_letters() {
-        woken = execution.step(now_ns, Event::Time);
+        woken = execution.step(now_ns, Occasion::Time);
     }
     if !section::puts_off(core, now_ns)
         && let Some(waiting) = execution.follow(interrupted, now_ns)

@@ -63,7 +63,7 @@ pub enum Work {
 }
 
 /// What a step of the scheduler is about, besides the time.
-enum Event {
+enum Occasion {
     /// A release or a deadline is due.
     Time,
     /// The instance has finished.

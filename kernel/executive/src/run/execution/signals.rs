@@ -17,7 +17,7 @@ use super::cluster::MAY_DIVIDE;
 use super::core_set::CoreSet;
 use super::letters::{self, Letters};
 use super::watcher::Watcher;
-use super::{Event, Execution, cluster, divided, status};
+use super::{Execution, Occasion, cluster, divided, status};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, this_core};
 
@@ -157,8 +157,8 @@ pub fn raise_in_interrupt(plan: u64, dag: DagId) {
         execution.signals.requests.keep(Request::Signal(dag));
         return;
     }
-    let event = Event::Signalled(dag);
-    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), event));
+    let occasion = Occasion::Signalled(dag);
+    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), occasion));
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.

@@ -13,7 +13,7 @@ use super::core_set::CoreSet;
 use super::runner::Runner;
 use super::status::note_running;
 use super::time::{here, instance_time_ns, seat, since_epoch};
-use super::{EPOCH_NS, Event, Execution, Work, letters};
+use super::{EPOCH_NS, Execution, Occasion, Work, letters};
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
@@ -83,7 +83,7 @@ impl Execution {
 
     /// Makes one step of the scheduler and returns which other cores have to
     /// look at what they should run.
-    pub(super) fn step(&mut self, now_ns: u64, event: Event) -> CoreSet {
+    pub(super) fn step(&mut self, now_ns: u64, occasion: Occasion) -> CoreSet {
         let here = here();
         let Self {
             scheduler,
@@ -100,30 +100,30 @@ impl Execution {
         let mut woken = CoreSet::default();
         let instant_ns = since_epoch(now_ns);
         watcher.instant_ns = instant_ns.max(scheduler.now_ns());
-        let is_survived = match event {
-            Event::Failed(failed) if scheduler.survives(failed.dag, failed.job) => {
+        let is_survived = match occasion {
+            Occasion::Failed(failed) if scheduler.survives(failed.dag, failed.job) => {
                 watcher.other(watcher.task_set.vertex(failed)).is_some()
             }
             _ => false,
         };
         let mut moment = scheduler.at(instant_ns);
-        match event {
-            Event::Time => {}
-            Event::Completed(instance) => {
+        match occasion {
+            Occasion::Time => {}
+            Occasion::Completed(instance) => {
                 moment.complete(instance, watcher);
                 signals.send(&mut moment, watcher, &mut woken);
             }
-            Event::Failed(instance) if is_survived => {
+            Occasion::Failed(instance) if is_survived => {
                 moment.fail_replaceable(instance, watcher);
             }
-            Event::Failed(instance) => {
+            Occasion::Failed(instance) => {
                 moment.fail(instance, watcher);
                 if let Some(dag) = signals.after_fault(instance.dag) {
                     signals.pass(dag, &mut moment, watcher, &mut woken);
                 }
             }
-            Event::Signalled(dag) => moment.signal(dag, watcher),
-            Event::Control(control) => control.apply(&mut moment, watcher),
+            Occasion::Signalled(dag) => moment.signal(dag, watcher),
+            Occasion::Control(control) => control.apply(&mut moment, watcher),
         }
         if has_letters {
             letters::take(&signals.letters, signals.cluster, &mut moment, watcher);
