@@ -1,9 +1,9 @@
 //! How much earlier than an instant a thread has to set its alarm, to be awake at that instant.
 //!
 //! From a timer's interrupt to the thread that waits for it Linux takes some tens of
-//! microseconds, in a virtual machine more, and most of it is the same each time. A thread that has nothing else
-//! to do can have it pass before the instant: it wakes up a little early, and watches the clock
-//! for the rest.
+//! microseconds, in a virtual machine more, and most of it is the same each time. A thread that
+//! has nothing else to do can have it pass before the instant: it wakes up a little early, and
+//! watches the clock for the rest.
 
 /// The lead that a thread gives itself, learnt from how late it woke up.
 ///
@@ -25,7 +25,7 @@ impl Lead {
         instant_ns.saturating_sub(self.ns)
     }
 
-    /// Takes note of when a thread woke up whose alarm was set.
+    /// Notes when a thread woke up, and when its alarm was due.
     pub(crate) fn learn(&mut self, alarm_ns: u64, woke_ns: u64) {
         let late_ns = woke_ns.saturating_sub(alarm_ns);
         self.ns = match late_ns > self.ns {

@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn an_instance_at_the_end_of_its_budget_gets_time_to_exceed_it() {
-        // Were it 1 ns, this thread would look for ever, on the core that the instance needs.
+        // Were it 1 ns, this thread would look without end, on the core that the instance needs.
         assert!([0, 1, 100].map(pause_ns).iter().all(|ns| *ns >= 10_000));
         assert_eq!(pause_ns(5_000_000), 5_000_001);
     }

@@ -2,8 +2,8 @@
 //!
 //! Where people can look, this stands in front of what else is done with what crosses. Of the
 //! topic that is watched, a completion copies the value into one room, and the next one takes its
-//! place: a person reads slower than a DAG writes. The console takes it out, and makes its text in its
-//! own time.
+//! place: a person reads slower than a DAG writes. The console takes it out, and
+//! makes its text in its own time.
 
 use alloc::boxed::Box;
 use alloc::string::String;

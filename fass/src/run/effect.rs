@@ -1,9 +1,9 @@
 //! What an instance leaves outside its DAG, held back until it is complete.
 //!
 //! Values on edges need no holding back: their readers are started by the
-//! scheduler, and only after the completion. A latest value and a signal have
-//! readers that ask nobody, and so has a request to the run as a whole. So the function only *prepares* them, and the platform
-//! publishes them when it reports the completion
+//! scheduler, and only after the completion. Latest values, signals and requests to the
+//! run as a whole have readers that do not wait for it. So the function only *prepares*
+//! them, and the platform publishes them when it reports the completion
 //! ([`Body::complete`](crate::Body::complete)): the completion boundary (R3) holds
 //! for them as it does for edges, also in virtual time, where a function has run
 //! long before its instance is complete.

@@ -12,8 +12,8 @@ use crate::report::Ns;
 use crate::report::run::Run;
 use executive::text::json;
 
-/// Names the subtasks of a run whose calls took longer than they may. The commit has reckoned
-/// with these overheads.
+/// Names the subtasks of a run that took longer than their WCET and these overheads, which are
+/// those of the commit.
 pub(crate) fn note(run: &Run, overheads: Overheads) {
     let set = run.task_set();
     let mut subtasks = set.dags().iter().flat_map(|dag| dag.subtasks());

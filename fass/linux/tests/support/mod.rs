@@ -70,8 +70,7 @@ pub(crate) fn ticking(name: &str, jobs: u64, period: Duration, priority: u32, us
 
 /// Returns every breach of R1 to R4, and those of R5 that last for longer than this bound: a
 /// second with SCHED_FIFO, ten without. What should run waits for what Linux and a hypervisor
-/// do, without SCHED_FIFO for other programs besides; and no rule is broken for so long unless
-/// it is broken by us.
+/// do and, without SCHED_FIFO, for other programs. A breach that lasts longer is ours.
 pub(crate) fn breaches(run: &Run) -> Vec<Violation> {
     let bound_ns = match run.options().preemption {
         Preemption::Enabled => 1_000_000_000,

@@ -1,4 +1,4 @@
-//! What a core has to answer that takes no interrupts.
+//! The questions that a core has to answer if it takes no interrupts.
 //!
 //! Another core opens an accusation and sends a non-maskable interrupt, by which the accused
 //! answers. Each accusation is of its own core and is open until that has answered, so each

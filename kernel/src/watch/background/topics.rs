@@ -1,8 +1,8 @@
 //! Topics at the console: `echo TOPIC` shows values as they are completed, `hz TOPIC` how often.
 //!
 //! Values are those of topics that the app records (`Dag::record`). One is shown every
-//! [`BETWEEN_NS`] at most, the latest, with the number of those that were left out. How often a
-//! topic is written the journal knows, of any topic.
+//! [`BETWEEN_NS`] at most, the latest, with the number of those that were left out. The journal
+//! knows how often any topic is written.
 
 use core::fmt::{self, Display};
 use core::sync::atomic::{AtomicU64, Ordering};

@@ -130,8 +130,8 @@ pub fn first_core(number: usize) -> u32 {
     nth(number).core(FIRST_SEAT)
 }
 
-/// Does something as if this core were one of another cluster, whose lock is held: where it has
-/// a seat, if it has one there at all, is counted from that cluster's first core.
+/// Does something as if this core belonged to another cluster, whose lock is held. The core's
+/// seat, if it has one there, is then counted from that cluster's first core.
 pub(super) fn among<R>(cluster: &Cluster, what: impl FnOnce() -> R) -> R {
     let core = this_core::get();
     let own = core.place.load(Ordering::Relaxed);
