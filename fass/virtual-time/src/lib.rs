@@ -3,8 +3,8 @@
 //! For our purposes *virtual time* is a clock that jumps from one event to the next (other
 //! words are in `docs/glossary.md`). The real functions run, with real values on real topics,
 //! under the very scheduler that the kernel uses; only the passing of time is made up: a
-//! function takes no time except where it says so with `fass::execute_for`, or
-//! [`VirtualTime::silent`] does. A second of a DAG's life takes about a millisecond, and
+//! function takes as long as it says with `fass::execute_for`, else its subtask's WCET, or what
+//! [`VirtualTime::silent`] says in place of that. Where neither says anything it takes no time. A second of a DAG's life takes about a millisecond, and
 //! every run of the same DAGs gives the same events at the same nanosecond.
 //!
 //! It is the place to test an app: build the DAGs with the app's own code,
@@ -27,11 +27,12 @@
 //!   If the instance is preempted in virtual time, its function has long
 //!   returned; `fass::now_ns` inside it counts as if it were not preempted.
 //! - The kernel's own overheads are zero. (The commit's answers can include
-//!   them: [`VirtualTime::overheads`].)
+//!   them: [`VirtualTime::overheads`]. Interrupts can be [late](VirtualTime::late).)
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
 mod command;
+mod disturbed;
 mod edge;
 mod error;
 mod job;
@@ -66,8 +67,8 @@ pub use silent::Silent;
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///
-/// Made with one core, EDF and preemption; the builder's methods change that
-/// and are to be called before the commit. A thread's newest machine is the one
+/// Made with the machine's defaults, static priorities and preemption, but one core; the
+/// builder's methods change that and are to be called before the commit. A thread's newest machine is the one
 /// that `fass::finish_create_dags` commits to; dropping it removes it.
 ///
 /// # Examples
@@ -200,17 +201,6 @@ impl VirtualTime {
         self
     }
 
-    /// Sets how long a call takes whose function does not say so by `fass::execute_for`:
-    /// no time, unless this says otherwise. What executes counts from the call's start, so
-    /// `fass::now_ns` in the function does not show it.
-    ///
-    /// See [`Silent`].
-    #[must_use = "the machine itself is returned"]
-    pub fn silent(self, silent: Silent) -> Self {
-        self.machine.surroundings.silent.set(silent);
-        self
-    }
-
     /// Contains panics: one in a function ends its DAG only, or costs a job of it
     /// (`Dag::survive_faults`), as on the kernel's machine, instead of failing the run.
     ///
@@ -331,7 +321,8 @@ impl VirtualTime {
 
     /// Runs until every job of every DAG has ended, and reports all that
     /// happened since the commit. (Where DAGs have no last job, that is when a function shuts
-    /// the run down, or never.)
+    /// the run down, or never.) If no call has taken any time, it says so on standard error
+    /// ([`Report::took_no_time`]).
     ///
     /// # Panics
     ///
@@ -339,7 +330,11 @@ impl VirtualTime {
     ///
     /// See [`VirtualTime`].
     pub fn run(&self) -> Report {
-        or_panic(self.try_run())
+        let report = or_panic(self.try_run());
+        if let Some(warning) = report.warning() {
+            eprintln!("{warning}");
+        }
+        report
     }
 
     /// Runs for `duration` of virtual time, including events at its very end,

@@ -60,7 +60,7 @@ pub(crate) fn make_current() -> Rc<Machine> {
         cores: Cell::new(1),
         clusters: RefCell::default(),
         assigns: Cell::new(false),
-        policy: Cell::new(Policy::Edf),
+        policy: Cell::new(Policy::StaticPriority),
         preemption: Cell::new(Preemption::Enabled),
         overheads: Cell::new(Overheads::default()),
         wcets: RefCell::new(None),
@@ -127,7 +127,7 @@ struct HostPlatform;
 
 impl Platform for HostPlatform {
     fn policy(&self) -> Policy {
-        current().map_or(Policy::Edf, |machine| machine.policy.get())
+        current().map_or(Policy::StaticPriority, |machine| machine.policy.get())
     }
 
     fn preemption(&self) -> Preemption {
@@ -228,6 +228,12 @@ impl Platform for HostPlatform {
             ));
         }
         let surroundings = &machine.surroundings;
+        if let Some((dag, subtask)) = surroundings.absent_fault(&plan.task_set) {
+            return Err(LaunchError::new(format!(
+                "subtask `{subtask}` of dag `{dag}`, which is to fail, is not in the commit; \
+                 name one that is"
+            )));
+        }
         let signals = surroundings
             .edge
             .launch(&mut plan)

@@ -65,6 +65,8 @@ pub struct Report {
     pub divergence: Option<Divergence>,
     pub(crate) task_set: Arc<TaskSet>,
     pub(crate) options: SchedulerOptions,
+    /// Whether interrupts may have been late.
+    pub(crate) is_late: bool,
 }
 
 impl Report {
@@ -101,6 +103,17 @@ impl Report {
     #[must_use]
     pub fn took_no_time(&self) -> bool {
         self.instances.iter().all(|record| record.execution_ns == 0)
+    }
+
+    /// Returns what to tell people if nothing follows from the times.
+    pub(crate) fn warning(&self) -> Option<String> {
+        let calls = self.instances.len();
+        (calls > 0 && self.took_no_time()).then(|| {
+            format!(
+                "virtual time: no call of {calls} took any time, so response times and deadlines \
+                 say nothing; state WCETs, or call `fass::execute_for`"
+            )
+        })
     }
 
     /// Returns the verified model that ran.
@@ -148,7 +161,8 @@ impl Report {
         let mut events = self.events.clone();
         events.sort_by_key(|event| event.time_ns);
         let events = events.iter().copied();
-        let (task_set, terms) = (&self.task_set, Terms::EXACT);
+        // With any tolerance it is not judged how late a timer is.
+        let (task_set, terms) = (&self.task_set, Terms::whole(self.is_late.into()));
         let mut found = law::violations(task_set, terms, events.clone());
         let of_dispatch = law::dispatch_violations(task_set, &self.options, terms, events);
         found.extend(of_dispatch);
@@ -262,5 +276,30 @@ impl Report {
             panic!("dag `{dag}` has no subtask `{subtask}`");
         }
         panic!("there is no dag `{dag}`");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+
+    use crate::VirtualTime;
+
+    #[test]
+    fn a_run_in_which_no_time_passes_is_told() {
+        let warning = |attributes: SubtaskAttributes| {
+            let machine = VirtualTime::new();
+            let (dag, period) = (create_dag(), Duration::from_millis(10));
+            dag.period(period).relative_deadline(period).jobs(3);
+            dag.register_untyped_subtask(|_| (), attributes);
+            finish_create_dags(&[dag]).expect("the DAG is right");
+            machine.run().warning()
+        };
+        let tick = SubtaskAttributes::named("tick");
+        let said = warning(tick.clone()).expect("nothing took any time");
+        assert!(said.contains("no call of 3 took any time"), "{said}");
+        assert_eq!(warning(tick.wcet(Duration::from_millis(1))), None);
     }
 }

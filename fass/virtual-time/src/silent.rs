@@ -2,8 +2,10 @@
 
 use sched_dag::Instance;
 
+use crate::VirtualTime;
+
 /// The time that a call takes if its function executes nothing by `fass::execute_for`, and
-/// the subtask has a WCET.
+/// the subtask has a WCET. Without one it takes none.
 ///
 /// ```
 /// use std::time::Duration;
@@ -28,9 +30,9 @@ use sched_dag::Instance;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Silent {
     /// None.
-    #[default]
     NoTime,
     /// Its WCET: stated, or observed ([`VirtualTime::wcets`](crate::VirtualTime::wcets)).
+    #[default]
     Wcet,
     /// A time from 1 ns to the WCET, drawn uniformly. It follows from the seed and the
     /// instance alone.
@@ -56,15 +58,34 @@ impl Silent {
                 let drawn = numbers
                     .into_iter()
                     .fold(mix(seed), |drawn, n| mix(drawn ^ n));
-                let scaled = (u128::from(drawn) * u128::from(wcet_ns)) >> 64;
-                u64::try_from(scaled).map_or(wcet_ns, |ns| (ns + 1).min(wcet_ns))
+                (share(drawn, wcet_ns) + 1).min(wcet_ns)
             }
         }
     }
 }
 
+impl VirtualTime {
+    /// Sets how long a call takes whose function does not say so by `fass::execute_for`: its
+    /// WCET, unless this says otherwise. What executes counts from the call's start, so
+    /// `fass::now_ns` in the function does not show it.
+    ///
+    /// See [`Silent`].
+    #[must_use = "the machine itself is returned"]
+    pub fn silent(self, silent: Silent) -> Self {
+        self.machine.surroundings.silent.set(silent);
+        self
+    }
+}
+
+/// Returns a number below `end`, which is as far from 0 as `drawn` is among all numbers; 0 if
+/// there is none below.
+pub(crate) fn share(drawn: u64, end: u64) -> u64 {
+    // The upper half of a product is less than each factor.
+    u64::try_from((u128::from(drawn) * u128::from(end)) >> 64).unwrap_or(0)
+}
+
 /// The step of the generator SplitMix64 (Steele, Lea and Flood 2014).
-fn mix(state: u64) -> u64 {
+pub(crate) fn mix(state: u64) -> u64 {
     let z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use sched_dag::DagId;
 use sched_dag::lifecycle::Request;
 
+use crate::disturbed::{Fault, Late};
 use crate::edge::Edge;
 use crate::silent::Silent;
 use crate::wires::Wires;
@@ -15,6 +16,10 @@ use crate::wires::Wires;
 pub(crate) struct Surroundings {
     /// How long calls take that do not say.
     pub(crate) silent: Cell<Silent>,
+    /// How late interrupts are.
+    pub(crate) late: Cell<Late>,
+    /// The calls that fail.
+    pub(crate) faults: RefCell<Vec<Fault>>,
     /// What is recorded and replayed.
     pub(crate) edge: Edge,
     /// Bytes on their way in and out.

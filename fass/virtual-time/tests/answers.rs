@@ -108,7 +108,7 @@ fn the_answer_is_for_the_preemption_and_the_cores_of_the_platform() {
 
 #[test]
 fn not_proven_is_accepted_and_says_why() {
-    let machine = VirtualTime::new();
+    let machine = VirtualTime::new().policy(Policy::Edf);
     let late = chain("late", ms(10), ms(4), [ms(2), ms(1)]);
     let busy = chain("busy", ms(10), ms(9), [ms(3), ms(3)]);
     let commit = finish_create_dags(&[late, busy]).expect("a proof is not demanded");
@@ -132,7 +132,7 @@ fn not_proven_is_accepted_and_says_why() {
 
 #[test]
 fn a_demanded_proof_that_is_missing_refuses_the_commit() {
-    let machine = VirtualTime::new();
+    let machine = VirtualTime::new().policy(Policy::Edf);
     let late = chain("late", ms(10), ms(4), [ms(2), ms(1)]);
     let busy = chain("busy", ms(10), ms(9), [ms(3), ms(3)]);
     busy.demand_proof();
@@ -190,6 +190,24 @@ fn dags_without_all_wcets_say_so() {
             .first_unproven()
             .map(|answer| answer.dag.name.as_str()),
         Some("unknown")
+    );
+}
+
+#[test]
+fn an_answer_says_which_wcets_are_observed_ones() {
+    let said_and_hash = |machine: VirtualTime| {
+        let dag = chain("seen", ms(10), ms(9), [ms(3), ms(3)]);
+        let commit = finish_create_dags(&[dag]).expect("the DAG is right");
+        let hash = machine.run().task_set().dags()[0].graph_hash();
+        (texts(commit.answers()).remove(0), hash)
+    };
+    let (stated, hash) = said_and_hash(VirtualTime::new());
+    assert_eq!(stated, "dag `seen` takes at most 6ms, by multiple paths");
+    let file = format!("margin 20\ndag {hash} seen\nwcet 1200000 1 sink\nend\n");
+    let (observed, _) = said_and_hash(VirtualTime::new().wcets(&file));
+    assert_eq!(
+        observed,
+        "dag `seen` takes at most 4.2ms, by multiple paths; 1 of 2 WCETs are observed ones and 20 %"
     );
 }
 

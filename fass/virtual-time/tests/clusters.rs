@@ -2,7 +2,7 @@
 
 mod support;
 
-use fass::{ConstructionPolicy, Dag, Latest, Raiser, Sample};
+use fass::{ConstructionPolicy, Dag, Latest, Policy, Raiser, Sample};
 use fass::{create_dag, finish_create_dags, finish_create_dags_with};
 use support::sharing::{Seen, ms, named, taking, work};
 use virtual_time::{CoreId, VirtualTime};
@@ -19,7 +19,10 @@ fn busy(name: &str, cluster: u32, work_ms: u64, jobs: u64) -> Dag {
 #[test]
 fn an_overload_in_one_cluster_leaves_the_other_alone() {
     let run = |overload_ms| {
-        let machine = VirtualTime::new().cores(3).clusters(&[1, 2]);
+        let machine = VirtualTime::new()
+            .cores(3)
+            .clusters(&[1, 2])
+            .policy(Policy::Edf);
         let calm = busy("calm", 0, 6, 20);
         let loads = ["one", "two", "three"].map(|name| busy(name, 1, overload_ms, 20));
         let commit = finish_create_dags(&[&[calm][..], &loads].concat()).unwrap();

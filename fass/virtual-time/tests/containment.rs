@@ -2,7 +2,7 @@
 
 mod support;
 
-use fass::{Dag, OverrunPolicy, Unique, create_dag};
+use fass::{Dag, FaultLimit, OverrunPolicy, Unique, create_dag, finish_create_dags};
 use support::{commit, diamond, execute, ms, named, pair};
 use virtual_time::{Instance, JobOutcome, Report, VirtualTime};
 
@@ -193,4 +193,36 @@ fn values_that_wait_for_a_broken_body_do_no_harm() {
         (3, 3, 1)
     );
     assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn a_call_that_is_to_fail_does_so_in_place_of_its_function() {
+    let machine = VirtualTime::new().fault("pair", "sink", 1);
+    let dag = create_dag();
+    dag.name("pair").jobs(4).survive_faults(FaultLimit {
+        faults: 1,
+        window: 4,
+        in_all: 1,
+    });
+    dag.register_periodic_subtask(|| (1,), vec!["number"], ms(10), named("source"));
+    dag.restarting(|| |_: (i32,)| execute(ms(1)))
+        .register_sink_subtask(vec!["number"], ms(10), named("sink").wcet(ms(2)));
+    commit(&[dag]);
+    let report = machine.run();
+    let outcomes: Vec<_> = report.jobs.iter().map(|job| job.outcome).collect();
+    let met = Some(JobOutcome::Met);
+    assert_eq!(outcomes, [met, Some(JobOutcome::Failed), met, met]);
+    assert_eq!(report.panics[0].message, "a fault that was asked for");
+    let failed = (report.instance(report.panics[0].instance)).expect("it was ready");
+    assert_eq!(failed.execution_ns, 2 * MS);
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
+fn a_call_that_is_to_fail_must_be_in_the_commit() {
+    let _machine = VirtualTime::new().fault("healthy", "drain", 1);
+    let said = finish_create_dags(&[healthy()]).expect_err("no such subtask");
+    let expected = "subtask `drain` of dag `healthy`, which is to fail, is not in the commit; \
+                    name one that is";
+    assert!(said.to_string().contains(expected), "{said}");
 }

@@ -10,10 +10,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
 use fass::{
-    Dag, OverrunPolicy, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags,
+    Commit, Dag, OverrunPolicy, Policy, Preemption, SubtaskAttributes, create_dag,
+    finish_create_dags,
 };
 use support::execute;
-use virtual_time::VirtualTime;
+use virtual_time::{Report, VirtualTime};
 
 const CASES: u64 = 400;
 
@@ -150,13 +151,14 @@ fn random_dag(random: &mut Random, name: &str) -> Dag {
     dag
 }
 
-/// Runs a case and returns how many of its DAGs were proven.
-fn case(seed: u64) -> usize {
+/// Runs a case, with interrupts that are late by up to so many nanoseconds.
+fn run(seed: u64, late_ns: u64) -> (Commit, Report) {
     let mut random = Random::new(seed);
     let machine = VirtualTime::new()
         .cores(random.pick(&[1, 2, 3, 4, 8]))
         .policy(random.pick(&[Policy::Edf, Policy::StaticPriority]))
-        .preemption(random.pick(&[Preemption::Enabled, Preemption::Disabled]));
+        .preemption(random.pick(&[Preemption::Enabled, Preemption::Disabled]))
+        .late(Duration::from_nanos(late_ns), seed);
     let names = ["first", "second", "third"];
     let count = 1 + random.below(names.len());
     let dags: Vec<Dag> = (names[..count].iter())
@@ -166,10 +168,18 @@ fn case(seed: u64) -> usize {
     let report = machine.run();
     let violations = report.violations();
     assert!(violations.is_empty(), "{}", violations[0]);
-    let mut proven = 0;
-    for (statistics, answer) in report.statistics.iter().zip(commit.answers()) {
+    for statistics in &report.statistics {
         let ended = statistics.completed + statistics.aborts + statistics.skips;
         assert_eq!(ended, 25, "{statistics:?}");
+    }
+    (commit, report)
+}
+
+/// Runs a case without late interrupts and returns how many of its DAGs were proven.
+fn case(seed: u64) -> usize {
+    let (commit, report) = run(seed, 0);
+    let mut proven = 0;
+    for (statistics, answer) in report.statistics.iter().zip(commit.answers()) {
         let Some(bound) = answer.verdict.bound() else {
             continue;
         };
@@ -198,4 +208,18 @@ fn random_dags_keep_the_rules_and_the_bounds() {
     }
     println!("{proven} DAGs of {CASES} commits were proven");
     assert!(proven > 50, "only {proven} bounds were put to the test");
+}
+
+#[test]
+fn random_dags_keep_the_rules_where_interrupts_are_late() {
+    let mut latest_ns = 0;
+    for seed in 0..CASES / 4 {
+        let (_, report) = run(seed, 100_000);
+        let late_ns = report
+            .jobs
+            .iter()
+            .map(|job| job.released_at_ns - job.release_ns);
+        latest_ns = late_ns.max().unwrap_or(0).max(latest_ns);
+    }
+    assert!(latest_ns > 50_000, "{latest_ns} ns at most");
 }

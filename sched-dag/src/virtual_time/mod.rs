@@ -95,6 +95,13 @@ pub trait Workload: Observer {
         self.take_signal(now_ns).map(Request::Signal)
     }
 
+    /// Returns how late the timer's interrupt is that is due then; what comes before it at the
+    /// scheduler does what is due. Asked several times for one interrupt.
+    fn late_ns(&self, due_ns: u64) -> u64 {
+        let _ = due_ns;
+        0
+    }
+
     /// Reports whether the run is to stop, though jobs are left. Asked before each
     /// instant.
     fn stops(&self) -> bool {
@@ -226,7 +233,11 @@ impl VirtualTime {
     pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload) -> End {
         while !workload.stops() {
             let of_scheduler = |cluster: &Cluster| cluster.scheduler.next_event_ns();
-            let scheduler_ns = self.clusters.iter().filter_map(of_scheduler).min();
+            let due = self.clusters.iter().filter_map(of_scheduler);
+            // The time may have passed the due one already, by another event.
+            let interrupts = due
+                .map(|due_ns| (due_ns.saturating_add(workload.late_ns(due_ns))).max(self.now_ns));
+            let scheduler_ns = interrupts.min();
             let signal_ns = workload.next_signal_ns();
             let signal_ns = signal_ns.map(|signal_ns| signal_ns.max(self.now_ns));
             let events = [self.next_finish_ns(), scheduler_ns, signal_ns];

@@ -34,6 +34,8 @@ pub(crate) struct Session {
     bodies: Vec<Vec<Body>>,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
+    /// Whether interrupts may be late.
+    is_late: bool,
     /// What replaces them after faults.
     others: Vec<Vec<Vec<Body>>>,
     recording: Recording,
@@ -46,6 +48,7 @@ impl Session {
             may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
             driver: Driver::of_clusters(&task_set, options).with_lifecycle(plan.lifecycle),
             options,
+            is_late: false,
             recording: Recording {
                 journal: Recorder::new(Arc::clone(&task_set)),
                 executed_ns: BTreeMap::new(),
@@ -80,6 +83,7 @@ impl Session {
         machine: &Surroundings,
         duration: Option<Duration>,
     ) -> Result<Report, RunError> {
+        self.is_late |= machine.late.get().most_ns > 0;
         let until = machine.until.get();
         let until_ns = match duration {
             Some(duration) => {
@@ -208,6 +212,7 @@ impl Session {
             divergence,
             task_set: Arc::clone(&self.task_set),
             options: self.options,
+            is_late: self.is_late,
         };
         report.look_at_events(&self.recording.executed_ns);
         report

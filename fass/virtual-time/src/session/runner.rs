@@ -1,7 +1,7 @@
 //! What a run does when its driver says so: bodies run, all else is written down.
 
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use fass::Body;
 use sched_dag::Recorder;
@@ -12,6 +12,9 @@ use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, TaskSet};
 
 use crate::record::PanicRecord;
 use crate::surroundings::Surroundings;
+
+/// The message of a fault that a test asked for.
+const FAULT: &str = "a fault that was asked for";
 
 /// What is written down of a run.
 #[derive(Debug)]
@@ -85,13 +88,20 @@ impl Workload for Runner<'_> {
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
         machine.edge.begin(instance);
+        let fails = machine.fails(instance, self.task_set);
         let body = self.body(instance);
         // Unwind safety: a body that panicked is never run again, and the
         // machine's cells hold plain numbers.
-        let result = catch_unwind(AssertUnwindSafe(|| body.run(instance.job)));
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            if fails {
+                body.discard(instance.job);
+                resume_unwind(Box::new(FAULT));
+            }
+            body.run(instance.job);
+        }));
         machine.edge.end(instance, now_ns);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
-        if executed_ns == 0 && result.is_ok() {
+        if executed_ns == 0 && (result.is_ok() || fails) {
             let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
             executed_ns = machine.silent.get().of_call_ns(instance, subtask.wcet_ns());
         }
@@ -142,6 +152,10 @@ impl Workload for Runner<'_> {
 
     fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
         self.recording.journal.on_core(What::Resume, instance, core);
+    }
+
+    fn late_ns(&self, due_ns: u64) -> u64 {
+        self.machine.late.get().of_interrupt_ns(due_ns)
     }
 
     fn stops(&self) -> bool {
