@@ -272,6 +272,9 @@ fn every_reason_of_a_platform_is_listed() {
     let sources = sources(&[
         "kernel/executive/src/run/execution/mod.rs",
         "fass/virtual-time/src/platform.rs",
+        "fass/src/commit/added.rs",
+        "fass/virtual-time/src/additions.rs",
+        "fass/virtual-time/src/session/adding.rs",
         "fass/native/src/platform.rs",
         "fass/linux/src/platform.rs",
     ]);

@@ -339,7 +339,7 @@ impl Dag {
     pub(crate) fn open(&self) -> RefMut<'_, Draft> {
         let draft = self.draft.borrow_mut();
         assert!(
-            !draft.is_committed,
+            draft.committed.is_none(),
             "dag `{}` is committed and cannot be changed; build a new DAG and commit that",
             draft.spec.name
         );

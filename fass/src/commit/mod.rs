@@ -11,11 +11,15 @@
 //!    the commit as a fault does.
 //! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 5. *Launch.* The platform takes the plan.
+//!
+//! A commit of DAGs that are added to a run (`added`) goes the same way, with the answer about all.
 
+pub(crate) mod added;
 pub(crate) mod answer;
 pub(crate) mod assign;
 pub(crate) mod chains;
 mod count;
+mod demands;
 pub(crate) mod error;
 pub(crate) mod fault;
 mod missing;
@@ -35,9 +39,10 @@ use crate::api::dag::Dag;
 use crate::platform;
 use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
+use demands::{demands_of, lacking_proofs};
 use error::CommitError;
 use fault::Fault;
-use tie::tie;
+use tie::{next_plan, tie};
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
 ///
@@ -149,19 +154,30 @@ pub fn finish_create_dags_with(
     let answers = Answers::new(&task_set, platform);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
-    let faults = lacking_proofs(dags, &answers);
+    let demands = demands_of(dags);
+    let faults = lacking_proofs(&demands, &answers);
     if !faults.is_empty() {
         return Err(CommitError { faults, warnings });
     }
     let staleness = staleness::of_all(dags, &task_set, &answers.of_dags);
     let task_set = Arc::new(task_set);
-    let plan = tie(dags, Arc::clone(&task_set), &answers, staleness.clone());
+    let number = next_plan();
+    let plan = tie(
+        dags,
+        (number, 0),
+        Arc::clone(&task_set),
+        &answers,
+        staleness.clone(),
+    );
     match platform.launch(plan) {
         Ok(()) => Ok(Commit {
             warnings,
             answers,
             staleness,
-            task_set,
+            task_set: Arc::clone(&task_set),
+            answered: task_set,
+            number,
+            demands,
         }),
         Err(error) => Err(CommitError {
             faults: Vec::from([Fault::NotLaunched(error)]),
@@ -196,6 +212,12 @@ pub struct Commit {
     answers: Answers,
     staleness: Vec<Staleness>,
     task_set: Arc<TaskSet>,
+    /// Those DAGs that the answers were made about.
+    answered: Arc<TaskSet>,
+    /// The plan's number.
+    number: u64,
+    /// By DAG, whether it demands a proof.
+    demands: Vec<bool>,
 }
 
 impl Commit {
@@ -261,7 +283,7 @@ impl Commit {
     /// ```
     #[must_use]
     pub fn witnesses(&self) -> String {
-        self.answers.witness(&self.task_set)
+        self.answers.witness(&self.answered)
     }
 
     /// Returns for each subtask that samples a latest value, in the order of the
@@ -295,19 +317,6 @@ impl Commit {
     }
 }
 
-/// Returns a fault for each DAG that demands a proof and has none.
-fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
-    let demanding =
-        (dags.iter().zip(&answers.of_dags)).filter(|(dag, _)| dag.draft.borrow().demands_proof);
-    let lacking = demanding.filter_map(|(_, answer)| {
-        Some(Fault::NotProven {
-            dag: answer.dag.clone(),
-            unproven: answer.verdict.unproven()?.clone(),
-        })
-    });
-    lacking.collect()
-}
-
 /// Verifies all DAGs, and collects the faults of both crates.
 fn verify(
     dags: &[Dag],
@@ -327,7 +336,7 @@ fn verify(
             faults.push(Fault::GivenTwice { dag: label });
             continue;
         }
-        if draft.is_committed {
+        if draft.committed.is_some() {
             faults.push(Fault::AlreadyCommitted { dag: label });
             continue;
         }

@@ -31,19 +31,22 @@ pub(crate) fn of_all(dags: &[Dag], task_set: &TaskSet, answers: &[Answer]) -> Ve
                 continue;
             };
             let model = &task_set.dags()[writer];
-            let period = Duration::from_nanos(model.period_ns());
-            let response = answers[writer].verdict.bound();
-            let bound = response.filter(|_| !model.is_sporadic());
             found.push(Staleness {
                 reader_dag: reader.dag.clone(),
                 reader: label_of(dag, *subtask),
                 writer_dag: answers[writer].dag.clone(),
                 topic: latest.topic().into(),
-                bound: bound.and_then(|response| period.checked_add(response)),
+                bound: bound(model, &answers[writer]),
             });
         }
     }
     found
+}
+
+/// Returns how old a value of a DAG can be, by the answer about that.
+pub(crate) fn bound(writer: &sched_dag::Dag, answer: &Answer) -> Option<Duration> {
+    let response = answer.verdict.bound().filter(|_| !writer.is_sporadic())?;
+    Duration::from_nanos(writer.period_ns()).checked_add(response)
 }
 
 /// Returns the position of the DAG whose topic a latest value is of.

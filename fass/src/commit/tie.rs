@@ -24,81 +24,90 @@ use crate::run::topic::Wiring;
 /// The plans made so far.
 static PLANS: AtomicU64 = AtomicU64::new(0);
 
-/// Turns verified DAGs into a plan, and closes their handles.
+/// Returns the number of a new plan.
+pub(crate) fn next_plan() -> u64 {
+    PLANS.fetch_add(1, Ordering::Relaxed) + 1
+}
+
+/// Turns verified DAGs into the plan of a number, in which they stand from the place `first` on,
+/// and closes their handles.
 pub(crate) fn tie(
     dags: &[Dag],
+    (number, first): (u64, u32),
     task_set: Arc<TaskSet>,
     answers: &Answers,
     staleness: Vec<Staleness>,
 ) -> Plan {
-    let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
     let recorded = dags
         .iter()
         .map(|dag| core::mem::take(&mut dag.draft.borrow_mut().recorded));
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
     let (mut channels, mut samplers) = (0, Vec::new());
-    let (bodies, others) = ((0..).map(DagId).zip(dags).zip(task_set.dags()))
-        .map(|((id, dag), verified)| {
-            let (spec, make_bodies, latest, effects, resets) = {
-                let mut draft = dag.draft.borrow_mut();
-                draft.is_committed = true;
-                let name = draft.spec.name.clone();
-                let named = DagSpec {
-                    name,
-                    ..DagSpec::default()
-                };
-                let spec = core::mem::replace(&mut draft.spec, named);
-                if let Some(target) = &draft.target {
-                    target.set(number, id);
+    let (bodies, others) = ((first..)
+        .map(DagId)
+        .zip(dags)
+        .zip(task_set.dags())
+        .zip(&recorded))
+    .map(|(((id, dag), verified), of_dag)| {
+        let (spec, make_bodies, latest, effects, resets) = {
+            let mut draft = dag.draft.borrow_mut();
+            draft.committed = Some((number, id));
+            let name = draft.spec.name.clone();
+            let named = DagSpec {
+                name,
+                ..DagSpec::default()
+            };
+            let spec = core::mem::replace(&mut draft.spec, named);
+            if let Some(target) = &draft.target {
+                target.set(number, id);
+            }
+            let effects = core::mem::take(&mut draft.effects);
+            let make_bodies = core::mem::take(&mut draft.make_bodies);
+            let resets = core::mem::take(&mut draft.resets);
+            let latest = draft.latest.clone();
+            (spec, make_bodies, latest, effects, resets)
+        };
+        let lines = any.map(|any| {
+            let samples = samples(dags, dag, &recorded);
+            any.open_all(of_dag, &samples, (id, &spec), &mut channels)
+        });
+        let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
+        let faults = match verified.on_fault() {
+            OnFault::EndDag => 0,
+            OnFault::DropJob(limit) => limit.in_all,
+        };
+        resets.into_iter().for_each(|provide| provide.1(faults));
+        let mut wiring = Wiring::new(&spec, &latest, slots, faults);
+        let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
+            let any = of_dag.first();
+            any.and_then(|any| any.source(of_dag, &spec, &mut wiring, subtask))
+                .unwrap_or_else(|| make_body(&mut wiring, subtask))
+        };
+        let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
+        let mut others: Vec<Vec<Body>> = bodies.iter().map(|_| Vec::new()).collect();
+        for (subtask, of_subtask) in wiring.others {
+            others[subtask] = of_subtask;
+        }
+        for (subtask, effect) in effects {
+            bodies[subtask].add_effects([effect]);
+        }
+        for latest in latest {
+            let writes = |subtask: &SubtaskSpec| {
+                (subtask.outputs.iter()).any(|port| port.topic == latest.topic())
+            };
+            if let Some(writer) = spec.subtasks.iter().position(writes) {
+                for body in others[writer].iter_mut().chain([&mut bodies[writer]]) {
+                    body.add_effects(latest.effects());
                 }
-                let effects = core::mem::take(&mut draft.effects);
-                let make_bodies = core::mem::take(&mut draft.make_bodies);
-                let resets = core::mem::take(&mut draft.resets);
-                let latest = draft.latest.clone();
-                (spec, make_bodies, latest, effects, resets)
-            };
-            let of_dag = &recorded[id.index()];
-            let lines = any.map(|any| {
-                let samples = samples(dags, dag, &recorded);
-                any.open_all(of_dag, &samples, (id, &spec), &mut channels)
-            });
-            let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
-            let faults = match verified.on_fault() {
-                OnFault::EndDag => 0,
-                OnFault::DropJob(limit) => limit.in_all,
-            };
-            resets.into_iter().for_each(|provide| provide.1(faults));
-            let mut wiring = Wiring::new(&spec, &latest, slots, faults);
-            let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
-                let any = of_dag.first();
-                any.and_then(|any| any.source(of_dag, &spec, &mut wiring, subtask))
-                    .unwrap_or_else(|| make_body(&mut wiring, subtask))
-            };
-            let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
-            let mut others: Vec<Vec<Body>> = bodies.iter().map(|_| Vec::new()).collect();
-            for (subtask, of_subtask) in wiring.others {
-                others[subtask] = of_subtask;
             }
-            for (subtask, effect) in effects {
-                bodies[subtask].add_effects([effect]);
-            }
-            for latest in latest {
-                let writes = |subtask: &SubtaskSpec| {
-                    (subtask.outputs.iter()).any(|port| port.topic == latest.topic())
-                };
-                if let Some(writer) = spec.subtasks.iter().position(writes) {
-                    for body in others[writer].iter_mut().chain([&mut bodies[writer]]) {
-                        body.add_effects(latest.effects());
-                    }
-                }
-            }
-            if let (Some(any), Some(lines)) = (any, lines) {
-                any.attach(lines, (id, &mut bodies), &mut samplers);
-            }
-            (bodies, others)
-        })
-        .unzip();
+        }
+        if let (Some(any), Some(lines)) = (any, lines) {
+            any.attach(lines, (id, &mut bodies), &mut samplers);
+        }
+        (bodies, others)
+    })
+    .unzip();
     let handler = |dag: &Dag| Some(dag.draft.borrow().on_fault.as_ref()?.get()?.1);
     Plan {
         task_set,

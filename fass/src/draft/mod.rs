@@ -21,7 +21,7 @@ use core::fmt;
 use core::time::Duration;
 
 use sched_dag::lifecycle::Lifecycle;
-use sched_dag::{Activation, DagSpec, LatestSpec, Priority, SubtaskId};
+use sched_dag::{Activation, DagId, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
 use crate::run::effect::Effect;
@@ -47,7 +47,8 @@ pub(crate) struct Draft {
     pub(crate) make_bodies: Vec<MakeBody>,
     /// What only this crate can find wrong.
     pub(crate) flaws: Vec<Flaw>,
-    pub(crate) is_committed: bool,
+    /// The number of its plan, and its own there, once it is committed.
+    pub(crate) committed: Option<(u64, DagId)>,
     /// Whether the relative deadline is the DAG's own, rather than its sinks' longest.
     pub(crate) states_deadline: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
@@ -328,7 +329,7 @@ impl fmt::Debug for Draft {
         f.debug_struct("Draft")
             .field("spec", &self.spec)
             .field("flaws", &self.flaws)
-            .field("is_committed", &self.is_committed)
+            .field("committed", &self.committed)
             .finish_non_exhaustive()
     }
 }

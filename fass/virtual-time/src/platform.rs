@@ -13,7 +13,8 @@ use std::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
+    Additions, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
+    Recorded,
 };
 
 use recording::Channel;
@@ -39,9 +40,9 @@ pub(crate) struct Machine {
     pub(crate) wcets: RefCell<Option<String>>,
     /// What it shares with its run.
     pub(crate) surroundings: Surroundings,
-    session: RefCell<Option<Session>>,
+    pub(crate) session: RefCell<Option<Session>>,
     /// The number of the launched plan.
-    plan: Cell<Option<u64>>,
+    pub(crate) plan: Cell<Option<u64>>,
     has_launched: Cell<bool>,
 }
 
@@ -123,7 +124,7 @@ impl Machine {
 }
 
 /// The installed platform, which has no state of its own.
-struct HostPlatform;
+pub(crate) struct HostPlatform;
 
 impl Platform for HostPlatform {
     fn policy(&self) -> Policy {
@@ -215,6 +216,10 @@ impl Platform for HostPlatform {
         expect_current().surroundings.edge.lend(channel, job, take);
     }
 
+    fn additions(&self) -> Option<&dyn Additions> {
+        Some(self)
+    }
+
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
         let Some(machine) = current() else {
             return Err(LaunchError::new(
@@ -253,7 +258,7 @@ impl Platform for HostPlatform {
     }
 }
 
-fn current() -> Option<Rc<Machine>> {
+pub(crate) fn current() -> Option<Rc<Machine>> {
     CURRENT.with_borrow(Weak::upgrade)
 }
 

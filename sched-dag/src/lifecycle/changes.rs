@@ -53,6 +53,10 @@ impl Lifecycle for Changes {
         self.paused.retain(|&other| other != dag);
     }
 
+    fn add(&mut self, dag: DagId) {
+        self.dags.push(dag);
+    }
+
     fn may_shut_down(&self) -> bool {
         self.may_shut_down
     }

@@ -66,6 +66,9 @@ pub trait Lifecycle: fmt::Debug + Send {
     /// Leaves a DAG alone from now on (L6).
     fn leave_alone(&mut self, dag: DagId);
 
+    /// Takes note of a DAG that is added to the run (A1 to A4): a shutdown closes it, too.
+    fn add(&mut self, dag: DagId);
+
     /// Reports whether a function may ask for the end of the run.
     fn may_shut_down(&self) -> bool;
 }

@@ -5,6 +5,8 @@
 //! commits its DAGs. The commit asks it for the policy and the cores to verify
 //! against, and leaves the [`Plan`] with it.
 
+mod additions;
+
 use alloc::borrow::Cow;
 use alloc::string::String;
 use core::fmt;
@@ -18,6 +20,8 @@ use crate::edge::Begin;
 use crate::run::cell::SetOnce;
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
+
+pub use additions::Additions;
 
 static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
 
@@ -178,6 +182,11 @@ pub trait Platform: Sync {
     /// Lends the recorded value of a channel and a job to `take`, if there is one.
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         let _ = (channel, job, take);
+    }
+
+    /// Returns what takes DAGs during a run; a platform that takes none does not define this.
+    fn additions(&self) -> Option<&dyn Additions> {
+        None
     }
 
     /// Takes a plan over. Its first release is the platform's to time.
