@@ -83,7 +83,9 @@ fn e5_intra_task_priorities() {
         (observed(&given), intra_task(&task, &given, 2)),
         (64, Some(70))
     );
+    assert_eq!(multi_path(&task, 2), Some(66));
     let assigned = assign_intra_task(&task).unwrap();
+    assert_eq!(assigned, [0, 1, 3, 4, 5, 2, 6, 7]);
     assert_eq!(
         (observed(&assigned), intra_task(&task, &assigned, 2)),
         (59, Some(65))
