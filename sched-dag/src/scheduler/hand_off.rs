@@ -7,7 +7,7 @@
 //! without a list of decisions. Where more is to be decided it says so, and the
 //! driver ends the instant as ever.
 //!
-//! # When one core is all there is to it
+//! # When only one core is concerned
 //!
 //! No release and no deadline is due, and at most one instance has become ready
 //! by the completion, or there is no other core. Before the instant no core was
@@ -126,8 +126,8 @@ impl Scheduler {
         }
     }
 
-    /// Ends the instance on `core`, and gives `taker` the first in line if one core is
-    /// all there is to it: then `core` is not idle yet, and `taker` not taken from the
+    /// Ends the instance on `core`, and gives `taker` the first in line if only one core is
+    /// concerned: then `core` is not idle yet, and `taker` not taken from the
     /// idle ones. If more is to be decided, `core` is idle. Reports whether the observer
     /// has still to be told that the instance given is ready.
     #[inline(always)]

@@ -89,7 +89,7 @@ impl Session {
                     Answer::List(listing) => self.listing = Some(listing),
                     Answer::ShutsDown => self.is_shutting_down = true,
                 },
-                Typed::TooLong => refuse("", &"the line is too long; no command is"),
+                Typed::TooLong => refuse("", &"the line is too long: no command is as long"),
                 Typed::NotText => refuse("", &"the line is not UTF-8"),
             }
             break;

@@ -45,7 +45,7 @@ pub(super) struct ReadyQueue {
     rest: Rest,
 }
 
-/// Its numbers are its own, so that telling the first one apart takes one comparison.
+/// `repr(u8)`, so that testing for the first variant takes one comparison.
 #[derive(Clone, Debug, Hash)]
 #[repr(u8)]
 enum Rest {
@@ -166,8 +166,7 @@ impl ReadyQueue {
         }
     }
 
-    /// Puts it in front only before another one there: to see whether it precedes the
-    /// rest would take as long as to put it there.
+    /// Compares with the front only: comparing with the rest costs as much as inserting.
     #[inline]
     fn insert_among_others(&mut self, key: Key) {
         let precedes_front = !self.front.is_none() && key < self.front;
