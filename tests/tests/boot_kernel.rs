@@ -110,6 +110,14 @@ fn a_response_beyond_its_proven_bound_is_no_success() {
             .reason
             .contains("in job 3, beyond its proven bound of 1.000 ms; ");
     assert!(names_both, "{}", verdict.reason);
+    // So its WCET has not held either, in as many calls.
+    let lines: Vec<_> = outcome.transcript.of_kind("wcet_exceeded").collect();
+    let [line] = lines[..] else {
+        panic!("not one line of kind `wcet_exceeded`\n{}", outcome.tail());
+    };
+    assert_eq!(line.text_at("dag_name"), Some("guess"), "{}", line.text);
+    assert_eq!(line.number_at("beyond"), Some(2), "{}", line.text);
+    assert!(line.number_at("longest_ns") > line.number_at("wcet_ns"));
     // An app may know that its WCETs are guesses; a line says it all the same.
     let outcome = guest("exceeded").word("accept=yes").succeed();
     assert_eq!(outcome.transcript.of_kind("bound_exceeded").count(), 1);

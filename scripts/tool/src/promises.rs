@@ -176,6 +176,7 @@ README.md
             "docs/dag-file.md",
             "docs/errors.md",
             "docs/guide.md",
+            "docs/proving.md",
             "docs/seeing.md",
             "docs/serial-protocol.md",
         ] {
