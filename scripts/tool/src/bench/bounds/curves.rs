@@ -12,7 +12,7 @@ use crate::oracle::bounds::older::{Width, long_paths, melani_edf, melani_fp};
 use crate::random::Random;
 
 /// The policies, in the order of [`Point::proven`].
-const POLICIES: [Policy; 2] = [Policy::StaticPriority, Policy::Edf];
+pub(super) const POLICIES: [Policy; 2] = [Policy::StaticPriority, Policy::Edf];
 
 /// What is proven at one load on one number of cores.
 pub(super) struct Point {
@@ -42,10 +42,10 @@ pub(super) fn measure(cores: u32, sets: u64, seed: u64) -> Vec<Point> {
             for _ in 0..sets {
                 let specs = set(&mut random, cores, tenths);
                 for (policy, proven) in POLICIES.into_iter().zip(&mut point.proven) {
-                    let (before, now) = verdicts(&specs, policy, cores);
-                    proven[0] += u64::from(before);
-                    proven[1] += u64::from(now);
-                    point.lost += u64::from(before && !now);
+                    let found = verdicts(&specs, policy, cores);
+                    proven[0] += u64::from(found.before);
+                    proven[1] += u64::from(found.now);
+                    point.lost += u64::from(found.is_lost());
                 }
             }
             point
@@ -53,13 +53,31 @@ pub(super) fn measure(cores: u32, sets: u64, seed: u64) -> Vec<Point> {
         .collect()
 }
 
-/// Returns whether a set was proven before, and whether it is now.
-fn verdicts(specs: &[DagSpec], policy: Policy, cores: u32) -> (bool, bool) {
+/// By what a set is proven.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Verdicts {
+    /// By Melani's form with the width refinement alone.
+    pub(super) melani: bool,
+    /// By one of the forms before the multi-path bound.
+    pub(super) before: bool,
+    /// By the commit's answer.
+    pub(super) now: bool,
+}
+
+impl Verdicts {
+    /// Reports whether the set was proven before and is not now.
+    pub(super) const fn is_lost(self) -> bool {
+        self.before && !self.now
+    }
+}
+
+/// Finds by what a set is proven.
+pub(super) fn verdicts(specs: &[DagSpec], policy: Policy, cores: u32) -> Verdicts {
     let options =
         CommitOptions::new(policy, cores).with_construction(ConstructionPolicy::any_graph());
     let Ok(verified) = verify(specs, &options) else {
         // A WCET beyond the deadline.
-        return (false, false);
+        return Verdicts::default();
     };
     let settings = Settings {
         policy,
@@ -72,25 +90,27 @@ fn verdicts(specs: &[DagSpec], policy: Policy, cores: u32) -> (bool, bool) {
     let tasks: Option<Vec<Task>> = tasks.map(|dag| Task::from_dag(dag, 0).ok()).collect();
     let tasks = tasks.unwrap_or_default();
     let mut tasks: Vec<&Task> = tasks.iter().collect();
-    let before = match policy {
+    let (melani, before) = match policy {
         Policy::StaticPriority => {
             // As a commit derives priorities: deadline-monotonic, equal ones in order.
             tasks.sort_by_key(|task| task.relative_deadline_ns());
-            melani_fp(&tasks, cores, Width::Used).is_some()
-                || grm_capacity(&tasks, cores) == Some(true)
-                || bonifaci_dm(&tasks, cores)
+            let others = grm_capacity(&tasks, cores) == Some(true) || bonifaci_dm(&tasks, cores);
+            (melani_fp(&tasks, cores, Width::Used).is_some(), others)
         }
         Policy::Edf => {
-            melani_edf(&tasks, cores, Width::Used).is_some()
-                || gedf_capacity(&tasks, cores) == Some(true)
-                || bonifaci_edf(&tasks, cores)
+            let others = gedf_capacity(&tasks, cores) == Some(true) || bonifaci_edf(&tasks, cores);
+            (melani_edf(&tasks, cores, Width::Used).is_some(), others)
         }
     };
     // The most urgent DAG had the bound of long paths.
     let first = tasks.first().is_none_or(|task| {
         policy == Policy::Edf || long_paths(task, cores) <= task.relative_deadline_ns()
     });
-    (before && first, now)
+    Verdicts {
+        melani,
+        before: (melani || before) && first,
+        now,
+    }
 }
 
 /// Writes a row a load, and the sums for each number of cores.

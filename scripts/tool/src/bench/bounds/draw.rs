@@ -1,8 +1,12 @@
-//! Random sets of DAGs of a given load.
+//! Random sets of DAGs: of a given load, or small ones.
 
 use sched_dag::{DagSpec, SubtaskSpec};
 
 use crate::random::Random;
+
+/// The unit of small sets: 2 to 4 cores divide it, so that it does not matter that the forms
+/// before rounded down.
+const UNIT_NS: u64 = 12;
 
 /// Draws a set whose load on `cores` cores is about `tenths` tenths.
 ///
@@ -14,7 +18,11 @@ pub(super) fn set(random: &mut Random, cores: u32, tenths: u64) -> Vec<DagSpec> 
     let shares: Vec<u64> = (0..count).map(|_| random.within(1, 20)).collect();
     let all: u64 = shares.iter().sum();
     let dags = shares.iter().enumerate().map(|(number, share)| {
-        let mut spec = dag(random);
+        let (subtasks, density) = (random.within(5, 20), random.within(2, 8));
+        // In us, so that it does not matter that the forms before rounded down.
+        let mut spec = dag(random, subtasks, density, |random| {
+            1_000 * random.within(1, 100)
+        });
         let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
         let volume: u64 = wcets.sum();
         // T = volume / (share of the load), the load being `tenths * cores / 10`.
@@ -27,9 +35,46 @@ pub(super) fn set(random: &mut Random, cores: u32, tenths: u64) -> Vec<DagSpec> 
     dags.collect()
 }
 
-fn dag(random: &mut Random) -> DagSpec {
-    let subtasks = random.within(5, 20);
-    let density = random.within(2, 8);
+/// Draws a small set with short deadlines: of 2 to 5 DAGs of 2 to 8 subtasks, which take up to
+/// 20 units. A DAG's period lies between its longest path, or a quarter of its volume, and three
+/// times its volume; its deadline between the longest path and the period.
+pub(super) fn small(random: &mut Random) -> Vec<DagSpec> {
+    let dags = 0..random.within(2, 5);
+    let dags = dags.map(|number| {
+        let (subtasks, density) = (random.within(2, 8), random.within(1, 4));
+        let mut spec = dag(random, subtasks, density, |random| {
+            UNIT_NS * random.within(1, 20)
+        });
+        let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
+        let (volume, length) = (wcets.sum::<u64>(), length_ns(&spec));
+        let period = random.within(length.max(volume / 4) / UNIT_NS, 3 * volume / UNIT_NS);
+        let deadline = random.within(length / UNIT_NS, period);
+        spec.name = format!("dag {number}");
+        spec.period_ns = Some(UNIT_NS * period);
+        spec.relative_deadline_ns = Some(UNIT_NS * deadline);
+        spec
+    });
+    dags.collect()
+}
+
+/// Returns the length of the longest path of a DAG whose edges lead to larger numbers.
+fn length_ns(spec: &DagSpec) -> u64 {
+    let wcet_ns = |subtask: usize| spec.subtasks[subtask].wcet_ns.unwrap_or(0);
+    let mut ends: Vec<u64> = Vec::new();
+    for to in 0..spec.subtasks.len() {
+        let before = spec.edges.iter().filter(|edge| edge.1 == to);
+        let start = before.map(|edge| ends[edge.0]).max().unwrap_or(0);
+        ends.push(start + wcet_ns(to));
+    }
+    ends.into_iter().max().unwrap_or(0)
+}
+
+fn dag(
+    random: &mut Random,
+    subtasks: u64,
+    density: u64,
+    mut wcet_ns: impl FnMut(&mut Random) -> u64,
+) -> DagSpec {
     let mut edges = Vec::new();
     for to in 1..subtasks {
         for from in 0..to {
@@ -42,8 +87,7 @@ fn dag(random: &mut Random) -> DagSpec {
     DagSpec {
         subtasks: (0..subtasks)
             .map(|_| SubtaskSpec {
-                // In us, so that it does not matter that the forms before rounded down.
-                wcet_ns: Some(1_000 * random.within(1, 100)),
+                wcet_ns: Some(wcet_ns(random)),
                 ..SubtaskSpec::default()
             })
             .collect(),
