@@ -38,7 +38,7 @@ impl Commit {
     /// ```
     /// use core::time::Duration;
     /// use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
-    /// use virtual_time::{Silent, VirtualTime};
+    /// use virtual_time::VirtualTime;
     ///
     /// let ms = Duration::from_millis;
     /// let ticking = |name, wcet| -> Dag {
@@ -49,7 +49,7 @@ impl Commit {
     ///     dag.register_untyped_subtask(|_job| (), tick);
     ///     dag
     /// };
-    /// let machine = VirtualTime::new().silent(Silent::Wcet);
+    /// let machine = VirtualTime::new();
     /// let mut commit = finish_create_dags(&[ticking("first", 6)]).unwrap();
     /// machine.run_for(ms(25));
     ///

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Commit, Dag, SubtaskAttributes, create_dag, finish_create_dags, shutting_down};
-use fass::{LaunchError, Shutdown};
+use fass::{LaunchError, Policy, Shutdown};
 use support::lifecycle::events;
 use support::sharing::{ms, named, work};
-use virtual_time::{Silent, VirtualTime};
+use virtual_time::VirtualTime;
 
 /// A DAG of one subtask with a period and a WCET, which its calls take, and as deadline the period.
 fn dag(name: &str, period: u64, wcet: u64) -> Dag {
@@ -35,7 +35,7 @@ fn taking(wcet: u64) -> SubtaskAttributes {
 }
 
 fn machine() -> VirtualTime {
-    VirtualTime::new().silent(Silent::Wcet)
+    VirtualTime::new().policy(Policy::Edf)
 }
 
 fn commit(dags: &[Dag]) -> Commit {
