@@ -112,6 +112,7 @@ mod run;
 pub use api::dag::{Dag, create_dag};
 pub use api::latest::{Latest, Sample, Sampling};
 pub use api::lifecycle::{Shutdown, ShuttingDown, Switch, Switching, shutting_down};
+pub use api::modes::{Entering, Entrance, Mode, Modes};
 pub use api::parameter::{Parameter, ParameterValue, Reading, Tunable, Unsettable};
 pub use api::replaceable::Replaceable;
 pub use api::signal::{Raiser, Raising, Signal};
@@ -128,6 +129,7 @@ pub use commit::error::CommitError;
 pub use commit::fault::Fault;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
+pub use draft::modes::ModeFault;
 pub use platform::{
     Additions, AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
 };

@@ -25,6 +25,10 @@ pub struct CoreId(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct ClusterId(pub u32);
 
+/// A mode, by its position among those of one commit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ModeId(pub u32);
+
 /// One execution of a subtask: the part of job `job` that `subtask` does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instance {
@@ -46,6 +50,14 @@ impl DagId {
 
 impl ClusterId {
     /// Returns the position as an index into a table of clusters.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl ModeId {
+    /// Returns the position as an index into a table of modes.
     #[must_use]
     pub const fn index(self) -> usize {
         self.0 as usize

@@ -121,7 +121,7 @@ pub mod virtual_time;
 pub mod wcets;
 
 pub use clusters::{Clusters, Why};
-pub use ids::{ClusterId, CoreId, DagId, Instance, SubtaskId, Vertex};
+pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;

@@ -3,7 +3,7 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use crate::ids::{CoreId, DagId, Instance};
+use crate::ids::{CoreId, DagId, Instance, ModeId};
 use crate::journal::{Event, Subject, What};
 use crate::kept::Journal;
 use crate::policy::JobOutcome;
@@ -155,6 +155,10 @@ impl<J: Events> Observer for Recorder<J> {
 
     fn closed(&mut self, dag: DagId) {
         self.of_job(What::Closed, dag, 0);
+    }
+
+    fn entered(&mut self, mode: ModeId) {
+        self.of_job(What::Entered, DagId(0), mode.0.into());
     }
 
     fn deadline_missed(&mut self, dag: DagId, job: u64, _: u64) {

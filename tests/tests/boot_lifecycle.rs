@@ -3,6 +3,7 @@
 use harness::Guest;
 use sched_dag::journal::What;
 use tool::Outcome;
+use tool::protocol::Status;
 
 fn number(outcome: &Outcome, kind: &str, name: &str) -> u64 {
     let mut lines = outcome.transcript.of_kind(kind);
@@ -35,4 +36,51 @@ fn functions_pause_and_resume_a_dag_and_shut_the_run_down() {
         let changes = [What::Off, What::On, What::Closed].map(count);
         assert_eq!(changes, [6, 5, 3], "{cores} cores");
     }
+}
+
+#[test]
+fn modes_are_entered_at_once_and_when_what_leaves_is_idle() {
+    for cores in [1, 4] {
+        let guest = Guest::new("guest-tests").word("test=modes");
+        let outcome = guest.cores(cores).word("trace=dump").succeed();
+        assert_eq!(number(&outcome, "modes", "violations"), 0);
+        assert_eq!(number(&outcome, "modes", "allocations"), 0);
+
+        let runs = tool::trace::read(&outcome.serial).expect("a trace");
+        let findings = tool::trace::check(&runs[0], 1_000_000);
+        assert_eq!(findings.breaches, [], "{cores} cores");
+        // `cruise` is DAG 0 and mode 0, `descend` DAG 1 and mode 1.
+        let (mut mode, mut entered, mut in_flight) = (0, Vec::new(), [0_u32; 3]);
+        let mut events = runs[0].events.clone();
+        events.sort_by_key(|event| event.time_ns);
+        for event in &events {
+            let dag = event.dag.index();
+            match event.what {
+                What::Released => {
+                    assert!(dag == 2 || dag == mode, "{event:?} in mode {mode}");
+                    in_flight[dag] += 1;
+                }
+                What::Completed => in_flight[dag] -= 1,
+                What::Entered => {
+                    mode = usize::try_from(event.job).expect("few modes");
+                    entered.push(mode);
+                    let is_idle = in_flight[0] == 0;
+                    assert!(mode == 0 || is_idle, "`cruise` has a job in flight");
+                }
+                _ => {}
+            }
+        }
+        // Mode 0 at first, then 1 and 0 in turns: each six jobs of 40.
+        assert_eq!(entered.len(), 14, "{entered:?}");
+        let turns = entered.iter().enumerate();
+        assert!(turns.clone().all(|(turn, mode)| turn % 2 == *mode));
+    }
+}
+
+#[test]
+fn where_cores_are_divided_such_dags_are_refused() {
+    let guest = Guest::new("guest-tests").word("test=lifecycle_divided");
+    let outcome = guest.cores(2).end_in(Status::Failure);
+    let expected = "the cores are divided, and a subtask pauses DAGs, enters modes or ends the run";
+    assert!(outcome.serial.contains(expected), "{}", outcome.tail());
 }

@@ -19,10 +19,11 @@ use tool::fault_page::{documented_faults, function_bodies, is_said_by, table};
 use tool::system::workspace;
 
 /// The files whose functions the page shows, each named as its fault.
-const EXAMPLES: [&str; 5] = [
+const EXAMPLES: [&str; 6] = [
     "tests/guest/src/faults/graph.rs",
     "tests/guest/src/faults/values.rs",
     "tests/guest/src/faults/shared.rs",
+    "tests/guest/src/faults/modes.rs",
     "tests/tests/commit_faults.rs",
     "tests/tests/commit_without_platform.rs",
 ];
@@ -228,6 +229,10 @@ fn every_kind_of_fault_has_an_entry() {
         assert!(found.len() >= 12, "{file}: {found:?}");
         codes.extend(found.into_iter().map(String::from));
     }
+    // Those of modes are named where they are found.
+    let modes = fs::read_to_string(workspace().join("fass/src/draft/modes.rs")).expect("it");
+    let found = modes.split("add(\"").skip(1);
+    codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
     assert_eq!(documented, codes);
     let page = fs::read_to_string(workspace().join("docs/errors.md")).expect("the page");
     for code in codes {

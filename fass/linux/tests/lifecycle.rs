@@ -5,7 +5,8 @@ mod support;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use fass::{Shutdown, SubtaskAttributes, Switch, create_dag, finish_create_dags, shutting_down};
+use fass::{Entrance, Modes, Shutdown, SubtaskAttributes, Switch};
+use fass::{create_dag, finish_create_dags, shutting_down};
 use linux::Mechanism;
 use sched_dag::DagId;
 use sched_dag::journal::What;
@@ -54,5 +55,51 @@ fn functions_pause_and_resume_a_dag_and_shut_the_run_down() {
         let changes: Vec<What> = whats.filter(of_life).collect();
         let expected = [What::Off, What::On, What::Off, What::Closed, What::Closed];
         assert_eq!(changes, expected);
+    }
+}
+
+#[test]
+fn functions_enter_modes_when_idle_and_at_once() {
+    for (cores, mechanism) in [(1, Mechanism::Normal), (2, Mechanism::Fifo)] {
+        let alone = alone(cores, mechanism);
+        let named = SubtaskAttributes::named;
+        let ticking = |name| {
+            let ticked = Arc::new(AtomicU64::new(0));
+            let count = Arc::clone(&ticked);
+            let dag = create_dag();
+            dag.name(name).period(ms(1)).relative_deadline(ms(1));
+            let tick = move |_job| _ = count.fetch_add(1, Relaxed);
+            dag.register_untyped_subtask(tick, named("tick").priority(1));
+            (dag, ticked)
+        };
+        let (cruise, _) = ticking("cruise");
+        let (descend, descended) = ticking("descend");
+        let modes = Modes::new();
+        let flight = modes.mode("flight", &[&cruise]);
+        let landing = modes.mode("landing", &[&descend]);
+        let asks = create_dag();
+        asks.name("asks").period(ms(10)).relative_deadline(ms(10));
+        type Uses<'a> = (Entrance<'a>, Entrance<'a>, Shutdown<'a>);
+        let mut step = 0;
+        let ask = move |(mut flight, mut landing, mut shutdown): Uses<'_>, _job| {
+            match step {
+                0 => landing.when_idle(),
+                // However slow this computer is.
+                1 if descended.load(Relaxed) == 0 => return,
+                1 => flight.at_once(),
+                _ => shutdown.request(),
+            }
+            step += 1;
+        };
+        asks.using((flight.entering(), landing.entering(), shutting_down()))
+            .register_untyped_subtask(ask, named("ask").priority(0));
+        finish_create_dags(&[cruise, descend, asks]).unwrap();
+
+        let run = alone.machine.run().unwrap();
+        assert_eq!(run.violations().count(), 0);
+        let events = run.journal().events();
+        let entered = events.filter(|event| event.what == What::Entered);
+        let entered: Vec<u64> = entered.map(|event| event.job).collect();
+        assert_eq!(entered, [0, 1, 0]);
     }
 }

@@ -172,8 +172,8 @@ impl Platform for HostThreads {
         }
         if plan.lifecycle.is_some() {
             return Err(LaunchError::new(
-                "a function may pause dags or end the run, or a dag starts paused, which `Native` \
-                 does not do; run it on the kernel, on Linux or in virtual time",
+                "a function may pause dags, enter modes or end the run, or a dag starts paused, \
+                 which `Native` does not do; run it on the kernel, on Linux or in virtual time",
             ));
         }
         let mut place = machine.plan.borrow_mut();

@@ -17,7 +17,8 @@ use sched_dag::lifecycle::{Changes, Lifecycle};
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
 use crate::draft::Draft;
-use crate::run::request::{Asked, GO, STOP, Wish, wish};
+use crate::draft::modes::dags_of_modes;
+use crate::run::request::{Asked, GO, Of, STOP, Wish, wish};
 use crate::run::signal::Target;
 
 /// The use of a DAG by a subtask that may pause and resume it: the function gets a [`Switch`].
@@ -195,13 +196,14 @@ impl Dag {
 
 /// Makes what serves the requests of DAGs. Only what is stated here names it, so an app that
 /// states nothing of that kind has no code for it.
-fn lifecycle(dags: &[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle> {
+pub(super) fn lifecycle(dags: &[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle> {
     let drafts = || (0..).map(DagId).zip(dags);
     let paused = drafts().filter(|(_, draft)| draft.borrow().starts_paused);
     let paused: Vec<DagId> = paused.map(|(dag, _)| dag).collect();
     let may_shut_down = drafts().any(|(_, draft)| draft.borrow().may_shut_down);
     let count = u32::try_from(dags.len()).unwrap_or(u32::MAX);
-    Box::new(Changes::new(count, may_shut_down).with_paused(paused))
+    let changes = Changes::new(count, may_shut_down).with_paused(paused);
+    Box::new(changes.with_modes(dags_of_modes(dags)))
 }
 
 impl sealed::Sealed for Switching {}
@@ -219,7 +221,7 @@ impl Uses for Switching {
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let mut draft = dag.draft.borrow_mut();
         draft.switches.push((subtask, Arc::clone(&self.target)));
-        ask(&mut draft, subtask, Some(self.target))
+        ask(&mut draft, subtask, Of::Dag(self.target))
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
@@ -243,7 +245,7 @@ impl Uses for ShuttingDown {
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let mut draft = dag.draft.borrow_mut();
         draft.may_shut_down = true;
-        ask(&mut draft, subtask, None)
+        ask(&mut draft, subtask, Of::Run)
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
@@ -256,10 +258,10 @@ impl Uses for ShuttingDown {
 }
 
 /// Notes that completions of a subtask may ask for something.
-fn ask(draft: &mut Draft, subtask: usize, target: Option<Arc<Target>>) -> Wish {
+pub(super) fn ask(draft: &mut Draft, subtask: usize, of: Of) -> Wish {
     draft.lifecycle = Some(lifecycle);
     let wish = wish();
-    let asked = Asked::new(Arc::clone(&wish), target);
+    let asked = Asked::new(Arc::clone(&wish), of);
     draft.effects.push((subtask, Box::new(asked)));
     wish
 }

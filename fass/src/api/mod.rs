@@ -6,6 +6,7 @@
 pub(crate) mod dag;
 pub(crate) mod latest;
 pub(crate) mod lifecycle;
+pub(crate) mod modes;
 pub(crate) mod parameter;
 pub(crate) mod record;
 pub(crate) mod replaceable;

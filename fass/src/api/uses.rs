@@ -5,8 +5,8 @@
 //! share, the [latest value](crate::Latest) of a topic of any DAG, a
 //! [signal](crate::Signal) that the subtask may raise, a [wire](crate::Wire) for bytes, a
 //! [parameter](crate::Parameter) that is set from outside, a DAG that it may
-//! [pause](crate::Switch), the [end](crate::Shutdown) of the run. The function then gets what it
-//! uses as its *first* argument, in front of the inputs:
+//! [pause](crate::Switch), a [mode](crate::Modes) that it may enter, the [end](crate::Shutdown) of
+//! the run. The function then gets what it uses as its *first* argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
 //! |---|---|---|
@@ -15,6 +15,7 @@
 //! | [`Latest::sample`](crate::Latest::sample) | `Option<Sample<T>>` | bounded staleness |
 //! | [`Signal::raising`](crate::Signal::raising) | `Raiser` | sporadic release |
 //! | [`Dag::switching`] | `Switch` | pauses (P1 to P5) |
+//! | [`Mode::entering`](crate::Mode::entering) | `Entrance` | modes (M1 to M7) |
 //! | [`shutting_down`](crate::shutting_down) | `Shutdown` | the end (C1 to C5) |
 //! | [`Wire::receiving`](crate::Wire::receiving) | `Received<T>` | input |
 //! | [`Wire::sending`](crate::Wire::sending) | `Sender` | output |
@@ -51,7 +52,7 @@ pub(crate) mod sealed {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is nothing that a subtask uses",
     label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()` and `parameter.reading()`"
+    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()` and `parameter.reading()`"
 )]
 pub trait Uses: sealed::Sealed {
     /// What the function gets.

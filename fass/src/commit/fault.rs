@@ -14,6 +14,7 @@ use sched_dag::{DagLabel, SubtaskLabel};
 use super::answer::Unproven;
 use super::count::Count;
 use crate::draft::flaw::Flaw;
+use crate::draft::modes::ModeFault;
 use crate::platform::LaunchError;
 
 /// One reason why a commit was refused.
@@ -137,6 +138,8 @@ pub enum Fault {
         /// The subtask.
         subtask: SubtaskLabel,
     },
+    /// Something is wrong with the modes.
+    Modes(ModeFault),
     /// A subtask has a function for after a fault, and a fault ends its DAG.
     ReplacedInVain {
         /// The DAG.
@@ -196,6 +199,7 @@ impl Fault {
             Self::LatestNotCommitted { .. } => "latest_not_committed",
             Self::SignalNotCommitted { .. } => "signal_not_committed",
             Self::SwitchedNotCommitted { .. } => "switched_not_committed",
+            Self::Modes(fault) => fault.code(),
             Self::ReplacedInVain { .. } => "replaced_in_vain",
             Self::NothingReplaceable { .. } => "nothing_replaceable",
             Self::StateWithoutReset { .. } => "state_without_reset",
@@ -327,6 +331,7 @@ impl fmt::Display for Fault {
                 "{subtask} of {dag} may pause a dag that is not in the commit; commit both dags in \
                  one call"
             ),
+            Self::Modes(fault) => fault.fmt(f),
             Self::ReplacedInVain { dag, subtask } => write!(
                 f,
                 "{subtask} of {dag} has another function for after a fault, and a fault ends the \

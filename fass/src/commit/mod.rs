@@ -23,6 +23,7 @@ mod demands;
 pub(crate) mod error;
 pub(crate) mod fault;
 mod missing;
+mod modes;
 mod replaceable;
 mod staleness;
 mod tie;
@@ -358,6 +359,7 @@ fn verify(
         faults.extend(replaceable::check(&draft, &label));
         specs.push(spec);
     }
+    modes::check(dags, &mut faults);
     // A commit of nothing but repeated DAGs has been told what is wrong.
     if specs.is_empty() && !faults.is_empty() {
         return Err(CommitError {

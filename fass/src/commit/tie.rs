@@ -7,6 +7,7 @@ use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::cell::RefCell;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::lifecycle::Lifecycle;
@@ -15,6 +16,7 @@ use sched_dag::{DagId, DagSpec, OnFault, SubtaskSpec, TaskSet};
 use super::answer::Answers;
 use super::staleness::writer_of;
 use crate::api::dag::Dag;
+use crate::draft::Draft;
 use crate::run::plan::{Body, Plan};
 use crate::run::record::{AnyRecorded, Sampled};
 use crate::run::staleness::Staleness;
@@ -126,8 +128,13 @@ pub(crate) fn tie(
 /// Returns what serves the requests of the DAGs, if there can be any.
 fn lifecycle(dags: &[Dag]) -> Option<Box<dyn Lifecycle>> {
     let make = dags.iter().find_map(|dag| dag.draft.borrow().lifecycle)?;
-    let drafts: Vec<_> = dags.iter().map(|dag| Rc::clone(&dag.draft)).collect();
-    Some(make(&drafts))
+    Some(make(&drafts(dags)))
+}
+
+/// Returns what has been registered of DAGs.
+#[inline(never)]
+pub(super) fn drafts(dags: &[Dag]) -> Vec<Rc<RefCell<Draft>>> {
+    dags.iter().map(|dag| Rc::clone(&dag.draft)).collect()
 }
 
 /// Returns what a DAG's subtasks sample of recorded topics.

@@ -9,6 +9,7 @@
 
 pub(crate) mod attributes;
 pub(crate) mod flaw;
+pub(crate) mod modes;
 
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
@@ -70,6 +71,10 @@ pub(crate) struct Draft {
     pub(crate) starts_paused: bool,
     /// Whether a subtask may end the run.
     pub(crate) may_shut_down: bool,
+    /// The modes that it is in, and those that its subtasks may enter.
+    pub(crate) modes: Vec<modes::Modes>,
+    /// What finds their faults, if there are any.
+    pub(crate) check_modes: Option<modes::Check>,
     /// What makes that which serves requests, if it states something of that kind.
     pub(crate) lifecycle: Option<MakeLifecycle>,
     /// What completions of subtasks do beyond the DAG, latest values apart.

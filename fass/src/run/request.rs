@@ -3,16 +3,17 @@
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use sched_dag::lifecycle::Request;
+use sched_dag::ModeId;
+use sched_dag::lifecycle::{Entry, Request};
 
 use super::effect::Effect;
 use super::signal::Target;
 
 /// No wish.
 const NOTHING: u8 = 0;
-/// The wish that a DAG is paused, or the run ends.
+/// The wish that a DAG is paused, that the run ends, or that a mode is entered at once.
 pub(crate) const STOP: u8 = 1;
-/// The wish that a DAG is resumed.
+/// The wish that a DAG is resumed, or that a mode is entered when what leaves is idle.
 pub(crate) const GO: u8 = 2;
 
 /// What an instance wishes; the last word counts.
@@ -23,16 +24,22 @@ pub(crate) fn wish() -> Wish {
     Arc::new(AtomicU8::new(NOTHING))
 }
 
+/// What a wish is about.
+pub(crate) enum Of {
+    Run,
+    Dag(Arc<Target>),
+    Mode(ModeId),
+}
+
 /// What an instance may ask for.
 pub(crate) struct Asked {
     wish: Wish,
-    /// The DAG that is meant; `None`: the run.
-    target: Option<Arc<Target>>,
+    of: Of,
 }
 
 impl Asked {
-    pub(crate) const fn new(wish: Wish, target: Option<Arc<Target>>) -> Self {
-        Self { wish, target }
+    pub(crate) const fn new(wish: Wish, of: Of) -> Self {
+        Self { wish, of }
     }
 }
 
@@ -43,10 +50,12 @@ impl Effect for Asked {
             return;
         }
         self.wish.store(NOTHING, Ordering::Relaxed);
-        ask(match &self.target {
-            None => Request::ShutDown,
-            Some(target) if wish == STOP => Request::Pause(target.dag()),
-            Some(target) => Request::Resume(target.dag()),
+        ask(match &self.of {
+            Of::Run => Request::ShutDown,
+            Of::Dag(target) if wish == STOP => Request::Pause(target.dag()),
+            Of::Dag(target) => Request::Resume(target.dag()),
+            Of::Mode(mode) if wish == STOP => Request::Enter(*mode, Entry::AtOnce),
+            Of::Mode(mode) => Request::Enter(*mode, Entry::WhenIdle),
         });
     }
 }

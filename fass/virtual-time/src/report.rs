@@ -188,6 +188,7 @@ impl Report {
         let dag = self.dag_name(event.dag);
         let name = match event.instance() {
             Some(instance) => self.subtask_name(instance),
+            None if *what == What::Entered => return format!("{time_ns} entered mode {job}"),
             None if what.is_of_dag() => return format!("{time_ns} {what} {dag}"),
             None => dag,
         };

@@ -62,10 +62,13 @@ pub enum What {
     On,
     /// A DAG is closed: it releases no further job.
     Closed,
+    /// The run enters a mode, whose number stands where the job's does. The event's DAG is 0
+    /// and means nothing.
+    Entered,
 }
 
 /// All of it, by number, as it is printed.
-const WORDS: [(What, &str); 22] = [
+const WORDS: [(What, &str); 23] = [
     (What::Released, "released"),
     (What::Queued, "queued"),
     (What::Skipped, "skipped"),
@@ -88,6 +91,7 @@ const WORDS: [(What, &str); 22] = [
     (What::Off, "off"),
     (What::On, "on"),
     (What::Closed, "closed"),
+    (What::Entered, "entered"),
 ];
 
 /// A text that is none of the words.
@@ -112,10 +116,13 @@ impl What {
         WORDS[self as usize].1
     }
 
-    /// Reports whether it happens to a DAG as a whole, so that the job means nothing.
+    /// Reports whether it happens to a DAG as a whole, or to the run, and to no job.
     #[must_use]
     pub const fn is_of_dag(self) -> bool {
-        matches!(self, Self::Stopped | Self::Off | Self::On | Self::Closed)
+        matches!(
+            self,
+            Self::Stopped | Self::Off | Self::On | Self::Closed | Self::Entered
+        )
     }
 
     /// Reports whether it happens to a job or a DAG, not to an instance.
@@ -166,7 +173,7 @@ mod tests {
             assert_eq!(What::from_number(number), Some(what));
             assert_eq!(what.to_string().parse(), Ok(what));
         }
-        assert_eq!(What::from_number(22), None);
+        assert_eq!(What::from_number(23), None);
         assert_eq!("Start".parse::<What>(), Err(UnknownWord));
     }
 }

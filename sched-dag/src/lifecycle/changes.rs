@@ -1,9 +1,10 @@
-//! Serves requests: which DAGs rest, and the end of the run.
+//! Serves requests: which DAGs rest, which mode runs, and the end of the run.
 
 use alloc::vec::Vec;
 
-use super::{Change, Lifecycle, Request};
-use crate::ids::DagId;
+use super::modes::Modes;
+use super::{Change, Entry, Lifecycle, Request};
+use crate::ids::{DagId, ModeId};
 
 /// What an app states of its run's life, and how far that has come.
 #[derive(Clone, Debug, Default)]
@@ -12,7 +13,10 @@ pub struct Changes {
     dags: Vec<DagId>,
     /// Those that are paused from the beginning on.
     paused: Vec<DagId>,
+    modes: Modes,
     may_shut_down: bool,
+    /// How many DAGs the plan has.
+    count: usize,
 }
 
 impl Changes {
@@ -21,8 +25,9 @@ impl Changes {
     pub fn new(dags: u32, may_shut_down: bool) -> Self {
         Self {
             dags: (0..dags).map(DagId).collect(),
-            paused: Vec::new(),
             may_shut_down,
+            count: dags as usize,
+            ..Self::default()
         }
     }
 
@@ -30,6 +35,15 @@ impl Changes {
     #[must_use]
     pub fn with_paused(self, paused: Vec<DagId>) -> Self {
         Self { paused, ..self }
+    }
+
+    /// States the DAGs of each mode, by their numbers; the run begins in the first one (M1).
+    #[must_use]
+    pub fn with_modes(self, modes: Vec<Vec<DagId>>) -> Self {
+        Self {
+            modes: Modes::new(modes),
+            ..self
+        }
     }
 
     fn touches(&self, dag: DagId) -> bool {
@@ -40,10 +54,18 @@ impl Changes {
 impl Lifecycle for Changes {
     fn serve(&mut self, request: Request, changes: &mut Vec<Change>) {
         match request {
-            Request::Begin => changes.extend(self.paused.drain(..).map(Change::Pause)),
+            Request::Begin => {
+                changes.extend(self.paused.drain(..).map(Change::Pause));
+                self.modes.ask(ModeId(0), Entry::AtOnce, changes);
+            }
+            Request::GoOn => self.modes.go_on(changes),
+            Request::Enter(mode, entry) => self.modes.ask(mode, entry, changes),
             Request::Pause(dag) if self.touches(dag) => changes.push(Change::Pause(dag)),
             Request::Resume(dag) if self.touches(dag) => changes.push(Change::Resume(dag)),
-            Request::ShutDown => changes.extend(self.dags.drain(..).map(Change::Close)),
+            Request::ShutDown => {
+                self.modes = Modes::default();
+                changes.extend(self.dags.drain(..).map(Change::Close));
+            }
             Request::Signal(_) | Request::Pause(_) | Request::Resume(_) => {}
         }
     }
@@ -51,6 +73,7 @@ impl Lifecycle for Changes {
     fn leave_alone(&mut self, dag: DagId) {
         self.dags.retain(|&other| other != dag);
         self.paused.retain(|&other| other != dag);
+        self.modes.leave_alone(dag);
     }
 
     fn add(&mut self, dag: DagId) {
@@ -59,5 +82,14 @@ impl Lifecycle for Changes {
 
     fn may_shut_down(&self) -> bool {
         self.may_shut_down
+    }
+
+    fn room(&self) -> (usize, usize) {
+        // A pause and a resumption of each DAG, both ways into each mode, and those that there are
+        // one of: the beginning, going on, the end.
+        let kinds = 2 * self.count + 2 * self.modes.count() + 3;
+        // At the beginning: what is paused, what the first mode changes, and that it is entered. A
+        // mode pauses DAGs, awaits them, resumes others, and is entered.
+        (kinds, 2 * self.count + 1)
     }
 }

@@ -1,7 +1,7 @@
 //! What functions ask of a run as a whole, and how it comes about.
 //!
 //! A function may ask for more than values: that a sporadic DAG gets a signal, that a DAG rests
-//! or goes on, that the run ends. As all that a function does, a *request* takes effect with
+//! or goes on, that another set of DAGs runs (M1 to M7, in the module `modes`), that the run ends. As all that a function does, a *request* takes effect with
 //! the completion of its instance (R3), never before. The rules, whose tests in `tests/lifecycle.rs`
 //! bear their numbers:
 //!
@@ -9,7 +9,8 @@
 //!   and faults of that instant and before its releases. An instance that fails has asked for
 //!   nothing.
 //! - **L2, in which order.** Requests of one instant are served in the order of their
-//!   completions, those of one instance in the order in which its subtask states what it uses.
+//!   completions, those of one instance in the order in which its subtask states what it uses, each
+//!   once.
 //! - **L3, pausing.** A DAG that is paused or resumed follows P1 to P5: what is in flight goes
 //!   on, due jobs are skipped, the grid stays. A DAG may pause itself: the job in hand goes on.
 //! - **L4, the beginning.** A DAG may be paused from time 0 on, before its first release.
@@ -23,12 +24,13 @@
 //! image none of whose functions asks for such a thing has no code for it.
 
 mod changes;
+mod modes;
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::fmt;
 
-use crate::ids::DagId;
+use crate::ids::{DagId, ModeId};
 use crate::scheduler::{Moment, Observer};
 pub use changes::Changes;
 
@@ -41,10 +43,24 @@ pub enum Request {
     Pause(DagId),
     /// A paused DAG releases jobs again.
     Resume(DagId),
+    /// Another set of DAGs runs.
+    Enter(ModeId, Entry),
     /// The run ends: no DAG releases a further job.
     ShutDown,
     /// The run begins. No function asks for that, but a driver, before all else.
     Begin,
+    /// What waits may come about. A driver asks for that in each step until it has, before all
+    /// else.
+    GoOn,
+}
+
+/// When a mode is entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// At the instant of the request (M2).
+    AtOnce,
+    /// When nothing is in flight of the DAGs that leave (M3).
+    WhenIdle,
 }
 
 /// What a request comes to, in a scheduler.
@@ -56,11 +72,16 @@ pub enum Change {
     Resume(DagId),
     /// A DAG is closed (C1 to C5).
     Close(DagId),
+    /// If the DAG has a job in flight, the changes that follow do not come about: in the next step
+    /// the driver asks for [`Request::GoOn`].
+    Await(DagId),
+    /// A mode is entered, and nothing waits any more.
+    Enter(ModeId),
 }
 
 /// Serves requests other than signals.
 pub trait Lifecycle: fmt::Debug + Send {
-    /// Says what a request comes to. There is room for a change of each DAG.
+    /// Says what a request comes to. There is [`room`](Self::room) for the changes.
     fn serve(&mut self, request: Request, changes: &mut Vec<Change>);
 
     /// Leaves a DAG alone from now on (L6).
@@ -71,6 +92,10 @@ pub trait Lifecycle: fmt::Debug + Send {
 
     /// Reports whether a function may ask for the end of the run.
     fn may_shut_down(&self) -> bool;
+
+    /// Returns how many different requests there can be, signals not counted, and how many changes
+    /// one comes to at most.
+    fn room(&self) -> (usize, usize);
 }
 
 /// The requests of a run that are on their way to its scheduler.
@@ -86,12 +111,9 @@ impl Requests {
     /// Takes room for the requests of a plan of so many DAGs.
     #[must_use]
     pub fn new(dags: usize, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
-        // A signal, a pause and a resumption of each, and those that there are one of.
-        let (kept, changes) = match lifecycle {
-            None => (dags, 0),
-            Some(_) => (dags.saturating_mul(3).saturating_add(2), dags),
-        };
-        let mut kept = Vec::with_capacity(kept);
+        let room = lifecycle.as_ref().map(|lifecycle| lifecycle.room());
+        let (others, changes) = room.unwrap_or_default();
+        let mut kept = Vec::with_capacity(dags.saturating_add(others));
         kept.extend(lifecycle.as_ref().map(|_| Request::Begin));
         Self {
             kept,
@@ -126,6 +148,7 @@ impl Requests {
     /// knows its address in all of the scheduler's code, which is 4 % of a release.
     #[inline(always)]
     pub fn serve(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
+        let mut waits = false;
         for request in self.kept.drain(..) {
             match (request, &mut self.lifecycle) {
                 (Request::Signal(dag), _) => moment.signal(dag, observer),
@@ -138,8 +161,20 @@ impl Requests {
                     Change::Pause(dag) => moment.pause(dag, observer),
                     Change::Resume(dag) => moment.resume(dag, observer),
                     Change::Close(dag) => moment.close(dag, observer),
+                    Change::Await(dag) if moment.in_flight(dag) == 0 => {}
+                    Change::Await(_) => {
+                        waits = true;
+                        break;
+                    }
+                    Change::Enter(mode) => {
+                        waits = false;
+                        observer.entered(mode);
+                    }
                 }
             }
+        }
+        if waits {
+            self.kept.push(Request::GoOn);
         }
     }
 }

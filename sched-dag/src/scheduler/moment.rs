@@ -87,6 +87,17 @@ impl<'s> Moment<'s> {
         self.scheduler.pause(dag, observer);
     }
 
+    /// Returns the number of jobs of a DAG that are in flight.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    #[inline]
+    pub fn in_flight(&self, dag: DagId) -> u64 {
+        self.scheduler.in_flight(dag)
+    }
+
     /// Ends the pause of a DAG: jobs that are due from now on are released. Does
     /// nothing if it is not paused.
     ///

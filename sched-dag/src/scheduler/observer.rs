@@ -3,7 +3,7 @@
 //! Every report happens at the instant that the driver has given to
 //! [`Scheduler::at`](crate::Scheduler::at), so none carries a "now".
 
-use crate::ids::{DagId, Instance};
+use crate::ids::{DagId, Instance, ModeId};
 use crate::policy::JobOutcome;
 
 /// A receiver of the scheduler's reports; every method does nothing by default.
@@ -77,6 +77,11 @@ pub trait Observer {
         let _ = dag;
     }
 
+    /// The run is in another mode. Reported by the driver, as the scheduler knows none.
+    fn entered(&mut self, mode: ModeId) {
+        let _ = mode;
+    }
+
     /// The deadline of job `job` has passed, and the job is not complete.
     fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
         let _ = (dag, job, deadline_ns);
@@ -123,6 +128,7 @@ pass_on! {
     switched_off(dag: DagId);
     switched_on(dag: DagId);
     closed(dag: DagId);
+    entered(mode: ModeId);
     deadline_missed(dag: DagId, job: u64, deadline_ns: u64);
     job_completed(dag: DagId, job: u64, outcome: JobOutcome);
 }

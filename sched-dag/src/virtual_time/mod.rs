@@ -42,13 +42,14 @@
 
 mod adding;
 mod cluster;
+mod serving;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::ids::{CoreId, DagId, Instance};
-use crate::lifecycle::{Change, Lifecycle, Request};
+use crate::lifecycle::{Lifecycle, Request};
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{HandOff, Moment, Observer, Scheduler};
 use crate::task_set::TaskSet;
@@ -166,6 +167,8 @@ pub struct VirtualTime {
     failing: Vec<(Instance, CoreId)>,
     lifecycle: Option<Box<dyn Lifecycle>>,
     has_begun: bool,
+    /// Whether a request waits for jobs to end.
+    waits: bool,
 }
 
 /// Why a run in virtual time has ended.
@@ -212,6 +215,7 @@ impl VirtualTime {
             clusters,
             lifecycle: None,
             has_begun: false,
+            waits: false,
         }
     }
 
@@ -305,6 +309,9 @@ impl VirtualTime {
         if !core::mem::replace(&mut self.has_begun, true) {
             self.serve(Request::Begin, workload);
         }
+        if core::mem::take(&mut self.waits) {
+            self.serve(Request::GoOn, workload);
+        }
         while let Some(request) = workload.take_request(now_ns) {
             self.serve(request, workload);
         }
@@ -315,24 +322,6 @@ impl VirtualTime {
             }
         }
         Ok(())
-    }
-
-    /// Serves a request at this instant.
-    fn serve(&mut self, request: Request, workload: &mut impl Workload) {
-        let (clusters, now_ns) = (&mut self.clusters[..], self.now_ns);
-        let mut changes = Vec::new();
-        match (request, &mut self.lifecycle) {
-            (Request::Signal(dag), _) => at(clusters, now_ns, dag).signal(dag, workload),
-            (_, Some(lifecycle)) => lifecycle.serve(request, &mut changes),
-            (_, None) => {}
-        }
-        for change in changes {
-            match change {
-                Change::Pause(dag) => at(clusters, now_ns, dag).pause(dag, workload),
-                Change::Resume(dag) => at(clusters, now_ns, dag).resume(dag, workload),
-                Change::Close(dag) => at(clusters, now_ns, dag).close(dag, workload),
-            }
-        }
     }
 
     /// Completes what finishes at `now_ns`, and notes what fails instead.
@@ -357,7 +346,7 @@ impl VirtualTime {
                     continue;
                 }
                 workload.finished(instance, number, now_ns);
-                if finished > 1 || !is_last || !is_quiet(workload) {
+                if finished > 1 || !is_last || self.waits || !is_quiet(workload) {
                     scheduler.at(now_ns).complete(instance, workload);
                     continue;
                 }

@@ -33,6 +33,20 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     Ok(())
 }
 
+/// Commits such DAGs for divided cores, which is refused.
+pub(crate) fn divided(machine: &Machine) -> Result<(), Ending> {
+    machine.divide(&[1, 1]);
+    machine.options().finish(&["test"])?;
+    let ticks = ticks();
+    let asks = asks(&ticks);
+    let dags = [ticks, asks, ends()];
+    for dag in &dags {
+        dag.cluster(0);
+    }
+    finish_create_dags(&dags)?;
+    Ok(())
+}
+
 fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }

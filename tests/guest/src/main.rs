@@ -19,6 +19,7 @@ mod kernel_crimes;
 mod large;
 mod lifecycle;
 mod limits;
+mod modes;
 mod occupation;
 mod overrun;
 mod preemption;
@@ -41,7 +42,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 40] = [
+const TESTS: [(&str, Test); 42] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -76,6 +77,8 @@ const TESTS: [(&str, Test); 40] = [
     ("flood", limits::flood),
     ("large", large::run),
     ("lifecycle", lifecycle::run),
+    ("lifecycle_divided", lifecycle::divided),
+    ("modes", modes::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),

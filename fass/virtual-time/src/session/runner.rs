@@ -8,7 +8,7 @@ use sched_dag::Recorder;
 use sched_dag::journal::What;
 use sched_dag::lifecycle::Request;
 use sched_dag::virtual_time::Workload;
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, TaskSet};
+use sched_dag::{CoreId, DagId, Instance, JobOutcome, ModeId, Observer, TaskSet};
 
 use crate::record::PanicRecord;
 use crate::surroundings::Surroundings;
@@ -249,6 +249,10 @@ impl Observer for Runner<'_> {
 
     fn closed(&mut self, dag: DagId) {
         self.recording.journal.closed(dag);
+    }
+
+    fn entered(&mut self, mode: ModeId) {
+        self.recording.journal.entered(mode);
     }
 
     fn aborted(&mut self, dag: DagId, job: u64) {

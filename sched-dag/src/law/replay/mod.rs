@@ -148,7 +148,7 @@ impl Replay<'_> {
             What::Stopped => self.dag(event.dag).is_stopped = true,
             What::Off | What::Closed => self.dag(event.dag).is_off = true,
             What::On => self.dag(event.dag).is_off = false,
-            What::Signalled | What::Dropped | What::Request => {}
+            What::Signalled | What::Dropped | What::Request | What::Entered => {}
             What::Released | What::Queued | What::Skipped => self.release(event),
             What::Aborted | What::Missed | What::Completed => self.job(event),
             _ => self.instance(event),

@@ -7,6 +7,7 @@
 //! inputs) has no case.
 
 mod graph;
+mod modes;
 mod shared;
 mod values;
 
@@ -79,6 +80,11 @@ pub const CASES: &[Case] = &[
     ("latest_not_committed", shared::latest_not_committed),
     ("signal_not_committed", shared::signal_not_committed),
     ("switched_not_committed", shared::switched_not_committed),
+    ("duplicate_mode", modes::duplicate_mode),
+    ("several_sets_of_modes", modes::several_sets_of_modes),
+    ("mode_not_committed", modes::mode_not_committed),
+    ("mode_starts_paused", modes::mode_starts_paused),
+    ("mode_without_handler", modes::mode_without_handler),
     ("not_proven", values::not_proven),
     ("already_committed", graph::already_committed),
 ];

@@ -157,8 +157,8 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
     let mut lifecycle = plan.lifecycle.take();
     if lifecycle.is_some() && plan.task_set.is_divided() {
         return Err(LaunchError::new(
-            "the cores are divided, and a subtask pauses DAGs or ends the run, which reaches one \
-             cluster only; leave one of the two out",
+            "the cores are divided, and a subtask pauses DAGs, enters modes or ends the run, which \
+             reaches one cluster only; leave one of the two out",
         ));
     }
     let task_set = &plan.task_set;

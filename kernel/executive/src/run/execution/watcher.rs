@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use fass::edge::Happened;
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Placement;
-use sched_dag::{ClusterId, CoreId, DagId, Instance, JobOutcome, Journal, Observer};
+use sched_dag::{ClusterId, CoreId, DagId, Instance, JobOutcome, Journal, ModeId, Observer};
 use sched_dag::{TaskSet, Vertex};
 
 use super::Runner;
@@ -173,6 +173,10 @@ impl Observer for Watcher {
 
     fn closed(&mut self, dag: DagId) {
         self.of_job(What::Closed, dag, 0);
+    }
+
+    fn entered(&mut self, mode: ModeId) {
+        self.of_job(What::Entered, DagId(0), mode.0.into());
     }
 
     fn deadline_missed(&mut self, dag: DagId, job: u64, _: u64) {

@@ -1,0 +1,171 @@
+//! The modes that are stated before the commit, and what may be wrong with them.
+
+use alloc::format;
+use alloc::rc::{Rc, Weak};
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::fmt;
+
+use sched_dag::{DagId, DagLabel};
+
+use super::Draft;
+
+/// A mode as stated so far.
+pub(crate) struct ModeDraft {
+    pub(crate) name: String,
+    /// With the names that they had when the mode was made. A draft keeps its modes, so these do
+    /// not keep it.
+    pub(crate) dags: Vec<(Weak<RefCell<Draft>>, String)>,
+}
+
+/// The modes of one handle.
+pub(crate) type Modes = Rc<RefCell<Vec<ModeDraft>>>;
+
+/// All drafts of a commit.
+pub(crate) type Drafts = [Rc<RefCell<Draft>>];
+
+/// Reports all that is wrong with the modes of a commit.
+pub(crate) type Check = fn(&Drafts, &mut dyn FnMut(ModeFault));
+
+/// Something that is wrong with [modes](crate::Modes).
+///
+/// ```
+/// use fass::{Modes, SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// # let period = core::time::Duration::from_millis(10);
+/// let lander = create_dag();
+/// lander.name("lander").period(period).relative_deadline(period);
+/// lander.register_untyped_subtask(|_job| (), SubtaskAttributes::named("descend"));
+/// let modes = Modes::new();
+/// modes.mode("landing", &[]);
+/// modes.mode("landing", &[&lander]);
+/// let error = finish_create_dags(&[lander]).unwrap_err();
+/// assert_eq!(error.to_string(), "two modes are called `landing`; give each a name of its own");
+/// assert_eq!(error.faults()[0].code(), "duplicate_mode");
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ModeFault {
+    code: &'static str,
+    text: String,
+}
+
+impl ModeFault {
+    pub(crate) const fn code(&self) -> &'static str {
+        self.code
+    }
+}
+
+impl fmt::Display for ModeFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// Returns the DAGs of each mode of a commit.
+pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
+    let found = of_commit(drafts);
+    let modes = found.first().map(|modes| modes.borrow());
+    let id = |(dag, _): &(Weak<_>, _)| (0..).map(DagId).nth(place(drafts, dag)?);
+    let dags = |mode: &ModeDraft| mode.dags.iter().filter_map(id).collect();
+    modes.map_or(Vec::new(), |modes| modes.iter().map(dags).collect())
+}
+
+/// Reports all that is wrong with the modes of a commit.
+pub(crate) fn check(drafts: &Drafts, report: &mut dyn FnMut(ModeFault)) {
+    let found = of_commit(drafts);
+    let mut add = |code, text| report(ModeFault { code, text });
+    if found.len() > 1 {
+        let text = "the commit has modes of more than one `Modes`; make all of them by one";
+        add("several_sets_of_modes", text.into());
+    }
+    for modes in &found {
+        let modes = modes.borrow();
+        for (number, mode) in modes.iter().enumerate() {
+            let name = &mode.name;
+            if modes[..number].iter().any(|other| other.name == *name) {
+                let text = format!("two modes are called `{name}`; give each a name of its own");
+                add("duplicate_mode", text);
+            }
+            let unknown = (mode.dags.iter()).filter(|(dag, _)| place(drafts, dag).is_none());
+            for (_, dag) in unknown {
+                let text = format!(
+                    "mode `{name}` has dag `{dag}`, which is not in the commit; commit all dags of \
+                     its modes in one call"
+                );
+                add("mode_not_committed", text);
+            }
+        }
+    }
+    let modes = dags_of_modes(drafts);
+    let in_some = |dag: DagId| modes.iter().any(|mode| mode.contains(&dag));
+    for dag in (0..).map(DagId).take(drafts.len()) {
+        let draft = drafts[dag.index()].borrow();
+        if draft.starts_paused && in_some(dag) {
+            let text = format!(
+                "{} starts paused and is in a mode, and the first mode says what is paused at the \
+                 start; drop `starts_paused`",
+                label(drafts, dag)
+            );
+            add("mode_starts_paused", text);
+        }
+        // What brings about a safe state is on wherever the DAG is that may need it.
+        let Some(handler) = handler(drafts, &draft).filter(|&handler| in_some(handler)) else {
+            continue;
+        };
+        let lacks =
+            |mode: &Vec<DagId>| (mode.contains(&dag) || !in_some(dag)) && !mode.contains(&handler);
+        if let Some(number) = modes.iter().position(lacks) {
+            let text = format!(
+                "a fault of {} releases {}, which is off in mode `{}`; add it to that mode, or to \
+                 none",
+                label(drafts, dag),
+                label(drafts, handler),
+                found[0].borrow()[number].name
+            );
+            add("mode_without_handler", text);
+        }
+    }
+}
+
+/// Returns the modes that a commit names, each handle once.
+fn of_commit(drafts: &Drafts) -> Vec<Modes> {
+    let mut found: Vec<Modes> = Vec::new();
+    for draft in drafts {
+        for modes in &draft.borrow().modes {
+            if !found.iter().any(|other| Rc::ptr_eq(other, modes)) {
+                found.push(Rc::clone(modes));
+            }
+        }
+    }
+    found
+}
+
+/// Returns the place of a DAG in the commit.
+fn place(drafts: &Drafts, dag: &Weak<RefCell<Draft>>) -> Option<usize> {
+    let is_it = |draft: &Rc<_>| core::ptr::eq(Rc::as_ptr(draft), dag.as_ptr());
+    drafts.iter().position(is_it)
+}
+
+/// Returns the DAG that a fault of another releases.
+fn handler(drafts: &Drafts, draft: &Draft) -> Option<DagId> {
+    let target = draft.on_fault.as_ref()?;
+    let is_it = |other: &Rc<RefCell<Draft>>| {
+        let other = other.borrow();
+        other
+            .target
+            .as_ref()
+            .is_some_and(|own| Arc::ptr_eq(own, target))
+    };
+    (0..).map(DagId).nth(drafts.iter().position(is_it)?)
+}
+
+fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
+    let mut name = drafts[dag.index()].borrow().spec.name.clone();
+    if name.is_empty() {
+        name = dag.0.to_string();
+    }
+    DagLabel { id: dag, name }
+}

@@ -1,0 +1,72 @@
+//! A run in two modes, which a DAG of no mode changes.
+//!
+//! `cruise` and `descend` have a job every 4 ms, of two milliseconds and less; each is a mode of
+//! its own. `pilot`, every 6 ms, asks for the landing when idle and for the flight at once, in
+//! turns of three jobs. At last it shuts the run down.
+
+use alloc::vec;
+use core::time::Duration;
+
+use fass::{Dag, Entrance, Modes, Occupation, Shutdown, SubtaskAttributes, create_dag};
+use fass::{execute_for, finish_create_dags, shutting_down};
+use kernel::{Ending, Machine, json};
+
+/// What the pilot changes.
+type Uses<'a> = (Entrance<'a>, Entrance<'a>, Shutdown<'a>);
+
+/// Runs them, and prints how that went.
+pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    machine.options().finish(&["test"])?;
+    let (cruise, descend) = (working("cruise"), working("descend"));
+    let modes = Modes::new();
+    let flight = modes.mode("flight", &[&cruise]);
+    let landing = modes.mode("landing", &[&descend]);
+
+    let pilot = create_dag();
+    pilot.name("pilot").relative_deadline(ms(6));
+    let mut job = 0_u64;
+    let fly = move |(mut flight, mut landing, mut end): Uses<'_>| {
+        job += 1;
+        match job % 6 {
+            _ if job == 40 => end.request(),
+            2 => landing.when_idle(),
+            5 => flight.at_once(),
+            _ => {}
+        }
+        hold(100);
+    };
+    pilot
+        .using((flight.entering(), landing.entering(), shutting_down()))
+        .register_periodic_subtask(fly, vec![], ms(6), taking("fly", 300));
+    finish_create_dags(&[cruise, descend, pilot])?;
+    let run = machine.run()?;
+    json::emit("modes", |line| {
+        line.number("violations", run.violations().count() as u64)
+            .number("allocations", run.allocations());
+    });
+    Ok(())
+}
+
+fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+fn hold(us: u64) {
+    execute_for(Duration::from_micros(us), Occupation::Hold);
+}
+
+fn taking(name: &str, us: u64) -> SubtaskAttributes {
+    SubtaskAttributes::named(name).wcet(Duration::from_micros(us))
+}
+
+/// A fork-join that keeps its cores busy for most of the time.
+fn working(name: &str) -> Dag {
+    let dag = create_dag();
+    dag.name(name).period(ms(4)).relative_deadline(ms(4));
+    let work = |_job| hold(500);
+    let step = |subtask| dag.register_untyped_subtask(work, taking(subtask, 700));
+    let (first, left, right, last) = (step("first"), step("left"), step("right"), step("last"));
+    dag.precede(&first, &left).precede(&first, &right);
+    dag.precede(&left, &last).precede(&right, &last);
+    dag
+}
