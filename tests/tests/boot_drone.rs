@@ -1,6 +1,7 @@
 //! The drone on one core and on several.
 
 use harness::Guest;
+use sched_dag::journal::What;
 
 #[test]
 fn it_flies_without_a_miss_on_one_two_and_four_cores() {
@@ -11,7 +12,13 @@ fn it_flies_without_a_miss_on_one_two_and_four_cores() {
         let line = line.expect("the app's line");
         let number = |name: &str| line.number_at(name).expect(name);
         assert!(number("waypoints") >= 2, "{cores} cores: {}", line.text);
-        for none in ["deadline_misses", "skips", "violations", "allocations"] {
+        for none in [
+            "deadline_misses",
+            "frames_skipped",
+            "descents",
+            "violations",
+            "allocations",
+        ] {
             assert_eq!(number(none), 0, "{cores} cores: {}", line.text);
         }
     }
@@ -24,7 +31,7 @@ fn a_camera_that_is_too_slow_skips_frames_and_the_control_loop_keeps_its_deadlin
     let line = outcome.transcript.of_kind("drone").next();
     let line = line.expect("the app's line");
     let number = |name: &str| line.number_at(name).expect(name);
-    assert!(number("skips") >= 20, "{}", line.text);
+    assert!(number("frames_skipped") >= 20, "{}", line.text);
     assert_eq!(number("attitude_misses"), 0, "{}", line.text);
 }
 
@@ -37,5 +44,26 @@ fn when_the_camera_fails_the_drone_is_sent_down_and_stays_under_control() {
     let line = line.expect("the app's line");
     let number = |name: &str| line.number_at(name).expect(name);
     assert_eq!(number("landed"), 1, "{}", line.text);
+    assert!(number("descents") >= 5, "{}", line.text);
     assert_eq!(number("attitude_misses"), 0, "{}", line.text);
+}
+
+#[test]
+fn a_reserve_that_is_set_at_boot_sends_it_down_early_in_the_mode_of_the_landing() {
+    let guest = Guest::new("drone").cores(2).word("trace=dump");
+    let outcome = guest.word("seconds=2").word("set=reserve=95").succeed();
+    let line = outcome.transcript.of_kind("drone").next();
+    let line = line.expect("the app's line");
+    let number = |name: &str| line.number_at(name).expect(name);
+    assert_eq!(number("landed"), 1, "{}", line.text);
+    assert!(number("descents") >= 10, "{}", line.text);
+    for none in ["deadline_misses", "violations", "allocations"] {
+        assert_eq!(number(none), 0, "{}", line.text);
+    }
+    let runs = tool::trace::read(&outcome.serial).expect("a trace");
+    let modes: Vec<u64> = (runs[0].events.iter())
+        .filter(|event| event.what == What::Entered)
+        .map(|event| event.job)
+        .collect();
+    assert_eq!(modes, [0, 1]);
 }

@@ -4,8 +4,8 @@ use alloc::vec;
 use core::time::Duration;
 
 use common::random::Random;
-use fass::{Dag, Latest, Occupation, OverrunPolicy, Raiser, Sample, Signal, SubtaskAttributes};
-use fass::{create_dag, execute_for};
+use fass::{Dag, Entrance, Latest, Mode, Modes, Occupation, OverrunPolicy, Parameter};
+use fass::{Raiser, Sample, Signal, SubtaskAttributes, create_dag, execute_for};
 use maths::{acos, sqrt};
 
 use crate::airframe::{Airframe, Force, Measured, Pose, Vector, rotation};
@@ -16,7 +16,7 @@ use crate::{FRAME, Flight, PERIOD, SECONDS, Workload};
 /// The WCETs in microseconds: three times and more what was observed on four cores in mode
 /// `deterministic`, where all of them share one clock (`./scripts/run --app drone --cores 4`).
 /// The images' have room for a build without optimization.
-pub const WCETS: [(&str, u64); 11] = [
+pub const WCETS: [(&str, u64); 12] = [
     ("measure", 60),
     ("estimate", 60),
     ("control", 60),
@@ -27,6 +27,7 @@ pub const WCETS: [(&str, u64); 11] = [
     ("drain", 60),
     ("watch", 60),
     ("decide", 60),
+    ("descend", 60),
     ("alarm", 60),
 ];
 
@@ -41,20 +42,22 @@ const WAYPOINTS: [Vector; 4] = [
 /// Where to wait for the first decision.
 const START: Vector = [0.0, 0.0, 3.0];
 
-/// Where to come down.
-const GROUND: Vector = [0.0, 0.0, 0.5];
+/// How high the airframe is when it stands.
+const GROUND: f64 = 0.5;
+
+/// How far the drone comes down between two jobs of `descent`.
+const STEP: f64 = 0.075;
 
 /// What the battery has at first, in thrust and time; to hover takes 11.8 a second.
 const CHARGE: f64 = 130.0;
-
-/// With less than this part left, the drone comes down.
-const LITTLE: f64 = 0.35;
 
 /// The drone's DAGs, and what is known of the flight when they have ended.
 #[derive(Debug)]
 pub struct System {
     /// In the order of the table above.
-    pub dags: [Dag; 6],
+    pub dags: [Dag; 7],
+    /// With fewer percent of the charge left, the drone comes down.
+    pub reserve: Parameter<u32>,
     /// The figures.
     pub flight: Flight,
 }
@@ -64,12 +67,13 @@ impl Workload {
     #[must_use]
     pub fn build(self) -> System {
         let flight = Flight::default();
-        let [attitude, camera, battery, mission, command, safety] = [
+        let [attitude, camera, battery, mission, command, descent, safety] = [
             ("attitude", PERIOD),
             ("camera", FRAME),
             ("battery", Duration::from_millis(100)),
             ("mission", Duration::from_millis(50)),
             ("command", Duration::from_millis(200)),
+            ("descent", Duration::from_millis(50)),
             ("safety", PERIOD),
         ]
         .map(|(name, period)| {
@@ -88,21 +92,27 @@ impl Workload {
             pose: attitude.latest("pose"),
             force: attitude.latest("force"),
             fix: camera.latest("fix"),
-            charge: battery.latest("charge"),
+            is_low: battery.latest("is_low"),
             goal: command.latest("goal"),
-            is_alarmed: safety.latest("is_alarmed"),
+            height: descent.latest("height"),
         };
+        let modes = Modes::new();
+        modes.mode("flight", &[&camera, &mission]);
+        let landing = modes.mode("landing", &[&descent]);
+        let reserve = Parameter::new("reserve", 35, 5..=95);
         self.register_attitude(&attitude, &views, &flight);
         self.register_camera(&camera, &views, &flight);
-        let changed = self.register_command(&command, &views, &flight);
-        self.register_battery(&battery, &views, &changed);
+        let changed = self.register_command(&command, &views, &landing, &flight);
+        self.register_battery(&battery, &views, &changed, &reserve);
         self.register_mission(&mission, &views, &changed);
-        let alarm = self.register_safety(&safety, &flight);
+        self.register_descent(&descent, &views);
+        let alarm = self.register_safety(&safety, &landing, &flight);
         for dag in [&camera, &battery, &mission, &command] {
             dag.on_fault(&alarm);
         }
         System {
-            dags: [attitude, camera, battery, mission, command, safety],
+            dags: [attitude, camera, battery, mission, command, descent, safety],
+            reserve,
             flight,
         }
     }
@@ -138,11 +148,12 @@ impl Workload {
             taking("estimate"),
         );
 
-        type Ahead<'a> = (Seen<'a, Fix>, Seen<'a, Vector>, Seen<'a, bool>);
-        let control = move |(fix, goal, alarm): Ahead<'_>, (estimate,): (Estimate,)| {
+        type Ahead<'a> = (Seen<'a, Fix>, Seen<'a, Vector>, Seen<'a, f64>);
+        let control = move |(fix, goal, height): Ahead<'_>, (estimate,): (Estimate,)| {
             self.spend("control");
-            if alarm.is_some() {
-                return (control(&estimate, None, GROUND),);
+            // The landing: without the camera, which rests.
+            if let Some(height) = height {
+                return (control(&estimate, None, [0.0, 0.0, *height.value]),);
             }
             let fix = fix.map(|fix| (*fix.value, seconds(fix.age_ns())));
             let goal = goal.map_or(START, |goal| *goal.value);
@@ -151,7 +162,7 @@ impl Workload {
         let uses = (
             views.fix.sample(),
             views.goal.sample(),
-            views.is_alarmed.sample(),
+            views.height.sample(),
         );
         dag.using(uses).register_subtask(
             control,
@@ -228,52 +239,89 @@ impl Workload {
         );
     }
 
-    fn register_command(self, dag: &Dag, views: &Views, flight: &Flight) -> Signal {
+    fn register_command(self, dag: &Dag, views: &Views, landing: &Mode, flight: &Flight) -> Signal {
         let flight = flight.clone();
         let mut ahead = WAYPOINTS.into_iter().cycle();
-        let decide = move |charge: Seen<'_, f64>| {
+        let mut goal = START;
+        let decide = move |(is_low, mut landing): (Seen<'_, bool>, Entrance<'_>)| {
             self.spend("decide");
-            let lands = charge.is_some_and(|charge| *charge.value < LITTLE);
+            let lands = is_low.is_some_and(|is_low| *is_low.value);
             flight.decided(lands);
-            let goal = if lands { None } else { ahead.next() };
-            (goal.unwrap_or(GROUND),)
+            if lands {
+                landing.when_idle(); // after the frame in hand
+            } else {
+                goal = ahead.next().unwrap_or(START);
+            }
+            (goal,)
         };
-        dag.using(views.charge.sample()).register_sporadic_subtask(
-            decide,
-            vec!["goal"],
-            Duration::from_millis(200),
-            taking("decide"),
+        dag.using((views.is_low.sample(), landing.entering()))
+            .register_sporadic_subtask(
+                decide,
+                vec!["goal"],
+                Duration::from_millis(200),
+                taking("decide"),
+            )
+    }
+
+    fn register_descent(self, dag: &Dag, views: &Views) {
+        let mut ahead = None;
+        let descend = move |estimate: Seen<'_, Estimate>| {
+            self.spend("descend");
+            let height = ahead.or(estimate.map(|estimate| estimate.value.height));
+            let height = (height.unwrap_or(START[2]) - STEP).max(GROUND);
+            ahead = Some(height);
+            (height,)
+        };
+        dag.using(views.estimate.sample())
+            .register_periodic_subtask(
+                descend,
+                vec!["height"],
+                Duration::from_millis(50),
+                taking("descend"),
+            );
+    }
+
+    fn register_safety(self, dag: &Dag, landing: &Mode, flight: &Flight) -> Signal {
+        let flight = flight.clone();
+        let alarm = move |mut landing: Entrance<'_>| {
+            self.spend("alarm");
+            flight.decided(true);
+            landing.at_once();
+        };
+        dag.using(landing.entering()).register_sporadic_subtask(
+            alarm,
+            vec![],
+            PERIOD,
+            taking("alarm"),
         )
     }
 
-    fn register_safety(self, dag: &Dag, flight: &Flight) -> Signal {
-        let flight = flight.clone();
-        let alarm = move || {
-            self.spend("alarm");
-            flight.decided(true);
-            (true,)
-        };
-        dag.register_sporadic_subtask(alarm, vec!["is_alarmed"], PERIOD, taking("alarm"))
-    }
-
-    fn register_battery(self, dag: &Dag, views: &Views, changed: &Signal) {
-        let mut left = CHARGE;
-        let drain = move |(force, mut changed): (Seen<'_, Force>, Raiser<'_>)| {
+    fn register_battery(
+        self,
+        dag: &Dag,
+        views: &Views,
+        changed: &Signal,
+        reserve: &Parameter<u32>,
+    ) {
+        let (mut left, mut was_low) = (CHARGE, false);
+        type Around<'a> = (Seen<'a, Force>, Raiser<'a>, u32);
+        let drain = move |(force, mut changed, reserve): Around<'_>| {
             self.spend("drain");
-            let was_enough = left >= LITTLE * CHARGE;
             left = (left - force.map_or(0.0, |force| force.value.thrust) * 0.1).max(0.0);
-            if was_enough && left < LITTLE * CHARGE {
+            let is_low = left * 100.0 < CHARGE * f64::from(reserve);
+            if is_low && !was_low {
                 changed.raise();
             }
-            (left / CHARGE,)
+            was_low = is_low;
+            (is_low,)
         };
-        dag.using((views.force.sample(), changed.raising()))
-            .register_periodic_subtask(
-                drain,
-                vec!["charge"],
-                Duration::from_millis(100),
-                taking("drain"),
-            );
+        let uses = (views.force.sample(), changed.raising(), reserve.reading());
+        dag.using(uses).register_periodic_subtask(
+            drain,
+            vec!["is_low"],
+            Duration::from_millis(100),
+            taking("drain"),
+        );
     }
 
     fn register_mission(self, dag: &Dag, views: &Views, changed: &Signal) {
@@ -281,9 +329,9 @@ impl Workload {
             move |(fix, goal, mut changed): (Seen<'_, Fix>, Seen<'_, Vector>, Raiser<'_>)| {
                 self.spend("watch");
                 let Some(fix) = fix else { return };
-                let [x, y, height] = goal.map_or(START, |goal| *goal.value);
+                let [x, y, _] = goal.map_or(START, |goal| *goal.value);
                 let (x, y) = (x - fix.value.position[0], y - fix.value.position[1]);
-                if sqrt(x * x + y * y) < 0.15 && height > GROUND[2] {
+                if sqrt(x * x + y * y) < 0.15 {
                     changed.raise();
                 }
             };
@@ -310,9 +358,9 @@ struct Views {
     pose: Latest<Pose>,
     force: Latest<Force>,
     fix: Latest<Fix>,
-    charge: Latest<f64>,
+    is_low: Latest<bool>,
     goal: Latest<Vector>,
-    is_alarmed: Latest<bool>,
+    height: Latest<f64>,
 }
 
 /// What an image was taken from, and what was believed then.

@@ -7,15 +7,20 @@
 //! | `battery` | every 100 ms | `drain` |
 //! | `mission` | every 50 ms | `watch` |
 //! | `command` | by a signal, at most every 200 ms | `decide` |
-//! | `safety` | by a fault of another than `attitude` | `alarm` |
+//! | `descent` | every 50 ms | `descend` |
+//! | `safety` | by a fault of `camera`, `battery`, `mission` or `command` | `alarm` |
 //!
 //! The airframe and what its sensors see are simulated, within `measure`, `move` and `capture`;
 //! all else is what would fly. The airframe is a *state* of `attitude`. Between the DAGs travel
 //! *latest values*: `camera` reads what `attitude` believes, `attitude` where `camera` has seen
 //! the beacon and what `command` has decided. `mission` signals a waypoint that is reached,
-//! `battery` that little is left; then the drone comes down. It does so, without the camera, when
-//! a fault has ended a DAG (`Dag::on_fault`). A frame that is not done when the
-//! next is due makes that one be skipped.
+//! `battery` that little is left. A frame that is not done when the next is due makes that one be
+//! skipped.
+//!
+//! There are two *modes*: in `flight`, `camera` and `mission` run, in `landing` `descent` does; the
+//! others run in both. `command` enters the landing for want of charge when the camera is done with
+//! its frame, `safety` at once when a fault has ended a DAG (`Dag::on_fault`). How many percent of
+//! the charge are too few is the *parameter* `reserve`.
 //!
 //! The code here knows no kernel: the tests fly it in virtual time.
 

@@ -16,13 +16,17 @@ use sched_dag::{DagId, Vertex};
 
 kernel::entry!(main);
 
+/// The DAGs of which more is told, by their places in `System::dags`.
+const ATTITUDE: DagId = DagId(0);
+const CAMERA: DagId = DagId(1);
+const DESCENT: DagId = DagId(5);
+
 fn main(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let seconds = options.number("seconds", 1..=100_000, 8)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
     let delay_us = options.number("delay_us", 0..=1_000_000, 0)?;
     let fault_at = options.number("fault_at", 0..=1_000_000, 0)?;
-    options.finish(&["seconds", "seed", "delay_us", "fault_at"])?;
     let workload = Workload {
         seconds,
         seed,
@@ -38,6 +42,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     }
 
     let system = workload.build();
+    machine.offer(&[&system.reserve])?;
+    options.finish(&["seconds", "seed", "delay_us", "fault_at"])?;
     let commit = finish_create_dags(&system.dags)?;
     for answer in commit.answers() {
         println!("{answer}");
@@ -52,12 +58,11 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
     println!();
     println!("{flight}");
-    let (mut misses, mut skips) = (0, 0);
+    let mut misses = 0;
     let mut vertices = (0..).map(Vertex);
     for (id, dag) in (0..).map(DagId).zip(run.task_set().dags()) {
         let counts = run.statistics(id);
         misses += counts.misses;
-        skips += counts.skips;
         println!(
             "  {:<10}{:>7} jobs, {} deadlines missed, {} skipped",
             dag.name(),
@@ -89,8 +94,9 @@ fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
         line.number("waypoints", flight.waypoints())
             .number("landed", u64::from(flight.has_landed()))
             .number("deadline_misses", misses)
-            .number("attitude_misses", run.statistics(DagId(0)).misses)
-            .number("skips", skips)
+            .number("attitude_misses", run.statistics(ATTITUDE).misses)
+            .number("frames_skipped", run.statistics(CAMERA).skips)
+            .number("descents", run.statistics(DESCENT).completed)
             .number("violations", violations)
             .number("allocations", run.allocations());
     });

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drone::{FRAME, Workload};
-use fass::{Policy, finish_create_dags};
-use virtual_time::{Report, VirtualTime};
+use fass::{Parameter, Policy, finish_create_dags};
+use virtual_time::{DagId, Report, VirtualTime, What};
 
 const WORKLOAD: Workload = Workload {
     seconds: 8,
@@ -14,9 +14,13 @@ const WORKLOAD: Workload = Workload {
     fault_at: None,
 };
 
-fn fly(workload: Workload, cores: u32, policy: Policy) -> (drone::Flight, Report) {
+fn machine(cores: u32, policy: Policy) -> VirtualTime {
     let machine = VirtualTime::new().cores(cores).policy(policy);
-    let machine = machine.contain_panics();
+    machine.contain_panics()
+}
+
+/// Commits the DAGs.
+fn take_off(workload: Workload) -> (drone::Flight, Parameter<u32>) {
     let system = workload.build();
     let commit = finish_create_dags(&system.dags).expect("every DAG is proven");
     assert!(
@@ -25,7 +29,31 @@ fn fly(workload: Workload, cores: u32, policy: Policy) -> (drone::Flight, Report
             .iter()
             .all(|answer| answer.verdict.bound().is_some())
     );
-    (system.flight, machine.run())
+    (system.flight, system.reserve)
+}
+
+fn fly(workload: Workload, cores: u32, policy: Policy) -> (drone::Flight, Report) {
+    let machine = machine(cores, policy);
+    let (flight, _) = take_off(workload);
+    (flight, machine.run())
+}
+
+/// Returns when the landing began, which no frame and no look for a waypoint comes after.
+fn landed_ns(report: &Report) -> u64 {
+    let is_landing = |what, job| what == What::Entered && job == 1;
+    let mut entered = (report.events.iter()).filter(|event| is_landing(event.what, event.job));
+    let landed_ns = entered.next().expect("it has landed").time_ns;
+    assert!(entered.next().is_none(), "once");
+    for event in &report.events {
+        if event.what == What::Released && event.time_ns != landed_ns {
+            let is_late = event.time_ns > landed_ns;
+            let is_of_flight = [DagId(1), DagId(3)].contains(&event.dag);
+            let is_of_landing = event.dag == DagId(5);
+            assert!(!(is_late && is_of_flight), "{event:?}");
+            assert!(is_late || !is_of_landing, "{event:?}");
+        }
+    }
+    landed_ns
 }
 
 #[test]
@@ -39,8 +67,11 @@ fn it_flies_its_waypoints_and_comes_down_without_a_miss() {
         println!("{cores} cores, {policy:?}: {flight}");
         assert_eq!(report.violations(), []);
         for dag in &report.statistics {
-            assert_eq!((dag.misses, dag.skips), (0, 0), "{dag:?}");
+            assert_eq!(dag.misses, 0, "{dag:?}");
         }
+        assert_eq!(report.statistics[0].skips, 0);
+        assert!(landed_ns(&report) > 5_000_000_000);
+        assert!(report.statistics[5].completed >= 10);
         assert_eq!(report.statistics[0].completed, 8_000);
         assert!(flight.waypoints() >= 3, "{flight}");
         assert!(flight.has_landed(), "{flight}");
@@ -59,7 +90,7 @@ fn a_camera_that_is_too_slow_skips_frames_and_delays_nothing_else() {
     };
     let (flight, report) = fly(workload, 2, Policy::StaticPriority);
     let [attitude, camera, ..] = &report.statistics[..] else {
-        panic!("five DAGs");
+        panic!("seven DAGs");
     };
     assert_eq!((attitude.completed, attitude.misses), (8_000, 0));
     assert!(camera.skips > 100, "{camera:?}");
@@ -76,13 +107,32 @@ fn when_the_camera_fails_the_drone_comes_down_by_its_other_sensors() {
     let (flight, report) = fly(workload, 2, Policy::StaticPriority);
     assert_eq!(report.panics.len(), 1);
     let [attitude, camera, .., safety] = &report.statistics[..] else {
-        panic!("six DAGs");
+        panic!("seven DAGs");
     };
     assert_eq!((attitude.completed, attitude.misses), (5_000, 0));
     assert_eq!((camera.completed, safety.completed), (60, 1));
+    // In frame 60, and right after the fault.
+    assert!((1_999_980_000..2_005_000_000).contains(&landed_ns(&report)));
     assert!(
         flight.has_landed() && flight.most_tilt_degrees() < 25.0,
         "{flight}"
     );
+    assert!(flight.height_metres() < 0.8, "{} m", flight.height_metres());
+}
+
+#[test]
+fn a_person_who_wants_more_reserve_has_the_drone_land_earlier() {
+    let machine = machine(2, Policy::StaticPriority);
+    let (flight, reserve) = take_off(Workload {
+        seconds: 4,
+        ..WORKLOAD
+    });
+    let _ = machine.run_for(Duration::from_secs(1));
+    assert!(!flight.has_landed(), "{flight}");
+    reserve.set(95).expect("it is within the range");
+    let report = machine.run();
+    assert!(flight.has_landed(), "{flight}");
+    // `drain` reads it at 1 s, `decide` follows, and the camera has one frame to finish.
+    assert!((1_000_000_000..1_150_000_000).contains(&landed_ns(&report)));
     assert!(flight.height_metres() < 0.8, "{} m", flight.height_metres());
 }

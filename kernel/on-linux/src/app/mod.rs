@@ -12,6 +12,9 @@ pub(crate) mod event;
 pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
+#[path = "../../../src/watch/background/offered.rs"]
+mod offered;
+mod parameters;
 #[path = "../../../src/start/terms.rs"]
 pub(crate) mod terms;
 #[path = "../../../src/app/wcet_notes.rs"]

@@ -1,44 +1,12 @@
-//! Parameters that a person sets at the console, or the command line's word `set`.
+//! What a person says of parameters at the console.
 
-use alloc::sync::Arc;
-use alloc::vec::Vec;
-use core::fmt;
 use core::fmt::Display;
 
 use fass::Tunable;
-use sched_dag::nearest_of;
 
 use super::more::Commands;
+use super::offered::Parameters;
 use crate::println;
-
-/// The parameters that an app offers.
-pub(crate) struct Parameters(pub(crate) Vec<Arc<dyn Tunable>>);
-
-impl Parameters {
-    /// Sets one of them, or tells why not.
-    pub(crate) fn set(
-        &self,
-        name: &str,
-        value: &str,
-        refuse: &mut dyn FnMut(&dyn Display),
-    ) -> Option<&dyn Tunable> {
-        let Some(parameter) = self.0.iter().find(|of| of.name() == name) else {
-            refuse(&fmt::from_fn(|f| {
-                write!(f, "there is no parameter `{name}`; ")?;
-                match nearest_of(name, &mut self.0.iter().map(|of| of.name())) {
-                    Some(near) => write!(f, "did you mean `{near}`?"),
-                    None => f.write_str("`params` lists them"),
-                }
-            }));
-            return None;
-        };
-        if !parameter.set_text(value) {
-            refuse(&parameter.refusal(value));
-            return None;
-        }
-        Some(&**parameter)
-    }
-}
 
 impl Commands for Parameters {
     fn help(&self) -> &'static [(&'static str, &'static str)] {
