@@ -102,9 +102,8 @@ fn what_shares_behind_the_schedulers_back_is_found_by_a_replay() {
 #[test]
 fn what_does_not_fit_is_named_job_by_job() {
     let file = File::new("long");
-    let outcome = guest(&["test=recorded_long"])
-        .records(&file.0, 16)
-        .succeed();
+    let guest = guest(&["test=recorded_long"]).cores(1);
+    let outcome = guest.records(&file.0, 16).succeed();
     let bytes = file.bytes();
     let recording = Recording::read(&bytes).expect("it is whole");
     assert!(!recording.is_cut() && recording.lost() > 0);

@@ -1,7 +1,11 @@
 //! Topics at the console of the machine: values as they are completed, and how often.
 
+use std::fs;
+
 use harness::Guest;
+use recording::Recording;
 use tool::protocol::MachineLine;
+use tool::{recordings, system};
 
 #[test]
 fn values_are_echoed_and_what_is_left_out_is_counted() {
@@ -62,4 +66,35 @@ fn values_are_echoed_and_what_is_left_out_is_counted() {
         "{}",
         outcome.serial
     );
+}
+
+#[test]
+fn what_is_echoed_while_a_run_is_recorded_is_in_the_recording() {
+    let log = system::new_log("echoed").expect("a folder for logs");
+    let file = log.with_extension("rec");
+    let conversation = [
+        ("\"kind\":\"tuned\"", "echo gain"),
+        ("\"kind\":\"echo\"", "set gain 1.5"),
+        ("\"kind\":\"echo\",\"topic\":\"gain\"", "echo off"),
+        ("\"command\":\"echo off\"", "shutdown"),
+    ];
+    let guest = Guest::new("guest-tests").word("test=tuned").cores(2);
+    let outcome = guest.records(&file, 64).conversation(&conversation);
+    let outcome = outcome.succeed();
+    let bytes = recordings::received(&file).expect("the guest has sent it");
+    let _ = fs::remove_file(&file);
+
+    let recording = Recording::read(&bytes).expect("it is whole");
+    assert_eq!(recording.lost(), 0);
+    let values = recording.values::<f64>("loop", "gain").expect("there are");
+    let values = values.collect::<Vec<_>>();
+    assert!((0..).zip(&values).all(|(job, value)| job == value.0));
+    let echoes = outcome.transcript.of_kind("echo").collect::<Vec<_>>();
+    assert!(echoes.len() >= 2, "{}", outcome.serial);
+    for echo in echoes {
+        let job = echo.number_at("job").expect("a job");
+        let recorded = values.iter().find(|(of, _)| *of == job);
+        let recorded = recorded.map(|(_, value)| value.to_string());
+        assert_eq!(recorded.as_deref(), echo.text_at("value"));
+    }
 }

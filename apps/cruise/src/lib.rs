@@ -63,7 +63,7 @@ pub fn trusting(line: &[u8]) -> Option<i32> {
 pub fn build(wire: &Wire, releases: Releases, decode: Decoder, jobs: u64) -> [Dag; 2] {
     let taking = |name, us| SubtaskAttributes::named(name).wcet(Duration::from_micros(us));
     let cruise = create_dag();
-    cruise.name("cruise");
+    (cruise.name("cruise").record::<Option<i32>>("gap")).record::<i32>("speed");
     let mut newest = None;
     let measure = move |packets: Received<'_, i32>| {
         newest = packets.last().or(newest);

@@ -1,11 +1,12 @@
 //! Recording topics: stating which values shall be written down.
 
+use alloc::boxed::Box;
 use alloc::rc::Rc;
 
 use recording::Recordable;
 
 use super::dag::Dag;
-use crate::edge::begin;
+use crate::edge::{self, Crossing, Host, Wish};
 use crate::platform::{expect_installed, record};
 use crate::run::crossing::Edge;
 use crate::run::message::Message;
@@ -19,6 +20,14 @@ static EDGE: Edge = Edge {
     replays: || expect_installed().replays(),
     replay: |channel, job, take| expect_installed().replay(channel, job, take),
 };
+
+fn begin(wish: Wish) -> Box<dyn Crossing> {
+    let host = Host {
+        raise: |plan, dag| expect_installed().raise(plan, dag),
+        now_ns: || expect_installed().now_ns(),
+    };
+    edge::begin(wish, host)
+}
 
 impl Dag {
     /// Records the values of a topic, where the platform records.

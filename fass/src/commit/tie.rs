@@ -45,7 +45,7 @@ pub(crate) fn tie(
         .map(|dag| core::mem::take(&mut dag.draft.borrow_mut().recorded));
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
-    let (mut channels, mut samplers) = (0, Vec::new());
+    let mut lines = Vec::new();
     let (bodies, others) = ((first..)
         .map(DagId)
         .zip(dags)
@@ -70,9 +70,9 @@ pub(crate) fn tie(
             let latest = draft.latest.clone();
             (spec, make_bodies, latest, effects, resets)
         };
-        let lines = any.map(|any| {
+        let sampled = any.map(|any| {
             let samples = samples(dags, dag, &recorded);
-            any.open_all(of_dag, &samples, (id, &spec), &mut channels)
+            any.open_all(of_dag, &samples, (id, &spec), &mut lines)
         });
         let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
         let faults = match verified.on_fault() {
@@ -104,8 +104,8 @@ pub(crate) fn tie(
                 }
             }
         }
-        if let (Some(any), Some(lines)) = (any, lines) {
-            any.attach(lines, (id, &mut bodies), &mut samplers);
+        if let (Some(any), Some(sampled)) = (any, sampled) {
+            any.attach(sampled, &mut bodies);
         }
         (bodies, others)
     })
@@ -121,7 +121,7 @@ pub(crate) fn tie(
         after_fault: dags.iter().map(handler).collect(),
         lifecycle: lifecycle(dags),
         staleness,
-        samplers,
+        lines,
     }
 }
 

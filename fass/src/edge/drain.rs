@@ -1,67 +1,56 @@
-//! The file that is made of what a tape has written.
+//! The file that is made of what a tape has taken.
+//!
+//! Values and events wait in places of their own. The drain takes the earliest of those that are
+//! there, so the file has them nearly in the order of their times, and each channel's in its own.
 
 use alloc::vec::Vec;
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::sync::atomic::Ordering;
 
 use recording::{Entry, Header, Stream, What};
 use sched_dag::{DagId, TaskSet};
 
-use super::ring::RingReader;
+use super::lost::Lost;
+use super::ring::{Event, EventReader};
 use super::{Drain, Drained};
+use crate::run::cell::outbox::OutboxReader;
 
-/// What a record is, in 40 bits.
+/// What an event is, in a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tag {
-    /// The value of a job.
-    Value { channel: u16 },
-    /// Lost values: the record has the first job, and its bytes the last one.
-    Lost { channel: u16 },
-    /// What else happened; the bytes have the job's release, where it is known.
-    Event {
-        what: What,
-        dag: DagId,
-        subtask: u32,
-    },
+pub(super) struct Tag {
+    pub(super) what: What,
+    pub(super) dag: DagId,
+    pub(super) subtask: u32,
 }
 
 const EVENTS: [What; 4] = [What::Signal, What::Skip, What::Cut, What::Restart];
 
 impl Tag {
-    #[inline(always)]
     pub(super) fn to_word(self) -> u64 {
-        match self {
-            Self::Value { channel } => u64::from(channel) << 8,
-            Self::Lost { channel } => 1 | u64::from(channel) << 8,
-            Self::Event { what, dag, subtask } => {
-                let place = EVENTS.iter().position(|other| *other == what);
-                let narrow = |number: u32| u64::from(u16::try_from(number).unwrap_or(u16::MAX));
-                let number = 2 + place.unwrap_or(0) as u64;
-                number | narrow(subtask) << 8 | narrow(dag.0) << 24
-            }
-        }
+        let place = EVENTS.iter().position(|other| *other == self.what);
+        let narrow = |number: u32| u64::from(u16::try_from(number).unwrap_or(u16::MAX));
+        place.unwrap_or(0) as u64 | narrow(self.subtask) << 16 | narrow(self.dag.0) << 32
     }
 
-    fn of_word(word: u64) -> Self {
-        let [kind, low, high, dag @ ..] = word.to_le_bytes();
-        let channel = u16::from_le_bytes([low, high]);
-        match kind {
-            0 => Self::Value { channel },
-            1 => Self::Lost { channel },
-            _ => Self::Event {
-                what: EVENTS[usize::from(kind - 2) % EVENTS.len()],
-                dag: DagId(u16::from_le_bytes([dag[0], dag[1]]).into()),
-                subtask: channel.into(),
-            },
-        }
+    /// Returns what it is, and the numbers of DAG and subtask.
+    fn of_word(word: u64) -> (What, u16, u16) {
+        let [kind, _, s_0, s_1, d_0, d_1, ..] = word.to_le_bytes();
+        let what = EVENTS[usize::from(kind) % EVENTS.len()];
+        let [subtask, dag] = [[s_0, s_1], [d_0, d_1]].map(u16::from_le_bytes);
+        (what, dag, subtask)
     }
 }
 
 /// Makes the file.
 pub(super) struct OfTape {
-    ring: RingReader,
+    events: EventReader,
+    /// By channel.
+    records: Vec<OutboxReader>,
+    lost: Lost,
     header: Header,
     stream: Option<Stream>,
     releases: Vec<Releases>,
+    /// When the run's time begins, on the clock, on which values were complete.
+    epoch_ns: u64,
 }
 
 /// When a DAG's jobs are due.
@@ -118,13 +107,131 @@ fn place_of(job: u64) -> Option<usize> {
 }
 
 impl OfTape {
-    pub(super) fn new(ring: RingReader, header: Header, task_set: &TaskSet) -> Self {
+    pub(super) fn new(
+        events: EventReader,
+        records: Vec<OutboxReader>,
+        header: Header,
+        lost: Lost,
+        task_set: &TaskSet,
+    ) -> Self {
         Self {
-            ring,
+            events,
+            records,
+            lost,
             header,
             stream: None,
             releases: Releases::of_all(task_set),
+            epoch_ns: 0,
         }
+    }
+
+    /// Finds what is earliest of all that waits: a channel, or `None` for an event, and its time.
+    fn earliest(&mut self) -> Option<(u64, Option<u16>)> {
+        let event = self.events.next().map(|event| (event.at_ns, None));
+        let epoch_ns = self.epoch_ns;
+        let values = (0..)
+            .zip(&mut self.records)
+            .filter_map(|(channel, records)| {
+                let at_ns = records.next()?.at_ns.saturating_sub(epoch_ns);
+                Some((at_ns, Some(channel)))
+            });
+        // At one time an event is first, such as the signal that released a job.
+        event
+            .into_iter()
+            .chain(values)
+            .min_by_key(|(at_ns, _)| *at_ns)
+    }
+
+    fn release_ns(&self, dag: u16, job: u64) -> Option<u64> {
+        self.releases.get(usize::from(dag))?.of(job)
+    }
+
+    /// Tells of the values of a channel that are lost, before the next one, or at the end.
+    fn tell_lost(&mut self, channel: u16, next: Option<(u64, u64)>, send: &mut dyn FnMut(&[u8])) {
+        let before = next.map(|(job, _)| job);
+        while let Some((first, last)) = self.lost.values[usize::from(channel)].take(before) {
+            for job in first..=last {
+                let dag = self.header.channels[usize::from(channel)].dag;
+                let release_ns = self.release_ns(dag, job).unwrap_or(0);
+                let lost = Entry {
+                    what: What::Lost,
+                    dag,
+                    place: channel,
+                    job,
+                    release_ns,
+                    // What is told at the end only has no time of its own.
+                    at_ns: next.map_or(release_ns, |(_, at_ns)| at_ns),
+                    value: &[],
+                };
+                if let Some(stream) = &mut self.stream {
+                    stream.write(&lost, send);
+                }
+            }
+        }
+    }
+
+    /// Writes the next value of a channel.
+    fn write_value(&mut self, channel: u16, at_ns: u64, send: &mut dyn FnMut(&[u8])) {
+        let number = usize::from(channel);
+        let Some(job) = self.records[number].next().map(|record| record.job) else {
+            return;
+        };
+        self.tell_lost(channel, Some((job, at_ns)), send);
+        let dag = self.header.channels[number].dag;
+        let release_ns = self.release_ns(dag, job).unwrap_or(at_ns);
+        let records = &mut self.records[number];
+        if let (Some(stream), Some(record)) = (&mut self.stream, records.next()) {
+            let value = Entry {
+                what: What::Value,
+                dag,
+                place: channel,
+                job,
+                release_ns,
+                at_ns,
+                value: record.bytes,
+            };
+            stream.write(&value, send);
+        }
+        records.forget();
+    }
+
+    /// Writes the next event.
+    fn write_event(&mut self, send: &mut dyn FnMut(&[u8])) {
+        let Some(event) = self.events.next() else {
+            return;
+        };
+        self.events.forget();
+        let Event {
+            tag,
+            job,
+            at_ns,
+            release_ns,
+        } = event;
+        let (what, dag, place) = Tag::of_word(tag);
+        let known = release_ns.or_else(|| self.release_ns(dag, job));
+        let release_ns = known.unwrap_or(at_ns);
+        if what == What::Signal
+            && let Some(releases) = self.releases.get_mut(usize::from(dag))
+        {
+            releases.note(job, release_ns);
+        }
+        let entry = Entry {
+            what,
+            dag,
+            place,
+            job,
+            release_ns,
+            at_ns,
+            value: &[],
+        };
+        if let Some(stream) = &mut self.stream {
+            stream.write(&entry, send);
+        }
+    }
+
+    /// Reports whether the recording has ended before that time, for something had no room.
+    fn has_ended(&self, at_ns: u64) -> bool {
+        self.lost.rest_ns.load(Ordering::Acquire) < at_ns
     }
 }
 
@@ -133,105 +240,39 @@ impl Drain for OfTape {
         self.stream = Some(Stream::begin(&self.header, send));
     }
 
-    fn step(&mut self, send: &mut dyn FnMut(&[u8])) -> bool {
-        let Self {
-            ring,
-            header,
-            stream: Some(stream),
-            releases,
-        } = self
-        else {
-            return false;
-        };
-        ring.take(|head, words, length| {
-            let first = || words.first().map(|word| word.load(Ordering::Relaxed));
-            let mut entry = Entry {
-                what: What::Value,
-                dag: 0,
-                place: 0,
-                job: head.job,
-                release_ns: 0,
-                at_ns: head.at_ns,
-                value: &[],
-            };
-            let tag = Tag::of_word(head.tag);
-            if let Tag::Value { channel } | Tag::Lost { channel } = tag {
-                entry.place = channel;
-                entry.dag = header.channels[usize::from(channel)].dag;
-            }
-            let of_dag = |dag: u16| releases.get(usize::from(dag));
-            let release_ns = |dag, job| of_dag(dag).and_then(|releases| releases.of(job));
-            match tag {
-                Tag::Value { .. } => {
-                    entry.release_ns = release_ns(entry.dag, entry.job).unwrap_or(entry.at_ns);
-                    let value = |part: &mut dyn FnMut(&[u8])| parts(words, length, part);
-                    stream.write_parts(&entry, length, value, send);
-                }
-                Tag::Lost { .. } => {
-                    entry.what = What::Lost;
-                    for job in head.job..=first().unwrap_or(head.job) {
-                        let release_ns = release_ns(entry.dag, job).unwrap_or(0);
-                        // What is told at the end only has no time of its own.
-                        let at_ns = match head.at_ns {
-                            u64::MAX => release_ns,
-                            at_ns => at_ns,
-                        };
-                        stream.write(
-                            &Entry {
-                                job,
-                                release_ns,
-                                at_ns,
-                                ..entry
-                            },
-                            send,
-                        );
-                    }
-                }
-                Tag::Event { what, dag, subtask } => {
-                    entry.what = what;
-                    entry.dag = u16::try_from(dag.0).unwrap_or(u16::MAX);
-                    entry.place = u16::try_from(subtask).unwrap_or(u16::MAX);
-                    let known = first().or_else(|| release_ns(entry.dag, entry.job));
-                    entry.release_ns = known.unwrap_or(entry.at_ns);
-                    if what == What::Signal
-                        && let Some(releases) = releases.get_mut(dag.index())
-                    {
-                        releases.note(entry.job, entry.release_ns);
-                    }
-                    stream.write(&entry, send);
-                }
-            }
-        })
+    fn begin_run(&mut self, epoch_ns: u64) {
+        self.epoch_ns = epoch_ns;
     }
 
-    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Drained {
-        let is_cut = self.ring.is_closed();
-        let Some(stream) = self.stream.take() else {
-            return Drained {
-                entries: 0,
-                lost: 0,
-                is_cut,
-            };
-        };
-        let (entries, lost) = (stream.entries(), stream.lost());
-        match is_cut {
-            true => stream.cut(send),
-            false => stream.end(send),
+    fn step(&mut self, send: &mut dyn FnMut(&[u8])) -> bool {
+        match self.earliest() {
+            Some((at_ns, _)) if self.has_ended(at_ns) => return false,
+            Some((at_ns, Some(channel))) => self.write_value(channel, at_ns, send),
+            Some((_, None)) => self.write_event(send),
+            None => return false,
         }
-        Drained {
+        true
+    }
+
+    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Option<Drained> {
+        let is_cut = self.has_ended(u64::MAX);
+        if !is_cut {
+            (0..)
+                .take(self.records.len())
+                .for_each(|channel| self.tell_lost(channel, None, send));
+        }
+        let (mut entries, mut lost) = (0, 0);
+        if let Some(stream) = self.stream.take() {
+            (entries, lost) = (stream.entries(), stream.lost());
+            match is_cut {
+                true => stream.cut(send),
+                false => stream.end(send),
+            }
+        }
+        Some(Drained {
             entries,
             lost,
             is_cut,
-        }
-    }
-}
-
-/// Gives the bytes that words hold.
-fn parts(words: &[AtomicU64], length: usize, part: &mut dyn FnMut(&[u8])) {
-    let mut left = length;
-    for word in words {
-        let bytes = word.load(Ordering::Relaxed).to_le_bytes();
-        part(&bytes[..left.min(bytes.len())]);
-        left = left.saturating_sub(bytes.len());
+        })
     }
 }

@@ -84,7 +84,7 @@ impl Echoing for Echo {
 }
 
 impl Crossing for Echo {
-    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) {
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool {
         if core::mem::take(&mut self.is_launched) {
             self.topics.clear();
             self.watch(None);
@@ -96,6 +96,8 @@ impl Crossing for Echo {
         if let Some(inner) = &mut self.inner {
             inner.open(dag, graph, channels);
         }
+        // Any topic may be the one that is watched, so each value has to come by here.
+        false
     }
 
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
@@ -126,9 +128,9 @@ impl Crossing for Echo {
         }
     }
 
-    fn failed(&mut self, instance: Instance, at_ns: u64) {
+    fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
         if let Some(inner) = &mut self.inner {
-            inner.failed(instance, at_ns);
+            inner.failed(instance, at_ns, clock_ns);
         }
     }
 
@@ -140,10 +142,6 @@ impl Crossing for Echo {
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
         self.inner.as_mut()?.drain()
-    }
-
-    fn flush(&mut self) -> bool {
-        self.inner.as_mut().is_none_or(|inner| inner.flush())
     }
 
     fn outcome(&self, is_over: bool) -> Option<Outcome> {

@@ -18,8 +18,8 @@ use super::replay::Outcome;
 use super::{Crossing, Drain, Drained, Happened, name, open};
 use crate::run::crossing::Recorded;
 use crate::run::latest_jobs::LatestJobs;
+use crate::run::line::LineOf;
 use crate::run::plan::Plan;
-use crate::run::sample::{SampledBy, give_failed};
 
 /// Keeps the last jobs.
 pub(super) struct Latest {
@@ -36,7 +36,7 @@ struct Kept {
     header: Header,
     latest: LatestJobs,
     releases: Vec<Releases>,
-    samplers: Vec<SampledBy>,
+    lines: Vec<LineOf>,
     has_failed: bool,
 }
 
@@ -53,8 +53,9 @@ impl Latest {
 }
 
 impl Crossing for Latest {
-    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) {
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool {
         open(&mut self.header, dag, graph, channels);
+        false
     }
 
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
@@ -66,7 +67,7 @@ impl Crossing for Latest {
             header,
             latest,
             releases: Releases::of_all(&plan.task_set),
-            samplers: mem::take(&mut plan.samplers),
+            lines: mem::take(&mut plan.lines),
             has_failed: false,
         });
         Ok(())
@@ -95,10 +96,11 @@ impl Crossing for Latest {
         }
     }
 
-    fn failed(&mut self, instance: Instance, at_ns: u64) {
+    fn failed(&mut self, instance: Instance, at_ns: u64, _clock_ns: u64) {
         if let Some(kept) = &mut self.kept {
-            let mut take = |sample: &Recorded<'_>| kept.latest.take(sample);
-            give_failed(&kept.samplers, instance, at_ns, &mut take);
+            for of in kept.lines.iter().filter(|of| of.is_sample_of(instance)) {
+                of.line.show(at_ns, |sample| kept.latest.take(sample));
+            }
             kept.latest.hold(instance.dag.index(), instance.job);
             kept.has_failed = true;
         }
@@ -109,10 +111,6 @@ impl Crossing for Latest {
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
         let kept = self.kept.take_if(|kept| kept.has_failed)?;
         Some(Box::new(OfLatest { kept, stream: None }))
-    }
-
-    fn flush(&mut self) -> bool {
-        true
     }
 
     fn outcome(&self, _is_over: bool) -> Option<Outcome> {
@@ -177,17 +175,17 @@ impl Drain for OfLatest {
         false
     }
 
-    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Drained {
+    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Option<Drained> {
         let (mut entries, mut lost) = (0, 0);
         if let Some(stream) = self.stream.take() {
             (entries, lost) = (stream.entries(), stream.lost());
             stream.cut(send);
         }
-        Drained {
+        Some(Drained {
             entries,
             lost,
             is_cut: true,
-        }
+        })
     }
 }
 
@@ -241,7 +239,7 @@ mod tests {
             after_fault: Vec::new(),
             lifecycle: None,
             staleness: Vec::new(),
-            samplers: Vec::new(),
+            lines: Vec::new(),
         };
         latest.launch(&mut plan).expect("it refuses nothing");
         latest
@@ -283,9 +281,9 @@ mod tests {
         let mut latest = launched();
         (0..=30).for_each(|job| run(&mut latest, job));
         assert!(latest.drain().is_none(), "nothing has failed");
-        latest.failed(instance(30), due_ns(30));
+        latest.failed(instance(30), due_ns(30), 0);
         (31..=100).for_each(|job| run(&mut latest, job));
-        latest.failed(instance(90), due_ns(90));
+        latest.failed(instance(90), due_ns(90), 0);
 
         let mut drain = latest.drain().expect("a job has failed");
         assert!(latest.drain().is_none(), "once");
@@ -293,7 +291,7 @@ mod tests {
         let mut send = |bytes: &[u8]| file.extend_from_slice(bytes);
         drain.begin(&mut send);
         assert!(!drain.step(&mut send));
-        assert_eq!(drain.end(&mut send).entries, 3 * 16);
+        assert_eq!(drain.end(&mut send).expect("a file").entries, 3 * 16);
 
         let recording = Recording::read(&file).expect("it is one");
         assert!(recording.is_cut());

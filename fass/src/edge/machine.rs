@@ -9,31 +9,37 @@ use sched_dag::DagId;
 use sched_dag::journal::What;
 
 use super::replay::{Outcome, Replay};
-use super::{Crossing, Drain, Happened, name, open};
+use super::signals::Signals;
+use super::{Crossing, Drain, Happened, Host, name, open};
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
 
 /// A replay of what the loader has left in memory.
 pub(super) struct OfMachine {
     bytes: &'static [u8],
+    host: Host,
     own: Header,
     /// From the launch on.
     replay: Option<Replay>,
+    signals: Option<Signals>,
 }
 
 impl OfMachine {
-    pub(super) fn new(bytes: &'static [u8]) -> Self {
+    pub(super) fn new(bytes: &'static [u8], host: Host) -> Self {
         Self {
             bytes,
+            host,
             own: Header::default(),
             replay: None,
+            signals: None,
         }
     }
 }
 
 impl Crossing for OfMachine {
-    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) {
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool {
         open(&mut self.own, dag, graph, channels);
+        false
     }
 
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
@@ -41,17 +47,9 @@ impl Crossing for OfMachine {
         let read = Replay::read(self.bytes);
         let mut replay = read.map_err(|malformed| format!("the recording, {malformed}"))?;
         replay.fit(&self.own, &plan.task_set)?;
-        let dags = plan.task_set.dags().iter();
-        let mut replayed = ((0..).map(DagId).zip(dags)).filter(|(dag, _)| replay.is_of(*dag));
-        if let Some((_, dag)) = replayed.find(|(_, dag)| dag.is_sporadic()) {
-            return Err(format!(
-                "dag `{}` is sporadic, and a machine does not replay signals yet; replay it in \
-                 virtual time",
-                dag.name()
-            ));
-        }
         replay.prepare(plan);
         replay.guard(plan);
+        self.signals = Some(Signals::take_over(plan, &mut replay));
         self.replay = Some(replay);
         Ok(())
     }
@@ -62,7 +60,14 @@ impl Crossing for OfMachine {
         }
     }
 
-    fn happened(&mut self, _what: What, _happened: &Happened) {}
+    fn happened(&mut self, what: What, happened: &Happened) {
+        if let What::Released | What::Skipped = what
+            && let (Some(replay), Some(signals)) = (&mut self.replay, &self.signals)
+        {
+            let dag = happened.dag;
+            signals.follow(dag, replay.next_signal_ns(dag));
+        }
+    }
 
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         if let Some(value) = (self.replay.as_ref()).and_then(|replay| replay.value(channel, job)) {
@@ -71,11 +76,7 @@ impl Crossing for OfMachine {
     }
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
-        None
-    }
-
-    fn flush(&mut self) -> bool {
-        true
+        self.signals.as_ref()?.raiser(self.host)
     }
 
     fn outcome(&self, is_over: bool) -> Option<Outcome> {

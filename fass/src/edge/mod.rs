@@ -1,9 +1,10 @@
 //! What crosses the edge of a run on a machine: written into a buffer, or taken from a recording.
 //!
-//! A *tape* takes what happens, from the core that completes: it allocates nothing and waits for
-//! nothing. The *drain* makes the file of it, whenever a core has time. A *replay* lends recorded
-//! values, and compares those that are computed. An *echo* keeps the latest value of a topic for
-//! people to look at. If none of these is asked for, the inputs of the last
+//! A *tape* takes what happens, from the core that completes, and makes places for values, into
+//! which instances write them: it allocates nothing and waits for nothing. The *drain* makes the
+//! file of it, whenever a core has time. A *replay* lends recorded values, and compares those that
+//! are computed. An *echo* keeps the latest value of a topic for people to look at. If none of
+//! these is asked for, the inputs of the last
 //! jobs may be kept, for the case that one fails.
 //!
 //! A platform reaches all this by what [`Platform::open_channels`](crate::Platform::open_channels)
@@ -13,9 +14,11 @@ mod drain;
 mod echo;
 mod guard;
 mod latest;
+mod lost;
 mod machine;
 mod replay;
 mod ring;
+mod signals;
 mod tape;
 
 use alloc::boxed::Box;
@@ -57,6 +60,14 @@ pub enum Wish {
     Echo(Option<&'static Wish>),
 }
 
+/// What a replay needs of the platform.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Host {
+    /// Takes a signal from outside.
+    pub(crate) raise: fn(u64, DagId),
+    pub(crate) now_ns: fn() -> u64,
+}
+
 /// Begins to do what is wished.
 pub type Begin = fn(Wish) -> Box<dyn Crossing>;
 
@@ -72,8 +83,10 @@ pub type Begin = fn(Wish) -> Box<dyn Crossing>;
 /// }
 /// ```
 pub trait Crossing: Send {
-    /// Takes the recorded topics of a DAG, and the hash of its names and edges.
-    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]);
+    /// Takes the recorded topics of a DAG, and the hash of its names and edges. Reports whether
+    /// the launch will take the values from where they are written, so that only those come to
+    /// [`record`](Self::record) that have no room.
+    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool;
 
     /// Takes the plan, before anything of it has run. Takes all memory that will be needed.
     ///
@@ -88,18 +101,18 @@ pub trait Crossing: Send {
     /// Takes what has become of a job, or of an instance.
     fn happened(&mut self, what: What, happened: &Happened);
 
-    /// Takes note that an instance has failed, and what it had sampled.
-    fn failed(&mut self, _instance: Instance, _at_ns: u64) {}
+    /// Takes note that an instance has failed, and what it had sampled: `at_ns` on the time of
+    /// the run, `clock_ns` on that of [`crate::now_ns`].
+    fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
+        let _ = (instance, at_ns, clock_ns);
+    }
 
     /// Lends the recorded value of a channel and a job, if there is one.
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8]));
 
-    /// Returns what makes a file of what is recorded; the first time only. Of the last jobs there
-    /// is a file when one has failed.
+    /// Returns what core 0 has to do; the first time only. Of the last jobs there is a file when
+    /// one has failed.
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
-
-    /// Hands what is left to the drain, at the end of the run; `false`: not all has room.
-    fn flush(&mut self) -> bool;
 
     /// Returns what a replay has found; if the run is over, also a value that it has not computed.
     fn outcome(&self, is_over: bool) -> Option<Outcome>;
@@ -152,18 +165,24 @@ impl Seen {
     }
 }
 
-/// Makes a file of what is recorded. Allocates nothing but for the header.
+/// What core 0 does of it when it has nothing else to do: it makes a file of what is recorded, and
+/// allocates nothing but for the header; or it raises the signals of a replay.
 ///
 /// See [`Crossing`].
 pub trait Drain: Send {
     /// Sends the header.
     fn begin(&mut self, send: &mut dyn FnMut(&[u8]));
 
+    /// Takes when the time of the run begins, on the clock of [`crate::now_ns`].
+    fn begin_run(&mut self, epoch_ns: u64) {
+        let _ = epoch_ns;
+    }
+
     /// Sends the next entry; `false`: there is none.
     fn step(&mut self, send: &mut dyn FnMut(&[u8])) -> bool;
 
-    /// Sends the end.
-    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Drained;
+    /// Sends the end, when the run is over and nothing is left; `None`: there is no file.
+    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Option<Drained>;
 }
 
 /// How complete a recording is.
@@ -197,12 +216,12 @@ pub struct Happened {
 }
 
 /// Begins to do what is wished.
-pub(crate) fn begin(wish: Wish) -> Box<dyn Crossing> {
+pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
     match wish {
         Wish::Record { app, bytes } => Box::new(tape::Tape::new(app, bytes)),
-        Wish::Replay(bytes) => Box::new(machine::OfMachine::new(bytes)),
+        Wish::Replay(bytes) => Box::new(machine::OfMachine::new(bytes, host)),
         Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
-        Wish::Echo(other) => Box::new(echo::Echo::new(other.map(|other| begin(*other)))),
+        Wish::Echo(other) => Box::new(echo::Echo::new(other.map(|other| begin(*other, host)))),
     }
 }
 

@@ -161,9 +161,12 @@ pub trait Platform: Sync {
 
     /// Takes the recorded topics of a DAG and the hash of its names and edges, before the plan
     /// comes. Channels are numbered over all DAGs, in the order of the calls. `begin` is for
-    /// platforms that have no memory of their own for what crosses.
-    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
+    /// platforms that have no memory of their own for what crosses. Reports what
+    /// [`Crossing::open`](crate::edge::Crossing::open) does, or else `false`: then values come by
+    /// [`record`](Self::record).
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
         let _ = (dag, graph, channels, begin);
+        false
     }
 
     /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had

@@ -1,7 +1,7 @@
 //! What crosses the edge of a DAG: a value on its way to the platform, the way there and back,
 //! and the room that it is written into.
 
-use recording::{Channel, Recordable};
+use recording::Channel;
 use sched_dag::DagId;
 
 /// The least room for a value.
@@ -36,8 +36,9 @@ pub(crate) struct Edge {
     pub(crate) crosses: fn() -> bool,
     /// Reports whether that is so of what other subtasks than sources write, too.
     pub(crate) has_results: fn() -> bool,
-    /// Takes the recorded topics of a DAG, and the hash of its graph.
-    pub(crate) open: fn(DagId, u64, &[Channel]),
+    /// Takes the recorded topics of a DAG, and the hash of its graph. Reports whether the plan's
+    /// taker will read the values; else they are given to it.
+    pub(crate) open: fn(DagId, u64, &[Channel]) -> bool,
     /// Takes a value.
     pub(crate) record: fn(&Recorded<'_>),
     /// Reports whether there is a replay.
@@ -49,12 +50,10 @@ pub(crate) struct Edge {
 /// Lends the value of a channel and a job.
 type Lend = fn(u16, u64, &mut dyn FnMut(&[u8]));
 
-/// Returns the room for a value.
-pub(super) fn room_of<T: Recordable>() -> usize {
-    room_for(T::LEAST_BYTES)
-}
-
 /// Returns the room for a value of at least so many bytes.
-pub(super) fn room_for(least_bytes: usize) -> usize {
-    ROOM.max(2 * least_bytes)
+pub(crate) const fn room_for(least_bytes: usize) -> usize {
+    match 2 * least_bytes {
+        room if room > ROOM => room,
+        _ => ROOM,
+    }
 }

@@ -12,6 +12,22 @@ use alloc::boxed::Box;
 
 use sched_dag::lifecycle::Request;
 
+/// An effect without its signals.
+pub(crate) struct Muted(pub(crate) Box<dyn Effect>);
+
+impl Effect for Muted {
+    fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
+        self.0.happen(completed_ns, &mut |request| match request {
+            Request::Signal(_) => {}
+            other => ask(other),
+        });
+    }
+
+    fn fail(&mut self, failed_ns: u64) {
+        self.0.fail(failed_ns);
+    }
+}
+
 /// Something that a function has prepared, perhaps.
 pub(crate) trait Effect: Send {
     /// Publishes it if it was prepared since the last time. `ask` takes what the scheduler is

@@ -5,12 +5,16 @@
 //! Nothing in here knows how a DAG is built or verified, and nothing allocates once the
 //! commit has made it.
 
-#[allow(unsafe_code, reason = "the one cell type of the job slots")]
+#[allow(
+    unsafe_code,
+    reason = "the four cells of job slots, shared values and records"
+)]
 pub(crate) mod cell;
 pub(crate) mod crossing;
 pub(crate) mod effect;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;
+pub(crate) mod line;
 pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod record;

@@ -9,8 +9,8 @@ use alloc::vec::Vec;
 use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, TaskSet};
 
-use super::effect::{Act, Effect};
-use super::sample::SampledBy;
+use super::effect::{Act, Effect, Muted};
+use super::line::LineOf;
 use super::staleness::Staleness;
 
 /// A committed set of DAGs, ready to be scheduled.
@@ -56,8 +56,8 @@ pub struct Plan {
     /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
     /// passes between DAGs, for platforms that show it.
     pub staleness: Vec<Staleness>,
-    /// The subtasks that sample recorded topics.
-    pub(crate) samplers: Vec<SampledBy>,
+    /// The ways of recorded values, by channel.
+    pub(crate) lines: Vec<LineOf>,
 }
 
 /// The executable part of a subtask: its function with its ends of the topics.
@@ -213,6 +213,12 @@ impl Body {
     /// ```
     pub fn on_completion(&mut self, act: Box<dyn FnMut() + Send>) {
         self.effects.push(Box::new(Act(act)));
+    }
+
+    /// Keeps its signals from going anywhere.
+    pub(crate) fn mute(&mut self) {
+        let effects = core::mem::take(&mut self.effects).into_iter();
+        self.effects = effects.map(|effect| Box::new(Muted(effect)) as _).collect();
     }
 
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a

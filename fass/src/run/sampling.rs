@@ -4,21 +4,12 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::DagId;
-
 use super::effect::Effect;
 use super::plan::{Body, Subtask};
-use super::sample::{SampleLine, SampledBy};
+use super::sample::SampleLine;
 
-/// Lets the bodies of sampling subtasks tell their lines which job they run, and notes who they
-/// are.
-pub(super) fn attach(
-    lines: Vec<(usize, Arc<SampleLine>)>,
-    (dag, bodies): (DagId, &mut Vec<Body>),
-    samplers: &mut Vec<SampledBy>,
-) {
-    let noted = |(subtask, line): &(usize, _)| SampledBy::new(dag, *subtask, line);
-    samplers.extend(lines.iter().map(noted));
+/// Lets the bodies of sampling subtasks tell their lines which job they run.
+pub(super) fn attach(lines: Vec<(usize, Arc<SampleLine>)>, bodies: &mut Vec<Body>) {
     let mut all: Vec<Option<Body>> = core::mem::take(bodies).into_iter().map(Some).collect();
     for (subtask, line) in lines {
         all[subtask] = all[subtask].take().map(|body| {

@@ -2,7 +2,7 @@
 //!
 //! A [`Publisher`] is the writing end of a topic and owns the writer of every
 //! edge that leaves it, one a reading port, and one of every subtask that samples
-//! the topic's latest value; a [`Subscriber`] is one reading
+//! the topic's latest value; if it is recorded, a *tap* looks at each value before; a [`Subscriber`] is one reading
 //! port. At commit [`Wiring`] hands out the ends: whichever end of an edge is
 //! asked for first makes the ring and leaves the other end for the one
 //! that asks second. All rings exist before the first release, so no job can be missed
@@ -61,23 +61,45 @@ impl<T> Subscriber<T> {
 /// fn same<T>(_: fn(T), _: fn(T)) {}
 /// same::<<(i32,) as VecToPubs>::Pubs>(|_| (), |_: Publishers<(Publisher<i32>,)>| ());
 /// ```
-pub struct Publisher<T> {
-    /// That of the one reading port, where nobody else reads the topic.
-    only: Option<Writer<T>>,
-    /// Those of all reading ports otherwise.
-    several: Box<[Writer<T>]>,
+pub struct Publisher<T>(End<T>);
+
+enum End<T> {
+    /// To the one reading port, where nobody else reads the topic.
+    One(Writer<T>),
+    /// To any number of readers, or by way of somebody who looks at the values.
+    Other(Box<dyn Relay<T>>),
+}
+
+/// What takes values on their way to a topic's readers.
+pub(super) trait Relay<T>: Send + Sync {
+    fn send(&mut self, job: u64, value: T);
+}
+
+/// What puts something between a writer and its readers.
+pub(super) type Wrap<T> = Option<Box<dyn FnOnce(Publisher<T>) -> Publisher<T>>>;
+
+/// Any number of readers.
+struct Several<T> {
+    /// One a reading port.
+    writers: Box<[Writer<T>]>,
     /// One a subtask that samples the topic's latest value.
     stages: Box<[Box<dyn Stage<T>>]>,
 }
 
 impl<T: Message> Publisher<T> {
     fn new(mut writers: Vec<Writer<T>>, stages: Box<[Box<dyn Stage<T>>]>) -> Self {
-        let is_one = writers.len() == 1 && stages.is_empty();
-        Self {
-            only: if is_one { writers.pop() } else { None },
-            several: writers.into(),
-            stages,
+        if stages.is_empty()
+            && writers.len() == 1
+            && let Some(writer) = writers.pop()
+        {
+            return Self(End::One(writer));
         }
+        let writers = writers.into();
+        Self::by_way_of(Several { writers, stages })
+    }
+
+    pub(super) fn by_way_of(relay: impl Relay<T> + 'static) -> Self {
+        Self(End::Other(Box::new(relay)))
     }
 
     /// Hands the value of `job` to every reader: clones for all but the last,
@@ -91,26 +113,23 @@ impl<T: Message> Publisher<T> {
     /// than the plan says.
     #[inline]
     pub(crate) fn send(&mut self, job: u64, value: T) {
-        match &mut self.only {
-            Some(only) => put(only, job, value),
-            None => self.share(job, value),
+        match &mut self.0 {
+            End::One(writer) => put(writer, job, value),
+            End::Other(relay) => relay.send(job, value),
         }
     }
+}
 
-    /// Does so for any number of readers. Apart, so that the usual way to one reader
-    /// is short.
-    #[inline(never)]
-    fn share(&mut self, job: u64, value: T) {
+impl<T: Message> Relay<T> for Several<T> {
+    fn send(&mut self, job: u64, value: T) {
         // The commit refuses several readers of a type that gives `None`.
-        let stage = |stage: &mut Box<dyn Stage<T>>, value: &T| {
-            if !stage.looks_at(job, value)
-                && let Some(clone) = value.for_another_reader()
-            {
+        let stage = |stage: &mut Box<dyn Stage<T>>| {
+            if let Some(clone) = value.for_another_reader() {
                 stage.stage(job, clone);
             }
         };
-        if let Some((last, others)) = self.several.split_last_mut() {
-            (self.stages.iter_mut()).for_each(|sampled| stage(sampled, &value));
+        if let Some((last, others)) = self.writers.split_last_mut() {
+            self.stages.iter_mut().for_each(stage);
             for writer in others {
                 if let Some(clone) = value.for_another_reader() {
                     put(writer, job, clone);
@@ -118,10 +137,8 @@ impl<T: Message> Publisher<T> {
             }
             put(last, job, value);
         } else if let Some((last, others)) = self.stages.split_last_mut() {
-            (others.iter_mut()).for_each(|sampled| stage(sampled, &value));
-            if !last.looks_at(job, &value) {
-                last.stage(job, value);
-            }
+            others.iter_mut().for_each(stage);
+            last.stage(job, value);
         }
     }
 }
@@ -171,7 +188,7 @@ pub(crate) struct Wiring {
     /// For each subtask the edges that lead from it carrying tokens.
     tokens_from: Vec<Vec<usize>>,
     /// For each latest value its topic, and where the writer puts it: a
-    /// `Vec<Box<dyn Stage<T>>>`.
+    /// `Vec<Box<dyn Stage<T>>>`; or what shall stand between, a [`Wrap<T>`].
     stages: Vec<(String, Box<dyn Any>)>,
     /// How many faults of the DAG are survived.
     pub(crate) faults: u32,
@@ -229,7 +246,9 @@ impl Wiring {
         }
     }
 
-    /// Returns the ends of the edges that lead to an untyped subtask, and from it.
+    /// Returns the ends of the edges that lead to an untyped subtask, and from it. Compiled with
+    /// the app, so that its sending is: this crate's own code is compiled for size.
+    #[inline]
     pub(crate) fn tokens(&mut self, subtask: usize) -> (Vec<Subscriber<Token>>, Publisher<Token>) {
         let to = core::mem::take(&mut self.tokens_to[subtask]);
         let from = core::mem::take(&mut self.tokens_from[subtask]);
@@ -249,16 +268,23 @@ impl Wiring {
         }
     }
 
-    fn stages<T: Message>(&mut self, topic: &str) -> Box<[Box<dyn Stage<T>>]> {
+    /// Makes the end of a topic that leads to these readers.
+    fn publisher<T: Message>(&mut self, topic: &str, writers: Vec<Writer<T>>) -> Publisher<T> {
         let mut found = Vec::new();
-        for (of, stages) in &mut self.stages {
-            if of == topic
-                && let Some(stages) = stages.downcast_mut::<Vec<Box<dyn Stage<T>>>>()
-            {
+        let of_topic = self.stages.iter_mut().filter(|(of, _)| of == topic);
+        let mut wrap = None;
+        for (_, any) in of_topic {
+            if let Some(stages) = any.downcast_mut::<Vec<Box<dyn Stage<T>>>>() {
                 found.append(stages);
+            } else if let Some(found) = any.downcast_mut::<Wrap<T>>() {
+                wrap = found.take();
             }
         }
-        found.into()
+        let publisher = Publisher::new(writers, found.into());
+        match wrap {
+            Some(wrap) => wrap(publisher),
+            None => publisher,
+        }
     }
 
     fn reader<T: Message>(&mut self, edge: usize) -> Reader<T> {
@@ -311,8 +337,7 @@ impl Ports<'_> {
         self.next += 1;
         let edges = self.wiring.edges_of_topic.get(topic).cloned();
         let edges = edges.unwrap_or_default();
-        let stages = self.wiring.stages(topic);
         let writers = edges.iter().map(|&e| self.wiring.writer(e)).collect();
-        Publisher::new(writers, stages)
+        self.wiring.publisher(topic, writers)
     }
 }

@@ -196,12 +196,13 @@ impl Platform for HostPlatform {
         true
     }
 
-    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], _: Begin) {
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], _: Begin) -> bool {
         let machine = expect_current();
         // Those of a second plan, which will be refused, are not this run's.
         if !machine.has_launched.get() {
             machine.surroundings.edge.open(dag, graph, channels);
         }
+        false
     }
 
     fn record(&self, value: &Recorded<'_>) {

@@ -234,7 +234,7 @@ impl Machine {
     pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
-        let mut outgoing = edge::begin();
+        let mut outgoing = edge::begin(epoch_ns);
         let allocations_before = heap::usage().allocations;
         let locks_before = execution::lock_acquisitions();
         console::defer();

@@ -86,14 +86,12 @@ pub(crate) struct Adjacency {
 }
 
 impl TaskSet {
-    /// Lets a DAG lose no job, for a replay: due releases queue, whatever it has stated. A
-    /// periodic one ends after so many jobs, as its recording does.
+    /// Lets a DAG lose no job, for a replay: due releases queue, whatever it has stated. It ends
+    /// after so many jobs, as its recording does.
     pub fn replay(&mut self, dag: DagId, jobs: u64) {
         let dag = &mut self.dags[dag.index()];
         dag.overrun = OverrunPolicy::Queue;
-        if !dag.is_sporadic() {
-            dag.jobs = Some(dag.jobs.map_or(jobs, |stated| stated.min(jobs)));
-        }
+        dag.jobs = Some(dag.jobs.map_or(jobs, |stated| stated.min(jobs)));
     }
 
     /// Counts the subtasks of verified DAGs.

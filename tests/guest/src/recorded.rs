@@ -7,7 +7,8 @@ use alloc::{format, vec};
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{Occupation, Sample, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use fass::{Occupation, OverrunPolicy, Sample, SubtaskAttributes};
+use fass::{create_dag, execute_for, finish_create_dags};
 use kernel::{Ending, Machine};
 
 use crate::kernel_crimes;
@@ -64,11 +65,11 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     machine.run().map(drop)
 }
 
-/// Runs a chain that computes without a pause, each link of which is recorded.
+/// Runs a chain that leaves one core no pause, each link of which is recorded.
 pub(crate) fn long(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     let dag = create_dag();
-    dag.name("chain").jobs(20);
+    (dag.name("chain").jobs(20)).overrun(OverrunPolicy::Queue);
     let topics = (0..LINKS).map(|link| format!("link {link}"));
     let topics: vec::Vec<_> = topics.collect();
     for topic in &topics {
@@ -86,7 +87,7 @@ pub(crate) fn long(machine: &Machine) -> Result<(), Ending> {
         let (from, to) = (&topics[link - 1], &topics[link]);
         dag.register_subtask(pass, vec![from], vec![to], attributes(link));
     }
-    let last = |_: (Block,)| ();
+    let last = |_: (Block,)| execute_for(2 * PERIOD, Occupation::Hold);
     dag.register_sink_subtask(last, vec![&topics[LINKS - 1]], PERIOD, attributes(LINKS));
     finish_create_dags(&[dag])?;
     let run = machine.run()?;

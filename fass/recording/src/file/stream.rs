@@ -60,23 +60,6 @@ impl Stream {
     /// See [`Writer`](crate::Writer).
     pub fn write(&mut self, entry: &Entry<'_>, send: &mut dyn FnMut(&[u8])) {
         let value = entry.value;
-        self.write_parts(entry, value.len(), |part| part(value), send);
-    }
-
-    /// Adds an entry whose value has so many bytes, which `value` gives part by part.
-    ///
-    /// # Panics
-    ///
-    /// If the value has 4 GiB or more.
-    ///
-    /// See [`Stream`].
-    pub fn write_parts(
-        &mut self,
-        entry: &Entry<'_>,
-        length: usize,
-        value: impl FnOnce(&mut dyn FnMut(&[u8])),
-        send: &mut dyn FnMut(&[u8]),
-    ) {
         self.entries += 1;
         self.lost += u64::from(entry.what == What::Lost);
         let mut head = [0; ENTRY_HEAD];
@@ -86,9 +69,9 @@ impl Stream {
             ..*entry
         }
         .encode(&mut out);
-        self.head(ENTRY, ENTRY_HEAD + length, send);
+        self.head(ENTRY, ENTRY_HEAD + value.len(), send);
         self.put(&head, send);
-        value(&mut |part| self.put(part, send));
+        self.put(value, send);
         send(&self.crc.value().to_le_bytes());
     }
 

@@ -316,7 +316,17 @@ impl Replay {
     pub fn prepare(&self, plan: &mut Plan) {
         let task_set = Arc::make_mut(&mut plan.task_set);
         for dag in (0..).map(DagId).take(task_set.dags().len()) {
-            if let Some(jobs) = self.jobs_of(dag) {
+            // No other signals come: without a last job, it would end no run, or keep none going.
+            let of_signals = || {
+                self.signals
+                    .get(&dag)
+                    .map_or(0, |signals| signals.len() as u64)
+            };
+            let jobs = match task_set.dag(dag).is_sporadic() {
+                true => Some(of_signals()),
+                false => self.jobs_of(dag),
+            };
+            if let Some(jobs) = jobs {
                 task_set.replay(dag, jobs);
                 if let Some(lifecycle) = &mut plan.lifecycle {
                     lifecycle.leave_alone(dag);

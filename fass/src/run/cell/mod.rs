@@ -1,5 +1,5 @@
-//! The three cells in which the crate's `unsafe` lives: a job slot, a shared value
-//! and a set-once.
+//! The cells in which the crate's `unsafe` lives: a job slot, a shared value and a
+//! set-once; and, in a file of its own, an [`outbox`].
 //!
 //! # The slot ring
 //!
@@ -84,8 +84,7 @@ const fn turn_of(job: u64) -> u64 {
     job << 1 | 1
 }
 
-/// Makes the ring of one edge with at least `slots` slots and returns its two ends.
-/// Besides the near one they are a power of two, so that going round takes no comparison.
+/// Makes the ring of one edge with `slots` slots at least; besides the near one a power of two.
 ///
 /// # Panics
 ///
@@ -396,5 +395,6 @@ impl<T> Drop for SetOnce<T> {
     }
 }
 
+pub(crate) mod outbox;
 #[cfg(test)]
 mod tests;

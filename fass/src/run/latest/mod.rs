@@ -60,7 +60,8 @@ pub(crate) trait AnyLatest {
     /// Returns the number of subtasks that sample it.
     fn samplers(&self) -> usize;
 
-    /// Returns the writing ends: a `Vec<Box<dyn Stage<T>>>`.
+    /// Returns the writing ends, a `Vec<Box<dyn Stage<T>>>`, or what shall stand between the
+    /// writer and all others, a [`Wrap<T>`](super::topic::Wrap).
     fn stages(&self) -> Box<dyn Any>;
 
     /// Returns what the writer's completion does.
@@ -106,11 +107,6 @@ impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
 /// Where a writer puts what shall show at its completion.
 pub(crate) trait Stage<T>: Send + Sync {
     fn stage(&mut self, job: u64, value: T);
-
-    /// Looks at the value, and reports whether that is enough; else it takes one.
-    fn looks_at(&mut self, _job: u64, _value: &T) -> bool {
-        false
-    }
 }
 
 /// What looks at the samples of one subtask, or gives them in a replay. It gets the reader's slot,

@@ -75,16 +75,17 @@ pub fn has_results() -> bool {
     ECHOES.load(Ordering::Relaxed) || !matches!(WISH.get(), Some(Wish::Latest { .. }))
 }
 
-/// Takes the recorded topics of a DAG.
-pub fn open(dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
+/// Takes the recorded topics of a DAG, and reports whether their values are read where they are
+/// written.
+pub fn open(dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
     let wish = match (WISH.get(), ECHOES.load(Ordering::Relaxed)) {
         (wish, true) => Wish::Echo(wish),
         (Some(wish), false) => *wish,
-        (None, false) => return,
+        (None, false) => return false,
     };
     let mut crossing = CROSSING.lock();
     let crossing = crossing.get_or_insert_with(|| begin(wish));
-    crossing.open(dag, graph, channels);
+    crossing.open(dag, graph, channels)
 }
 
 /// Makes a plan one that is recorded or replayed, if there is a wish.
@@ -125,9 +126,13 @@ pub fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     Ok(())
 }
 
-/// Takes what sends the recording of the run that begins.
-pub fn begin() -> Outgoing {
-    OUTGOING.lock().take()
+/// Takes what sends the recording of the run that begins, whose time begins then.
+pub fn begin(epoch_ns: u64) -> Outgoing {
+    let mut outgoing = OUTGOING.lock().take();
+    if let Some(drain) = &mut outgoing {
+        drain.begin_run(epoch_ns);
+    }
+    outgoing
 }
 
 /// Sends an entry, if there is one; `false`: there was none.
@@ -144,17 +149,13 @@ pub fn end(outgoing: Outgoing, is_over: bool) {
         let _ = OUTCOME.set(outcome);
     }
     let mut outgoing = outgoing.or_else(before_fault);
-    loop {
-        while send(&mut outgoing) {}
-        if (CROSSING.lock().as_mut()).is_none_or(|crossing| crossing.flush()) {
-            break;
-        }
-    }
     while send(&mut outgoing) {}
     let Some(mut drain) = outgoing else {
         return;
     };
-    let drained = drain.end(&mut debug_port::send);
+    let Some(drained) = drain.end(&mut debug_port::send) else {
+        return;
+    };
     let is_complete = !drained.is_cut && drained.lost == 0;
     json::emit("recorded", |line| {
         line.number("entries", drained.entries)
@@ -175,16 +176,18 @@ fn before_fault() -> Outgoing {
     Some(drain)
 }
 
-/// Takes note that an instance has failed, on the run's time. The scheduler's lock is held.
-pub fn failed(instance: Instance, at_ns: u64) {
+/// Takes note that an instance has failed, on the run's time and the clock's. The scheduler's
+/// lock is held.
+pub fn failed(instance: Instance, at_ns: u64, clock_ns: u64) {
     if IS_ON.load(Ordering::Relaxed)
         && let Some(crossing) = CROSSING.lock_uninterrupted().as_mut()
     {
-        crossing.failed(instance, at_ns);
+        crossing.failed(instance, at_ns, clock_ns);
     }
 }
 
-/// Takes a value, and when that was in the time of the run. The scheduler's lock is held.
+/// Takes a value that is not read where it was written, and when that was in the time of the run.
+/// The scheduler's lock is held.
 pub fn record(value: &Recorded<'_>, at_ns: u64) {
     if let Some(crossing) = CROSSING.lock_uninterrupted().as_mut() {
         crossing.record(value, at_ns);

@@ -175,8 +175,8 @@ impl Platform for Kernel {
         edge::has_results()
     }
 
-    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) {
-        edge::open(dag, graph, channels, begin);
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
+        edge::open(dag, graph, channels, begin)
     }
 
     fn record(&self, value: &Recorded<'_>) {

@@ -93,13 +93,14 @@ pub fn fail(now_ns: u64) {
     };
     let instance = execution.scheduler.instance_of(vertex);
     // Not when the interrupt came: a step may have left events since then.
-    let ended_ns = since_epoch(clock::now_ns());
+    let clock_ns = clock::now_ns();
+    let ended_ns = since_epoch(clock_ns);
     execution
         .watcher
         .journal
         .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
-    edge::failed(instance, ended_ns);
+    edge::failed(instance, ended_ns, clock_ns);
     let woken = execution.step(now_ns, Occasion::Failed(instance));
     drop(place);
     woken.wake();

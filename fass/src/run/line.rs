@@ -1,0 +1,185 @@
+//! The way of a channel's values to the platform.
+//!
+//! A value is written into an [outbox](super::cell::outbox) when its instance has it, and goes on
+//! when the instance is complete: the platform's reader finds it there, or, if it has none, is
+//! given it at once.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use core::fmt;
+use core::sync::atomic::{AtomicBool, AtomicU16, Ordering};
+
+use recording::{Encoder, Recordable, Role};
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, Instance};
+
+use super::cell::SetOnce;
+use super::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
+use super::crossing::{Edge, Recorded, room_for};
+use super::effect::Effect;
+
+/// The number of a channel while it has none.
+const NO_CHANNEL: u16 = u16::MAX;
+
+/// What those share who write a channel's values, publish them, or replay them.
+pub(crate) struct Line {
+    number: AtomicU16,
+    pub(super) edge: &'static Edge,
+    /// Whether the platform reads the values; else it is given each.
+    is_read: AtomicBool,
+    /// Where the values are written, if anybody wants them.
+    outbox: SetOnce<Outbox>,
+}
+
+impl Line {
+    pub(super) const fn new(edge: &'static Edge) -> Self {
+        Self {
+            number: AtomicU16::new(NO_CHANNEL),
+            edge,
+            is_read: AtomicBool::new(false),
+            outbox: SetOnce::new(),
+        }
+    }
+
+    /// Reports whether the channel has a number, for else nobody wants its values.
+    pub(super) fn is_open(&self) -> bool {
+        self.number() != NO_CHANNEL
+    }
+
+    /// Returns the number of the channel.
+    pub(super) fn number(&self) -> u16 {
+        self.number.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn set_number(&self, number: u16) {
+        self.number.store(number, Ordering::Relaxed);
+    }
+
+    /// Notes whether the platform reads the values, which have at least so many bytes.
+    pub(super) fn open(&self, is_read: bool, least_bytes: usize) {
+        self.is_read.store(is_read, Ordering::Relaxed);
+        if !is_read && let Some((outbox, _)) = outbox(words_of(room_for(least_bytes))) {
+            // The commit, which comes once, does this or the other.
+            let _ = self.outbox.set(outbox);
+        }
+    }
+
+    /// Returns what the writer's completion does.
+    pub(super) fn effect(self: &Arc<Self>) -> Box<dyn Effect> {
+        match self.is_read.load(Ordering::Relaxed) {
+            true => Box::new(Publishing(Arc::clone(self))),
+            false => Box::new(Giving(Arc::clone(self))),
+        }
+    }
+
+    /// Returns what reads the values, which have at least so many bytes, from a place of so many
+    /// words, or more where that would hold too few of them; `None`: there is no memory. If values
+    /// are given, also what whoever takes them puts them into.
+    pub(crate) fn reader(
+        &self,
+        words: usize,
+        least_bytes: usize,
+    ) -> Option<(OutboxReader, Option<Outbox>)> {
+        // Half of it is in one piece, wherever the next value comes.
+        let least = 2 * words_of(room_for(least_bytes)) + 1;
+        let (outbox, reader) = outbox(words.max(least))?;
+        if !self.is_read.load(Ordering::Relaxed) {
+            return Some((reader, Some(outbox)));
+        }
+        let _ = self.outbox.set(outbox);
+        Some((reader, None))
+    }
+
+    /// Writes the value of an instance that is not complete.
+    #[inline(always)]
+    pub(super) fn stage<T: Recordable>(&self, job: u64, write: impl Fn(&mut Encoder<'_>)) {
+        if let Some(outbox) = self.outbox.get() {
+            let most = const { room_for(T::LEAST_BYTES) };
+            outbox.stage(job, most, |bytes| {
+                let mut out = Encoder::new(bytes);
+                write(&mut out);
+                out.finish()
+            });
+        }
+    }
+
+    /// Lets the reader have the value, if there is one: its instance is complete.
+    #[inline(always)]
+    fn publish(&self, completed_ns: u64) {
+        if let Some(outbox) = self.outbox.get()
+            && !outbox.publish(completed_ns)
+        {
+            self.show(completed_ns, self.edge.record);
+        }
+    }
+
+    /// Gives what is there to the platform: the value, or that it had no room.
+    #[inline(never)]
+    pub(crate) fn show(&self, completed_ns: u64, take: impl FnOnce(&Recorded<'_>)) {
+        if let Some(outbox) = self.outbox.get() {
+            outbox.show(|job, bytes| {
+                take(&Recorded {
+                    channel: self.number(),
+                    job,
+                    completed_ns,
+                    bytes,
+                });
+            });
+        }
+    }
+
+    /// Publishes or gives the value, whichever it is.
+    pub(super) fn give(&self, completed_ns: u64) {
+        self.end(completed_ns, self.edge.record);
+    }
+
+    /// Publishes the value, or gives it to that, as what has no room to be published.
+    pub(crate) fn end(&self, at_ns: u64, take: impl FnOnce(&Recorded<'_>)) {
+        let is_read = self.is_read.load(Ordering::Relaxed);
+        if !is_read || !(self.outbox.get()).is_some_and(|outbox| outbox.publish(at_ns)) {
+            self.show(at_ns, take);
+        }
+    }
+}
+
+/// Lets the reader have a value.
+struct Publishing(Arc<Line>);
+
+impl Effect for Publishing {
+    // Compiled with the app: this crate's own code is compiled for size.
+    #[inline]
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        self.0.publish(completed_ns);
+    }
+}
+
+/// Gives a value to the platform.
+struct Giving(Arc<Line>);
+
+impl Effect for Giving {
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        self.0.show(completed_ns, self.0.edge.record);
+    }
+}
+
+/// The line of a channel of a plan, and of which subtask it is.
+pub(crate) struct LineOf {
+    pub(crate) dag: DagId,
+    pub(crate) subtask: usize,
+    pub(crate) role: Role,
+    pub(crate) line: Arc<Line>,
+}
+
+impl LineOf {
+    /// Reports whether it has what an instance has sampled.
+    pub(crate) fn is_sample_of(&self, instance: Instance) -> bool {
+        let of = (self.dag, self.subtask, self.role);
+        of == (instance.dag, instance.subtask.index(), Role::Sample)
+    }
+}
+
+impl fmt::Debug for LineOf {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("LineOf")
+    }
+}
