@@ -131,7 +131,8 @@ pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
 pub use draft::modes::ModeFault;
 pub use platform::{
-    Additions, AlreadyInstalled, LaunchError, Occupation, Platform, execute_for, install, now_ns,
+    Additions, AlreadyInstalled, Clock, LaunchError, Occupation, Platform, execute_for, install,
+    now_ns, set_clock,
 };
 pub use recording::Channel;
 pub use run::crossing::Recorded;

@@ -66,6 +66,7 @@ pub use app::machine_handle::{Machine, Resources};
 pub use executive::memory::heap::KernelHeap;
 pub use executive::{print, println};
 pub use report::run::Run;
+pub use start::CLOCK;
 
 /// Text on the serial line, which [`print!`] and [`println!`] write.
 pub mod console {

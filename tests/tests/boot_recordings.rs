@@ -53,7 +53,13 @@ fn numbers<const N: usize>(line: &Value, names: [&str; N]) -> [u64; N] {
 
 /// Replays it, and returns how many values were compared, and how many were not computed.
 fn replay(cores: u64, policy: &str, file: &Path) -> [u64; 2] {
-    let guest = guest(&["test=recorded", "step=7", &format!("policy={policy}")]);
+    replay_with(&[], cores, policy, file)
+}
+
+fn replay_with(words: &[&str], cores: u64, policy: &str, file: &Path) -> [u64; 2] {
+    let policy = format!("policy={policy}");
+    let words = [&["test=recorded", "step=7", &policy], words].concat();
+    let guest = guest(&words);
     let outcome = guest.cores(cores).replays(file).succeed();
     numbers(&line(&outcome, "replayed"), ["compared", "uncompared"])
 }
@@ -82,6 +88,29 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     // The step is another one: sources are not called, or all values would be others.
     for (cores, policy) in [(1, "static"), (2, "edf"), (4, "static")] {
         assert_eq!(replay(cores, policy, &file.0), [100, 0], "{cores} {policy}");
+    }
+}
+
+#[test]
+fn functions_are_told_the_time_again_that_they_were_told() {
+    let file = File::new("told");
+    let recorded = record(guest(&["test=recorded", "asks=yes"]).cores(2), &file);
+    let said = line(&recorded, "recorded");
+    assert_eq!(numbers(&said, ["entries", "lost"]), [250, 0]);
+    let bytes = file.bytes();
+    let recording = Recording::read(&bytes).expect("it is whole");
+    let told = recording
+        .entries()
+        .filter(|entry| entry.what == What::Clock);
+    for entry in told {
+        let times = Vec::<u64>::from_bytes(entry.value).expect("a list of times");
+        assert_eq!(times.len(), 1);
+        // From the kernel's entry on, and not from the first release.
+        assert!(times[0] > entry.at_ns && entry.at_ns > entry.release_ns);
+    }
+    for (cores, policy) in [(1, "static"), (2, "edf"), (4, "static")] {
+        let compared = replay_with(&["asks=yes"], cores, policy, &file.0);
+        assert_eq!(compared, [100, 0], "{cores} {policy}");
     }
 }
 

@@ -6,7 +6,7 @@
 use alloc::vec::Vec;
 use core::sync::atomic::Ordering;
 
-use recording::{Entry, Header, Stream, What};
+use recording::{Encoder, Entry, Header, Recordable, Stream, What};
 use sched_dag::{DagId, TaskSet};
 
 use super::lost::Lost;
@@ -22,7 +22,13 @@ pub(super) struct Tag {
     pub(super) subtask: u32,
 }
 
-const EVENTS: [What; 4] = [What::Signal, What::Skip, What::Cut, What::Restart];
+const EVENTS: [What; 5] = [
+    What::Signal,
+    What::Skip,
+    What::Cut,
+    What::Restart,
+    What::Clock,
+];
 
 impl Tag {
     pub(super) fn to_word(self) -> u64 {
@@ -38,6 +44,15 @@ impl Tag {
         let [subtask, dag] = [[s_0, s_1], [d_0, d_1]].map(u16::from_le_bytes);
         (what, dag, subtask)
     }
+}
+
+/// The bytes of a list of one time.
+const TOLD: usize = 4 + 8;
+
+/// Writes down what an instance was told that asked for the time, as a list of one.
+fn write_told(clock_ns: u64, bytes: &mut [u8; TOLD]) -> &[u8] {
+    (1_u32, clock_ns).encode(&mut Encoder::new(bytes));
+    bytes
 }
 
 /// Makes the file.
@@ -215,6 +230,7 @@ impl OfTape {
         {
             releases.note(job, release_ns);
         }
+        let mut told = [0; TOLD];
         let entry = Entry {
             what,
             dag,
@@ -222,7 +238,10 @@ impl OfTape {
             job,
             release_ns,
             at_ns,
-            value: &[],
+            value: match what {
+                What::Clock => write_told(at_ns + self.epoch_ns, &mut told),
+                _ => &[],
+            },
         };
         if let Some(stream) = &mut self.stream {
             stream.write(&entry, send);

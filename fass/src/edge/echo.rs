@@ -134,6 +134,13 @@ impl Crossing for Echo {
         }
     }
 
+    fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
+        match &mut self.inner {
+            Some(inner) => inner.tell_time(instance, clock_ns, at_ns),
+            None => clock_ns,
+        }
+    }
+
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         if let Some(inner) = &self.inner {
             inner.lend(channel, job, take);

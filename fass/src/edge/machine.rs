@@ -6,6 +6,7 @@ use alloc::string::String;
 
 use recording::{Channel, Header};
 use sched_dag::DagId;
+use sched_dag::Instance;
 use sched_dag::journal::What;
 
 use super::replay::{Outcome, Replay};
@@ -67,6 +68,11 @@ impl Crossing for OfMachine {
             let dag = happened.dag;
             signals.follow(dag, replay.next_signal_ns(dag));
         }
+    }
+
+    fn tell_time(&mut self, instance: Instance, clock_ns: u64, _at_ns: u64) -> u64 {
+        let told = (self.replay.as_mut()).and_then(|replay| replay.next_told_ns(instance));
+        told.unwrap_or(clock_ns)
     }
 
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {

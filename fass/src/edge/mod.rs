@@ -107,6 +107,13 @@ pub trait Crossing: Send {
         let _ = (instance, at_ns, clock_ns);
     }
 
+    /// Returns what an instance is told that asks for the time, `clock_ns` on the clock of
+    /// [`crate::now_ns`] and `at_ns` on the time of the run.
+    fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
+        let _ = (instance, at_ns);
+        clock_ns
+    }
+
     /// Lends the recorded value of a channel and a job, if there is one.
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8]));
 

@@ -74,6 +74,30 @@ impl Tape {
     }
 }
 
+impl Tape {
+    /// Puts an event into its ring; without room the recording ends.
+    fn put(&mut self, what: recording::What, happened: &Happened) {
+        let Happened {
+            dag,
+            subtask,
+            job,
+            release_ns,
+            at_ns,
+        } = *happened;
+        let event = Event {
+            tag: Tag { what, dag, subtask }.to_word(),
+            job,
+            at_ns,
+            release_ns,
+        };
+        if let Some(events) = &mut self.events
+            && !events.put(&event)
+        {
+            self.lost.end(at_ns);
+        }
+    }
+}
+
 /// Takes a value that is not where the drain reads it: it is given, and is put there, or is lost.
 fn take(given: &[Option<Outbox>], lost: &Lost, value: &Recorded<'_>, at_ns: u64) {
     let outbox = given
@@ -108,25 +132,9 @@ impl Crossing for Tape {
     }
 
     fn happened(&mut self, what: What, happened: &Happened) {
-        let Happened {
-            dag,
-            subtask,
-            job,
-            release_ns,
-            at_ns,
-        } = *happened;
         // The platform tells of releases only where they are signals.
-        let (Some(events), Some(what)) = (&mut self.events, recorded(what, true)) else {
-            return;
-        };
-        let event = Event {
-            tag: Tag { what, dag, subtask }.to_word(),
-            job,
-            at_ns,
-            release_ns,
-        };
-        if !events.put(&event) {
-            self.lost.end(at_ns);
+        if let Some(what) = recorded(what, true) {
+            self.put(what, happened);
         }
     }
 
@@ -136,6 +144,22 @@ impl Crossing for Tape {
                 take(&self.given, &self.lost, sample, at_ns);
             });
         }
+    }
+
+    fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
+        let number = u16::try_from(instance.dag.0);
+        let mut channels = self.header.channels.iter();
+        if channels.any(|channel| Ok(channel.dag) == number) {
+            let asked = Happened {
+                dag: instance.dag,
+                subtask: instance.subtask.0,
+                job: instance.job,
+                release_ns: None,
+                at_ns,
+            };
+            self.put(recording::What::Clock, &asked);
+        }
+        clock_ns
     }
 
     fn lend(&self, _channel: u16, _job: u64, _take: &mut dyn FnMut(&[u8])) {}

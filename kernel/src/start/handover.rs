@@ -34,6 +34,14 @@ use executive::text::{console, json};
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
 
+/// What tells functions the time, unless that is recorded or replayed.
+///
+/// ```no_run
+/// // To be told the time though the run is recorded, and leave no trace of it there:
+/// fass::set_clock(&kernel::CLOCK);
+/// ```
+pub static CLOCK: fass::Clock = clock::now_ns;
+
 /// The last processor that can be reached without x2APIC; the next id means all of them.
 const LAST_SHORT_ID: u32 = 254;
 
@@ -211,6 +219,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
     }
     // A second installation would come from a second boot, which there is not.
     let _ = fass::install(&KERNEL);
+    fass::set_clock(&CLOCK);
     let command_line = info.command_line().unwrap_or("(not UTF-8)");
     json::report("boot", |line| {
         line.text("version", env!("CARGO_PKG_VERSION"))

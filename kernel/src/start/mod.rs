@@ -10,4 +10,5 @@ mod probe;
 mod settings;
 mod terms;
 
+pub use handover::CLOCK;
 pub(crate) use handover::start;

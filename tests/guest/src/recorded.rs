@@ -22,13 +22,14 @@ type Block = [u64; 256];
 const LINKS: usize = 8;
 
 /// Runs a fork and a join, in which both branches may share a counter behind the scheduler's
-/// back.
+/// back, or ask for the time.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let cheats = options.choice("cheats", &[("no", false), ("yes", true)])?;
     let dies_in = options.number("dies_in", 0..=1000, 1000)?;
     let step = options.number("step", 1..=1000, 1)?;
-    options.finish(&["test", "cheats", "dies_in", "step"])?;
+    let asks = options.choice("asks", &[("no", false), ("yes", true)])?;
+    options.finish(&["test", "asks", "cheats", "dies_in", "step"])?;
     let named = SubtaskAttributes::named;
     let dag = create_dag();
     dag.name("counts").jobs(50);
@@ -49,7 +50,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         let calls = Arc::clone(&calls);
         let count = move |(input,): (u64,)| {
             let call = calls.fetch_add(1, Ordering::Relaxed);
-            (input + if cheats { call } else { 0 },)
+            let told = if asks { fass::now_ns() } else { 0 };
+            (input + told + if cheats { call } else { 0 },)
         };
         dag.register_subtask(count, vec![waited], vec![output], named(output));
     }

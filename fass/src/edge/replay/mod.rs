@@ -28,7 +28,7 @@ pub struct Replay {
     is_cut: bool,
     passed: Arc<Passed>,
     /// What instances were answered that asked for the time.
-    clock: BTreeMap<(u16, u16, u64), Vec<u64>>,
+    clock: BTreeMap<(u16, u16, u64), Told>,
     /// The releases, if the DAG is sporadic; those of skipped jobs, too, so that the jobs after
     /// them keep their numbers.
     signals: BTreeMap<DagId, VecDeque<u64>>,
@@ -51,6 +51,13 @@ pub struct Replay {
     divergence: Option<(u16, u64, Range<usize>)>,
     /// The value that is not the recorded one.
     computed: Vec<u8>,
+}
+
+/// The times that an instance was told, and how many of them it has been told again.
+#[derive(Debug, Default)]
+struct Told {
+    times: Vec<u64>,
+    taken: usize,
 }
 
 /// What a replay has found.
@@ -152,8 +159,9 @@ impl Replay {
                     of_dag.push_back(release_ns);
                 }
                 What::Clock => {
-                    let answers = Vec::<u64>::from_bytes(value)?;
-                    clock.insert((dag, place, job), answers);
+                    // The machine writes each answer by itself.
+                    let told = clock.entry((dag, place, job)).or_insert_with(Told::default);
+                    told.times.extend(Vec::<u64>::from_bytes(value)?);
                 }
                 What::Lost if role(place) == Role::Source => {
                     lost.get_or_insert((place, job));
@@ -199,8 +207,17 @@ impl Replay {
     #[must_use]
     pub fn clock(&self, instance: Instance) -> Option<&[u64]> {
         let (dag, subtask) = narrow(instance)?;
-        let answers = self.clock.get(&(dag, subtask, instance.job))?;
-        Some(answers)
+        let told = self.clock.get(&(dag, subtask, instance.job))?;
+        Some(&told.times)
+    }
+
+    /// Takes the next one of these times.
+    pub(super) fn next_told_ns(&mut self, instance: Instance) -> Option<u64> {
+        let (dag, subtask) = narrow(instance)?;
+        let told = self.clock.get_mut(&(dag, subtask, instance.job))?;
+        let time_ns = told.times.get(told.taken).copied();
+        told.taken += 1;
+        time_ns
     }
 
     /// Returns what is recorded of the DAGs besides values.

@@ -1,5 +1,5 @@
 //! The cells in which the crate's `unsafe` lives: a job slot, a shared value and a
-//! set-once; and, in a file of its own, an [`outbox`].
+//! set-once; and, in files of their own, an [`outbox`] and a [`current`] one of several.
 //!
 //! # The slot ring
 //!
@@ -395,6 +395,7 @@ impl<T> Drop for SetOnce<T> {
     }
 }
 
+pub(crate) mod current;
 pub(crate) mod outbox;
 #[cfg(test)]
 mod tests;

@@ -88,12 +88,14 @@ pub fn open(dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool 
     crossing.open(dag, graph, channels)
 }
 
-/// Makes a plan one that is recorded or replayed, if there is a wish.
-pub fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
+/// Makes a plan one that is recorded or replayed, if there is a wish. Reports whether that goes for
+/// the times, too, that functions are told.
+pub fn launch(plan: &mut Plan) -> Result<bool, LaunchError> {
     let Some(wish) = WISH.get() else {
         let mut place = CROSSING.lock();
         let launched = place.as_mut().map(|crossing| crossing.launch(plan));
-        return launched.unwrap_or(Ok(())).map_err(LaunchError::new);
+        let launched = launched.unwrap_or(Ok(())).map_err(LaunchError::new);
+        return launched.map(|()| false);
     };
     let word = match wish {
         Wish::Record { .. } => "record",
@@ -103,7 +105,7 @@ pub fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let is_asked_for = !matches!(wish, Wish::Latest { .. });
     let mut place = CROSSING.lock();
     let launched = match place.as_mut() {
-        None if !is_asked_for => return Ok(()),
+        None if !is_asked_for => return Ok(false),
         None => Err(format!(
             "`{word}`: no topic of the app is recorded; name topics by `Dag::record`"
         )),
@@ -123,7 +125,18 @@ pub fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     }
     *OUTGOING.lock() = outgoing;
     IS_ON.store(true, Ordering::Relaxed);
-    Ok(())
+    Ok(is_asked_for)
+}
+
+/// Tells the instance that runs here the time, and has it written down; or tells what the recording
+/// says that it was. Times are the clock's and the run's.
+pub fn tell_time(running: fn() -> Option<Instance>, clock_ns: u64, at_ns: u64) -> u64 {
+    let mut crossing = CROSSING.lock();
+    // Interrupts are off, so it stays here.
+    match (crossing.as_mut(), running()) {
+        (Some(crossing), Some(instance)) => crossing.tell_time(instance, clock_ns, at_ns),
+        _ => clock_ns,
+    }
 }
 
 /// Takes what sends the recording of the run that begins, whose time begins then.

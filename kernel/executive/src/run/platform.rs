@@ -6,8 +6,8 @@ use core::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Channel, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
-    Recorded,
+    Channel, Clock, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy,
+    Preemption, Recorded,
 };
 use sched_dag::analysis::{self, Answer, Settings};
 use sched_dag::{DagId, SchedulerOptions, TaskSet};
@@ -95,6 +95,13 @@ impl Kernel {
             .store(preemption == Preemption::Enabled, Ordering::Relaxed);
     }
 }
+
+/// Tells functions the time where that is recorded or replayed.
+static TOLD: Clock = || {
+    let clock_ns = clock::now_ns();
+    let running = || execution::running(this_core::get());
+    edge::tell_time(running, clock_ns, execution::since_epoch(clock_ns))
+};
 
 impl Platform for Kernel {
     fn policy(&self) -> Policy {
@@ -192,7 +199,9 @@ impl Platform for Kernel {
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
-        edge::launch(&mut plan)?;
+        if edge::launch(&mut plan)? {
+            fass::set_clock(&TOLD);
+        }
         stacks::watch(&mut plan);
         let options = SchedulerOptions {
             policy: self.policy(),
