@@ -69,7 +69,7 @@ impl Commit {
         self.add_with(dags, ConstructionPolicy::paper())
     }
 
-    /// Works like [`add`](Self::add) for other shapes of graph.
+    /// Works like [`add`](Self::add) for other shapes of graph. See [`add`](Self::add).
     ///
     /// # Errors
     ///
