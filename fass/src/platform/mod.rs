@@ -20,6 +20,7 @@ use crate::edge::Begin;
 use crate::run::cell::SetOnce;
 use crate::run::cell::current::Current;
 use crate::run::crossing::Recorded;
+use crate::run::cutter::Cutter;
 use crate::run::plan::Plan;
 
 pub use additions::Additions;
@@ -141,6 +142,13 @@ pub trait Platform: Sync {
 
     /// Occupies the calling instance's core for `duration` of execution time.
     fn execute_for(&self, duration: Duration, how: Occupation);
+
+    /// Returns what runs the optional parts of subtasks
+    /// ([`Dag::refining`](crate::Dag::refining)); without it a commit with such a subtask is
+    /// refused.
+    fn cutter(&self) -> Option<Cutter> {
+        None
+    }
 
     /// Takes a signal to a sporadic DAG of the plan with a number, from outside all
     /// subtasks ([`Signal::raise`](crate::Signal::raise)); does nothing if that plan

@@ -11,6 +11,7 @@
 )]
 pub(crate) mod cell;
 pub(crate) mod crossing;
+pub(crate) mod cutter;
 pub(crate) mod effect;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;

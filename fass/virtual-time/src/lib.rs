@@ -37,6 +37,7 @@ mod disturbed;
 mod edge;
 mod error;
 mod job;
+mod optional;
 mod platform;
 mod record;
 mod report;

@@ -26,7 +26,7 @@ use super::{contexts, execution};
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, interrupt_flag, this_core};
+use crate::machine::{clock, cut, interrupt_flag, section, this_core};
 use crate::text::backtrace::Spot;
 use crate::text::excerpt::Excerpt;
 use crate::text::json;
@@ -109,7 +109,8 @@ pub fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupted) -> b
     true
 }
 
-/// Ends this core's instance if its budget is used up.
+/// Ends this core's instance if its budget is used up; if that is the one of its optional part,
+/// ends that part.
 pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
     let core = this_core::get();
     let context = core.context();
@@ -120,6 +121,15 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
     if context.budget_end_ns() > now_ns {
         timer::set(Alarm::Budget, context.budget_end_ns());
         return;
+    }
+    if cut::can_cut(context) {
+        // What is given up in a section would keep the section for good.
+        if section::puts_off(core, now_ns) {
+            return;
+        }
+        if !section::is_in_one(core) && interrupted.cut() {
+            return;
+        }
     }
     let budget = Duration::from_nanos(execution::budget_ns(instance));
     let rip = interrupted.instruction();
