@@ -15,7 +15,7 @@ pub const LAYER: usize = 32;
 /// A graph to be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// So many subtasks, one after the other; at least 2.
+    /// So many subtasks, one after the other; at least 1.
     Chain(usize),
     /// A source, this number of subtasks side by side, a sink.
     ForkJoin(usize),

@@ -16,8 +16,8 @@ use crate::task_set::TaskSet;
 /// Instances by the absolute deadline, then by the slot of the job, then by vertex.
 #[derive(Clone, Debug, Hash)]
 pub(super) struct ByDeadline {
-    /// The deadlines of the jobs that have ready instances, by slot.
-    jobs: IndexedHeap<(u64, u32)>,
+    /// What comes before the vertex in the keys of the jobs that have ready instances, by slot.
+    jobs: IndexedHeap<u128>,
     /// By slot.
     lines: Box<[Line]>,
 }
@@ -49,10 +49,10 @@ impl ByDeadline {
 
     #[inline]
     pub(super) fn insert(&mut self, key: Key) {
-        let (deadline_ns, slot) = key.deadline_and_slot();
-        let line = &mut self.lines[slot as usize];
+        let slot = key.slot();
+        let line = &mut self.lines[slot];
         if line.subtasks.is_empty() {
-            self.jobs.set(slot as usize, (deadline_ns, slot));
+            self.jobs.set(slot, key.before_the_vertex());
         }
         line.subtasks.insert((key.vertex() - line.first) as usize);
     }
@@ -60,19 +60,19 @@ impl ByDeadline {
     /// Returns the smallest key.
     #[inline]
     pub(super) fn peek(&self) -> Option<Key> {
-        let ((deadline_ns, slot), _) = self.jobs.peek()?;
-        let line = &self.lines[slot as usize];
+        let (job, slot) = self.jobs.peek()?;
+        let line = &self.lines[slot];
         let vertex = line.first + to_u32(line.subtasks.first()?);
-        Some(Key::of_parts(deadline_ns, slot, vertex))
+        Some(Key::of_job(job, vertex))
     }
 
     #[inline]
     pub(super) fn remove(&mut self, key: Key) {
-        let (_, slot) = key.deadline_and_slot();
-        let line = &mut self.lines[slot as usize];
+        let slot = key.slot();
+        let line = &mut self.lines[slot];
         line.subtasks.remove((key.vertex() - line.first) as usize);
         if line.subtasks.is_empty() {
-            self.jobs.remove(slot as usize);
+            self.jobs.remove(slot);
         }
     }
 }

@@ -1,25 +1,28 @@
-//! A binary heap of items that are known by index.
+//! A heap of items that are known by index.
 //!
 //! The items are `0..capacity`, each in the heap at most once, so that an item
 //! can be found and removed, or get another key, in logarithmic time (Williams,
-//! Communications of the ACM 7, 1964, with a table of positions next to it). All
-//! memory is taken when the heap is made.
+//! Communications of the ACM 7, 1964, with a table of positions next to it). Each entry
+//! has four below it, which makes the way half as long as with two, and an entry that
+//! moves is written once, where it ends (LaMarca and Ladner, Journal of Experimental
+//! Algorithmics 1, 1996). All memory is taken when the heap is made.
 
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::ids::to_u32;
+/// How many entries stand below each.
+const BELOW: usize = 4;
 
 /// The position of an item that is not in the heap.
-const ABSENT: u32 = u32::MAX;
+const ABSENT: usize = usize::MAX;
 
 /// A heap with the smallest key on top.
 #[derive(Clone, Debug, Hash)]
 pub(crate) struct IndexedHeap<K> {
-    entries: Vec<(K, u32)>,
+    entries: Vec<(K, usize)>,
     /// Where in `entries` each item is.
-    positions: Box<[u32]>,
+    positions: Box<[usize]>,
 }
 
 impl<K: Ord + Copy> IndexedHeap<K> {
@@ -35,31 +38,27 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     /// Returns the smallest key and its item.
     #[inline]
     pub(crate) fn peek(&self) -> Option<(K, usize)> {
-        self.entries
-            .first()
-            .map(|&(key, item)| (key, item as usize))
+        self.entries.first().copied()
     }
 
     /// Returns an item's key, if it is in.
     #[inline]
     pub(crate) fn key(&self, item: usize) -> Option<K> {
-        self.entries
-            .get(self.positions[item] as usize)
-            .map(|&(key, _)| key)
+        self.entries.get(self.positions[item]).map(|&(key, _)| key)
     }
 
     /// Puts an item into the heap, or gives it another key.
     #[inline]
     pub(crate) fn set(&mut self, item: usize, key: K) {
         let position = self.positions[item];
-        if position == ABSENT {
-            self.entries.push((key, to_u32(item)));
-            self.positions[item] = to_u32(self.entries.len() - 1);
-            self.rise(self.entries.len() - 1);
-        } else {
-            self.entries[position as usize].0 = key;
-            self.sink(position as usize);
-            self.rise(self.positions[item] as usize);
+        let entry = (key, item);
+        match self.entries.get(position) {
+            None => {
+                self.entries.push(entry);
+                self.rise(self.entries.len() - 1, entry);
+            }
+            Some((old, _)) if *old < key => self.sink(position, entry),
+            Some(_) => self.rise(position, entry),
         }
     }
 
@@ -78,53 +77,63 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         if position == ABSENT {
             return;
         }
-        let position = position as usize;
         self.positions[item] = ABSENT;
-        self.entries.swap_remove(position);
-        if position < self.entries.len() {
-            let moved = self.entries[position].1;
-            self.positions[moved as usize] = to_u32(position);
-            self.sink(position);
-            self.rise(self.positions[moved as usize] as usize);
+        let Some(last) = self.entries.pop() else {
+            return;
+        };
+        if let Some((removed, _)) = self.entries.get(position) {
+            match *removed < last.0 {
+                true => self.sink(position, last),
+                false => self.rise(position, last),
+            }
         }
     }
 
+    /// Puts an entry where `position` is, or above.
     #[inline]
-    fn rise(&mut self, mut position: usize) {
+    fn rise(&mut self, mut position: usize, entry: (K, usize)) {
         while position > 0 {
-            let above = (position - 1) / 2;
-            if self.entries[above].0 <= self.entries[position].0 {
-                return;
+            let above = (position - 1) / BELOW;
+            if self.entries[above].0 <= entry.0 {
+                break;
             }
-            self.swap(above, position);
+            self.put(position, self.entries[above]);
             position = above;
         }
+        self.put(position, entry);
     }
 
+    /// Puts an entry where `position` is, or below.
     #[inline]
-    fn sink(&mut self, mut position: usize) {
-        loop {
-            let left = 2 * position + 1;
-            if left >= self.entries.len() {
-                return;
+    fn sink(&mut self, mut position: usize, entry: (K, usize)) {
+        while let first = BELOW * position + 1
+            && let Some(&(mut least)) = self.entries.get(first)
+        {
+            let mut from = first;
+            for (place, below) in self
+                .entries
+                .iter()
+                .enumerate()
+                .skip(first + 1)
+                .take(BELOW - 1)
+            {
+                if below.0 < least.0 {
+                    (from, least) = (place, *below);
+                }
             }
-            let right = left + 1;
-            let right_is_smaller =
-                right < self.entries.len() && self.entries[right].0 < self.entries[left].0;
-            let below = if right_is_smaller { right } else { left };
-            if self.entries[position].0 <= self.entries[below].0 {
-                return;
+            if entry.0 <= least.0 {
+                break;
             }
-            self.swap(position, below);
-            position = below;
+            self.put(position, least);
+            position = from;
         }
+        self.put(position, entry);
     }
 
     #[inline]
-    fn swap(&mut self, one: usize, other: usize) {
-        self.entries.swap(one, other);
-        self.positions[self.entries[one].1 as usize] = to_u32(one);
-        self.positions[self.entries[other].1 as usize] = to_u32(other);
+    fn put(&mut self, position: usize, entry: (K, usize)) {
+        self.entries[position] = entry;
+        self.positions[entry.1] = position;
     }
 }
 

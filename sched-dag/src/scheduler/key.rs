@@ -91,10 +91,22 @@ impl Key {
         low(self.0 >> 96) as usize
     }
 
-    /// Returns what the order `Deadline` has made it of before the vertex.
+    /// Returns what comes before the vertex.
     #[inline]
-    pub(super) const fn deadline_and_slot(self) -> (u64, u32) {
-        (upper(self.0), low(self.0 >> 32))
+    pub(super) const fn before_the_vertex(self) -> u128 {
+        self.0 >> 32
+    }
+
+    /// Puts a vertex behind that.
+    #[inline]
+    pub(super) const fn of_job(before: u128, vertex: u32) -> Self {
+        Self(before << 32 | vertex as u128)
+    }
+
+    /// Returns the slot, under the order `Deadline`.
+    #[inline]
+    pub(super) const fn slot(self) -> usize {
+        low(self.0 >> 32) as usize
     }
 }
 
@@ -103,13 +115,6 @@ impl Key {
 #[inline]
 const fn low(number: u128) -> u32 {
     number as u32
-}
-
-/// Returns the high 64 bits.
-#[allow(clippy::cast_possible_truncation, reason = "64 bits are left")]
-#[inline]
-const fn upper(number: u128) -> u64 {
-    (number >> 64) as u64
 }
 
 /// Returns the high and the low half.
@@ -128,7 +133,8 @@ mod tests {
         let keys = parts.map(|(first, second, vertex)| Key::of_parts(first, second, vertex));
         assert!(keys.is_sorted_by(|one, other| one < other));
         assert_eq!(keys[4].vertex(), 3);
-        assert_eq!(keys[4].deadline_and_slot(), (u64::MAX, 7));
+        assert_eq!(keys[4].slot(), 7);
+        assert_eq!(Key::of_job(keys[4].before_the_vertex(), 3), keys[4]);
         assert!(keys[4] < Key::NONE);
         assert_eq!(halves(0x1_0000_0002), [1, 2]);
     }

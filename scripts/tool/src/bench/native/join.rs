@@ -13,12 +13,11 @@ use std::sync::atomic::{
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use hand_off::Shape;
 use native::{Closure, Setting, worker};
 use sched_dag::Policy;
 
 use super::figure::Figure;
-use super::workload::task_set;
+use super::workload::{Graph, task_set};
 
 /// How long a branch computes.
 const WORK: Duration = Duration::from_micros(2);
@@ -80,7 +79,7 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
         policy: Policy::StaticPriority,
         workers: 2,
     };
-    let task_set = task_set(Shape::ForkJoin(2), jobs, setting.policy, setting.workers);
+    let task_set = task_set(Graph::ForkJoin(2), jobs, setting.policy, setting.workers);
     let report = native::run(task_set, vec![bodies], setting);
     if report.statistics[0].completed != jobs {
         return Err(format!("{WORKLOAD}: not all {jobs} jobs are complete"));
@@ -181,7 +180,7 @@ fn transfer() -> Result<Vec<f64>, String> {
         policy: Policy::StaticPriority,
         workers: 2,
     };
-    let task_set = task_set(Shape::ForkJoin(2), 1, setting.policy, setting.workers);
+    let task_set = task_set(Graph::ForkJoin(2), 1, setting.policy, setting.workers);
     native::run(task_set, bodies, setting);
     let samples = samples.lock().unwrap_or_else(PoisonError::into_inner);
     if samples.is_empty() {

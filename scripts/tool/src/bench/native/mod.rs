@@ -57,13 +57,13 @@ static TABLE: Command = Command {
             "only",
             Takes::Text("NAMES"),
             "The workloads, with commas between: chain-64, fork-join-2, fork-join-4, \
-             fork-join-6, layered-1000, join; all.",
+             fork-join-6, layered-1000, dags-1000, join; all.",
         ),
     ],
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under
 the scheduler, without values; `typed` are functions of fass with a u64 on each edge (of
-layered-1000: without values, but by fass). `static` and `edf` are the policies.
+layered-1000 and dags-1000: without values, but by fass). `static` and `edf` are the policies.
 
 Prints a table and a JSON object for each figure. Times depend on the host and on what
 else it does; compare figures of one run.

@@ -87,7 +87,7 @@ fn runners(workers: &[u32]) -> Vec<(Runner, u32)> {
 }
 
 fn jobs_a_round(graph: Graph) -> u64 {
-    (INSTANCES_A_ROUND / graph.shape().subtasks()) as u64
+    (INSTANCES_A_ROUND / graph.instances()) as u64
 }
 
 /// A small count, exactly.
@@ -109,7 +109,7 @@ fn pass(
         Runner::Floor => {
             let mut bodies = closures(graph, &times, jobs_a_round);
             for job in 0..jobs {
-                for body in &mut bodies {
+                for body in bodies.iter_mut().flatten() {
                     body(job);
                 }
             }
@@ -117,8 +117,8 @@ fn pass(
         }
         Runner::Closures(policy) => {
             let bodies = closures(graph, &times, jobs_a_round);
-            let task_set = task_set(graph.shape(), jobs, policy, workers);
-            native::run(task_set, vec![bodies], Setting { policy, workers })
+            let task_set = task_set(graph, jobs, policy, workers);
+            native::run(task_set, bodies, Setting { policy, workers })
         }
         Runner::Typed(policy) => {
             let machine = Native::new().workers(workers).policy(policy);

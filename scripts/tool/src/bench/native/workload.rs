@@ -6,7 +6,7 @@ use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use hand_off::Shape;
 use native::Closure;
 use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, TaskSet, verify};
@@ -20,6 +20,8 @@ pub(super) enum Graph {
     ForkJoin(usize),
     /// 1,000 subtasks in layers.
     Layered,
+    /// So many DAGs of one subtask, released at once, each with a deadline of its own.
+    Dags(u16),
 }
 
 impl fmt::Display for Graph {
@@ -28,20 +30,23 @@ impl fmt::Display for Graph {
             Self::Chain => write!(f, "chain-64"),
             Self::ForkJoin(parallel) => write!(f, "fork-join-{parallel}"),
             Self::Layered => write!(f, "layered-1000"),
+            Self::Dags(count) => write!(f, "dags-{count}"),
         }
     }
 }
 
 impl Graph {
-    pub(super) const ALL: [Self; 5] = [
+    pub(super) const ALL: [Self; 6] = [
         Self::Chain,
         Self::ForkJoin(2),
         Self::ForkJoin(4),
         Self::ForkJoin(6),
         Self::Layered,
+        Self::Dags(1_000),
     ];
 
-    pub(super) const fn shape(self) -> Shape {
+    /// Returns the shape of each DAG.
+    const fn shape(self) -> Shape {
         match self {
             Self::Chain => Shape::Chain(64),
             Self::ForkJoin(parallel) => Shape::ForkJoin(parallel),
@@ -49,15 +54,30 @@ impl Graph {
                 subtasks: 1_000,
                 seed: 1,
             },
+            Self::Dags(_) => Shape::Chain(1),
         }
     }
 
-    /// Returns what a step is called, and how many steps a job has.
+    /// Returns how many DAGs there are.
+    pub(super) fn dags(self) -> usize {
+        match self {
+            Self::Dags(count) => usize::from(count),
+            _ => 1,
+        }
+    }
+
+    /// Returns how many instances a job of each DAG has.
+    pub(super) fn instances(self) -> usize {
+        self.dags() * self.shape().subtasks()
+    }
+
+    /// Returns what a step is called, and how many steps a job of each DAG has.
     pub(super) fn steps(self) -> (&'static str, f64) {
         match self {
             Self::Chain => ("per hop", 63.0),
             Self::ForkJoin(_) => ("per job", 1.0),
             Self::Layered => ("per instance", 1_000.0),
+            Self::Dags(count) => ("per job", f64::from(count)),
         }
     }
 }
@@ -92,59 +112,93 @@ impl Rounds {
 /// A period that no job needs, with which the releases are back to back.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Makes empty functions; the source counts rounds.
-pub(super) fn closures(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Closure> {
+/// Makes empty functions, DAG by DAG; the first source counts rounds.
+pub(super) fn closures(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Closure>> {
+    let empty = || -> Closure { Box::new(|_| ()) };
+    let of_dag = || (0..graph.shape().subtasks()).map(|_| empty()).collect();
+    let mut bodies: Vec<Vec<Closure>> = (0..graph.dags()).map(|_| of_dag()).collect();
     let mut source = rounds.source(jobs_a_round);
-    let mut bodies: Vec<Closure> = vec![Box::new(move |_| source())];
-    bodies.resize_with(graph.shape().subtasks(), || Box::new(|_| ()));
+    bodies[0][0] = Box::new(move |_| source());
     bodies
 }
 
-/// Verifies the graph as a DAG of `jobs` jobs.
-pub(super) fn task_set(shape: Shape, jobs: u64, policy: Policy, workers: u32) -> TaskSet {
-    let period_ns = u64::try_from(PERIOD.as_nanos()).ok();
-    let spec = DagSpec {
-        name: "native".to_owned(),
-        period_ns,
-        relative_deadline_ns: period_ns,
+/// Verifies the graph, each DAG with `jobs` jobs.
+pub(super) fn task_set(graph: Graph, jobs: u64, policy: Policy, workers: u32) -> TaskSet {
+    let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).ok();
+    let spec = |dag| DagSpec {
+        name: format!("native{dag}"),
+        period_ns: nanoseconds(PERIOD),
+        relative_deadline_ns: nanoseconds(deadline(graph, dag)),
         jobs: Some(jobs),
         in_flight: Some(1),
-        subtasks: vec![SubtaskSpec::default(); shape.subtasks()],
-        edges: shape.edges(),
+        subtasks: vec![SubtaskSpec::default(); graph.shape().subtasks()],
+        edges: graph.shape().edges(),
         ..DagSpec::default()
     };
+    let specs: Vec<DagSpec> = (0..graph.dags()).map(spec).collect();
     let options =
         CommitOptions::new(policy, workers).with_construction(ConstructionPolicy::any_graph());
-    let verified = verify(&[spec], &options);
+    let verified = verify(&specs, &options);
     verified.expect("the graphs are right").task_set
+}
+
+/// Returns the relative deadline of a DAG: the period, or as many microseconds less as DAGs
+/// are before it in a shuffled order.
+fn deadline(graph: Graph, dag: usize) -> Duration {
+    // 617 shares no divisor with 1,000, so no two have the same.
+    let before = dag * 617 % graph.dags();
+    PERIOD - Duration::from_micros(before as u64)
 }
 
 /// Commits the graph by `fass` to the thread's machine, as an app would write it.
 pub(super) fn commit_typed(graph: Graph, jobs: u64, rounds: &Rounds, jobs_a_round: u64) {
-    let dag = create_dag();
-    dag.name("typed").jobs(jobs).in_flight(1);
-    let named = |number: usize| SubtaskAttributes::named(&format!("s{number}"));
-    let mut tick = rounds.source(jobs_a_round);
-    let shape = graph.shape();
-    if graph == Graph::Layered {
+    let tick = rounds.source(jobs_a_round);
+    let dags = match graph {
+        Graph::Layered | Graph::Dags(_) => untyped(graph, jobs, tick),
+        _ => vec![typed(graph, jobs, tick)],
+    };
+    finish_create_dags(&dags).expect("the graphs are right");
+}
+
+fn named(number: usize) -> SubtaskAttributes {
+    SubtaskAttributes::named(&format!("s{number}"))
+}
+
+/// Makes DAGs without values.
+fn untyped(graph: Graph, jobs: u64, tick: impl FnMut() + Send + 'static) -> Vec<Dag> {
+    let mut tick = Some(tick);
+    let mut register = |dag: &Dag, number| match tick.take() {
+        Some(mut tick) => dag.register_untyped_subtask(move |_| tick(), named(number)),
+        None => dag.register_untyped_subtask(|_| (), named(number)),
+    };
+    let dag = |number| {
+        let dag = create_dag();
+        dag.name(&format!("untyped{number}"))
+            .jobs(jobs)
+            .in_flight(1);
         dag.period(PERIOD);
-        dag.relative_deadline(PERIOD);
-        let mut subtasks = vec![dag.register_untyped_subtask(move |_| tick(), named(0))];
-        subtasks.extend(
-            (1..shape.subtasks()).map(|number| dag.register_untyped_subtask(|_| (), named(number))),
-        );
+        dag.relative_deadline(deadline(graph, number));
+        let shape = graph.shape();
+        let subtasks = 0..shape.subtasks();
+        let subtasks: Vec<_> = subtasks.map(|number| register(&dag, number)).collect();
         for (earlier, later) in shape.edges() {
             dag.precede(&subtasks[earlier], &subtasks[later]);
         }
-        finish_create_dags(&[dag]).expect("the graph is right");
-        return;
-    }
+        dag
+    };
+    (0..graph.dags()).map(dag).collect()
+}
+
+/// Makes one DAG with a value on each edge.
+fn typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static) -> Dag {
+    let dag = create_dag();
+    dag.name("typed").jobs(jobs).in_flight(1);
     let source = move || {
         tick();
         (1u64,)
     };
     dag.register_periodic_subtask(source, vec!["t0"], PERIOD, named(0));
-    let sink = shape.subtasks() - 1;
+    let sink = graph.shape().subtasks() - 1;
     let topics: Vec<String> = (0..sink).map(|number| format!("t{number}")).collect();
     for number in 1..sink {
         let input = match graph {
@@ -168,5 +222,5 @@ pub(super) fn commit_typed(graph: Graph, jobs: u64, rounds: &Rounds, jobs_a_roun
             dag.register_sink_subtask(body, inputs, PERIOD, attributes);
         }
     };
-    finish_create_dags(&[dag]).expect("the graph is right");
+    dag
 }
