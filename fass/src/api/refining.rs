@@ -32,7 +32,7 @@ use core::fmt;
 use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use core::time::Duration;
 
-use sched_dag::{DagId, DagLabel};
+use sched_dag::DagLabel;
 
 use super::dag::Dag;
 use crate::draft::Draft;
@@ -218,12 +218,12 @@ impl<Args: VecToSubs, Ret: VecToPubs> Refining<'_, Args, Ret> {
 }
 
 /// Refuses a subtask that refines where the platform cannot cut.
-fn check(draft: &Draft, subtask: usize, id: DagId) -> Result<(), LaunchError> {
-    if platform::expect_installed().cutter().is_some() {
+fn check(draft: &Draft, subtask: usize, dag: &DagLabel) -> Result<(), LaunchError> {
+    // That there is none at all is a fault of its own.
+    if platform::installed().is_none_or(|platform| platform.cutter().is_some()) {
         return Ok(());
     }
-    let name = draft.spec.name.clone();
-    let (subtask, dag) = (draft.label(subtask), DagLabel { id, name });
+    let subtask = draft.label(subtask);
     Err(LaunchError::new(format!(
         "{subtask} of {dag} refines its result, and this platform cuts no refinement; on the \
          machine turn the kernel's feature `refining` on, or register the mandatory function alone"

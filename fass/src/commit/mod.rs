@@ -24,7 +24,6 @@ pub(crate) mod error;
 pub(crate) mod fault;
 mod missing;
 mod modes;
-mod refining;
 mod replaceable;
 mod staleness;
 mod tie;
@@ -41,6 +40,7 @@ use crate::api::dag::Dag;
 use crate::platform;
 use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
+use demands::{demands_of, lacking_proofs};
 use error::CommitError;
 use fault::Fault;
 use tie::{next_plan, tie};
@@ -155,8 +155,8 @@ pub fn finish_create_dags_with(
     let answers = Answers::new(&task_set, platform);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
-    let demands = demands::demands_of(dags);
-    let faults = refining::with_refusal(dags, demands::lacking_proofs(&demands, &answers));
+    let demands = demands_of(dags);
+    let faults = lacking_proofs(&demands, &answers);
     if !faults.is_empty() {
         return Err(CommitError { faults, warnings });
     }

@@ -1,4 +1,5 @@
-//! What may be wrong with what a DAG states for after faults.
+//! What may be wrong with the functions that subtasks have besides their first ones: those for
+//! after faults, and refinements.
 
 use alloc::vec::Vec;
 
@@ -7,7 +8,7 @@ use sched_dag::{DagLabel, OnFault};
 use super::fault::Fault;
 use crate::draft::Draft;
 
-/// Returns what is wrong with what a DAG states for after faults.
+/// Returns what is wrong with these functions of a DAG.
 pub(super) fn check(draft: &Draft, label: &DagLabel) -> Vec<Fault> {
     let dag = label.clone();
     let drops_jobs = draft.spec.on_fault != OnFault::EndDag;
@@ -31,6 +32,10 @@ pub(super) fn check(draft: &Draft, label: &DagLabel) -> Vec<Fault> {
                 state: state.name.clone(),
             });
         }
+    }
+    // Called by a pointer: an image without refinements has nothing of it.
+    if let Some((subtask, check)) = draft.refines {
+        faults.extend(check(draft, subtask, label).err().map(Fault::NotLaunched));
     }
     faults
 }

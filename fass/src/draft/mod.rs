@@ -22,7 +22,7 @@ use core::fmt;
 use core::time::Duration;
 
 use sched_dag::lifecycle::Lifecycle;
-use sched_dag::{Activation, DagId, DagSpec, LatestSpec, Priority, SubtaskId};
+use sched_dag::{Activation, DagId, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
 use crate::platform::LaunchError;
@@ -42,7 +42,7 @@ use flaw::Flaw;
 pub(crate) type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
 
 /// Looks whether the platform can run a subtask of a DAG that refines.
-pub(crate) type CheckRefining = fn(&Draft, usize, DagId) -> Result<(), LaunchError>;
+pub(crate) type CheckRefining = fn(&Draft, usize, &DagLabel) -> Result<(), LaunchError>;
 
 /// A DAG as registered so far.
 #[derive(Default)]
