@@ -6,6 +6,8 @@
 //! against, and leaves the [`Plan`] with it.
 
 mod additions;
+mod clock;
+mod installed;
 
 use alloc::borrow::Cow;
 use alloc::string::String;
@@ -17,23 +19,14 @@ use sched_dag::analysis::{self, Answer, Overheads, Settings};
 use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::edge::Begin;
-use crate::run::cell::SetOnce;
-use crate::run::cell::current::Current;
 use crate::run::crossing::Recorded;
 use crate::run::cutter::Cutter;
 use crate::run::plan::Plan;
 
 pub use additions::Additions;
-
-static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
-
-/// What tells the time: the platform, unless it has named something else.
-static CLOCK: Current<Clock> = Current::new(&(ASK_THE_PLATFORM as Clock));
-
-/// Tells the time, as [`now_ns`] does.
-pub type Clock = fn() -> u64;
-
-const ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
+pub use clock::{Clock, now_ns, set_clock};
+pub use installed::{AlreadyInstalled, install};
+pub(crate) use installed::{expect_installed, installed, record};
 
 /// A machine that schedules committed DAGs.
 ///
@@ -275,90 +268,6 @@ impl fmt::Display for LaunchError {
 
 impl core::error::Error for LaunchError {}
 
-/// A platform is installed already; the earlier one stays.
-///
-/// # Examples
-///
-/// ```
-/// assert!(fass::AlreadyInstalled.to_string().contains("already installed"));
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AlreadyInstalled;
-
-impl fmt::Display for AlreadyInstalled {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a platform is already installed; install one platform, once, at start")
-    }
-}
-
-impl core::error::Error for AlreadyInstalled {}
-
-/// Installs the platform, once, for the whole program.
-///
-/// # Errors
-///
-/// [`AlreadyInstalled`] from the second call on.
-///
-/// # Examples
-///
-/// Apps do not call it; the kernel's entry or `VirtualTime` does. See
-/// [`Platform`] for a platform of one's own.
-///
-/// ```standalone_crate
-/// use virtual_time::VirtualTime;
-///
-/// let machine = VirtualTime::new(); // installs itself
-/// assert_eq!(fass::now_ns(), 0);
-/// ```
-pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> {
-    if PLATFORM.set(platform) {
-        Ok(())
-    } else {
-        Err(AlreadyInstalled)
-    }
-}
-
-/// Returns the installed platform, if there is one.
-#[inline]
-pub(crate) fn installed() -> Option<&'static dyn Platform> {
-    PLATFORM.get().copied()
-}
-
-/// Returns the platform's time in nanoseconds.
-///
-/// # Panics
-///
-/// If no platform is installed.
-///
-/// # Examples
-///
-/// ```
-/// let machine = virtual_time::VirtualTime::new();
-/// assert_eq!(fass::now_ns(), 0);
-/// ```
-#[inline]
-#[must_use]
-pub fn now_ns() -> u64 {
-    CLOCK.get()()
-}
-
-/// Has functions told the time by that from now on, in place of by [`Platform::now_ns`].
-///
-/// For platforms: one that writes down what functions were told has a way to do so, and all
-/// others a shorter one.
-///
-/// # Examples
-///
-/// ```standalone_crate
-/// static HALF_PAST: fass::Clock = || 30;
-///
-/// fass::set_clock(&HALF_PAST);
-/// assert_eq!(fass::now_ns(), 30);
-/// ```
-pub fn set_clock(clock: &'static Clock) {
-    CLOCK.set(clock);
-}
-
 /// Executes for `duration` on the calling instance's core, inside a subtask.
 ///
 /// Stands for computation that an app does not have yet, or whose time is what
@@ -399,26 +308,4 @@ pub fn set_clock(clock: &'static Clock) {
 /// ```
 pub fn execute_for(duration: Duration, how: Occupation) {
     expect_installed().execute_for(duration, how);
-}
-
-#[inline]
-pub(crate) fn expect_installed() -> &'static dyn Platform {
-    match installed() {
-        Some(platform) => platform,
-        None => missing(),
-    }
-}
-
-/// Gives a value to the platform. It looks for the platform itself: a function that is called for
-/// that is, in a crate compiled for size, as long again.
-pub(crate) fn record(value: &Recorded<'_>) {
-    match PLATFORM.get() {
-        Some(platform) => platform.record(value),
-        None => missing(),
-    }
-}
-
-#[cold]
-fn missing() -> ! {
-    panic!("no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`")
 }

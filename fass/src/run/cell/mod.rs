@@ -1,5 +1,4 @@
-//! The cells in which the crate's `unsafe` lives: a job slot, a shared value and a
-//! set-once; and, in files of their own, an [`outbox`] and a [`current`] one of several.
+//! The cells in which the crate's `unsafe` lives, some of them in files of their own.
 //!
 //! # The slot ring
 //!
