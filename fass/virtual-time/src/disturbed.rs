@@ -9,7 +9,6 @@ use sched_dag::{Instance, TaskSet};
 
 use crate::VirtualTime;
 use crate::silent::{mix, share};
-use crate::surroundings::Surroundings;
 
 /// How late a timer's interrupt is.
 #[derive(Clone, Copy, Debug, Default)]
@@ -96,25 +95,22 @@ impl Late {
     }
 }
 
-impl Surroundings {
-    /// Reports whether a call has to fail.
-    pub(crate) fn fails(&self, instance: Instance, task_set: &TaskSet) -> bool {
-        let dag = task_set.dag(instance.dag);
-        let subtask = dag.subtask(instance.subtask).name();
-        self.faults.borrow().iter().any(|fault| {
-            fault.job == instance.job && fault.dag == dag.name() && fault.subtask == subtask
-        })
-    }
+/// Reports whether a call has to fail.
+pub(crate) fn fails(faults: &[Fault], instance: Instance, task_set: &TaskSet) -> bool {
+    let dag = task_set.dag(instance.dag);
+    let subtask = dag.subtask(instance.subtask).name();
+    faults.iter().any(|fault| {
+        fault.job == instance.job && fault.dag == dag.name() && fault.subtask == subtask
+    })
+}
 
-    /// Returns names of DAG and subtask of a call that is to fail and cannot be there.
-    pub(crate) fn absent_fault(&self, task_set: &TaskSet) -> Option<(String, String)> {
-        let faults = self.faults.borrow();
-        let is_there = |fault: &&Fault| {
-            let mut dags = task_set.dags().iter().filter(|dag| dag.name() == fault.dag);
-            let names = |name: &str| name == fault.subtask;
-            dags.any(|dag| dag.subtasks().iter().any(|subtask| names(subtask.name())))
-        };
-        let absent = faults.iter().find(|fault| !is_there(fault))?;
-        Some((absent.dag.clone(), absent.subtask.clone()))
-    }
+/// Returns names of DAG and subtask of a call that is to fail and cannot be there.
+pub(crate) fn absent(faults: &[Fault], task_set: &TaskSet) -> Option<(String, String)> {
+    let is_there = |fault: &&Fault| {
+        let mut dags = task_set.dags().iter().filter(|dag| dag.name() == fault.dag);
+        let names = |name: &str| name == fault.subtask;
+        dags.any(|dag| dag.subtasks().iter().any(|subtask| names(subtask.name())))
+    };
+    let absent = faults.iter().find(|fault| !is_there(fault))?;
+    Some((absent.dag.clone(), absent.subtask.clone()))
 }

@@ -20,6 +20,7 @@ use fass::{
 use recording::Channel;
 use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
+use crate::disturbed;
 use crate::error::RunError;
 use crate::job::JobShown;
 use crate::optional;
@@ -245,7 +246,9 @@ impl Platform for HostPlatform {
             ));
         }
         let surroundings = &machine.surroundings;
-        if let Some((dag, subtask)) = surroundings.absent_fault(&plan.task_set) {
+        if let Some((dag, subtask)) =
+            disturbed::absent(&surroundings.faults.borrow(), &plan.task_set)
+        {
             return Err(LaunchError::new(format!(
                 "subtask `{subtask}` of dag `{dag}`, which is to fail, is not in the commit; \
                  name one that is"

@@ -10,6 +10,7 @@ use sched_dag::lifecycle::Request;
 use sched_dag::virtual_time::Workload;
 use sched_dag::{CoreId, DagId, Instance, JobOutcome, ModeId, Observer, TaskSet};
 
+use crate::disturbed;
 use crate::record::PanicRecord;
 use crate::surroundings::Surroundings;
 
@@ -88,7 +89,7 @@ impl Workload for Runner<'_> {
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
         machine.edge.begin(instance);
-        let fails = machine.fails(instance, self.task_set);
+        let fails = disturbed::fails(&machine.faults.borrow(), instance, self.task_set);
         let body = self.body(instance);
         // Unwind safety: a body that panicked is never run again, and the
         // machine's cells hold plain numbers.
