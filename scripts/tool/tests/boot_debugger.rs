@@ -31,7 +31,7 @@ fn a_breakpoint_in_a_subtask_shows_locals_and_callers() {
         return;
     }
     let commands = system::new_log("commands").expect("a folder for logs");
-    let lines = "next\nnext\ninfo locals\nprint goal[2]\nbacktrace 2\nkill\n";
+    let lines = "next\nnext\ninfo locals\nprint goal[2]\nbacktrace 2\n";
     fs::write(&commands, lines).expect("a file in it");
     let words = ["debug", "--app=drone", "--break=control", "--cores=2"];
     let file = commands.to_str().expect("a path of text");
