@@ -13,7 +13,7 @@ use super::dag::Dag;
 use super::lifecycle::{ask, lifecycle};
 use super::uses::{Uses, sealed};
 use crate::draft::modes::{self, ModeDraft};
-use crate::run::request::{GO, Of, STOP, Wish};
+use crate::run::request::{AT_ONCE, Of, WHEN_IDLE, Wish};
 
 /// The modes of a run: sets of DAGs, one of which runs at a time.
 ///
@@ -97,7 +97,7 @@ impl Entrance<'_> {
     ///
     /// See [`Modes`].
     pub fn at_once(&mut self) {
-        self.wish.store(STOP, Ordering::Relaxed);
+        self.wish.store(AT_ONCE, Ordering::Relaxed);
     }
 
     /// Asks for the mode when this instance is complete. From then on the DAGs that leave release
@@ -105,7 +105,7 @@ impl Entrance<'_> {
     ///
     /// See [`Modes`].
     pub fn when_idle(&mut self) {
-        self.wish.store(GO, Ordering::Relaxed);
+        self.wish.store(WHEN_IDLE, Ordering::Relaxed);
     }
 }
 

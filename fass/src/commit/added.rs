@@ -175,8 +175,8 @@ fn is_addable(dag: &Dag) -> Result<(), LaunchError> {
     }
     if draft.lifecycle.is_some() {
         return Err(LaunchError::new(
-            "a dag is added to a run, and pauses dags, starts paused or ends the run; commit it \
-             with the first ones",
+            "a dag is added to a run, and pauses dags, starts paused, has to do with modes or \
+             ends the run; commit it with the first ones",
         ));
     }
     Ok(())

@@ -11,10 +11,14 @@ use super::signal::Target;
 
 /// No wish.
 const NOTHING: u8 = 0;
-/// The wish that a DAG is paused, that the run ends, or that a mode is entered at once.
+/// The wish that a DAG is paused, or that the run ends.
 pub(crate) const STOP: u8 = 1;
-/// The wish that a DAG is resumed, or that a mode is entered when what leaves is idle.
+/// The wish that a DAG is resumed.
 pub(crate) const GO: u8 = 2;
+/// The wish that a mode is entered at once.
+pub(crate) const AT_ONCE: u8 = 1;
+/// The wish that a mode is entered when what leaves is idle.
+pub(crate) const WHEN_IDLE: u8 = 2;
 
 /// What an instance wishes; the last word counts.
 pub(crate) type Wish = Arc<AtomicU8>;
@@ -54,7 +58,7 @@ impl Effect for Asked {
             Of::Run => Request::ShutDown,
             Of::Dag(target) if wish == STOP => Request::Pause(target.dag()),
             Of::Dag(target) => Request::Resume(target.dag()),
-            Of::Mode(mode) if wish == STOP => Request::Enter(*mode, Entry::AtOnce),
+            Of::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, Entry::AtOnce),
             Of::Mode(mode) => Request::Enter(*mode, Entry::WhenIdle),
         });
     }
