@@ -39,10 +39,10 @@
 //! # Rooms, from top to bottom
 //!
 //! `entry` and `start` bring an image up, `app` is what an app sees of the kernel. `watch` looks
-//! in on a run, and [`report`] tells of it afterwards. What executes jobs is below, in a crate of
-//! its own, `executive`: cores, interrupts, memory, the drivers of the scheduler, and input and
-//! output ([`console`], [`json`], [`options`]). `docs/architecture.md` has the table that the
-//! tests hold this to.
+//! in on a run, and [`report`] tells of it afterwards; [`options`] reads the words of the command
+//! line. What executes jobs is below, in a crate of its own, `executive`: cores, interrupts,
+//! memory, the drivers of the scheduler, and output ([`console`], [`json`]).
+//! `docs/architecture.md` has the table that the tests hold this to.
 
 #![cfg_attr(not(test), no_std)]
 
@@ -52,6 +52,7 @@ mod app;
 #[allow(unsafe_code, reason = "the symbols that an image must define")]
 #[doc(hidden)]
 pub mod entry;
+pub mod options;
 pub mod report;
 mod start;
 mod watch;
@@ -78,12 +79,6 @@ pub mod console {
 pub mod json {
     #[doc(inline)]
     pub use executive::text::json::{Object, emit, line, quoted};
-}
-
-/// The words of the command line.
-pub mod options {
-    #[doc(inline)]
-    pub use executive::text::options::{Options, UsageError};
 }
 
 /// Returns the number of timer interrupts that all cores have taken since boot.

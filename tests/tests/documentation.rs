@@ -22,7 +22,7 @@ const FILES: [&str; 10] = [
     "kernel/src/lib.rs",
     "kernel/src/app/machine_handle.rs",
     "kernel/src/report/run.rs",
-    "kernel/executive/src/text/options.rs",
+    "kernel/src/options.rs",
     "kernel/executive/src/text/json.rs",
     "kernel/executive/src/text/console/mod.rs",
     "kernel/src/app/event.rs",

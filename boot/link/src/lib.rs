@@ -36,6 +36,9 @@ pub fn link_efi() {
     link(EFI, include_str!("../../efi/src/application.ld"));
 }
 
+/// Functions of the same instructions are kept once. Not where a debugger wants each by its name.
+const FOLDED: &str = "-Wl,--icf=all";
+
 /// Tells cargo to link the binaries of the package being built as images.
 ///
 /// To be called from `build.rs`. `kernel::entry!` makes sure that it was, and that `Cargo.toml` is
@@ -48,6 +51,9 @@ pub fn link_efi() {
 pub fn link_image() {
     // The script lies with the boot code that its symbols serve.
     link(IMAGE, include_str!("../../entry/src/image.ld"));
+    if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
+        println!("cargo::rustc-link-arg-bins={FOLDED}");
+    }
     println!("cargo::rustc-check-cfg=cfg(linked_as_image)");
     println!("cargo::rustc-cfg=linked_as_image");
     if let Ok(main) = std::fs::read_to_string("src/main.rs") {

@@ -41,6 +41,8 @@ mod app;
 pub mod entry;
 #[allow(unsafe_code, reason = "an allocator that counts")]
 mod heap;
+#[path = "../../src/options.rs"]
+pub mod options;
 pub mod report;
 #[doc(hidden)]
 pub mod text;
@@ -63,12 +65,6 @@ pub mod console {
 pub mod json {
     #[doc(inline)]
     pub use crate::text::json::{Object, emit, line, quoted};
-}
-
-/// The words of the command line.
-pub mod options {
-    #[doc(inline)]
-    pub use crate::text::options::{Options, UsageError};
 }
 
 /// Reports whether functions may use AVX: the processor has it.

@@ -5,9 +5,9 @@
 
 use alloc::vec::Vec;
 
+use crate::options::{Options, UsageError};
 use executive::run::execution::{Division, set_division};
 use executive::run::platform::KERNEL;
-use executive::text::options::{Options, UsageError};
 use fass::{Clusters, Platform};
 
 use super::machine_handle::Machine;

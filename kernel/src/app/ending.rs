@@ -6,8 +6,8 @@ use alloc::string::String;
 
 use fass::CommitError;
 
+use crate::options::UsageError;
 use executive::text::json;
-use executive::text::options::UsageError;
 
 /// Why an app ends other than by success.
 ///

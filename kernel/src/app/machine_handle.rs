@@ -14,6 +14,7 @@ use super::bound_verdict::BoundVerdict;
 use super::ending::Ending;
 use super::fault_verdict::FaultVerdict;
 use super::wcet_notes;
+use crate::options::Options;
 use crate::report::run::Run;
 use crate::report::{self, Ns};
 use crate::watch::background::{Background, LINE, Wishes, session};
@@ -22,7 +23,6 @@ use executive::machine::interrupts_off;
 use executive::memory::heap;
 use executive::run::platform::KERNEL;
 use executive::run::{contexts, edge, execution, heartbeat, worker};
-use executive::text::options::Options;
 use executive::text::{console, json};
 
 /// The machine, lent to the app's function for the time of the run.

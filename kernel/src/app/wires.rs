@@ -6,8 +6,8 @@ use fass::Wire;
 
 use super::ending::Ending;
 use super::machine_handle::Machine;
+use crate::options::UsageError;
 use crate::watch::background::wire::{self, Refusal};
-use executive::text::options::UsageError;
 
 impl Machine {
     /// Connects a wire to the second serial port (COM2, at I/O port 0x2f8): what is sent goes

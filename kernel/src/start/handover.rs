@@ -14,6 +14,7 @@ use crate::app::bound_verdict::BoundVerdict;
 use crate::app::ending::{self, Ending, Told};
 use crate::app::fault_verdict::FaultVerdict;
 use crate::app::machine_handle::Machine;
+use crate::options::Options;
 use crate::println;
 use crate::watch::{self, panic};
 use executive::interrupts;
@@ -28,7 +29,6 @@ use executive::machine::{
 use executive::memory::{self, OutOfMemory};
 use executive::run::platform::KERNEL;
 use executive::run::{contexts, edge, heartbeat, worker};
-use executive::text::options::Options;
 use executive::text::{console, json};
 
 /// An app: sets up its DAGs, runs them and reports.
@@ -326,7 +326,7 @@ extern "C" fn other_core(apic_id: u32) -> ! {
 }
 
 fn run_app(info: &'static BootInfo, name: &'static str, app: App) -> Result<(), Ending> {
-    let usage = |message: &str| Ending::Usage(executive::text::options::UsageError::new(message));
+    let usage = |message: &str| Ending::Usage(crate::options::UsageError::new(message));
     if info.is_command_line_cut {
         return Err(usage(&format!(
             "the command line is longer than {} bytes and was cut; give fewer words",

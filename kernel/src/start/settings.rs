@@ -28,12 +28,12 @@
 use fass::edge::Wish;
 
 use super::terms::Terms;
+use crate::options::{Options, UsageError};
 use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
 use executive::run::{edge, stacks, worker};
 use executive::text::graph;
-use executive::text::options::{Options, UsageError};
 
 /// What the words say about tracing and the background; all else is set where it
 /// belongs.

@@ -5,7 +5,7 @@ use alloc::format;
 
 use fass::{Overheads, Policy, Preemption};
 
-use executive::text::options::{Options, UsageError};
+use crate::options::{Options, UsageError};
 
 const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
 

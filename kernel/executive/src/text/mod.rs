@@ -1,12 +1,11 @@
-//! What goes in and out as text: the serial line, machine lines, and the command line's words.
+//! What goes in and out as text: the serial line, and machine lines.
 //!
 //! `console` takes text without disturbing what is measured; `json` prints the lines that
-//! programs read, `graph` a DAG as one of them; `excerpt` keeps a text that may not fit, and
-//! `options` reads what the command line says. Of the run, nothing is known here.
+//! programs read, `graph` a DAG as one of them; `excerpt` keeps a text that may not fit. Of the
+//! run, nothing is known here.
 
 pub mod backtrace;
 pub mod console;
 pub mod excerpt;
 pub mod graph;
 pub mod json;
-pub mod options;

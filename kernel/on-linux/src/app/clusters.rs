@@ -3,7 +3,7 @@
 use fass::Clusters;
 
 use super::machine_handle::Machine;
-use crate::text::options::UsageError;
+use crate::options::UsageError;
 
 impl Machine {
     /// Divides nothing: a commit refuses a DAG in another cluster than 0.

@@ -7,7 +7,7 @@ use fass::Wire;
 use linux::{Connection, Linux};
 
 use super::ending::Ending;
-use crate::text::options::UsageError;
+use crate::options::UsageError;
 
 /// The ends of an app's wire: where bytes come from, and where they go.
 #[derive(Clone, Debug)]

@@ -16,10 +16,10 @@ use super::fault_verdict::FaultVerdict;
 use super::wcet_notes;
 use super::words::Words;
 use crate::heap;
+use crate::options::{Options, UsageError};
 use crate::report;
 use crate::report::run::Run;
 use crate::text::json;
-use crate::text::options::{Options, UsageError};
 
 /// The machine, lent to the app's function for the time of the run.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use fass::Wire;
 use super::ending::Ending;
 use super::ends::Ends;
 use super::machine_handle::Machine;
-use crate::text::options::UsageError;
+use crate::options::UsageError;
 
 impl Machine {
     /// Connects a wire: what comes on standard input arrives in the next run, with the word

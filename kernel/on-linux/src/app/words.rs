@@ -21,8 +21,8 @@ use linux::{Linux, Mechanism};
 
 use super::ending::Ending;
 use super::terms::Terms;
+use crate::options::{Options, UsageError};
 use crate::text::graph;
-use crate::text::options::{Options, UsageError};
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
 const FOREIGN: [(&str, &str); 14] = [

@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use core::fmt;
 use core::fmt::Display;
 
-use executive::text::options::UsageError;
+use crate::options::UsageError;
 use fass::Tunable;
 use sched_dag::nearest_of;
 

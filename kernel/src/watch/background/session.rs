@@ -15,11 +15,11 @@ use sched_dag::{Dag, DagId, TaskSet};
 use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
 use super::more;
+use crate::options::whole_number;
 use crate::println;
 use executive::machine::serial;
 use executive::run::execution::{self, Control, Snapshot, State};
 use executive::text::json;
-use executive::text::options::whole_number;
 
 /// How often core 0 looks for bytes, at least.
 pub(crate) const PERIOD_NS: u64 = 20_000_000;

@@ -31,10 +31,12 @@ const MOST_CORES: usize = 64;
 /// The most instances that are named in a run.
 const MOST_NAMED: usize = 16;
 
-/// What was seen in this run.
+/// What was seen in this run. It begins as zeros, which take no room in an image.
 #[derive(Debug)]
 struct Watch {
-    /// When to look again, on the clock; `u64::MAX` if there is no run.
+    /// Whether there is a run.
+    looks: bool,
+    /// When to look again, on the clock.
     next_look_ns: u64,
     cores: [Seen; MOST_CORES],
     named: usize,
@@ -48,16 +50,15 @@ struct Seen {
     is_named: bool,
 }
 
-static WATCH: SpinLock<Watch> = SpinLock::new(Watch::from(u64::MAX));
+static WATCH: SpinLock<Watch> = SpinLock::new(Watch::NONE);
 
 impl Watch {
-    const fn from(now_ns: u64) -> Self {
-        Self {
-            next_look_ns: now_ns,
-            cores: [Seen::NOTHING; MOST_CORES],
-            named: 0,
-        }
-    }
+    const NONE: Self = Self {
+        looks: false,
+        next_look_ns: 0,
+        cores: [Seen::NOTHING; MOST_CORES],
+        named: 0,
+    };
 }
 
 impl Seen {
@@ -94,12 +95,16 @@ impl Seen {
 
 /// Begins to look, at a run that begins now.
 pub(super) fn begin() {
-    *WATCH.lock() = Watch::from(clock::now_ns());
+    *WATCH.lock() = Watch {
+        looks: true,
+        next_look_ns: clock::now_ns(),
+        ..Watch::NONE
+    };
 }
 
 /// Looks no longer.
 pub(super) fn end() {
-    *WATCH.lock() = Watch::from(u64::MAX);
+    WATCH.lock().looks = false;
 }
 
 /// Takes a look if one is due. In core 0's heartbeat.
@@ -108,7 +113,7 @@ pub(super) fn beat(now_ns: u64) {
     let Some(mut watch) = WATCH.try_lock() else {
         return;
     };
-    if now_ns < watch.next_look_ns {
+    if !watch.looks || now_ns < watch.next_look_ns {
         return;
     }
     watch.next_look_ns = now_ns.saturating_add(LOOK_NS);
