@@ -50,3 +50,35 @@ fn a_refinement_that_never_ends_costs_nothing_on_one_core() {
 fn a_refinement_that_never_ends_costs_nothing_on_four_cores() {
     a_cut_costs_nothing(4);
 }
+
+#[test]
+fn a_refinement_that_keeps_a_lock_is_a_fault_of_its_own_dag() {
+    for cores in [1, 4] {
+        let guest = Guest::new("guest-tests").word("test=refining_in_section");
+        let outcome = guest.cores(cores).succeed();
+        let tail = || format!("{cores} cores\n{}", outcome.tail());
+        let line = outcome.transcript.of_kind("refining").next();
+        let line = line.unwrap_or_else(|| panic!("no line of kind `refining`: {}", tail()));
+        let number = |name| line.number_at(name);
+        assert_eq!(number("faults"), Some(1), "{}", tail());
+        assert_eq!(
+            (number("cut"), number("completed")),
+            (Some(0), Some(0)),
+            "{}",
+            tail()
+        );
+        // The lock is lost; the other DAG, which does not use it, runs to its end.
+        assert_eq!(number("healthy_completed"), number("jobs"), "{}", tail());
+        assert_eq!(
+            (number("healthy_faults"), number("violations")),
+            (Some(0), Some(0)),
+            "{}",
+            tail()
+        );
+        let fault = outcome.transcript.of_kind("fault").next();
+        let fault = fault.unwrap_or_else(|| panic!("no fault: {}", tail()));
+        assert_eq!(fault.text_at("dag_name"), Some("refined"), "{}", tail());
+        assert_eq!(fault.text_at("subtask_name"), Some("plan"), "{}", tail());
+        assert_eq!(fault.text_at("cause"), Some("refinement"), "{}", tail());
+    }
+}

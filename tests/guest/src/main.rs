@@ -44,7 +44,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 43] = [
+const TESTS: [(&str, Test); 44] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -86,6 +86,7 @@ const TESTS: [(&str, Test); 43] = [
     ("recorded_crash", recorded::crash),
     ("recorded_long", recorded::long),
     ("refining", refining::run),
+    ("refining_in_section", refining::run_in_section),
     ("sharing", sharing::run),
     ("stacks", stacks::run),
     ("stacks_of_chain", stacks::chain),

@@ -72,9 +72,36 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     Ok(())
 }
 
+/// Runs it with a third refinement that keeps a lock, so that it cannot be cut.
+pub(crate) fn run_in_section(machine: &Machine) -> Result<(), Ending> {
+    machine.options().finish(&["test"])?;
+    machine.accept_faults(); // the one that is looked for
+    let in_section = |_| {
+        LOCK.with(|uses| {
+            while black_box(true) {
+                *uses = uses.wrapping_add(1);
+            }
+        });
+    };
+    let (refined, refinements) = refined(JOBS, in_section);
+    finish_create_dags(&[healthy(JOBS), refined])?;
+    let run = machine.run()?;
+    let [healthy, refined] = [HEALTHY, REFINED].map(|dag| *run.statistics(dag));
+    json::emit("refining", |line| {
+        line.number("jobs", JOBS)
+            .number("cut", refinements.cut())
+            .number("completed", refined.completed)
+            .number("faults", refined.faults)
+            .number("healthy_completed", healthy.completed)
+            .number("healthy_faults", healthy.faults)
+            .number("violations", run.violations().count() as u64);
+    });
+    Ok(())
+}
+
 /// Runs so many jobs of both DAGs.
 fn jobs(machine: &Machine, jobs: u64) -> Result<(kernel::Run, Refinements), Ending> {
-    let (refined, refinements) = refined(jobs);
+    let (refined, refinements) = refined(jobs, endless);
     finish_create_dags(&[healthy(jobs), refined])?;
     RESULTS
         .iter()
@@ -92,8 +119,8 @@ fn healthy(jobs: u64) -> Dag {
     dag
 }
 
-/// A DAG whose third refinement ends in no job, each in a way of its own.
-fn refined(jobs: u64) -> (Dag, Refinements) {
+/// A DAG whose third refinement ends in no job: what it calls again and again gets the job.
+fn refined(jobs: u64, taking: fn(u64)) -> (Dag, Refinements) {
     let dag = create_dag();
     dag.name("refined").jobs(jobs);
     let attributes = |name| SubtaskAttributes::named(name).priority(2);
@@ -101,10 +128,10 @@ fn refined(jobs: u64) -> (Dag, Refinements) {
     let read = move || (next.next().unwrap_or(0),);
     dag.register_periodic_subtask(read, vec!["job"], PERIOD, attributes("read"));
     let plan = |&(job,): &(u64,)| (job, 0_u64);
-    let refine = |&(job,): &(u64,), &(_, steps): &(u64, u64)| {
+    let refine = move |&(job,): &(u64,), &(_, steps): &(u64, u64)| {
         if steps == STEPS {
             loop {
-                endless(job);
+                taking(job);
             }
         }
         Some((job, steps + 1))

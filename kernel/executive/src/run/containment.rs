@@ -122,7 +122,8 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         timer::set(Alarm::Budget, context.budget_end_ns());
         return;
     }
-    if cut::can_cut(context) {
+    let refines = cut::can_cut(context);
+    if refines {
         // What is given up in a section would keep the section for good.
         if section::puts_off(core, now_ns) {
             return;
@@ -132,12 +133,21 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         }
     }
     let budget = Duration::from_nanos(execution::budget_ns(instance));
+    let over_budget = format_args!("executed for more than its budget of {budget:?}");
+    let (cause, message) = if refines {
+        (
+            "refinement",
+            format_args!("held a lock for too long to be cut"),
+        )
+    } else {
+        ("budget overrun", over_budget)
+    };
     let rip = interrupted.instruction();
     report(
         instance,
         &Fault {
-            cause: "budget overrun",
-            message: &format_args!("executed for more than its budget of {budget:?}"),
+            cause,
+            message: &message,
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: None,
             spot: Spot {
