@@ -28,8 +28,8 @@
 //! - A function whose budget is exceeded is not ended, only its DAG is: its thread goes
 //!   on, as a normal one, until the function returns.
 //! - An instance that waits in mid-function (reads a file, locks a mutex) leaves its core to
-//!   what was demoted there, and to other programs. So does a non-preemptive one, and if what
-//!   was demoted ends meanwhile, R5 counts that as a core that was lost.
+//!   what was demoted there, and to other programs. So does a non-preemptive one: what was
+//!   demoted there and ends meanwhile is reported when that one has ended, or when it is wanted.
 #![deny(unsafe_code)]
 
 mod control;
@@ -37,6 +37,7 @@ mod lead;
 mod level;
 mod look_out;
 mod machine;
+mod parked;
 mod platform;
 mod release;
 mod requests;

@@ -172,7 +172,7 @@ impl Team {
     }
 
     /// Ends a core's instance, which has exceeded its budget, and with it its DAG.
-    fn abandon(&self, state: &mut State, core: CoreId) {
+    pub(crate) fn abandon(&self, state: &mut State, core: CoreId) {
         let number = state.active[core.index()];
         let Some(vertex) = state.placement.current(core.index()) else {
             return;
@@ -193,6 +193,7 @@ impl Team {
             is_overrun: true,
         };
         state.fail(&self.workers, fault);
+        state.report_left(core, &self.workers);
     }
 }
 

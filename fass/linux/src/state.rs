@@ -17,6 +17,7 @@ use sched_dag::{
 };
 
 use crate::level::{Levels, Role};
+use crate::parked::Left;
 use crate::sys;
 use crate::worker::Worker;
 
@@ -55,11 +56,13 @@ pub(crate) struct State {
     /// By worker, the core to whose processor it is pinned.
     pinned: Box<[Option<CoreId>]>,
     /// By worker, when its instance last went on after it had lost its core, on the clock.
-    resumed_ns: Box<[u64]>,
+    pub(crate) resumed_ns: Box<[u64]>,
     /// What a worker that reports an end has just taken the processor from.
-    interrupted: Option<(CoreId, Vertex)>,
+    pub(crate) interrupted: Option<(CoreId, Vertex)>,
+    /// What has finished after it had lost its core, and is not reported yet.
+    pub(crate) left: Vec<Left>,
     /// Workers without a core and without an instance.
-    spare: Vec<Number>,
+    pub(crate) spare: Vec<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
     pub(crate) requests: Requests,
@@ -119,6 +122,7 @@ impl State {
             pinned: vec![None; workers].into_boxed_slice(),
             resumed_ns: vec![0; workers].into_boxed_slice(),
             interrupted: None,
+            left: Vec::with_capacity(workers),
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
             requests,
@@ -148,26 +152,6 @@ impl State {
         self.recorder.now_ns = self.since_epoch(time_ns);
         let instance = self.scheduler.instance_of(vertex);
         self.recorder.on_core(what, instance, core);
-    }
-
-    /// Returns when the instance of a worker has ended whose function returned at a time. If it
-    /// lost its core and got it back before it could say so, it ends there.
-    pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
-        returned_ns.max(self.resumed_ns[worker])
-    }
-
-    /// Writes down that an instance has ended that had lost its core. Right now that core's
-    /// processor is with the worker that says so, and what should run there is not.
-    pub(crate) fn note_end_of_parked(&mut self, worker: Number, what: What, vertex: Vertex) {
-        let core = self.core_of(worker);
-        let occupant = self.placement.current(core.index());
-        if let Some(occupant) = occupant {
-            self.note(What::Suspend, core, occupant);
-        }
-        self.note(What::Resume, core, vertex);
-        self.note(what, core, vertex);
-        // It goes on after the step that the end brings about, and within it nothing does.
-        self.interrupted = occupant.map(|occupant| (core, occupant));
     }
 
     /// Lets the scheduler see what happens now, and decide.
@@ -327,6 +311,9 @@ impl State {
                 self.spare.push(me);
                 self.seat(parked, core, workers);
                 workers[parked].promote(self.levels);
+                if self.has_left(parked) {
+                    workers[parked].call();
+                }
                 if let Some(vertex) = self.placement.current(core.index()) {
                     self.resumed_ns[parked] = sys::now_ns();
                     self.note_at(self.resumed_ns[parked], What::Resume, core, vertex);

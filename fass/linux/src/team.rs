@@ -14,6 +14,7 @@ use sched_dag::journal::What;
 use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
+use crate::parked::Left;
 use crate::requests::{Request, Requests};
 use crate::state::{Fault, Number, Runner, State};
 use crate::sys;
@@ -140,9 +141,13 @@ impl Team {
                 Woken::ToEnd => return,
                 Woken::ByCall => {
                     let mut state = self.lock();
-                    let next = state.seats[me].and_then(|_| state.find_work(me, &self.workers));
-                    self.settle(me, &state, next.is_some());
-                    next
+                    if let Some(left) = state.take_left(me) {
+                        self.report(me, state, left.runner, Ok(()), left.finish_ns)
+                    } else {
+                        let next = state.seats[me].and_then(|_| state.find_work(me, &self.workers));
+                        self.settle(me, &state, next.is_some());
+                        next
+                    }
                 }
                 Woken::ByTime => {
                     let mut state = self.lock();
@@ -201,14 +206,14 @@ impl Team {
 
     /// Reports that a worker's instance has ended, and finds what it does next.
     #[inline]
-    fn complete(
+    pub(crate) fn complete(
         &self,
         me: Number,
-        mut runner: Box<Runner>,
+        runner: Box<Runner>,
         outcome: Result<(), String>,
     ) -> Result<Option<Box<Runner>>, Abandoned> {
         let finish_ns = sys::now_ns();
-        let (workers, vertex) = (&self.workers, runner.vertex);
+        let workers = &self.workers;
         let is_raised = workers[me].report(self.levels);
         let mut state = self.lock();
         if is_raised {
@@ -218,22 +223,45 @@ impl Team {
         if state.abandoned.contains(&me) {
             return Err(Abandoned);
         }
+        if outcome.is_ok() && state.must_leave(me, workers) {
+            state.left.push(Left {
+                worker: me,
+                runner,
+                finish_ns,
+            });
+            workers[me].sit(None);
+            return Ok(None);
+        }
+        Ok(self.report(me, state, runner, outcome, finish_ns))
+    }
+
+    /// Tells the scheduler of the end of a worker's instance, and finds what it does next.
+    #[inline]
+    pub(crate) fn report(
+        &self,
+        me: Number,
+        mut state: MutexGuard<'_, State>,
+        mut runner: Box<Runner>,
+        outcome: Result<(), String>,
+        finish_ns: u64,
+    ) -> Option<Box<Runner>> {
+        let (workers, vertex) = (&self.workers, runner.vertex);
         let state_now = &mut *state;
-        if outcome.is_ok() && runner.body.has_effects() {
-            let requests = &mut state_now.requests;
-            let keep = &mut |request| requests.keep(request);
-            runner.body.complete(finish_ns, keep);
+        if outcome.is_ok() {
+            state_now.let_effects_happen(&mut runner, finish_ns);
         }
         let what = match outcome {
             Ok(()) => What::Finish,
             Err(_) => What::Ended,
         };
-        match state_now.seats[me] {
+        let seat = state_now.seats[me];
+        match seat {
             Some(core) => {
                 let end_ns = state_now.end_of(me, finish_ns);
                 state_now.note_at(end_ns, what, core, vertex);
                 state_now.placement.finish(core.index(), vertex, runner);
-                if outcome.is_ok() && state_now.requests.are_none() {
+                let is_usual = outcome.is_ok() && state_now.left.is_empty();
+                if is_usual && state_now.requests.are_none() {
                     match state_now.hand_off(core, vertex) {
                         HandOff::To(successor, decision) => {
                             if let Some(runner) = state_now.placement.start(core, successor) {
@@ -241,14 +269,14 @@ impl Team {
                                 let runner = state_now.begin(me, core, runner, job, workers);
                                 self.hand_offs.fetch_add(1, Ordering::Relaxed);
                                 self.announce(&state);
-                                return Ok(Some(runner));
+                                return Some(runner);
                             }
                             state_now.placement.set_target(core, Some(successor));
                         }
                         HandOff::Idle => {}
                         HandOff::Open => state_now.step(workers, |_, _| ()),
                     }
-                    return Ok(self.go_on(me, state));
+                    return self.go_on(me, state);
                 }
             }
             None => {
@@ -272,7 +300,10 @@ impl Team {
                 state_now.fail(workers, fault);
             }
         }
-        Ok(self.go_on(me, state))
+        if let Some(core) = seat {
+            state_now.report_left(core, workers);
+        }
+        self.go_on(me, state)
     }
 
     /// Ends a worker's step: finds what it does next, and calls others.
@@ -344,7 +375,7 @@ enum Woken {
 const AT_ONCE: usize = 16;
 
 /// The worker's instance was ended while it ran.
-struct Abandoned;
+pub(crate) struct Abandoned;
 
 /// Returns a panic's message.
 fn message(panic: &(dyn std::any::Any + Send)) -> String {

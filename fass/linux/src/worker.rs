@@ -125,6 +125,12 @@ impl Worker {
         was_demoted
     }
 
+    /// Reports whether the instance that its core has with it is over: it is about to take the
+    /// lock, or has been told to. Under the lock.
+    pub(crate) fn has_returned(&self) -> bool {
+        self.mode.load(Ordering::Acquire) == REPORTS
+    }
+
     /// Demotes it to a role, and reports whether it has: not if its instance has just
     /// ended. Under the lock.
     pub(crate) fn demote(&self, levels: Option<Levels>, role: Role) -> bool {

@@ -72,16 +72,14 @@ fn dag(number: u64, random: &mut Random) -> Dag {
             let us = random.below(1_500);
             let mut attributes =
                 SubtaskAttributes::named(&format!("subtask {subtask}")).priority(random.small(10));
-            let keeps_core = random.one_in(5);
-            if keeps_core {
+            if random.one_in(5) {
                 attributes = attributes.non_preemptive();
             }
             if random.one_in(20) {
                 // Sometimes it is exceeded.
                 attributes = attributes.budget(ms(1));
             }
-            // While it waits, what was preempted there may end on its core, which it is to keep.
-            let holds = random.one_in(4) && !keeps_core;
+            let holds = random.one_in(4);
             let function = move |job| {
                 match holds {
                     true => execute_for(Duration::from_micros(us), Occupation::Hold),
