@@ -30,7 +30,6 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use crate::install;
 use crate::lasting::Lasting;
 use crate::options::{Choice, Command, Menu, Parsed};
 
@@ -96,9 +95,9 @@ pub fn bench(words: &[OsString]) -> ExitCode {
     BENCH.run(words)
 }
 
-/// Runs a measurement that boots guests: `measure` gets what `plan` makes of the options,
-/// and says whether all limits hold.
-fn on_machine<Plan>(
+/// Runs a measurement: `measure` gets what `plan` makes of the options, and says whether all limits
+/// hold.
+fn by_plan<Plan>(
     table: &Command,
     words: &[OsString],
     plan: impl Fn(&Parsed) -> Result<Plan, String>,
@@ -112,8 +111,7 @@ fn on_machine<Plan>(
         Ok(plan) => plan,
         Err(line) => return table.refuse(&line),
     };
-    let measured = install::ensure_qemu().and_then(|()| measure(&plan));
-    match measured {
+    match measure(&plan) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(line) => table.fail(&line),

@@ -29,7 +29,7 @@ use std::time::Duration;
 use figure::Figure;
 use plan::{Boot, Plan};
 
-use super::on_machine;
+use super::by_plan;
 use crate::options::Request;
 use crate::outcome::boot;
 use crate::progress::Progress;
@@ -41,7 +41,7 @@ const LIMIT: Duration = Duration::from_secs(300);
 
 /// Runs `bench hand-off` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    on_machine(&table::TABLE, words, Plan::new, measure_all)
+    by_plan(&table::TABLE, words, Plan::new, measure_all)
 }
 
 /// Measures as `--compare` does, and prints the table.
@@ -69,6 +69,7 @@ pub fn check() -> Result<(), String> {
 
 /// Measures and reports. Returns whether nothing has grown.
 fn measure_all(plan: &Plan) -> Result<bool, String> {
+    install::ensure_qemu()?;
     if let Some(scale) = &plan.scale {
         return measure_scale(scale).map(|()| true);
     }

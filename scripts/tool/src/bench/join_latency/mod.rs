@@ -36,14 +36,14 @@ use join_latency::Samples;
 use plan::{Plan, Provenance};
 use progress::Progress;
 
-use super::on_machine;
+use super::by_plan;
 use crate::outcome::boot;
 use crate::qemu::Mode;
-use crate::{image, probe, program, system};
+use crate::{image, install, probe, program, system};
 
 /// Runs `bench join-latency` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    on_machine(&table::TABLE, words, Plan::new, |plan| {
+    by_plan(&table::TABLE, words, Plan::new, |plan| {
         measure_all(plan).map(|()| true)
     })
 }
@@ -52,7 +52,10 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 fn measure_all(plan: &Plan) -> Result<(), String> {
     let built = match plan.on_linux {
         true => image::build_linux("join-latency"),
-        false => image::build("join-latency"),
+        false => {
+            install::ensure_qemu()?;
+            image::build("join-latency")
+        }
     };
     let image = built.map_err(|error| error.to_string())?;
     let (mode, why) = match plan.on_linux {
