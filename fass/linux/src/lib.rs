@@ -42,6 +42,7 @@ mod platform;
 mod release;
 mod requests;
 mod run;
+mod seats;
 mod state;
 #[allow(
     unsafe_code,

@@ -14,6 +14,7 @@ use crate::control::Control;
 use crate::level::{Levels, USUAL_TOP};
 use crate::platform::{HOST, Terms};
 use crate::run::{self, Run};
+use crate::seats::Seats;
 use crate::sys;
 use crate::warnings;
 
@@ -23,6 +24,9 @@ pub enum Mechanism {
     /// By levels of SCHED_FIFO. What should run comes before all normal programs, and
     /// is preempted by what the scheduler puts before it.
     Fifo,
+    /// By our policy of `sched_ext`, the paper's way: the same order, put by a store and not
+    /// by a system call. The policy has to be loaded.
+    SchedExt,
     /// By threads like all others: nothing is preempted, and other programs have their
     /// share of the cores. It needs no privilege.
     Normal,
@@ -86,7 +90,8 @@ impl Linux {
     ///
     /// # Errors
     ///
-    /// If there are fewer processors, or none is asked for.
+    /// If there are fewer processors, or none is asked for; or if `sched_ext` is asked for and
+    /// our policy is not loaded, or another program has it.
     ///
     /// # Panics
     ///
@@ -101,7 +106,7 @@ impl Linux {
             )));
         }
         processors.truncate(cores as usize);
-        Ok(Self::on(processors, mechanism))
+        Self::on(processors, mechanism)
     }
 
     /// Takes so many cores, of which several share a processor if there are fewer of those.
@@ -112,7 +117,7 @@ impl Linux {
     ///
     /// # Errors
     ///
-    /// If none is asked for.
+    /// If none is asked for, or as [`new`](Self::new) because of the mechanism.
     ///
     /// # Panics
     ///
@@ -124,21 +129,26 @@ impl Linux {
             true => Err(StartError(
                 "0 cores are asked for; do ask for 1 or more".to_owned(),
             )),
-            false => Ok(Self::on(processors, mechanism)),
+            false => Self::on(processors, mechanism),
         }
     }
 
     /// Makes a machine whose cores are these processors.
-    fn on(processors: Vec<u32>, mechanism: Mechanism) -> Self {
+    fn on(processors: Vec<u32>, mechanism: Mechanism) -> Result<Self, StartError> {
         let (mut levels, mut found) = (None, Vec::new());
-        if mechanism == Mechanism::Fifo {
-            match Levels::take(USUAL_TOP) {
+        match mechanism {
+            Mechanism::Fifo => match Levels::of_fifo(USUAL_TOP) {
                 Ok(taken) => levels = Some(taken),
                 Err(why) => found.push(warnings::no_privilege(USUAL_TOP, &why)),
+            },
+            Mechanism::SchedExt => {
+                levels = Some(Levels::SchedExt(Seats::take().map_err(StartError)?));
             }
+            Mechanism::Normal => {}
         }
         if levels.is_some() {
-            found.extend(warnings::look(&processors));
+            let is_throttled = mechanism == Mechanism::Fifo;
+            found.extend(warnings::look(&processors, is_throttled));
         }
         let preemption = match levels {
             Some(_) => Preemption::Enabled,
@@ -165,7 +175,7 @@ impl Linux {
             look_at_commit: |_, _, _| (),
             allocations: || 0,
         });
-        Self { warnings: found }
+        Ok(Self { warnings: found })
     }
 
     fn change(self, change: impl FnOnce(&mut Terms)) -> Self {

@@ -3,6 +3,7 @@
 //! The symbols are those of the C library, which the standard library links anyway. Each
 //! function checks what it gets back and is safe to call with any arguments.
 
+use std::ffi::{CStr, c_char};
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd};
 use std::sync::atomic::AtomicU32;
@@ -13,6 +14,7 @@ unsafe extern "C" {
     fn epoll_ctl(epoll: i32, operation: i32, file: i32, event: *const Interest) -> i32;
     fn epoll_wait(epoll: i32, events: *mut Interest, most: i32, timeout_ms: i32) -> i32;
     fn mlockall(flags: i32) -> i32;
+    fn mmap(at: *mut u8, bytes: usize, access: i32, flags: i32, file: i32, from: i64) -> *mut u8;
     fn prctl(option: i32, ...) -> i32;
     fn sched_getaffinity(thread: i32, bytes: usize, mask: *mut u64) -> i32;
     fn sched_setaffinity(thread: i32, bytes: usize, mask: *const u64) -> i32;
@@ -43,10 +45,14 @@ const CLOCK_THREAD: i32 = 3;
 const SYS_GETTID: i64 = 186;
 #[cfg(target_arch = "x86_64")]
 const SYS_FUTEX: i64 = 202;
+#[cfg(target_arch = "x86_64")]
+const SYS_BPF: i64 = 321;
 #[cfg(not(target_arch = "x86_64"))]
 const SYS_GETTID: i64 = 178;
 #[cfg(not(target_arch = "x86_64"))]
 const SYS_FUTEX: i64 = 98;
+#[cfg(not(target_arch = "x86_64"))]
+const SYS_BPF: i64 = 280;
 
 /// The kernel's number of a thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -169,6 +175,41 @@ pub(crate) fn limit_real_time(microseconds: u64) -> io::Result<()> {
     let limits = [microseconds; 2];
     // SAFETY: the kernel reads one `rlimit`, which is two numbers.
     checked(unsafe { setrlimit(RLIMIT_RTTIME, &raw const limits) })
+}
+
+/// Returns the memory of a table of BPF's that is pinned at a place and of at least so many bytes,
+/// for as long as the program lasts.
+pub(crate) fn pinned_table(place: &CStr, bytes: usize) -> io::Result<&'static [AtomicU32]> {
+    /// `union bpf_attr` for this command.
+    #[repr(C)]
+    struct Pinned {
+        place: *const c_char,
+        file: u32,
+        flags: u32,
+    }
+    const GET_PINNED: i64 = 7;
+    const READ_AND_WRITE: i32 = 3;
+    const SHARED: i32 = 1;
+    let pinned = Pinned {
+        place: place.as_ptr(),
+        file: 0,
+        flags: 0,
+    };
+    // SAFETY: the kernel reads the struct, and from it a string that ends with 0.
+    let file = unsafe { syscall(SYS_BPF, GET_PINNED, &raw const pinned, size_of::<Pinned>()) };
+    let file = i32::try_from(file).unwrap_or(-1);
+    checked(file)?;
+    // SAFETY: the kernel has just opened it for us, and nobody else has its number.
+    let file = unsafe { OwnedFd::from_raw_fd(file) };
+    let none = std::ptr::null_mut();
+    // SAFETY: the kernel chooses an address at which nothing is, and refuses more bytes than there are.
+    let table = unsafe { mmap(none, bytes, READ_AND_WRITE, SHARED, file.as_raw_fd(), 0) };
+    if table.addr() == usize::MAX {
+        return Err(io::Error::last_os_error());
+    }
+    // SAFETY: the memory is on pages of its own and never given back; whatever bits it has are
+    // numbers, and what the kernel does to them meanwhile is atomic, too.
+    Ok(unsafe { std::slice::from_raw_parts(table.cast(), bytes / size_of::<AtomicU32>()) })
 }
 
 /// What waits for something new in a file.

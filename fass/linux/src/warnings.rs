@@ -14,8 +14,9 @@ pub(crate) fn no_privilege(top: i32, why: &io::Error) -> String {
     )
 }
 
-/// Looks at the kernel's settings, and locks the memory.
-pub(crate) fn look(processors: &[u32]) -> Vec<String> {
+/// Looks at the kernel's settings, those for real-time classes among them if these are used, and
+/// locks the memory.
+pub(crate) fn look(processors: &[u32], is_real_time: bool) -> Vec<String> {
     let mut found = Vec::new();
     let setting = |name: &str| {
         read(&format!("/proc/sys/kernel/{name}"))?
@@ -25,7 +26,8 @@ pub(crate) fn look(processors: &[u32]) -> Vec<String> {
     if let (Some(runtime), Some(period)) = (
         setting("sched_rt_runtime_us"),
         setting("sched_rt_period_us"),
-    ) && runtime >= 0
+    ) && is_real_time
+        && runtime >= 0
         && runtime < period
     {
         found.push(format!(

@@ -150,7 +150,12 @@ fn what_is_wrong_has_the_exit_code_and_the_line_that_it_has_on_the_machine() {
         (
             "run --app fork-join --on linux --cores 64",
             2,
-            "`cores=64`: 64 cores are asked for, and this program may use ",
+            "64 cores are asked for, and this program may use ",
+        ),
+        (
+            "run --app fork-join --on linux --append mechanism=sched-ext",
+            2,
+            "`mechanism=sched-ext`: allowed are fifo, sched_ext, normal",
         ),
         (
             "run --app faults --on linux",

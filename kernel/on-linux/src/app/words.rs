@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | `cores=N` | how many of the processors that the program may use are its cores | all of them |
 //! | `share=off\|on` | whether several cores share a processor where there are more cores | `off` |
-//! | `mechanism=fifo\|normal` | by which class of Linux's threads run | `fifo` |
+//! | `mechanism=fifo\|sched_ext\|normal` | by which class of Linux's threads run | `fifo` |
 //! | `module=FILE` | a file for the app | |
 //! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
 //! | `input=-` | what comes on standard input arrives on the app's wire | |
@@ -63,7 +63,11 @@ pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending
         return Err(UsageError::new(line).into());
     }
     let terms = Terms::read(options)?;
-    let mechanisms = [("fifo", Mechanism::Fifo), ("normal", Mechanism::Normal)];
+    let mechanisms = [
+        ("fifo", Mechanism::Fifo),
+        ("sched_ext", Mechanism::SchedExt),
+        ("normal", Mechanism::Normal),
+    ];
     let mechanism = options.choice("mechanism", &mechanisms)?;
     let cores = options.number("cores", 1..=1024, u64::from(linux::processors()))?;
     let limit_ms = options.number("limit_ms", 0..=86_400_000, 0)?;
@@ -94,8 +98,7 @@ pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending
             ("on", Linux::sharing),
         ],
     )?;
-    let machine = make(cores, mechanism)
-        .map_err(|error| UsageError::new(format!("`cores={cores}`: {error}")))?;
+    let machine = make(cores, mechanism).map_err(|error| UsageError::new(error.to_string()))?;
     let mut machine = machine
         .policy(terms.policy)
         .preemption(terms.preemption)
