@@ -35,6 +35,29 @@ impl<F: FnMut(u64) + Send + ?Sized> Execute for Box<F> {
     }
 }
 
+/// A place among those of all vertices, in a cluster that has the bodies of some.
+impl<B: Execute> Execute for Option<B> {
+    #[inline]
+    fn run(&mut self, job: u64) {
+        if let Some(body) = self {
+            body.run(job);
+        }
+    }
+
+    #[inline]
+    fn complete(&mut self, raise: &mut dyn FnMut(DagId)) {
+        if let Some(body) = self {
+            body.complete(raise);
+        }
+    }
+
+    fn discard(&mut self, job: u64) {
+        if let Some(body) = self {
+            body.discard(job);
+        }
+    }
+}
+
 impl Execute for Body {
     #[inline]
     fn run(&mut self, job: u64) {

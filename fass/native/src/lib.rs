@@ -17,14 +17,24 @@
 //! In a run that is *recorded* the scheduler's clock goes on, by 1 ns at each
 //! completion: there jobs can be late, and overruns happen as their policies say.
 //!
+//! # Clusters
+//!
+//! Where the workers are divided each cluster has a scheduler of its own, a lock if it has
+//! several workers, and a clock. What a cluster does from a release to a completion touches
+//! nothing that another one writes: so their clocks have nothing to do with each other, and one
+//! may be done before another has begun. A signal to another cluster counts when that takes it,
+//! in its next step; a latest value, as soon as it is shown.
+//!
 //! # What is guaranteed
 //!
 //! - R2, R3 and R5 of the task model, by the same scheduler as everywhere else; R1 on
 //!   the scheduler's clock. [`Native::run_recorded`] writes a run down and checks it.
 //! - What a function has written is visible to the functions of its successors,
 //!   whichever worker runs them.
+//! - R5 within each cluster.
 //! - Signals and latest values take effect with the completion that leaves them, before
-//!   the scheduler hears of it; what was sent to cancelled instances is dropped.
+//!   the scheduler hears of it; a signal to another cluster is never lost, and nobody waits for
+//!   it to be taken; what was sent to cancelled instances is dropped.
 //! - After the start nothing is allocated but by the functions themselves.
 //!
 //! # What is not
@@ -39,8 +49,10 @@
 #![forbid(unsafe_code)]
 
 mod alone;
+mod cluster;
 mod execute;
 mod mailbox;
+mod others;
 mod pin;
 mod platform;
 mod recorder;
@@ -48,10 +60,12 @@ mod relax;
 mod report;
 mod reports;
 mod run;
+mod start;
 mod team;
 mod watch;
 
 pub use pin::{Pinning, processors};
 pub use platform::Native;
 pub use report::{Recorded, Report};
-pub use run::{Closure, Setting, run, run_recorded, worker};
+pub use run::{Closure, Setting, run, run_recorded};
+pub use start::worker;

@@ -5,7 +5,7 @@ use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+use fass::{Clusters, LaunchError, Occupation, Plan, Platform, Policy, Preemption};
 
 use crate::report::{Recorded, Report};
 use crate::run::{Setting, run_bodies, run_bodies_recorded};
@@ -45,6 +45,7 @@ pub struct Native {
 struct Machine {
     policy: Cell<Policy>,
     workers: Cell<u32>,
+    clusters: RefCell<Clusters>,
     plan: RefCell<Option<Plan>>,
 }
 
@@ -70,6 +71,7 @@ impl Native {
         let machine = Rc::new(Machine {
             policy: Cell::new(Policy::StaticPriority),
             workers: Cell::new(1),
+            clusters: RefCell::default(),
             plan: RefCell::new(None),
         });
         CURRENT.set(Rc::downgrade(&machine));
@@ -80,6 +82,15 @@ impl Native {
     #[must_use = "the machine itself is returned"]
     pub fn workers(self, workers: u32) -> Self {
         self.machine.workers.set(workers);
+        self
+    }
+
+    /// Divides the workers into clusters of so many each, from worker 0 on. Each schedules its own
+    /// DAGs, on a clock of its own. See [`fass::Dag::cluster`].
+    #[must_use = "the machine itself is returned"]
+    pub fn clusters(self, sizes: &[u32]) -> Self {
+        let clusters = Clusters::Of(sizes.to_vec());
+        self.machine.clusters.replace(clusters);
         self
     }
 
@@ -137,6 +148,13 @@ impl Platform for HostThreads {
 
     fn cores(&self) -> u32 {
         current().map_or(1, |machine| machine.workers.get())
+    }
+
+    fn clusters(&self) -> Clusters {
+        let machine = current();
+        machine.map_or_else(Clusters::default, |machine| {
+            machine.clusters.borrow().clone()
+        })
     }
 
     /// The host's clock, from its first reading.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sched_dag::Recorder;
-use sched_dag::journal::What;
+use sched_dag::journal::{Event, What};
 use sched_dag::law::{Terms, dispatch_violations, violations};
 use sched_dag::{CoreId, Instance, SchedulerOptions, TaskSet};
 
@@ -26,14 +26,15 @@ impl Watch for Recorder {
     }
 }
 
-/// Checks everything.
+/// Checks everything, of the recorders of all clusters.
 pub(crate) fn judge(
-    recorder: &Recorder,
+    recorders: &[Recorder],
     report: Report,
     task_set: &Arc<TaskSet>,
     options: SchedulerOptions,
 ) -> Recorded {
-    let events = recorder.events.iter().copied();
+    let events = merged(recorders, task_set, options.cores);
+    let events = events.iter().copied();
     let mut found = violations(task_set, Terms::EXACT, events.clone());
     let of_dispatch = dispatch_violations(task_set, &options, Terms::EXACT, events.clone());
     found.extend(of_dispatch);
@@ -47,4 +48,24 @@ pub(crate) fn judge(
         instances: by_worker.iter().sum(),
         by_worker,
     }
+}
+
+/// Returns the events of all clusters, whose recorders count cores from their first one. Nothing
+/// in one depends on another, since each DAG and each core is in one cluster: so any order between
+/// them tells the same run, and the law wants that of time.
+fn merged(recorders: &[Recorder], task_set: &TaskSet, cores: u32) -> Vec<Event> {
+    let mut all = Vec::new();
+    for (cluster, recorder) in task_set.clusters().zip(recorders) {
+        let first = task_set.cores_of(cluster, cores).start;
+        let mut latest_ns = 0;
+        all.extend(recorder.events.iter().map(|&event| {
+            // What is said of a time before stays where it was said.
+            latest_ns = event.time_ns.max(latest_ns);
+            let core = CoreId(event.core.0 + first);
+            (latest_ns, Event { core, ..event })
+        }));
+    }
+    // It keeps the order within each.
+    all.sort_by_key(|&(at_ns, _)| at_ns);
+    all.into_iter().map(|(_, event)| event).collect()
 }

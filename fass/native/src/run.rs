@@ -1,21 +1,18 @@
 //! A run of a task set on workers, from the first release to the last completion.
 
-use std::cell::Cell;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 
 use sched_dag::Recorder;
-use sched_dag::{CoreId, Dag, DagId, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{ClusterId, Dag, DagId, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet};
 
+use crate::cluster::{self, Place, join};
 use crate::execute::Execute;
-use crate::pin::{Pinning, pin, processors};
+use crate::others::Office;
 use crate::recorder::judge;
-use crate::relax::poll;
 use crate::report::{Recorded, Report};
-use crate::reports::Reports;
+use crate::start::Start;
 use crate::watch::Watch;
-use crate::{alone, team};
 
 /// A function as a subtask's body; its argument is the job's number.
 pub type Closure = Box<dyn FnMut(u64) + Send>;
@@ -25,26 +22,18 @@ pub type Closure = Box<dyn FnMut(u64) + Send>;
 pub struct Setting {
     /// How the ready instances are ordered.
     pub policy: Policy,
-    /// The number of workers, at least 1.
+    /// The number of workers, at least 1: of those of all clusters, where a task set divides
+    /// them.
     pub workers: u32,
-}
-
-thread_local! {
-    static WORKER: Cell<Option<u32>> = const { Cell::new(None) };
-}
-
-/// Returns the calling worker's number, from 0; `None` outside of subtasks.
-#[must_use]
-pub fn worker() -> Option<u32> {
-    WORKER.get()
 }
 
 /// Runs a task set without `fass`: functions alone, by DAG and subtask.
 ///
 /// # Panics
 ///
-/// If a function panics; if there are no workers; if a periodic DAG has no limit of
-/// jobs; if the number of functions is not that of the subtasks.
+/// If a function panics; if there are no workers, or fewer than the clusters of the task set
+/// have; if a periodic DAG has no limit of jobs; if the number of functions is not that of the
+/// subtasks.
 ///
 /// # Examples
 ///
@@ -90,7 +79,7 @@ pub(crate) fn run_bodies<B: Execute>(
     bodies: Vec<Vec<B>>,
     setting: Setting,
 ) -> Report {
-    run_watched(&task_set, bodies, setting, ()).0
+    run_watched(&task_set, bodies, setting, || ()).0
 }
 
 pub(crate) fn run_bodies_recorded<B: Execute>(
@@ -106,9 +95,9 @@ pub(crate) fn run_bodies_recorded<B: Execute>(
             endless.name()
         );
     }
-    let recorder = Recorder::new(Arc::clone(&task_set));
-    let (report, recorder) = run_watched(&task_set, bodies, setting, recorder);
-    judge(&recorder, report, &task_set, options(setting))
+    let watch = || Recorder::new(Arc::clone(&task_set));
+    let (report, recorders) = run_watched(&task_set, bodies, setting, watch);
+    judge(&recorders, report, &task_set, options(setting))
 }
 
 const fn options(setting: Setting) -> SchedulerOptions {
@@ -119,12 +108,13 @@ const fn options(setting: Setting) -> SchedulerOptions {
     }
 }
 
+/// Runs all, and returns what has watched each cluster, too.
 fn run_watched<B: Execute, W: Watch>(
     task_set: &Arc<TaskSet>,
     bodies: Vec<Vec<B>>,
     setting: Setting,
-    mut watch: W,
-) -> (Report, W) {
+    watch: impl Fn() -> W,
+) -> (Report, Vec<W>) {
     let dags = task_set.dags();
     assert!(
         dags.iter()
@@ -136,95 +126,71 @@ fn run_watched<B: Execute, W: Watch>(
         subtasks.eq(bodies.iter().map(Vec::len)),
         "each subtask needs one function; give as many as there are subtasks"
     );
-    let mut bodies: Vec<B> = bodies.into_iter().flatten().collect();
-    let mut scheduler = Scheduler::new(Arc::clone(task_set), options(setting));
-    let start = Start::new(setting.workers);
-    if setting.workers == 1 {
-        let mut reports = Reports::new(task_set, watch, &mut bodies[..]);
-        thread::scope(|scope| {
-            let worker = scope.spawn(|| {
-                start.ready(0);
-                alone::run(&mut scheduler, &mut reports);
-            });
-            join(worker);
-        });
-        watch = reports.watch;
+    let clusters = task_set.clusters();
+    let busy = clusters.map(|cluster| task_set.cores_of(cluster, setting.workers).end);
+    let busy = busy.max().unwrap_or_default();
+    assert!(
+        (1..=setting.workers).contains(&busy),
+        "{} workers for clusters of {busy} cores; give at least 1, and one to each core",
+        setting.workers
+    );
+    let start = Start::new(busy);
+    let place = |cluster| Place {
+        task_set,
+        options: options(setting),
+        cluster,
+        start: &start,
+    };
+    let ran = if task_set.is_divided() {
+        run_divided(place, bodies, watch)
     } else {
-        let team = team::Team::new(scheduler, bodies, watch);
-        thread::scope(|scope| {
-            let workers: Vec<_> = (0..setting.workers)
-                .map(|worker| {
-                    let (team, start) = (&team, &start);
-                    scope.spawn(move || {
-                        start.ready(worker);
-                        team.work(CoreId(worker));
-                    })
-                })
-                .collect();
-            workers.into_iter().for_each(join);
-        });
-        (scheduler, watch) = team.into_parts();
-    }
+        let (place, watch) = (place(ClusterId(0)), watch());
+        let bodies = bodies.into_iter().flatten().collect();
+        let run = || cluster::run(place, bodies, watch, ());
+        vec![thread::scope(|scope| join(scope.spawn(run)))]
+    };
+    let (schedulers, watches): (Vec<Scheduler>, Vec<W>) = ran.into_iter().unzip();
+    let scheduler_of = |dag| &schedulers[task_set.dag(dag).cluster().index()];
     let ids = (0..).map(DagId).zip(dags);
     let sink_misses = |(dag, model): (DagId, &Dag)| {
         let sinks = model.sinks().iter();
         sinks
-            .map(|&sink| scheduler.sink_misses(dag, sink))
+            .map(|&sink| scheduler_of(dag).sink_misses(dag, sink))
             .collect()
     };
+    let statistics = |(dag, _)| *scheduler_of(dag).statistics(dag);
     let report = Report {
         sink_misses: ids.clone().map(sink_misses).collect(),
-        statistics: ids.map(|(dag, _)| *scheduler.statistics(dag)).collect(),
+        statistics: ids.map(statistics).collect(),
         pinning: start.pinning(),
     };
-    (report, watch)
+    (report, watches)
 }
 
-/// Waits for a worker's end, and passes its panic on.
-fn join(worker: thread::ScopedJoinHandle<'_, ()>) {
-    if let Err(panic) = worker.join() {
-        std::panic::resume_unwind(panic);
-    }
-}
-
-/// The common start of all workers: nobody begins before all are pinned.
-struct Start {
-    processors: Vec<u32>,
-    to_come: AtomicU32,
-    all_pinned: AtomicBool,
-}
-
-impl Start {
-    fn new(workers: u32) -> Self {
-        let processors = processors();
-        let enough = processors.len() >= workers as usize;
-        Self {
-            processors,
-            to_come: AtomicU32::new(workers),
-            all_pinned: AtomicBool::new(enough),
+/// Runs all clusters, and returns what each leaves.
+fn run_divided<'a, B: Execute, W: Watch>(
+    place: impl Fn(ClusterId) -> Place<'a>,
+    mut bodies: Vec<Vec<B>>,
+    watch: impl Fn() -> W,
+) -> Vec<(Scheduler, W)> {
+    let task_set = place(ClusterId(0)).task_set;
+    let office = Office::new(task_set);
+    thread::scope(|scope| {
+        let mut clusters = Vec::new();
+        for cluster in task_set.clusters() {
+            let mut own = Vec::with_capacity(task_set.vertices());
+            // Vertices are numbered over all DAGs; a cluster has the bodies of its own.
+            for (dag, bodies) in task_set.dags().iter().zip(&mut bodies) {
+                let end = own.len() + dag.subtasks().len();
+                if dag.cluster() == cluster {
+                    own.extend(bodies.drain(..).map(Some));
+                }
+                own.resize_with(end, || None);
+            }
+            let (place, watch) = (place(cluster), watch());
+            let others = office.seen_from(cluster);
+            clusters.push(scope.spawn(move || cluster::run(place, own, watch, others)));
         }
-    }
-
-    /// Pins the calling worker, and returns when all have done so.
-    fn ready(&self, worker: u32) {
-        WORKER.set(Some(worker));
-        let is_pinned = self.all_pinned.load(Ordering::Relaxed)
-            && self
-                .processors
-                .get(worker as usize)
-                .is_some_and(|&processor| pin(processor));
-        if !is_pinned {
-            self.all_pinned.store(false, Ordering::Relaxed);
-        }
-        self.to_come.fetch_sub(1, Ordering::AcqRel);
-        poll(|| (self.to_come.load(Ordering::Acquire) == 0).then_some(()));
-    }
-
-    fn pinning(&self) -> Pinning {
-        if self.all_pinned.load(Ordering::Relaxed) {
-            Pinning::Pinned
-        } else {
-            Pinning::Free
-        }
-    }
+        clusters.into_iter().map(join).collect()
+    })
 }

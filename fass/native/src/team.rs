@@ -1,4 +1,4 @@
-//! Several workers, and one scheduler under a lock.
+//! Several workers, and one scheduler under a lock: of all DAGs, or of their cluster.
 //!
 //! A worker that has finished an instance *posts* that in its mailbox, takes the lock, steps
 //! the scheduler, and mostly leaves with the next instance for itself. What other cores
@@ -32,12 +32,13 @@ use sched_dag::{CoreId, Decision, HandOff, Instance, Scheduler, Vertex};
 
 use crate::execute::{Execute, keep_signal};
 use crate::mailbox::{Assignment, Mailbox, Post};
+use crate::others::Others;
 use crate::relax::poll;
 use crate::reports::{Line, Reports, Shared};
 use crate::watch::Watch;
 
 /// What all workers share.
-pub(crate) struct Team<B, W> {
+pub(crate) struct Team<B, W, O> {
     state: Pair<Mutex<State<B, W>>>,
     bodies: Shared<B>,
     mailboxes: Box<[Mailbox]>,
@@ -45,6 +46,7 @@ pub(crate) struct Team<B, W> {
     is_serving: Pair<AtomicBool>,
     /// Set at the end, or by a worker that panics.
     is_over: Pair<AtomicBool>,
+    others: O,
 }
 
 /// A value in two cache lines of its own, since processors fetch them in pairs.
@@ -64,8 +66,8 @@ struct State<B, W> {
     decisions: Vec<Decision>,
 }
 
-impl<B: Execute, W: Watch> Team<B, W> {
-    pub(crate) fn new(scheduler: Scheduler, bodies: Vec<B>, watch: W) -> Self {
+impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
+    pub(crate) fn new(scheduler: Scheduler, bodies: Vec<B>, watch: W, others: O) -> Self {
         let cores = scheduler.options().cores as usize;
         let dags = scheduler.task_set().dags().len();
         let bodies = bodies.into_iter().map(|body| Line(Mutex::new(body)));
@@ -83,6 +85,7 @@ impl<B: Execute, W: Watch> Team<B, W> {
             bodies,
             is_serving: Pair(AtomicBool::new(false)),
             is_over: Pair(AtomicBool::new(false)),
+            others,
         }
     }
 
@@ -155,6 +158,13 @@ impl<B: Execute, W: Watch> Team<B, W> {
                 me.posted = None;
                 return Some(Some(self.begin(assignment)));
             }
+            if self.others.have_knocked()
+                && me.posted.is_none()
+                && let Some(mut state) = self.try_lock()
+                && let Some(own) = self.open(&mut state, me.core)
+            {
+                return Some(Some(self.begin(own)));
+            }
             self.is_over.0.load(Ordering::Acquire).then_some(None)
         })
     }
@@ -198,16 +208,23 @@ impl<B: Execute, W: Watch> Team<B, W> {
                 }
                 let own = self.take_note(&mut state, core, other, post);
                 if own.is_some() || state.busy == 0 {
-                    return Some(Some((own, mailbox, post.turn)));
+                    return Some(Some((own, Some((mailbox, post.turn)))));
                 }
                 mailbox.hint(post.turn);
             }
+            if self.others.have_knocked()
+                && let Some(own) = self.open(&mut state, core)
+            {
+                return Some(Some((Some(own), None)));
+            }
             self.is_over.0.load(Ordering::Relaxed).then_some(None)
         });
-        let (own, mailbox, turn) = last?;
+        let (own, to_tell) = last?;
         let own = own.map(|own| self.begin(own));
         drop(state);
-        mailbox.hint(turn);
+        if let Some((mailbox, turn)) = to_tell {
+            mailbox.hint(turn);
+        }
         self.is_serving.0.store(false, Ordering::Relaxed);
         own
     }
@@ -237,12 +254,16 @@ impl<B: Execute, W: Watch> Team<B, W> {
             now_ns,
             ..
         } = state;
-        if post.has_signals {
+        if post.has_signals || self.others.have_knocked() {
             let instance = scheduler.instance_of(vertex);
             let mut moment = scheduler.at(*now_ns);
             moment.complete(instance, reports);
-            for dag in self.mailboxes[core.index()].signals().drain(..) {
-                moment.signal(dag, reports);
+            if post.has_signals {
+                for dag in self.mailboxes[core.index()].signals().drain(..) {
+                    if !self.others.send(dag) {
+                        moment.signal(dag, reports);
+                    }
+                }
             }
             return self.proceed(state, here);
         }
@@ -258,11 +279,24 @@ impl<B: Execute, W: Watch> Team<B, W> {
         }
     }
 
-    /// Ends the instant; goes on to the next release if nothing runs and nothing
+    /// Makes a step because another cluster has knocked. Returns what `here` runs next.
+    #[cold]
+    fn open(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
+        // If nobody is busy the run has not begun.
+        if state.busy > 0 {
+            state.now_ns += W::STEP_NS;
+            state.reports.watch.instant(state.now_ns);
+        }
+        self.proceed(state, here)
+    }
+
+    /// Takes letters and ends the instant; goes on to the next event if nothing runs and nothing
     /// starts. Returns what `here` runs next.
     fn proceed(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
         loop {
-            let moment = state.scheduler.at(state.now_ns);
+            let mut moment = state.scheduler.at(state.now_ns);
+            self.others
+                .take(|dag| moment.signal(dag, &mut state.reports));
             let decisions = moment.release_due(&mut state.reports).dispatch();
             state.decisions.clear();
             state.decisions.extend_from_slice(decisions);
@@ -272,7 +306,8 @@ impl<B: Execute, W: Watch> Team<B, W> {
             if state.busy > 0 {
                 return None;
             }
-            let Some(event_ns) = state.scheduler.next_event_ns() else {
+            let (due_ns, then_ns) = (state.scheduler.next_event_ns(), state.now_ns + W::STEP_NS);
+            let Some(event_ns) = self.others.next_ns(due_ns, then_ns) else {
                 self.is_over.0.store(true, Ordering::Release);
                 return None;
             };

@@ -2,7 +2,7 @@
 //!
 //! A recorded run's clock goes on by 1 ns at each completion, so short periods make
 //! any load one likes. With idle workers serving busy ones, most completions are told
-//! by another worker.
+//! by another worker. Half of the sets have their workers divided into clusters.
 
 #[path = "../../../sched-dag/tests/support/random.rs"]
 mod random;
@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use native::{Closure, Setting};
 use random::Random;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagSpec, OverrunPolicy, Policy, Priority, SubtaskId,
-    SubtaskSpec, TaskSet, verify,
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, OverrunPolicy, Policy,
+    Priority, SubtaskId, SubtaskSpec, TaskSet, verify,
 };
 
 fn draw(random: &mut Random) -> DagSpec {
@@ -66,12 +66,31 @@ fn checking(task_set: &TaskSet) -> Vec<Vec<Closure>> {
     task_set.dags().iter().map(of_dag).collect()
 }
 
+/// Divides the workers of some sets, and puts each DAG into a cluster.
+fn divide(random: &mut Random, workers: u32, specs: &mut [DagSpec]) -> Clusters {
+    if random.chance(50) {
+        return Clusters::Undivided;
+    }
+    let mut sizes: Vec<u32> = Vec::new();
+    let mut left = workers;
+    while left > 0 {
+        let size = random.between(1, u64::from(left)).try_into().expect("few");
+        sizes.push(size);
+        left -= size;
+    }
+    for spec in specs {
+        let cluster = random.below(sizes.len()).try_into().expect("few");
+        spec.cluster = Some(ClusterId(cluster));
+    }
+    Clusters::Of(sizes)
+}
+
 #[test]
 fn random_sets_obey_r1_to_r5() {
     let mut counts = [0; 4];
     for seed in 0..150 {
         let mut random = Random::new(seed);
-        let specs: Vec<_> = (0..=random.below(3)).map(|_| draw(&mut random)).collect();
+        let mut specs: Vec<_> = (0..=random.below(3)).map(|_| draw(&mut random)).collect();
         let setting = Setting {
             policy: match random.chance(50) {
                 true => Policy::Edf,
@@ -79,8 +98,10 @@ fn random_sets_obey_r1_to_r5() {
             },
             workers: random.between(1, 4).try_into().expect("few"),
         };
+        let clusters = divide(&mut random, setting.workers, &mut specs);
         let options = CommitOptions::new(setting.policy, setting.workers)
-            .with_construction(ConstructionPolicy::any_graph());
+            .with_construction(ConstructionPolicy::any_graph())
+            .with_clusters(clusters);
         let verified = verify(&specs, &options).expect("the sets are right");
         let bodies = checking(&verified.task_set);
         let recorded = native::run_recorded(verified.task_set, bodies, setting);

@@ -4,82 +4,15 @@
 //! anything but the scheduler (relaxed atomics, which the processor may reorder); and
 //! every run is written down and held against R1 to R5.
 
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+#[path = "support/graphs.rs"]
+mod graphs;
+
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Barrier};
 
+use graphs::{chain, checking, commit, fork_join, layered, spec};
 use native::{Closure, Setting};
-use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, TaskSet, verify};
-
-/// A DAG by its edges, whose subtasks have priorities by their numbers.
-fn spec(subtasks: usize, edges: &[(usize, usize)], jobs: u64) -> DagSpec {
-    DagSpec {
-        period_ns: Some(100_000),
-        relative_deadline_ns: Some(100_000),
-        jobs: Some(jobs),
-        subtasks: vec![SubtaskSpec::default(); subtasks],
-        edges: edges.to_vec(),
-        ..DagSpec::default()
-    }
-}
-
-fn commit(specs: &[DagSpec], setting: Setting) -> TaskSet {
-    let options = CommitOptions::new(setting.policy, setting.workers)
-        .with_construction(ConstructionPolicy::any_graph());
-    verify(specs, &options)
-        .expect("the graphs are right")
-        .task_set
-}
-
-/// Bodies that count their jobs and check that all predecessors are as far as they
-/// have to be, and no successor is.
-fn checking(task_set: &TaskSet) -> (Vec<Vec<Closure>>, Vec<Arc<[AtomicU64]>>) {
-    let mut counts = Vec::new();
-    let bodies = task_set.dags().iter().map(|dag| {
-        let done: Arc<[AtomicU64]> = dag.subtasks().iter().map(|_| AtomicU64::new(0)).collect();
-        counts.push(Arc::clone(&done));
-        let ids = (0..dag.subtasks().len()).map(|index| u32::try_from(index).expect("few"));
-        ids.map(|own| {
-            let own = sched_dag::SubtaskId(own);
-            let predecessors = dag.predecessors(own).to_vec();
-            let successors = dag.successors(own).to_vec();
-            let done = Arc::clone(&done);
-            Box::new(move |job: u64| {
-                let of = |subtask: &sched_dag::SubtaskId| done[subtask.index()].load(Relaxed);
-                assert!(
-                    predecessors.iter().all(|earlier| of(earlier) == job + 1),
-                    "R2"
-                );
-                assert!(successors.iter().all(|later| of(later) == job), "R3");
-                assert_eq!(of(&own), job, "one instance after the other");
-                done[own.index()].store(job + 1, Relaxed);
-            }) as Closure
-        })
-        .collect()
-    });
-    (bodies.collect(), counts)
-}
-
-fn chain(length: usize) -> Vec<(usize, usize)> {
-    (1..length).map(|later| (later - 1, later)).collect()
-}
-
-fn fork_join(parallel: usize) -> Vec<(usize, usize)> {
-    let branches = 1..=parallel;
-    branches.flat_map(|b| [(0, b), (b, parallel + 1)]).collect()
-}
-
-/// Layers of 8; each subtask follows three of the layer before.
-fn layered(layers: usize) -> Vec<(usize, usize)> {
-    let mut edges = Vec::new();
-    for subtask in 8..8 * layers {
-        let before = (subtask / 8 - 1) * 8;
-        let mut places = [subtask * 7 % 8, subtask * 5 % 8, (subtask / 3) % 8];
-        places.sort_unstable();
-        edges.extend(places.map(|place| (before + place, subtask)));
-    }
-    edges.dedup();
-    edges
-}
+use sched_dag::{DagSpec, Policy};
 
 fn holds(specs: &[DagSpec]) {
     for policy in [Policy::StaticPriority, Policy::Edf] {

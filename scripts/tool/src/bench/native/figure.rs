@@ -33,7 +33,8 @@ impl Figure {
         }
     }
 
-    fn min(&self) -> f64 {
+    /// Returns the least time.
+    pub(super) fn min(&self) -> f64 {
         self.samples[0]
     }
 

@@ -12,8 +12,10 @@
 //! - `workload`: the graphs, as bodies that do nothing;
 //! - `throughput`: rounds of jobs, and what one step of them takes;
 //! - `join`: from the last return to the sink's start, across cores;
+//! - `clusters`: what two clusters of one core do, next to one core;
 //! - `figure`: a distribution, for people and for machines.
 
+mod clusters;
 mod figure;
 mod join;
 mod throughput;
@@ -57,13 +59,14 @@ static TABLE: Command = Command {
             "only",
             Takes::Text("NAMES"),
             "The workloads, with commas between: chain-64, fork-join-2, fork-join-4, \
-             fork-join-6, layered-1000, dags-1000, join; all.",
+             fork-join-6, layered-1000, dags-1000, join, clusters; all.",
         ),
     ],
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under
 the scheduler, without values; `typed` are functions of fass with a u64 on each edge (of
 layered-1000 and dags-1000: without values, but by fass). `static` and `edf` are the policies.
+`clusters` runs a graph in each of two clusters of one core, next to one on one core alone.
 
 Prints a table and a JSON object for each figure. Times depend on the host and on what
 else it does; compare figures of one run.
@@ -74,6 +77,9 @@ Exit code: 0 measured; 1 a run did not complete its jobs; 2 the command line is 
 
 /// The name of the joins across cores among the workloads.
 const JOIN: &str = "join";
+
+/// The name of two clusters next to one core.
+const CLUSTERS: &str = "clusters";
 
 /// Runs `bench native` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
@@ -94,6 +100,7 @@ struct Plan {
     jobs: u64,
     graphs: Vec<Graph>,
     with_join: bool,
+    with_clusters: bool,
 }
 
 impl Plan {
@@ -104,11 +111,11 @@ impl Plan {
         let known: Vec<String> = Graph::ALL.iter().map(Graph::to_string).collect();
         let of_nothing = names.iter().flatten().find(|name| {
             let is_graph = known.iter().any(|graph| graph == *name);
-            !is_graph && **name != JOIN
+            !is_graph && ![JOIN, CLUSTERS].contains(name)
         });
         if let Some(name) = of_nothing {
             return Err(format!(
-                "`--only`: no workload is called {}; there are {} and {JOIN}",
+                "`--only`: no workload is called {}; there are {}, {JOIN} and {CLUSTERS}",
                 quoted(name),
                 known.join(", ")
             ));
@@ -124,6 +131,7 @@ impl Plan {
         let rounds = options.number("rounds").unwrap_or(0);
         Ok(Self {
             with_join: is_wanted(JOIN) && workers.contains(&2),
+            with_clusters: is_wanted(CLUSTERS) && workers.contains(&2),
             workers,
             rounds: usize::try_from(rounds).unwrap_or(usize::MAX),
             jobs: options.number("jobs").unwrap_or(0),
@@ -160,12 +168,29 @@ fn measure(plan: &Plan) -> ExitCode {
             Err(line) => return TABLE.fail(&line),
         }
     }
+    let mut together = None;
+    if plan.with_clusters {
+        match clusters::measure(plan.rounds) {
+            Ok(mut of_clusters) => {
+                figures.append(&mut of_clusters.figures);
+                pinned &= of_clusters.pinned;
+                together = Some(of_clusters);
+            }
+            Err(line) => return TABLE.fail(&line),
+        }
+    }
     print!("{}", Figure::table(&figures));
+    if let Some(together) = &together {
+        print!("{}", together.lines());
+    }
     if !pinned {
         println!("workers were not pinned, as `taskset` (util-linux) is missing or refused");
     }
     for figure in &figures {
         println!("{}", figure.json(pinned));
+    }
+    if let Some(together) = &together {
+        print!("{}", together.json());
     }
     ExitCode::SUCCESS
 }
@@ -182,7 +207,7 @@ mod tests {
     fn workloads_are_chosen_by_name() {
         let plan = plan("--only fork-join-4,chain-64 --workers 1").expect("right");
         assert_eq!(plan.graphs, [Graph::Chain, Graph::ForkJoin(4)]);
-        assert!(!plan.with_join);
+        assert!(!plan.with_join && !plan.with_clusters);
     }
 
     #[test]

@@ -9,7 +9,10 @@ use std::time::{Duration, Instant};
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use hand_off::Shape;
 use native::Closure;
-use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, TaskSet, verify};
+use sched_dag::{
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, TaskSet,
+    verify,
+};
 
 /// A graph that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +97,12 @@ impl Rounds {
         durations.skip(times.len() / 10).collect()
     }
 
+    /// Returns the times themselves.
+    pub(super) fn times(&self) -> Vec<Instant> {
+        let times = self.0.lock();
+        times.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
     /// Returns what a source does: it reads the clock once in `jobs_a_round` jobs.
     pub(super) fn source(&self, jobs_a_round: u64) -> impl FnMut() + Send + 'static {
         let rounds = self.clone();
@@ -124,8 +133,25 @@ pub(super) fn closures(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<
 
 /// Verifies the graph, each DAG with `jobs` jobs.
 pub(super) fn task_set(graph: Graph, jobs: u64, policy: Policy, workers: u32) -> TaskSet {
+    let specs: Vec<DagSpec> = (0..graph.dags())
+        .map(|dag| spec(graph, dag, jobs))
+        .collect();
+    verified(&specs, CommitOptions::new(policy, workers))
+}
+
+/// Verifies a graph of one DAG twice, each in a cluster of one core.
+pub(super) fn divided(graph: Graph, jobs: u64, policy: Policy) -> TaskSet {
+    let specs = [0, 1].map(|cluster| DagSpec {
+        cluster: Some(ClusterId(cluster)),
+        ..spec(graph, 0, jobs)
+    });
+    let options = CommitOptions::new(policy, 2).with_clusters(Clusters::Of(vec![1, 1]));
+    verified(&specs, options)
+}
+
+fn spec(graph: Graph, dag: usize, jobs: u64) -> DagSpec {
     let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).ok();
-    let spec = |dag| DagSpec {
+    DagSpec {
         name: format!("native{dag}"),
         period_ns: nanoseconds(PERIOD),
         relative_deadline_ns: nanoseconds(deadline(graph, dag)),
@@ -134,12 +160,14 @@ pub(super) fn task_set(graph: Graph, jobs: u64, policy: Policy, workers: u32) ->
         subtasks: vec![SubtaskSpec::default(); graph.shape().subtasks()],
         edges: graph.shape().edges(),
         ..DagSpec::default()
-    };
-    let specs: Vec<DagSpec> = (0..graph.dags()).map(spec).collect();
-    let options =
-        CommitOptions::new(policy, workers).with_construction(ConstructionPolicy::any_graph());
-    let verified = verify(&specs, &options);
-    verified.expect("the graphs are right").task_set
+    }
+}
+
+fn verified(specs: &[DagSpec], options: CommitOptions) -> TaskSet {
+    let options = options.with_construction(ConstructionPolicy::any_graph());
+    verify(specs, &options)
+        .expect("the graphs are right")
+        .task_set
 }
 
 /// Returns the relative deadline of a DAG: the period, or as many microseconds less as DAGs
