@@ -146,7 +146,7 @@ pub use run::topic::{Ports, Publisher, Subscriber};
 
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use run::wire::incoming::Framing;
-pub use sched_dag::analysis::{Overheads, Reason, Test};
+pub use sched_dag::analysis::{OverheadSource, Overheads, Reason, Test};
 pub use sched_dag::lifecycle::Request;
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{

@@ -91,6 +91,70 @@ fn a_bound_holds_with_the_overheads_stated() {
 }
 
 #[test]
+fn overheads_that_the_kernel_measures_are_charged_hold_and_are_the_same_again() {
+    // A fork wider than the cores, and a DAG that preempts it.
+    let branches: String = (0..6)
+        .map(|n| format!("subtask b{n} wcet 1ms\nedge split -> b{n}\nedge b{n} -> join\n"))
+        .collect();
+    let text = format!(
+        "dag wide period 10ms\nsubtask split wcet 200us\nsubtask join wcet 200us\n{branches}\
+         dag quick period 2ms offset 1ms\nsubtask a wcet 100us\nsubtask b wcet 100us\n\
+         edge a -> b\nend\n"
+    );
+    let measured = "jobs=50 overheads=measured overheads_margin=10";
+    let first = boot(text.as_bytes(), measured, Status::Success);
+    let again = boot(text.as_bytes(), measured, Status::Success);
+    let line = |outcome: &Outcome| outcome.transcript.of_kind("overheads").next().cloned();
+    let figures = line(&first).expect("the kernel says what it has measured");
+    let of_again = line(&again).expect("a line");
+    assert_eq!(figures.text, of_again.text);
+    let figure = |name| figures.number_at(name).expect("it is there");
+    // 20 jobs of a subtask for each core, 18 of the fork, 16 of the chain and eight more.
+    assert_eq!(figure("dispatches"), 20 * (4 + 18 + 16 + 8));
+    assert_eq!(figure("releases"), 20 * 11);
+    assert_eq!(figure("margin_percent"), 10);
+    let charged = |name| (figure(name) * 110).div_ceil(100);
+    let (owed_ns, late_ns) = (charged("owed_ns"), charged("late_ns"));
+    assert!(owed_ns > 1_000 && late_ns > 0, "{}", figures.text);
+    // The same numbers, stated.
+    let stated = format!("jobs=50 overheads_ns=0,{},{owed_ns}", owed_ns + late_ns);
+    let stated = boot(text.as_bytes(), &stated, Status::Success);
+    assert!(line(&stated).is_none());
+    let bounds = |outcome: &Outcome| -> Vec<Option<u64>> {
+        let rows = outcome.transcript.of_kind("dag_run");
+        rows.map(|row| {
+            let tightness = row.number_at("tightness_permille");
+            assert!(tightness.is_some_and(|it| it <= 1000), "{}", row.text);
+            row.number_at("bound_ns")
+        })
+        .collect()
+    };
+    assert_eq!(bounds(&first).len(), 2);
+    assert_eq!(bounds(&first), bounds(&stated));
+}
+
+#[test]
+fn words_for_overheads_that_make_no_sense_are_refused() {
+    for (words, part) in [
+        (
+            "overheads=measured overheads_ns=0,0,0",
+            "`overheads=measured` and `overheads_ns` exclude each other; give one",
+        ),
+        (
+            "overheads_margin=5",
+            "add `overheads=measured`, or leave it out",
+        ),
+        (
+            "overheads=mesured",
+            "`overheads=mesured`: allowed are stated, measured",
+        ),
+    ] {
+        let reason = refusal(GOOD.as_bytes(), words);
+        assert!(reason.contains(part), "{words}: {reason}");
+    }
+}
+
+#[test]
 fn dags_run_in_the_clusters_that_they_state_or_that_the_commit_finds() {
     let file = |cluster: fn(u32) -> String| {
         let dag = |name: &str, number, wcets: [&str; 2]| {

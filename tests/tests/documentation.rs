@@ -18,9 +18,10 @@ const FOLDERS: [&str; 6] = [
     "fass/src/run",
     "fass/virtual-time/src",
 ];
-const FILES: [&str; 10] = [
+const FILES: [&str; 11] = [
     "kernel/src/lib.rs",
     "kernel/src/app/machine_handle.rs",
+    "kernel/src/app/overheads.rs",
     "kernel/src/report/run.rs",
     "kernel/src/options.rs",
     "kernel/executive/src/text/json.rs",
@@ -33,7 +34,7 @@ const FILES: [&str; 10] = [
 
 /// What is public for its own crate alone, because its module is not, or for the kernel,
 /// which does not pass it on.
-const INTERNAL: [&str; 16] = [
+const INTERNAL: [&str; 15] = [
     "Shared",
     "Changing",
     "Looking",
@@ -42,7 +43,6 @@ const INTERNAL: [&str; 16] = [
     "Sealed",
     "Resettable",
     "Reset",
-    "whole_number",
     "report",
     "write_line",
     "has_pending",

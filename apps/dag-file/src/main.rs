@@ -23,7 +23,9 @@ use report::Report;
 kernel::entry!(main);
 
 /// The app's words of the command line.
-const WORDS: [&str; 9] = [
+const WORDS: [&str; 11] = [
+    "overheads",
+    "overheads_margin",
     "clusters",
     "execution",
     "seed",
@@ -48,6 +50,7 @@ struct Wishes {
 }
 
 fn main(machine: &Machine) -> Result<(), Ending> {
+    machine.offer_overheads()?;
     machine.offer_clusters()?;
     let wishes = wishes(machine)?;
     let file = read(machine, wishes.settings.length)?;

@@ -15,7 +15,7 @@ use core::fmt;
 use core::time::Duration;
 
 use recording::Channel;
-use sched_dag::analysis::{self, Answer, Overheads, Settings};
+use sched_dag::analysis::{self, Answer, OverheadSource, Overheads, Settings};
 use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::edge::Begin;
@@ -121,6 +121,11 @@ pub trait Platform: Sync {
     /// ```
     fn overheads(&self) -> Overheads {
         Overheads::default()
+    }
+
+    /// Returns where these are from, for the answer to say so.
+    fn overhead_source(&self) -> OverheadSource {
+        OverheadSource::default()
     }
 
     /// Returns a file of WCETs that were observed, if the platform was given one; the

@@ -5,8 +5,8 @@ mod support;
 use std::time::Duration;
 
 use fass::{
-    Answer, Dag, Fault, Overheads, Policy, Preemption, Reason, SubtaskAttributes, Test, Untyped,
-    Verdict, create_dag, finish_create_dags,
+    Answer, Dag, Fault, OverheadSource, Overheads, Policy, Preemption, Reason, SubtaskAttributes,
+    Test, Untyped, Verdict, create_dag, finish_create_dags,
 };
 use support::{execute, ms, named};
 use virtual_time::VirtualTime;
@@ -208,6 +208,24 @@ fn an_answer_says_which_wcets_are_observed_ones() {
     assert_eq!(
         observed,
         "dag `seen` takes at most 4.2ms, by multiple paths; 1 of 2 WCETs are observed ones and 20 %"
+    );
+}
+
+#[test]
+fn an_answer_says_that_overheads_are_measured_ones() {
+    let _machine = VirtualTime::new();
+    let dag = chain("two", ms(10), ms(9), [ms(3), ms(3)]);
+    let commit = finish_create_dags(&[dag]).expect("the DAG is right");
+    let mut answer = commit.answers()[0].clone();
+    assert_eq!(answer.overheads, OverheadSource::Stated);
+    answer.overheads = OverheadSource::Measured {
+        dispatches: 500,
+        margin_percent: 20,
+    };
+    assert_eq!(
+        answer.to_string(),
+        "dag `two` takes at most 6ms, by multiple paths; overheads are the longest of 500 measured \
+         and 20 %"
     );
 }
 

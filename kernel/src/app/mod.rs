@@ -6,6 +6,7 @@
 //! gets back are made below, in `report` and `text`.
 
 pub(crate) mod bound_verdict;
+mod calibration;
 #[cfg(feature = "clusters")]
 mod clusters;
 pub(crate) mod ending;
@@ -13,6 +14,7 @@ pub(crate) mod event;
 pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
+mod overheads;
 mod parameters;
 mod topics;
 mod wcet_notes;

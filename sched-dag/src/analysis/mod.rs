@@ -104,7 +104,7 @@ pub use intra_task::{PATH_LIMIT, assign_intra_task, intra_task};
 pub use judge::{answer, answer_compact};
 pub use multi_path::multi_path;
 pub use multi_path_sets::{multi_path_edf, multi_path_fp};
-pub use overheads::Overheads;
+pub use overheads::{OverheadSource, Overheads};
 pub use refusal::Refusal;
 pub use task::{Task, TaskError};
 pub use width::{parallelism, width};

@@ -13,6 +13,7 @@
 //! Not covered: timer interrupts, caches refilled after a preemption, bus
 //! contention. Measure WCETs with these in them.
 
+use crate::law::Costs;
 use crate::policy::Preemption;
 
 /// Measured costs, each a worst case; all 0 by default.
@@ -27,7 +28,46 @@ pub struct Overheads {
     pub interrupt_ns: u64,
 }
 
+/// Where overheads are from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum OverheadSource {
+    /// Someone states them, or nobody: then they are 0.
+    #[default]
+    Stated,
+    /// They are the longest of so many, and a margin.
+    Measured {
+        /// How many instances were dispatched meanwhile.
+        dispatches: u64,
+        /// The margin, in hundredths.
+        margin_percent: u32,
+    },
+}
+
 impl Overheads {
+    /// Returns what to charge for costs that were measured, with a margin in hundredths: two of
+    /// the three numbers.
+    ///
+    /// - As *dispatch*, the lateness of an instance's release and once the longest time owed:
+    ///   that passes before its own first instruction.
+    /// - As *interrupt*, where instances are preempted, once more the longest time owed: before
+    ///   the next instruction of the one that it has preempted. It has preempted one at most,
+    ///   when it became ready, and so each resumption has one that pays for it. That one is
+    ///   more urgent than what it preempts, so a bound counts it as interference there.
+    ///
+    /// Work of the platform that interrupts a running instance, a timer's or another core's, is
+    /// within that call's time, as it is observed.
+    #[must_use]
+    pub const fn measured(costs: &Costs, margin_percent: u32) -> Self {
+        let percent = 100 + margin_percent as u64;
+        let owed_ns = costs.owed_ns.saturating_mul(percent).div_ceil(100);
+        let late_ns = costs.late_ns.saturating_mul(percent).div_ceil(100);
+        Self {
+            context_switch_ns: 0,
+            dispatch_ns: owed_ns.saturating_add(late_ns),
+            interrupt_ns: owed_ns,
+        }
+    }
+
     /// Returns what each instance is charged, or `None` if that overflows.
     #[must_use]
     pub fn of_an_instance_ns(&self, preemption: Preemption) -> Option<u64> {
@@ -42,7 +82,7 @@ impl Overheads {
 
 #[cfg(test)]
 mod tests {
-    use super::{Overheads, Preemption};
+    use super::{Costs, Overheads, Preemption};
 
     #[test]
     fn only_preemption_costs_an_interrupt() {
@@ -58,5 +98,20 @@ mod tests {
             ..overheads
         };
         assert_eq!(absurd.of_an_instance_ns(Preemption::Disabled), None);
+    }
+
+    #[test]
+    fn what_was_measured_is_charged_with_its_margin() {
+        let costs = Costs {
+            owed_ns: 7,
+            late_ns: 2,
+            ..Costs::default()
+        };
+        let charged = |margin| {
+            let of = Overheads::measured(&costs, margin);
+            (of.context_switch_ns, of.dispatch_ns, of.interrupt_ns)
+        };
+        assert_eq!(charged(0), (0, 9, 7));
+        assert_eq!(charged(50), (0, 14, 11));
     }
 }

@@ -8,7 +8,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::{FINEST, Journal};
-use crate::law::{self, Record, Tally, Terms, Violation};
+use crate::law::{self, Costs, Record, Tally, Terms, Violation};
 use crate::policy::SchedulerOptions;
 use crate::task_set::TaskSet;
 
@@ -73,6 +73,14 @@ impl Journal {
         let terms = self.terms(bound_ns);
         let judge = || law::dispatch_violations(task_set, options, terms, self.events());
         self.is_whole().then(judge)
+    }
+
+    /// Measures what the platform's own work has cost, core by core; `None` if events are lost.
+    #[must_use]
+    #[inline(never)]
+    pub fn costs(&self, task_set: &TaskSet) -> Option<Costs> {
+        let measure = || Costs::of_cores(task_set, self.events());
+        self.is_whole().then(measure)
     }
 
     const fn is_whole(&self) -> bool {

@@ -6,6 +6,7 @@
 //! - [`violations`]: every breach of the model's rules R1 to R4, and of what every
 //!   machine must keep: one life of each instance, one instance on each core;
 //! - [`dispatch_violations`]: every breach of R5; [`sweep`] is its core;
+//! - [`Costs`]: what the platform's own work has taken;
 //! - [`Record::of_events`]: the times of every job and instance, of the latest whole
 //!   jobs if the oldest events are lost;
 //! - [`Tally`]: statistics of a run of any length, in a fixed amount of memory.
@@ -19,6 +20,7 @@
 //! They do not find what leaves no event: that values went astray, or that a rule was
 //! broken before the events that are left.
 
+mod costs;
 mod dispatch;
 mod facts;
 mod histogram;
@@ -32,6 +34,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+pub use costs::Costs;
 pub use dispatch::{Dispatch, dispatch_violations, judge_dispatch};
 pub use histogram::Histogram;
 pub use replay::{Verdict, judge, violations};

@@ -29,7 +29,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 use core::time::Duration;
 
-use sched_dag::analysis::{self, Reason, Settings, TaskError, Test};
+use sched_dag::analysis::{self, OverheadSource, Reason, Settings, TaskError, Test};
 use sched_dag::wcets::WcetSource;
 use sched_dag::{ClusterId, DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet, Why};
 
@@ -72,6 +72,8 @@ pub struct Answer {
     pub verdict: Verdict,
     /// What is known of each sink, in the order of registration.
     pub sinks: Vec<SinkAnswer>,
+    /// Where the overheads are from that each instance was charged.
+    pub overheads: OverheadSource,
     /// Where the WCET of each subtask is from, in the order of registration.
     pub wcets: Vec<WcetSource>,
 }
@@ -311,6 +313,7 @@ impl Answers {
                     .map(Subtask::wcet_source)
                     .collect(),
                 dag: dag_label(task_set, dag),
+                overheads: platform.overhead_source(),
                 verdict,
             }
         });

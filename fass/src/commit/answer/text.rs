@@ -3,7 +3,7 @@
 use core::fmt;
 use core::time::Duration;
 
-use sched_dag::analysis::{Reason, TaskError};
+use sched_dag::analysis::{OverheadSource, Reason, TaskError};
 use sched_dag::wcets::WcetSource;
 
 use super::{Answer, Placement, Unproven, Verdict};
@@ -31,15 +31,22 @@ impl fmt::Display for Answer {
             WcetSource::Observed { margin_percent } => Some(margin_percent),
             _ => None,
         });
-        match observed.clone().next() {
-            None => Ok(()),
-            Some(margin) => {
-                let (count, all) = (observed.count(), self.wcets.len());
-                write!(
-                    f,
-                    "; {count} of {all} WCETs are observed ones and {margin} %"
-                )
-            }
+        if let Some(margin) = observed.clone().next() {
+            let (count, all) = (observed.count(), self.wcets.len());
+            write!(
+                f,
+                "; {count} of {all} WCETs are observed ones and {margin} %"
+            )?;
+        }
+        match self.overheads {
+            OverheadSource::Stated => Ok(()),
+            OverheadSource::Measured {
+                dispatches,
+                margin_percent,
+            } => write!(
+                f,
+                "; overheads are the longest of {dispatches} measured and {margin_percent} %"
+            ),
         }
     }
 }

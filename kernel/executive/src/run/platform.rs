@@ -9,7 +9,7 @@ use fass::{
     Channel, Clock, Clusters, Cutter, LaunchError, Occupation, Overheads, Plan, Platform, Policy,
     Preemption, Recorded,
 };
-use sched_dag::analysis::{self, Answer, Settings};
+use sched_dag::analysis::{self, Answer, OverheadSource, Settings};
 use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
 use super::execution::{self, Division, Terms};
@@ -32,6 +32,11 @@ pub struct Kernel {
     most_events: AtomicU64,
     /// What a commit adds to WCETs: context switch, dispatch, interrupt.
     overheads_ns: [AtomicU64; 3],
+    /// How many dispatches these are the longest of, 0 if they are stated, and the margin in
+    /// hundredths.
+    measured: [AtomicU64; 2],
+    /// Whether a commit is the kernel's own, to measure overheads with.
+    calibrates: AtomicBool,
     /// A file of WCETs that were observed.
     wcets: Once<&'static str>,
 }
@@ -44,6 +49,8 @@ pub static KERNEL: Kernel = Kernel {
     budget_factor: AtomicU64::new(0),
     most_events: AtomicU64::new(u64::MAX),
     overheads_ns: [const { AtomicU64::new(0) }; 3],
+    measured: [const { AtomicU64::new(0) }; 2],
+    calibrates: AtomicBool::new(false),
     wcets: Once::new(),
 };
 
@@ -64,6 +71,19 @@ impl Kernel {
         for (place, value) in self.overheads_ns.iter().zip(values) {
             place.store(value, Ordering::Relaxed);
         }
+    }
+
+    /// Says that these are the longest of so many dispatches, and a margin in hundredths.
+    pub fn set_measured(&self, dispatches: u64, margin_percent: u32) {
+        let values = [dispatches, u64::from(margin_percent)];
+        for (place, value) in self.measured.iter().zip(values) {
+            place.store(value, Ordering::Relaxed);
+        }
+    }
+
+    /// Makes the commits to come the kernel's own, of which nobody is told, or the app's again.
+    pub fn set_calibration(&self, calibrates: bool) {
+        self.calibrates.store(calibrates, Ordering::Relaxed);
     }
 
     /// Gives commits a file of WCETs that were observed.
@@ -154,8 +174,24 @@ impl Platform for Kernel {
         }
     }
 
+    fn overhead_source(&self) -> OverheadSource {
+        let [dispatches, margin_percent] = self
+            .measured
+            .each_ref()
+            .map(|value| value.load(Ordering::Relaxed));
+        match dispatches {
+            0 => OverheadSource::Stated,
+            _ => OverheadSource::Measured {
+                dispatches,
+                margin_percent: u32::try_from(margin_percent).unwrap_or(u32::MAX),
+            },
+        }
+    }
+
     fn wcets(&self) -> Option<Cow<'static, str>> {
-        self.wcets.get().copied().map(Cow::Borrowed)
+        let is_apps = !self.calibrates.load(Ordering::Relaxed);
+        let file = self.wcets.get().copied().filter(|_| is_apps);
+        file.map(Cow::Borrowed)
     }
 
     fn now_ns(&self) -> u64 {
@@ -203,22 +239,26 @@ impl Platform for Kernel {
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
-        if edge::launch(&mut plan)? {
-            fass::set_clock(&TOLD);
-        }
-        stacks::watch(&mut plan);
         let options = SchedulerOptions {
             policy: self.policy(),
             preemption: self.preemption(),
             cores: self.cores(),
         };
-        let overhead_ns = self.overheads().of_an_instance_ns(options.preemption);
-        graph::dump(&plan, options, overhead_ns);
-        let terms = Terms {
+        let mut terms = Terms {
             coincidence_ns: self.coincidence_ns.load(Ordering::Relaxed),
             budget_factor: self.budget_factor.load(Ordering::Relaxed),
             most_events: self.most_events.load(Ordering::Relaxed),
         };
+        if self.calibrates.load(Ordering::Relaxed) {
+            terms.most_events = u64::MAX;
+            return execution::prepare(plan, options, terms);
+        }
+        if edge::launch(&mut plan)? {
+            fass::set_clock(&TOLD);
+        }
+        stacks::watch(&mut plan);
+        let overhead_ns = self.overheads().of_an_instance_ns(options.preemption);
+        graph::dump(&plan, options, overhead_ns);
         execution::prepare(plan, options, terms)
     }
 }

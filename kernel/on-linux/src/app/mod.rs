@@ -14,6 +14,7 @@ pub(crate) mod lock;
 pub(crate) mod machine_handle;
 #[path = "../../../src/watch/background/offered.rs"]
 mod offered;
+mod overheads;
 mod parameters;
 #[path = "../../../src/start/terms.rs"]
 pub(crate) mod terms;

@@ -21,4 +21,5 @@ pub mod stg;
 pub mod yaml;
 
 pub use load::{Import, load};
+pub(crate) use prepare::states_overheads;
 pub use prepare::{Prepared, prepare};

@@ -36,6 +36,13 @@ fn overheads(cores: u64) -> String {
     format!("overheads_ns=1000,{},4000", 2500 * cores)
 }
 
+/// Reports whether a command line says what the kernel costs, or has it measure that.
+pub(crate) fn states_overheads(words: &str) -> bool {
+    words
+        .split_whitespace()
+        .any(|word| word.starts_with("overheads_ns=") || word.starts_with("overheads="))
+}
+
 /// A file that is ready to be booted.
 #[derive(Debug)]
 pub struct Prepared {
@@ -154,10 +161,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     if options.is_given("strict-deadlines") {
         words.push("deadlines=strict".into());
     }
-    if !options
-        .text("append")
-        .is_some_and(|words| words.contains("overheads_ns="))
-    {
+    if !states_overheads(options.text("append").unwrap_or_default()) {
         words.push(overheads(cores));
     }
     Ok(Some(Prepared {

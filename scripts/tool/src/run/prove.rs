@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::{Booted, RUN, Refusal, boot_app, check_files, conclude, prepare};
+use crate::dag_file::states_overheads;
 use crate::files::{self, Temporary};
 use crate::options::Parsed;
 use crate::progress::Progress;
@@ -141,7 +142,7 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
 /// line by which the next one commits with what was seen; `None` if the run has failed.
 fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>, Refusal> {
     let append = options.text("append").unwrap_or_default();
-    let measures = !append.contains("overheads_ns=");
+    let measures = !states_overheads(append);
     if options.is_given("wcets") && !measures {
         return Ok(Some(options.clone()));
     }

@@ -1,0 +1,98 @@
+//! DAGs of the kernel's own, by which it measures what it takes itself.
+//!
+//! Their functions do next to nothing, so what passes between their instances is the platform's.
+//! In each period an instance is at work on every core when ten DAGs are released at one instant:
+//! one step releases all of them, and preempts an instance on every core. One of the ten forks to
+//! 16 subtasks and joins, one is a chain, the others have one subtask each. Then the preempted
+//! instances go on. All have budgets, so that each dispatch sets an alarm.
+//!
+//! Steps are the longer, the more becomes ready at once. What an app has more of than this is
+//! what the margin is for.
+
+use alloc::format;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use fass::{
+    ConstructionPolicy, Dag, Occupation, Platform, SubtaskAttributes, Untyped, create_dag,
+    execute_for, finish_create_dags_with,
+};
+use sched_dag::law::Costs;
+
+use super::ending::Ending;
+use executive::machine::clock;
+use executive::run::platform::KERNEL;
+use executive::run::{execution, worker};
+
+const PERIOD: Duration = Duration::from_millis(1);
+const JOBS: u64 = 20;
+/// How long an instance takes that is to be preempted, and when it is.
+const BUSY: Duration = Duration::from_micros(400);
+const INTO_IT: Duration = Duration::from_micros(100);
+const WIDE: usize = 16;
+const LONG: usize = 16;
+const AT_ONCE: usize = 8;
+/// Nothing comes near it.
+const BUDGET: Duration = Duration::from_secs(10);
+/// Time for the cores to get ready.
+const LEAD_NS: u64 = 100_000;
+
+/// Runs them, and returns what they have shown.
+pub(super) fn run() -> Result<Costs, Ending> {
+    KERNEL.set_calibration(true);
+    let committed = finish_create_dags_with(&dags(), ConstructionPolicy::any_graph());
+    KERNEL.set_calibration(false);
+    committed?;
+    let failure = |what: &str| Ending::Failure(format!("overheads could not be measured: {what}"));
+    execution::begin(clock::now_ns() + LEAD_NS).ok_or_else(|| failure("nothing is committed"))?;
+    execution::arm_all();
+    worker::wait_in_background(|| false);
+    let ended = execution::end().ok_or_else(|| failure("nothing was run"))?;
+    let costs = ended.journal().costs(ended.task_set());
+    costs.ok_or_else(|| failure("there is no memory for their journal; give the machine more"))
+}
+
+fn dags() -> Vec<Dag> {
+    let busy = dag(Duration::ZERO, PERIOD * 2);
+    for _ in 0..KERNEL.cores() {
+        subtask(&busy, 1, BUSY);
+    }
+    let wide = dag(INTO_IT, PERIOD);
+    let [source, sink] = [(); 2].map(|()| urgent(&wide));
+    for _ in 0..WIDE {
+        let branch = urgent(&wide);
+        wide.precede(&source, &branch).precede(&branch, &sink);
+    }
+    let long = dag(INTO_IT, PERIOD);
+    let mut last = urgent(&long);
+    for _ in 1..LONG {
+        let next = urgent(&long);
+        long.precede(&last, &next);
+        last = next;
+    }
+    let singles = (0..AT_ONCE).map(|_| {
+        let single = dag(INTO_IT, PERIOD);
+        urgent(&single);
+        single
+    });
+    [busy, wide, long].into_iter().chain(singles).collect()
+}
+
+fn dag(offset: Duration, deadline: Duration) -> Dag {
+    let dag = create_dag();
+    dag.period(PERIOD).relative_deadline(deadline);
+    dag.offset(offset).jobs(JOBS);
+    dag
+}
+
+fn urgent(dag: &Dag) -> Untyped {
+    subtask(dag, 0, Duration::ZERO)
+}
+
+fn subtask(dag: &Dag, priority: u32, time: Duration) -> Untyped {
+    let attributes = SubtaskAttributes::default()
+        .priority(priority)
+        .budget(BUDGET);
+    let work = move |_job| execute_for(time, Occupation::Hold);
+    dag.register_untyped_subtask(work, attributes)
+}

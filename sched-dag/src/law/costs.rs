@@ -1,0 +1,196 @@
+//! What the platform's own work has cost in a run: two figures of its journal.
+//!
+//! An instance is *owed* a core as long as it should run by R5 and does not: from its
+//! readiness, or from the finish of what preempted it, until its first (or next)
+//! instruction. In theory that takes no time. On a machine it is all that the platform does
+//! between two instances: the interrupt, the scheduler's step, the journal, the hand-off to
+//! another core, the switch of contexts, the alarm of a budget. So the longest time for which
+//! one was owed a core is what each of these moments costs at most, however its parts share
+//! it. What comes before a readiness is the release's *lateness*, from the nominal to the
+//! actual release.
+
+use alloc::vec::Vec;
+use core::fmt;
+
+use crate::ids::Instance;
+use crate::journal::{Event, What};
+use crate::task_set::TaskSet;
+
+/// What was measured, in nanoseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Costs {
+    /// How many instances were dispatched.
+    pub dispatches: u64,
+    /// The longest time for which one was owed a core.
+    pub owed_ns: u64,
+    /// How many jobs were released.
+    pub releases: u64,
+    /// The longest time from the nominal to the actual release.
+    pub late_ns: u64,
+}
+
+impl Costs {
+    /// Measures the events of a whole run without faults, which are in their order, core by core:
+    /// an instance is owed a core from when it waits and the core on which it goes on has
+    /// finished another one. ([`judge_dispatch`](super::judge_dispatch) asks the rule itself,
+    /// with ten times the code: which instance was to run, whichever core took it.)
+    #[must_use]
+    pub fn of_cores(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {
+        let mut costs = Self::of_releases(task_set, events.clone());
+        let mut waiting: Vec<(Instance, u64)> = Vec::new();
+        // When each core finished an instance last.
+        let mut free_ns: Vec<u64> = Vec::new();
+        for event in events {
+            let Some(instance) = event.instance() else {
+                continue;
+            };
+            let core = event.core.0 as usize;
+            match event.what {
+                What::Ready | What::Suspend => waiting.push((instance, event.time_ns)),
+                What::Finish => {
+                    free_ns.resize(free_ns.len().max(core + 1), 0);
+                    free_ns[core] = event.time_ns;
+                }
+                What::Start | What::Resume => {
+                    costs.dispatches += u64::from(event.what == What::Start);
+                    let free_ns = free_ns.get(core).copied().unwrap_or(0);
+                    let waits = waiting.iter().position(|(other, _)| *other == instance);
+                    let since_ns = waits.map(|place| waiting.swap_remove(place).1.max(free_ns));
+                    let owed_ns = event.time_ns.saturating_sub(since_ns.unwrap_or(u64::MAX));
+                    costs.owed_ns = costs.owed_ns.max(owed_ns);
+                }
+                _ => {}
+            }
+        }
+        costs
+    }
+
+    /// Measures the releases alone.
+    #[must_use]
+    pub fn of_releases(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {
+        let mut costs = Self::default();
+        for event in events.clone().filter(|event| event.what == What::Released) {
+            costs.releases += 1;
+            let dag = task_set.dag(event.dag);
+            let late_ns = event.time_ns.saturating_sub(dag.grid_ns(event.job));
+            // A sporadic job's nominal release is its signal, which the step has seen; one that
+            // was queued waited for an older job.
+            let is_longer = late_ns > costs.late_ns && !dag.is_sporadic();
+            let waited = |other: Event| {
+                other.what == What::Queued && (other.dag, other.job) == (event.dag, event.job)
+            };
+            if is_longer && !events.clone().any(waited) {
+                costs.late_ns = late_ns;
+            }
+        }
+        costs
+    }
+}
+
+/// Says it in words.
+impl fmt::Display for Costs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            dispatches,
+            owed_ns,
+            releases,
+            late_ns,
+        } = self;
+        write!(
+            f,
+            "at most {owed_ns} ns until one of {dispatches} instances had its core, and {late_ns} \
+             ns until one of {releases} releases was made"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use super::*;
+    use crate::ids::{CoreId, DagId, SubtaskId};
+    use crate::policy::{Policy, Preemption, SchedulerOptions};
+    use crate::{CommitOptions, DagSpec, Priority, SubtaskSpec, law, verify};
+
+    /// Two DAGs of one subtask each, the first one more urgent.
+    fn two_dags() -> TaskSet {
+        let specs = [0, 1].map(|dag| DagSpec {
+            period_ns: Some(100),
+            relative_deadline_ns: Some(100),
+            subtasks: vec![SubtaskSpec {
+                priority: Some(Priority(dag)),
+                ..SubtaskSpec::default()
+            }],
+            ..DagSpec::default()
+        });
+        let options = CommitOptions::new(Policy::StaticPriority, 1);
+        verify(&specs, &options).unwrap().task_set
+    }
+
+    fn events(happened: &[(u64, What, u32, u64)]) -> Vec<Event> {
+        let event = |&(time_ns, what, dag, job): &(u64, What, u32, u64)| Event {
+            time_ns,
+            what,
+            core: CoreId(0),
+            dag: DagId(dag),
+            job,
+            subtask: (!what.is_of_job() || what.is_of_machine()).then_some(SubtaskId(0)),
+        };
+        happened.iter().map(event).collect()
+    }
+
+    #[test]
+    fn a_core_owes_from_its_last_finish_and_from_what_waits() {
+        use What::{Finish, Ready, Released, Resume, Start, Suspend};
+        let task_set = two_dags();
+        let events = events(&[
+            (2, Released, 1, 0),
+            (2, Ready, 1, 0),
+            (5, Start, 1, 0), // owed for 3
+            (101, Released, 0, 1),
+            (101, Ready, 0, 1),
+            (109, Suspend, 1, 0),
+            (112, Start, 0, 1), // owed for 11, of which another instance had 8
+            (120, Finish, 0, 1),
+            (127, Resume, 1, 0), // owed for 7, after 11 in which another one ran
+            (140, Finish, 1, 0),
+        ]);
+        let costs = Costs::of_cores(&task_set, events.iter().copied());
+        let expected = Costs {
+            dispatches: 2,
+            owed_ns: 11,
+            releases: 2,
+            late_ns: 2,
+        };
+        assert_eq!(costs, expected);
+        // The rule itself finds the same.
+        let options = SchedulerOptions {
+            policy: Policy::StaticPriority,
+            preemption: Preemption::Enabled,
+            cores: 1,
+        };
+        let terms = law::Terms::whole(u64::MAX);
+        let dispatch = law::judge_dispatch(&task_set, &options, terms, events.iter().copied());
+        assert_eq!(dispatch.waits.longest_owed_ns, 11);
+        // The last one counts from the finish before.
+        let without = events[5..].iter().copied();
+        assert_eq!(Costs::of_cores(&task_set, without).owed_ns, 7);
+    }
+
+    #[test]
+    fn a_release_that_waited_for_an_older_job_is_not_late() {
+        use What::{Queued, Released};
+        let task_set = two_dags();
+        let happened = [
+            (0, Released, 0, 0),
+            (104, Queued, 0, 1),
+            (150, Released, 0, 1),
+        ];
+        let late_ns = |happened: &[_]| {
+            Costs::of_releases(&task_set, events(happened).iter().copied()).late_ns
+        };
+        assert_eq!(late_ns(&happened), 0);
+        assert_eq!(late_ns(&[happened[0], happened[2]]), 50);
+    }
+}
