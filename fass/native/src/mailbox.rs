@@ -27,11 +27,18 @@ pub(crate) struct Assignment {
     pub(crate) job: u64,
 }
 
+/// The end of an instance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct End {
+    pub(crate) vertex: Vertex,
+    /// Whether it has left signals to be taken out.
+    pub(crate) has_signals: bool,
+}
+
 /// That a worker has finished an instance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Post {
-    pub(crate) vertex: Vertex,
-    pub(crate) has_signals: bool,
+    pub(crate) end: End,
     pub(crate) turn: u32,
 }
 
@@ -93,8 +100,10 @@ impl Mailbox {
     pub(crate) fn posted(&self) -> Post {
         let word = self.outgoing.post.load(Ordering::Acquire);
         Post {
-            vertex: Vertex(low(word)),
-            has_signals: word & SIGNALS != 0,
+            end: End {
+                vertex: Vertex(low(word)),
+                has_signals: word & SIGNALS != 0,
+            },
             turn: low(word >> TURN),
         }
     }
@@ -175,7 +184,7 @@ mod tests {
         let turn = mailbox.post(Vertex(3), true);
         let post = mailbox.posted();
         assert_eq!(
-            (post.vertex, post.has_signals, post.turn),
+            (post.end.vertex, post.end.has_signals, post.turn),
             (Vertex(3), true, turn)
         );
         assert!(!mailbox.is_hinted(turn));

@@ -21,6 +21,9 @@ use crate::relax::poll;
 
 /// The others, as one cluster sees them.
 pub(crate) trait Others: Copy + Send + Sync {
+    /// Whether there may be letters at all: then idle workers need the lock, to take them.
+    const MAY_KNOCK: bool = true;
+
     /// Reports whether the next step is to look at letters, or at the end.
     #[inline]
     fn have_knocked(self) -> bool {
@@ -53,7 +56,9 @@ pub(crate) trait Others: Copy + Send + Sync {
 }
 
 /// There are no others.
-impl Others for () {}
+impl Others for () {
+    const MAY_KNOCK: bool = false;
+}
 
 /// What all clusters of a run share.
 #[derive(Debug)]

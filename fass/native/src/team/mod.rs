@@ -12,11 +12,23 @@
 //! steps the scheduler for them. The scheduler's state is in its processor's cache; to
 //! fetch it into that of the worker which has finished would take ten transfers of
 //! cache lines, to be told takes one. And what becomes ready it runs itself. So a join
-//! across cores costs little more than one transfer. In a chain nobody serves: the
-//! worker that runs it has stepped the scheduler last.
+//! across cores costs little more than one transfer.
 //!
-//! A post is taken exactly once, by the owner of the lock: a server, or the worker
-//! itself, which tries the lock as long as nobody serves.
+//! # Keeping the lock
+//!
+//! A worker that leaves with the only instance that runs keeps the lock, too: nobody else
+//! has an end to report, and no other cluster may knock. So a chain, or the way from a sink over the next release to its
+//! fork, takes no lock and posts nothing.
+//!
+//! # Taking along
+//!
+//! A worker that leaves with something to run while others do run first takes what
+//! they have posted meanwhile, and gives each of them what its end gives it. So a worker that
+//! finds the lock taken waits for its mailbox, and tries the lock again only once in a while:
+//! each try takes the lock's line from its owner.
+//!
+//! A post is taken exactly once, by the owner of the lock: another worker, or
+//! the one that has posted, which tries the lock as long as nobody serves.
 //!
 //! # The order of a server's last steps
 //!
@@ -25,46 +37,40 @@
 //! right now. So the exchanges come first (the body's lock, the scheduler's), and then
 //! the stores that others wait for: they leave while the body runs.
 
+mod step;
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
-use sched_dag::{CoreId, Decision, HandOff, Instance, Scheduler, Vertex};
+use sched_dag::{CoreId, Scheduler, Vertex};
 
 use crate::execute::{Execute, keep_signal};
-use crate::mailbox::{Assignment, Mailbox, Post};
+use crate::mailbox::{Assignment, End, Mailbox};
 use crate::others::Others;
 use crate::relax::poll;
 use crate::reports::{Line, Reports, Shared};
 use crate::watch::Watch;
+
+use step::State;
 
 /// What all workers share.
 pub(crate) struct Team<B, W, O> {
     state: Pair<Mutex<State<B, W>>>,
     bodies: Shared<B>,
     mailboxes: Box<[Mailbox]>,
-    /// Whether the lock's owner looks into mailboxes.
+    /// Whether the lock's owner looks into mailboxes, or keeps the lock since they are empty.
     is_serving: Pair<AtomicBool>,
     /// Set at the end, or by a worker that panics.
     is_over: Pair<AtomicBool>,
     others: O,
 }
 
+/// Rounds of polling between two tries for the lock.
+const PAUSE: u32 = 32;
+
 /// A value in two cache lines of its own, since processors fetch them in pairs.
 #[repr(align(128))]
 struct Pair<T>(T);
-
-/// What is under the lock.
-struct State<B, W> {
-    scheduler: Scheduler,
-    reports: Reports<W, Shared<B>>,
-    now_ns: u64,
-    /// How many workers have an instance.
-    busy: u32,
-    /// By worker, the turn of its latest post that was taken note of.
-    noted: Box<[u32]>,
-    /// A copy of the last dispatch, to be carried out.
-    decisions: Vec<Decision>,
-}
 
 impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
     pub(crate) fn new(scheduler: Scheduler, bodies: Vec<B>, watch: W, others: O) -> Self {
@@ -80,6 +86,7 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
                 now_ns: 0,
                 busy: 0,
                 noted: vec![0; cores].into_boxed_slice(),
+                is_attended: false,
                 decisions: Vec::with_capacity(2 * cores),
             })),
             bodies,
@@ -99,6 +106,7 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
     /// Works until all jobs have ended. Worker 0 begins.
     pub(crate) fn work(&self, core: CoreId) {
         let _over = OverOnPanic(&self.is_over.0);
+        let mailbox = &self.mailboxes[core.index()];
         let mut me = Me {
             core,
             posted: None,
@@ -109,49 +117,65 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
             && let Some(mut state) = self.try_lock()
         {
             let own = self.proceed(&mut state, core);
+            // Another one may have begun, because of a letter: then this one has nothing to keep.
             next = own.map(|assignment| self.begin(assignment));
         }
         while let Some(mut running) = next.take().or_else(|| self.wait(&mut me)) {
             running.body.run(running.job);
             let mut has_signals = false;
-            let mailbox = &self.mailboxes[core.index()];
             running.body.complete(&mut |dag| {
                 has_signals = true;
                 keep_signal(&mut mailbox.signals(), dag);
             });
             drop(running.body);
-            me.posted = Some(mailbox.post(running.vertex, has_signals));
+            match running.kept {
+                Some(mut state) => {
+                    let end = End {
+                        vertex: running.vertex,
+                        has_signals,
+                    };
+                    let own = self.finish(&mut state, core, core, end);
+                    next = self.leave(state, core, own);
+                }
+                None => me.posted = Some(mailbox.post(running.vertex, has_signals)),
+            }
         }
     }
 
     /// Takes what an assignment needs.
     #[inline]
-    fn begin(&self, assignment: Assignment) -> Running<'_, B> {
+    fn begin(&self, assignment: Assignment) -> Running<'_, B, W> {
         let Assignment { vertex, job } = assignment;
         let body = self.bodies[vertex.index()].0.lock();
         Running {
             vertex,
             job,
             body: body.unwrap_or_else(PoisonError::into_inner),
+            kept: None,
         }
     }
 
     /// Waits for the next instance of this worker, and sees to it that its post is
     /// taken note of; `None` at the end.
     #[inline]
-    fn wait(&self, me: &mut Me) -> Option<Running<'_, B>> {
+    fn wait(&self, me: &mut Me) -> Option<Running<'_, B, W>> {
         let mailbox = &self.mailboxes[me.core.index()];
+        let mut pause = 0;
         poll(|| {
             if let Some(turn) = me.posted
                 && !self.is_serving.0.load(Ordering::Relaxed)
             {
                 if mailbox.is_hinted(turn) {
                     me.posted = None;
+                } else if pause > 0 {
+                    pause -= 1;
                 } else if let Some(state) = self.try_lock() {
                     me.posted = None;
                     if let Some(own) = self.step(state, me.core, turn) {
                         return Some(Some(own));
                     }
+                } else {
+                    pause = PAUSE;
                 }
             }
             if let Some(assignment) = mailbox.assigned_after(&mut me.assigned) {
@@ -169,165 +193,115 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
         })
     }
 
-    /// Takes the worker's own post, if nobody has done so meanwhile, and then
-    /// serves, if it has nothing else to do. Returns what it runs next.
+    /// Takes the worker's own post, if nobody has done so meanwhile, and those that others
+    /// have left. Returns what it runs next.
     #[inline]
     fn step<'a>(
         &'a self,
         mut state: MutexGuard<'a, State<B, W>>,
         core: CoreId,
         turn: u32,
-    ) -> Option<Running<'a, B>> {
+    ) -> Option<Running<'a, B, W>> {
         if state.noted[core.index()] == turn {
             return None;
         }
-        let post = self.mailboxes[core.index()].posted();
-        match self.take_note(&mut state, core, core, post) {
-            Some(own) => Some(self.begin(own)),
-            None if state.busy > 0 => self.serve(state, core),
-            None => None,
+        state.noted[core.index()] = turn;
+        let end = self.mailboxes[core.index()].posted().end;
+        let own = self.finish(&mut state, core, core, end);
+        if own.is_some() {
+            self.collect(&mut state, core);
+        }
+        self.leave(state, core, own)
+    }
+
+    /// Takes the posts of others for a worker that has something to run: each gets what its
+    /// own end gives it.
+    #[inline]
+    fn collect(&self, state: &mut State<B, W>, here: CoreId) {
+        for (other, mailbox) in (0..).map(CoreId).zip(&self.mailboxes) {
+            let post = mailbox.posted();
+            if other != here && post.turn != state.noted[other.index()] {
+                state.noted[other.index()] = post.turn;
+                let own = self.finish(state, here, other, post.end);
+                debug_assert!(own.is_none(), "{here:?} has something to run");
+                mailbox.hint(post.turn);
+            }
         }
     }
 
-    /// Takes the others' posts until this worker has something to run, or
-    /// nobody else has.
-    fn serve<'a>(
+    /// Serves if the worker has got nothing to run but others do; then gives the lock back, or
+    /// keeps it if nobody else could want it. Returns what the worker runs next.
+    #[inline(always)]
+    fn leave<'a>(
         &'a self,
         mut state: MutexGuard<'a, State<B, W>>,
         core: CoreId,
-    ) -> Option<Running<'a, B>> {
-        self.is_serving.0.store(true, Ordering::Relaxed);
+        own: Option<Assignment>,
+    ) -> Option<Running<'a, B, W>> {
+        let (own, ended) = match own {
+            Some(own) => (own, None),
+            None if state.busy > 0 => self.serve(&mut state, core)?,
+            None => return None,
+        };
+        let mut running = self.begin(own);
+        if state.busy == 1 && !O::MAY_KNOCK {
+            self.attend(&mut state);
+            running.kept = Some(state);
+            return Some(running);
+        }
+        let was_attended = std::mem::replace(&mut state.is_attended, false);
+        drop(state);
+        if let Some((mailbox, turn)) = ended {
+            mailbox.hint(turn);
+        }
+        if was_attended {
+            self.is_serving.0.store(false, Ordering::Relaxed);
+        }
+        Some(running)
+    }
+
+    /// Takes the others' posts until this worker has something to run, or
+    /// nobody else has. Returns also the last post's owner and turn, if nothing is hinted of
+    /// that yet.
+    #[inline(always)]
+    fn serve(
+        &self,
+        state: &mut State<B, W>,
+        core: CoreId,
+    ) -> Option<(Assignment, Option<(&Mailbox, u32)>)> {
+        self.attend(state);
         for other in (0..).map(CoreId).take(self.mailboxes.len()) {
             state.scheduler.anticipate(other);
         }
-        let last = poll(|| {
+        poll(|| {
             for (other, mailbox) in (0..).map(CoreId).zip(&self.mailboxes) {
                 let post = mailbox.posted();
                 if post.turn == state.noted[other.index()] {
                     continue;
                 }
-                let own = self.take_note(&mut state, core, other, post);
+                state.noted[other.index()] = post.turn;
+                let own = self.take_note(state, core, other, core, post.end);
                 if own.is_some() || state.busy == 0 {
-                    return Some(Some((own, Some((mailbox, post.turn)))));
+                    return Some(own.map(|own| (own, Some((mailbox, post.turn)))));
                 }
                 mailbox.hint(post.turn);
             }
             if self.others.have_knocked()
-                && let Some(own) = self.open(&mut state, core)
+                && let Some(own) = self.open(state, core)
             {
-                return Some(Some((Some(own), None)));
+                return Some(Some((own, None)));
             }
             self.is_over.0.load(Ordering::Relaxed).then_some(None)
-        });
-        let (own, to_tell) = last?;
-        let own = own.map(|own| self.begin(own));
-        drop(state);
-        if let Some((mailbox, turn)) = to_tell {
-            mailbox.hint(turn);
-        }
-        self.is_serving.0.store(false, Ordering::Relaxed);
-        own
+        })
     }
 
-    /// Takes the post of a worker that has finished an instance. Returns what `here`, which
-    /// has nothing to do, runs next.
+    /// Tells the others that the lock's owner looks after their posts.
     #[inline]
-    fn take_note(
-        &self,
-        state: &mut State<B, W>,
-        here: CoreId,
-        core: CoreId,
-        post: Post,
-    ) -> Option<Assignment> {
-        let vertex = post.vertex;
-        state.noted[core.index()] = post.turn;
-        state.busy -= 1;
-        if W::STEP_NS > 0 {
-            state.now_ns += W::STEP_NS;
-            state.reports.watch.instant(state.now_ns);
-            let instance = state.scheduler.instance_of(vertex);
-            state.reports.watch.finished(instance, core);
+    fn attend(&self, state: &mut State<B, W>) {
+        if !state.is_attended {
+            state.is_attended = true;
+            self.is_serving.0.store(true, Ordering::Relaxed);
         }
-        let State {
-            scheduler,
-            reports,
-            now_ns,
-            ..
-        } = state;
-        if post.has_signals || self.others.have_knocked() {
-            let instance = scheduler.instance_of(vertex);
-            let mut moment = scheduler.at(*now_ns);
-            moment.complete(instance, reports);
-            if post.has_signals {
-                for dag in self.mailboxes[core.index()].signals().drain(..) {
-                    if !self.others.send(dag) {
-                        moment.signal(dag, reports);
-                    }
-                }
-            }
-            return self.proceed(state, here);
-        }
-        let done = if core == here {
-            scheduler.hand_off(*now_ns, core, vertex, reports)
-        } else {
-            scheduler.hand_over(*now_ns, core, vertex, here, reports)
-        };
-        match done {
-            HandOff::To(_, decision) => Some(state.assign(decision.instance(), here)),
-            HandOff::Idle if state.busy > 0 => None,
-            HandOff::Idle | HandOff::Open => self.proceed(state, here),
-        }
-    }
-
-    /// Makes a step because another cluster has knocked. Returns what `here` runs next.
-    #[cold]
-    fn open(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
-        // If nobody is busy the run has not begun.
-        if state.busy > 0 {
-            state.now_ns += W::STEP_NS;
-            state.reports.watch.instant(state.now_ns);
-        }
-        self.proceed(state, here)
-    }
-
-    /// Takes letters and ends the instant; goes on to the next event if nothing runs and nothing
-    /// starts. Returns what `here` runs next.
-    fn proceed(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
-        loop {
-            let mut moment = state.scheduler.at(state.now_ns);
-            self.others
-                .take(|dag| moment.signal(dag, &mut state.reports));
-            let decisions = moment.release_due(&mut state.reports).dispatch();
-            state.decisions.clear();
-            state.decisions.extend_from_slice(decisions);
-            if !state.decisions.is_empty() {
-                return self.carry_out(state, here);
-            }
-            if state.busy > 0 {
-                return None;
-            }
-            let (due_ns, then_ns) = (state.scheduler.next_event_ns(), state.now_ns + W::STEP_NS);
-            let Some(event_ns) = self.others.next_ns(due_ns, then_ns) else {
-                self.is_over.0.store(true, Ordering::Release);
-                return None;
-            };
-            state.now_ns = event_ns.max(state.now_ns);
-            state.reports.watch.instant(state.now_ns);
-        }
-    }
-
-    fn carry_out(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
-        let mut own = None;
-        for index in 0..state.decisions.len() {
-            let decision = state.decisions[index];
-            let assignment = state.assign(decision.instance(), decision.core());
-            if decision.core() == here {
-                own = Some(assignment);
-            } else {
-                self.mailboxes[decision.core().index()].assign(assignment);
-            }
-        }
-        own
     }
 
     #[inline]
@@ -337,18 +311,6 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
             // The worker that panicked in there has set `is_over`; the run ends with its panic.
             Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
             Err(TryLockError::WouldBlock) => None,
-        }
-    }
-}
-
-impl<B, W: Watch> State<B, W> {
-    #[inline]
-    fn assign(&mut self, instance: Instance, core: CoreId) -> Assignment {
-        self.busy += 1;
-        self.reports.watch.started(instance, core);
-        Assignment {
-            vertex: self.scheduler.vertex(instance),
-            job: instance.job,
         }
     }
 }
@@ -363,10 +325,12 @@ struct Me {
 }
 
 /// An instance that a worker runs.
-struct Running<'a, B> {
+struct Running<'a, B, W> {
     vertex: Vertex,
     job: u64,
     body: MutexGuard<'a, B>,
+    /// The lock, if nothing else runs: then nobody else has an end to report.
+    kept: Option<MutexGuard<'a, State<B, W>>>,
 }
 
 /// Sends all workers home if one panics.
