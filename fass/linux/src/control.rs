@@ -7,12 +7,12 @@ use std::thread;
 use sched_dag::DagId;
 
 use crate::level::Role;
+use crate::office::Office;
 use crate::requests::Request;
 use crate::sys;
-use crate::team::Team;
 
-/// The handle of a committed run. What it asks for is done by the release thread, at
-/// once; after the run it does nothing.
+/// The handle of a committed run. What it asks for is done by the release thread of the DAG's
+/// cluster, at once; after the run it does nothing.
 ///
 /// ```
 /// use std::time::Duration;
@@ -35,7 +35,7 @@ use crate::team::Team;
 /// assert_eq!(run.violations().count(), 0);
 /// ```
 #[derive(Clone)]
-pub struct Control(Arc<Team>);
+pub struct Control(Arc<Office>);
 
 impl std::fmt::Debug for Control {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -44,8 +44,8 @@ impl std::fmt::Debug for Control {
 }
 
 impl Control {
-    pub(crate) const fn new(team: Arc<Team>) -> Self {
-        Self(team)
+    pub(crate) const fn new(office: Arc<Office>) -> Self {
+        Self(office)
     }
 
     /// Has a DAG's due jobs skipped until it is resumed.
@@ -78,14 +78,14 @@ impl Control {
     pub(crate) fn raise_on_input(self, dag: DagId, arrivals: sys::Arrivals) -> io::Result<()> {
         /// How long such a thread outlives its run.
         const MOST_MS: i32 = 200;
-        let team = self.0;
+        let office = self.0;
         let watch = move || {
-            if let Some(levels) = team.levels {
+            if let Some(levels) = office.levels {
                 levels.bring(sys::thread(), Role::Release);
             }
-            while !team.is_over() {
+            while !office.is_over() {
                 if arrivals.wait(MOST_MS) {
-                    team.request(dag, Request::Signal);
+                    office.request(dag, Request::Signal);
                 }
             }
         };

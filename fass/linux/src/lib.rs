@@ -8,6 +8,9 @@
 //! is *demoted* to a lower level of SCHED_FIFO, and a *spare* one takes its place.
 //! `docs/linux.md` says what to set up, and who may delay what.
 //!
+//! Where the cores are divided all that is so for each cluster by itself: it has a scheduler, a
+//! lock, a release thread that keeps to its processors, workers and a journal.
+//!
 //! # What is guaranteed
 //!
 //! - R1 to R4 of the task model, whatever Linux does to the threads: they hold by the order
@@ -32,11 +35,13 @@
 //!   demoted there and ends meanwhile is reported when that one has ended, or when it is wanted.
 #![deny(unsafe_code)]
 
+mod clusters;
 mod control;
 mod lead;
 mod level;
 mod look_out;
 mod machine;
+mod office;
 mod parked;
 mod platform;
 mod release;

@@ -7,7 +7,7 @@ use std::os::fd::AsFd;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{Overheads, Plan, Platform as _, Policy, Preemption, Signal};
+use fass::{Clusters, Overheads, Plan, Platform as _, Policy, Preemption, Signal};
 use sched_dag::SchedulerOptions;
 
 use crate::control::Control;
@@ -171,6 +171,8 @@ impl Linux {
             levels,
             overheads: Overheads::default(),
             budget_factor: 0,
+            clusters: Clusters::Undivided,
+            assigns: false,
             wcets: None,
             look_at_commit: |_, _, _| (),
             allocations: || 0,
@@ -274,7 +276,7 @@ impl Linux {
     /// committed.
     #[must_use]
     pub fn control(&self) -> Option<Control> {
-        HOST.team().map(Control::new)
+        HOST.office().map(Control::new)
     }
 
     /// Raises a signal whenever something arrives in a file that `poll` can wait for (a

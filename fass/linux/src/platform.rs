@@ -4,11 +4,14 @@ use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
-use fass::{LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption};
+use fass::{
+    Body, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
+};
 use sched_dag::lifecycle::Requests;
-use sched_dag::{Dag, DagId, Journal, OnFault, Scheduler, SchedulerOptions};
+use sched_dag::{Dag, DagId, Journal, OnFault, Scheduler, SchedulerOptions, TaskSet, Vertex};
 
 use crate::level::Levels;
+use crate::office::Office;
 use crate::requests::Request;
 use crate::run::Launched;
 use crate::state::State;
@@ -24,6 +27,9 @@ pub(crate) struct Terms {
     pub(crate) levels: Option<Levels>,
     pub(crate) overheads: Overheads,
     pub(crate) budget_factor: u64,
+    pub(crate) clusters: Clusters,
+    /// Whether the commit divides the cores.
+    pub(crate) assigns: bool,
     pub(crate) wcets: Option<Cow<'static, str>>,
     pub(crate) look_at_commit: fn(&Plan, SchedulerOptions, Option<u64>),
     pub(crate) allocations: fn() -> u64,
@@ -43,13 +49,13 @@ pub(crate) struct Host {
     terms: Mutex<Option<Terms>>,
     launched: Mutex<Option<Launched>>,
     /// The run that signals from outside are for.
-    team: RwLock<Option<Arc<Team>>>,
+    office: RwLock<Option<Arc<Office>>>,
 }
 
 pub(crate) static HOST: Host = Host {
     terms: Mutex::new(None),
     launched: Mutex::new(None),
-    team: RwLock::new(None),
+    office: RwLock::new(None),
 };
 
 /// How much memory a journal may take its quarter of.
@@ -69,15 +75,22 @@ impl Host {
     }
 
     /// Returns the run that was committed last, until it has ended.
-    pub(crate) fn team(&self) -> Option<Arc<Team>> {
-        self.team.read().map_or(None, |team| team.clone())
+    pub(crate) fn office(&self) -> Option<Arc<Office>> {
+        self.office.read().map_or(None, |office| office.clone())
+    }
+
+    /// Sets how the cores are divided, or that the commit does it: the last call counts.
+    pub(crate) fn divide(&self, clusters: Clusters, by_commit: bool) {
+        if let Some(terms) = self.terms().as_mut() {
+            (terms.clusters, terms.assigns) = (clusters, by_commit);
+        }
     }
 
     /// Forgets the run.
     pub(crate) fn forget(&self) {
-        self.team.clear_poison();
-        if let Ok(mut team) = self.team.write() {
-            *team = None;
+        self.office.clear_poison();
+        if let Ok(mut office) = self.office.write() {
+            *office = None;
         }
     }
 
@@ -98,6 +111,17 @@ impl Platform for Host {
     fn cores(&self) -> u32 {
         let count = |terms: &Terms| u32::try_from(terms.processors.len()).unwrap_or(u32::MAX);
         self.of_terms(count, 1)
+    }
+
+    fn clusters(&self) -> Clusters {
+        self.of_terms(|terms| terms.clusters.clone(), Clusters::Undivided)
+    }
+
+    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+        match self.of_terms(|terms| terms.assigns, false) {
+            true => fass::assign_clusters(self, task_set),
+            false => Ok(()),
+        }
     }
 
     fn overheads(&self) -> Overheads {
@@ -130,8 +154,8 @@ impl Platform for Host {
             "a subtask raises a signal that it was not registered with; register it by \
              `dag.using(signal.raising())`"
         );
-        if let Some(team) = self.team().filter(|team| team.plan == plan) {
-            team.request(dag, Request::Signal);
+        if let Some(office) = self.office().filter(|office| office.plan == plan) {
+            office.request(dag, Request::Signal);
         }
     }
 
@@ -140,7 +164,7 @@ impl Platform for Host {
             let line = "there is no `Linux` yet; make one before the commit";
             return Err(LaunchError::new(line));
         };
-        if self.team().is_some() {
+        if self.office().is_some() {
             let line =
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
@@ -160,30 +184,67 @@ impl Platform for Host {
         };
         let overhead_ns = terms.overheads.of_an_instance_ns(options.preemption);
         (terms.look_at_commit)(&plan, options, overhead_ns);
-        let task_set = plan.task_set;
-        let requests = Requests::new(task_set.dags().len(), plan.lifecycle);
-        let journal = Journal::new(&task_set, JOURNAL_BYTES, u64::MAX);
-        let scheduler = Scheduler::new(task_set, options);
-        let state = State::new(
-            scheduler,
-            plan.bodies,
-            (requests, plan.after_fault),
-            journal,
-            terms.processors,
-            terms.levels,
-        );
-        let team = Arc::new(Team::new(state, plan.number, terms.allocations));
-        if let Ok(mut place) = self.team.write() {
-            *place = Some(Arc::clone(&team));
+        if plan.lifecycle.is_some() && plan.task_set.is_divided() {
+            return Err(LaunchError::new(
+                "the cores are divided, and a subtask pauses DAGs, enters modes or ends the run, \
+                 which reaches one cluster only; leave one of the two out",
+            ));
+        }
+        let office = Office::new(plan.number, &plan.task_set, terms.levels);
+        let office = Arc::new(office);
+        if let Ok(mut place) = self.office.write() {
+            *place = Some(Arc::clone(&office));
         }
         let launched = Launched {
-            team,
-            bounds_ns: plan.bounds_ns,
-            sink_bounds_ns: plan.sink_bounds_ns,
+            bounds_ns: plan.bounds_ns.clone(),
+            sink_bounds_ns: plan.sink_bounds_ns.clone(),
+            options,
             budget_factor: terms.budget_factor,
+            allocations: terms.allocations,
+            teams: teams(plan, options, &terms, &office),
+            office,
         };
         let mut place = self.launched.lock().unwrap_or_else(PoisonError::into_inner);
         *place = Some(launched);
         Ok(())
     }
+}
+
+/// Makes what the threads of each cluster share.
+fn teams(
+    mut plan: Plan,
+    options: SchedulerOptions,
+    terms: &Terms,
+    office: &Arc<Office>,
+) -> Vec<Arc<Team>> {
+    let task_set = &plan.task_set;
+    let dags = task_set.dags().len();
+    let mut bodies: Vec<Vec<(Vertex, Body)>> = task_set.clusters().map(|_| Vec::new()).collect();
+    let mut vertices = (0..).map(Vertex);
+    for (dag, of_dag) in task_set.dags().iter().zip(plan.bodies) {
+        let vertices = vertices.by_ref();
+        bodies[dag.cluster().index()].extend(
+            of_dag
+                .into_iter()
+                .zip(vertices)
+                .map(|(body, vertex)| (vertex, body)),
+        );
+    }
+    let share = JOURNAL_BYTES / bodies.len();
+    let clusters = task_set.clusters().zip(bodies);
+    let team = |(cluster, bodies)| {
+        let cores = task_set.cores_of(cluster, options.cores);
+        let requests = Requests::new(dags, plan.lifecycle.take());
+        let state = State::new(
+            (cluster, office),
+            Scheduler::of_cluster(Arc::clone(task_set), options, cluster),
+            bodies,
+            (requests, plan.after_fault.clone()),
+            Journal::of_cluster(task_set, cluster, share, u64::MAX),
+            terms.processors[cores.start as usize..cores.end as usize].into(),
+            terms.levels,
+        );
+        Arc::new(Team::new(state, office))
+    };
+    clusters.map(team).collect()
 }

@@ -1,4 +1,4 @@
-//! The release thread: the clock of the scheduler.
+//! The release thread: the clock of the scheduler. Each cluster has one, on its own processors.
 //!
 //! It sleeps until the scheduler's next event, at an absolute time, so that releases keep
 //! to the nominal grid whatever one of them was late by. Idle workers are to be there first
@@ -98,15 +98,20 @@ impl Team {
     /// Makes the scheduler's steps until all jobs have ended.
     pub(crate) fn release(&self, mut budgets: Budgets) {
         sys::make_timers_exact();
+        if self.lock().task_set.is_divided() {
+            // Were it woken on another cluster's processor, that would wait for it.
+            let _ = sys::confine(sys::thread(), &self.lock().processors);
+        }
         if let Some(levels) = self.levels {
             levels.bring(sys::thread(), Role::Release);
         }
-        self.count_allocations();
         self.say_ready();
+        let alarm = self.office.alarm(self.cluster);
+        let mut rests = false;
         loop {
-            let seen = self.alarm.load(Ordering::Acquire);
+            let seen = alarm.load(Ordering::Acquire);
             let mut state = self.lock();
-            let budgets_ns = self.step_in_time(&mut state, &mut budgets);
+            let budgets_ns = self.step_in_time(&mut state, &mut budgets, &mut rests);
             self.call(state);
             match budgets_ns {
                 Some(budgets_ns) => self.sleep(seen, budgets_ns),
@@ -118,11 +123,12 @@ impl Team {
     /// Sleeps until it is rung for, or an event or the look at budgets is due. An event that a
     /// worker has seen to is none.
     fn sleep(&self, seen: u32, budgets_ns: u64) {
-        while self.alarm.load(Ordering::Acquire) == seen {
+        let alarm = self.office.alarm(self.cluster);
+        while alarm.load(Ordering::Acquire) == seen {
             let looks_at_ns = self.settle_look(budgets_ns);
             if sys::now_ns() < looks_at_ns {
                 let until_ns = (looks_at_ns < u64::MAX).then_some(looks_at_ns);
-                sys::wait(&self.alarm, seen, until_ns);
+                sys::wait(alarm, seen, until_ns);
             }
             let due_ns = self.look_out.next_ns().min(budgets_ns);
             if due_ns <= sys::now_ns() {
@@ -145,14 +151,20 @@ impl Team {
     }
 
     /// Makes one step, and returns when to look at budgets; `None` if all jobs have ended.
-    fn step_in_time(&self, state: &mut State, budgets: &mut Budgets) -> Option<u64> {
+    fn step_in_time(
+        &self,
+        state: &mut State,
+        budgets: &mut Budgets,
+        rests: &mut bool,
+    ) -> Option<u64> {
         if sys::now_ns() < state.epoch_ns {
             // What is asked for before time 0 is done then.
             self.look_out.announce(state.epoch_ns);
             return Some(u64::MAX);
         }
+        let mut letters = 0;
         state.step(&self.workers, |moment, mut observer| {
-            self.requests.serve(moment, &mut observer);
+            letters = self.office.serve(self.cluster, moment, &mut observer);
         });
         let look_ns = loop {
             match budgets.look(self, state, sys::now_ns()) {
@@ -161,13 +173,15 @@ impl Team {
             }
         };
         self.announce(state);
-        if !state.scheduler.is_finished() {
+        let is_finished = state.scheduler.is_finished();
+        if !self.office.settle(rests, is_finished, letters) {
+            if is_finished {
+                // This one rests.
+                self.look_out.announce(u64::MAX);
+            }
             return Some(look_ns);
         }
-        self.count_allocations();
-        self.over.store(1, Ordering::Release);
         self.workers.iter().for_each(|worker| worker.call());
-        sys::wake(&self.over, i32::MAX);
         None
     }
 

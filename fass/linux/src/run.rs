@@ -1,14 +1,15 @@
 //! A run: its threads while it goes on, and what it leaves behind.
 
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, MutexGuard};
 use std::thread::{self, JoinHandle};
 
 use sched_dag::law::{Record, Violation};
-use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
+use sched_dag::{Dag, DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
 
+use crate::office::Office;
 use crate::release::Budgets;
-use crate::state::Fault;
+use crate::state::{Fault, Number, State};
 use crate::sys;
 use crate::team::Team;
 
@@ -20,10 +21,15 @@ const LEAD_NS: u64 = 1_000_000;
 
 /// A plan that was committed.
 pub(crate) struct Launched {
-    pub(crate) team: Arc<Team>,
+    pub(crate) office: Arc<Office>,
+    /// By cluster.
+    pub(crate) teams: Vec<Arc<Team>>,
+    pub(crate) options: SchedulerOptions,
     pub(crate) bounds_ns: Vec<Option<u64>>,
     pub(crate) sink_bounds_ns: Vec<Vec<Option<u64>>>,
     pub(crate) budget_factor: u64,
+    /// Counts what the program has allocated so far.
+    pub(crate) allocations: fn() -> u64,
 }
 
 /// How often the run's threads did what.
@@ -59,60 +65,64 @@ pub struct Run {
 /// Starts the threads of a committed plan, waits for the end of all its jobs, and
 /// returns what happened. Releases count from `epoch_ns`, or from right now.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
-    let team = launched.team;
-    let threads: Vec<_> = (0..team.workers.len())
-        .map(|number| worker(&team, number))
-        .collect();
-    team.wait_until_ready(threads.len());
-    let mut state = team.lock();
-    state.epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
-    let epoch_ns = state.epoch_ns;
-    let budgets = Budgets::new(&state, launched.budget_factor);
-    drop(state);
-    let of_release = Arc::clone(&team);
-    let release = thread::Builder::new()
-        .name("fass-release".into())
-        .spawn(move || of_release.release(budgets))
-        .expect("the system has a thread to release jobs");
-    while !team.is_over() {
-        sys::wait(&team.over, 0, None);
+    let (office, teams) = (&launched.office, &launched.teams);
+    let workers = teams.iter().map(|team| {
+        let numbers = 0..team.workers.len();
+        numbers.map(|number| worker(team, number)).collect()
+    });
+    let workers: Vec<Vec<_>> = workers.collect();
+    for (team, workers) in teams.iter().zip(&workers) {
+        team.wait_until_ready(workers.len());
     }
-    let mut state = team.lock();
-    let abandoned = std::mem::take(&mut state.abandoned);
-    // Nobody writes any more: those that were abandoned see that they were.
-    let empty = Journal::new(&state.task_set, 0, 0);
-    let journal = std::mem::replace(&mut state.recorder.events, empty);
-    let task_set = Arc::clone(&state.task_set);
-    let statistics = (0..).map(DagId).take(task_set.dags().len());
-    let statistics = statistics
-        .map(|dag| *state.scheduler.statistics(dag))
-        .collect();
-    let sink_misses = (0..).map(DagId).zip(task_set.dags());
-    let sink_misses = sink_misses.map(|(dag, model)| {
+    let release = |team| release(team, launched.budget_factor);
+    let releases: Vec<_> = teams.iter().map(release).collect();
+    for (team, workers) in teams.iter().zip(&workers) {
+        team.wait_until_ready(workers.len() + 1);
+    }
+    let allocations = (launched.allocations)();
+    let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
+    for team in teams {
+        team.lock().epoch_ns = epoch_ns;
+    }
+    teams.iter().for_each(|team| office.ring(team.cluster));
+    office.wait_until_over();
+    let allocations = (launched.allocations)() - allocations;
+    releases.into_iter().for_each(join);
+    let mut states: Vec<_> = teams.iter().map(|team| team.lock()).collect();
+    let abandoned: Vec<Vec<Number>> = states.iter().map(|state| state.abandoned.clone()).collect();
+    let task_set = Arc::clone(&states[0].task_set);
+    let journal = journal(&mut states, &task_set, launched.options.cores);
+    let scheduler_of = |dag| &states[task_set.dag(dag).cluster().index()].scheduler;
+    let ids = (0..).map(DagId).zip(task_set.dags());
+    let statistics = |(dag, _)| *scheduler_of(dag).statistics(dag);
+    let statistics = ids.clone().map(statistics).collect();
+    let sink_misses = |(dag, model): (DagId, &Dag)| {
         let sinks = model.sinks().iter();
         sinks
-            .map(|sink| state.scheduler.sink_misses(dag, *sink))
+            .map(|sink| scheduler_of(dag).sink_misses(dag, *sink))
             .collect()
-    });
-    let sink_misses = sink_misses.collect();
-    let counts = Counts {
-        hand_offs: team.hand_offs.load(Ordering::Relaxed),
-        calls: team.calls.load(Ordering::Relaxed),
-        preemptions: state.preemptions,
     };
-    let (options, faults) = (state.scheduler.options(), std::mem::take(&mut state.faults));
-    state.abandoned.clone_from(&abandoned);
-    drop(state);
-    for (number, thread) in threads.into_iter().enumerate() {
-        if !abandoned.contains(&number) {
-            join(thread);
+    let sink_misses = ids.map(sink_misses).collect();
+    let mut counts = Counts::default();
+    let mut faults = Vec::new();
+    for (team, state) in teams.iter().zip(&mut states) {
+        counts.hand_offs += team.hand_offs.load(Ordering::Relaxed);
+        counts.calls += team.calls.load(Ordering::Relaxed);
+        counts.preemptions += state.preemptions;
+        faults.append(&mut state.faults);
+    }
+    drop(states);
+    for (workers, abandoned) in workers.into_iter().zip(abandoned) {
+        for (number, thread) in workers.into_iter().enumerate() {
+            if !abandoned.contains(&number) {
+                join(thread);
+            }
         }
     }
-    join(release);
     Run {
         record: journal.record(&task_set),
         task_set,
-        options,
+        options: launched.options,
         statistics,
         journal,
         faults,
@@ -121,8 +131,35 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
         bounds_ns: launched.bounds_ns,
         sink_bounds_ns: launched.sink_bounds_ns,
         sink_misses,
-        allocations: team.allocations.load(Ordering::Relaxed),
+        allocations,
     }
+}
+
+/// Takes the journals out, as one. Nobody writes any more: those that were abandoned see that
+/// they were.
+fn journal(states: &mut [MutexGuard<'_, State>], task_set: &Arc<TaskSet>, cores: u32) -> Journal {
+    let mut merged: Option<Journal> = None;
+    for (cluster, state) in task_set.clusters().zip(states) {
+        let empty = Journal::new(task_set, 0, 0);
+        let its = std::mem::replace(&mut state.recorder.events, empty);
+        match &mut merged {
+            None => merged = Some(its),
+            Some(merged) => {
+                let first_core = task_set.cores_of(cluster, cores).start;
+                merged.absorb(its, cluster, first_core);
+            }
+        }
+    }
+    merged.expect("there is a cluster at least")
+}
+
+fn release(team: &Arc<Team>, budget_factor: u64) -> JoinHandle<()> {
+    let budgets = Budgets::new(&team.lock(), budget_factor);
+    let team = Arc::clone(team);
+    thread::Builder::new()
+        .name("fass-release".into())
+        .spawn(move || team.release(budgets))
+        .expect("the system has a thread to release jobs")
 }
 
 fn worker(team: &Arc<Team>, number: usize) -> JoinHandle<()> {
@@ -210,7 +247,7 @@ impl Run {
         self.allocations
     }
 
-    /// Returns the faults that have ended DAGs, in their order.
+    /// Returns the faults that have ended DAGs, of each cluster in their order.
     #[must_use]
     pub fn faults(&self) -> &[Fault] {
         &self.faults

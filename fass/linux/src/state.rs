@@ -12,12 +12,12 @@ use sched_dag::journal::What;
 use sched_dag::lifecycle::Requests;
 use sched_dag::placement::{Next, Placement};
 use sched_dag::{
-    CoreId, DagId, Decision, Instance, Journal, Moment, Observer, Recorder, Scheduler, TaskSet,
-    Vertex,
+    ClusterId, CoreId, DagId, Decision, Instance, Journal, Moment, Observer, Recorder, Scheduler,
+    TaskSet, Vertex,
 };
 
 use crate::level::{Levels, Role};
-use crate::parked::Left;
+use crate::office::Office;
 use crate::sys;
 use crate::worker::Worker;
 
@@ -27,6 +27,14 @@ pub(crate) struct Runner {
     pub(crate) vertex: Vertex,
     /// The job whose instance it runs, or ran last.
     pub(crate) job: u64,
+}
+
+/// An instance that has finished, and is not reported yet.
+pub(crate) struct Left {
+    pub(crate) worker: Number,
+    pub(crate) runner: Box<Runner>,
+    /// When its function returned, on the clock.
+    pub(crate) finish_ns: u64,
 }
 
 /// The number of a worker.
@@ -43,8 +51,10 @@ pub struct Fault {
     pub is_overrun: bool,
 }
 
-/// The scheduler, the bodies, and which worker runs what.
+/// The scheduler of a cluster, its bodies, and which worker runs what.
 pub(crate) struct State {
+    pub(crate) cluster: ClusterId,
+    pub(crate) office: Arc<Office>,
     pub(crate) scheduler: Scheduler,
     pub(crate) recorder: Recorder<Journal>,
     pub(crate) placement: Placement<Box<Runner>, Number>,
@@ -74,7 +84,7 @@ pub(crate) struct State {
     decisions: Vec<Decision>,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
-    /// Time 0 of the run on the clock.
+    /// Time 0 of the run on the clock; `u64::MAX` until the run has begun.
     pub(crate) epoch_ns: u64,
     pub(crate) preemptions: u64,
 }
@@ -91,30 +101,33 @@ impl Observer for Discard<'_> {
 }
 
 impl State {
+    /// Makes that of a cluster, for its DAGs' bodies and its processors.
     pub(crate) fn new(
+        (cluster, office): (ClusterId, &Arc<Office>),
         scheduler: Scheduler,
-        bodies: Vec<Vec<Body>>,
+        bodies: Vec<(Vertex, Body)>,
         (requests, after_fault): (Requests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
         levels: Option<Levels>,
     ) -> Self {
         let task_set = Arc::clone(scheduler.task_set());
-        let (cores, dags) = (processors.len(), bodies.len());
-        let runners = (0..).map(Vertex).zip(bodies.into_iter().flatten());
-        let runners = runners.map(|(vertex, body)| {
+        let (cores, dags) = (processors.len(), task_set.dags().len());
+        let mut placement = Placement::empty(task_set.vertices(), cores);
+        let workers = cores + bodies.len();
+        for (vertex, body) in bodies {
             let job = 0;
-            Box::new(Runner { body, vertex, job })
-        });
-        let runners: Vec<_> = runners.collect();
-        let workers = cores + runners.len();
+            placement.replace(vertex, Box::new(Runner { body, vertex, job }));
+        }
         let mut seats = vec![None; workers].into_boxed_slice();
         for (core, seat) in (0..).map(CoreId).zip(&mut seats[..cores]) {
             *seat = Some(core);
         }
         Self {
+            cluster,
+            office: Arc::clone(office),
             recorder: Recorder::into(Arc::clone(&task_set), journal),
-            placement: Placement::new(runners.into_iter(), cores),
+            placement,
             task_set,
             scheduler,
             active: (0..cores).collect(),
@@ -132,7 +145,7 @@ impl State {
             decisions: Vec::with_capacity(2 * cores),
             processors,
             levels,
-            epoch_ns: 0,
+            epoch_ns: u64::MAX,
             preemptions: 0,
         }
     }
@@ -178,6 +191,7 @@ impl State {
         let instance = fault.instance;
         self.faults.push(fault);
         let handler = self.after_fault[instance.dag.index()];
+        let handler = handler.filter(|&handler| !self.office.send(self.cluster, handler));
         self.step(workers, |moment, mut observer| {
             moment.fail(instance, &mut observer);
             if let Some(handler) = handler {

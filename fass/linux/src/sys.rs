@@ -108,8 +108,15 @@ pub(crate) fn processors() -> Vec<u32> {
 
 /// Lets a thread run on one processor only.
 pub(crate) fn pin(thread: ThreadId, processor: u32) -> io::Result<()> {
+    confine(thread, &[processor])
+}
+
+/// Lets a thread run on these processors only.
+pub(crate) fn confine(thread: ThreadId, processors: &[u32]) -> io::Result<()> {
     let mut mask: Mask = [0; 128];
-    mask[(processor / 64) as usize % 128] = 1 << (processor % 64);
+    for processor in processors {
+        mask[(processor / 64) as usize % 128] |= 1 << (processor % 64);
+    }
     // SAFETY: the kernel reads as many bytes as the mask has.
     let result = unsafe { sched_setaffinity(thread.0, size_of::<Mask>(), mask.as_ptr()) };
     checked(result)

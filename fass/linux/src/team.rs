@@ -1,4 +1,4 @@
-//! The workers of a run, and how one goes from an instance to the next.
+//! The workers of a cluster, and how one goes from an instance to the next.
 //!
 //! A worker calls functions in place: from a completion that hands its core the next
 //! instance, the same thread goes on, without a switch, a wake or an allocation.
@@ -8,15 +8,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use sched_dag::HandOff;
 use sched_dag::journal::What;
+use sched_dag::{ClusterId, HandOff};
 
 use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
-use crate::parked::Left;
-use crate::requests::{Request, Requests};
-use crate::state::{Fault, Number, Runner, State};
+use crate::office::Office;
+use crate::state::{Fault, Left, Number, Runner, State};
 use crate::sys;
 use crate::worker::Worker;
 
@@ -30,49 +29,36 @@ pub(crate) fn with_own_worker<R>(look: impl FnOnce(&Worker) -> R) -> Option<R> {
     OWN.with_borrow(|own| own.as_ref().map(|(team, me)| look(&team.workers[*me])))
 }
 
-/// All that the threads of a run share.
+/// All that the threads of a cluster share.
 pub(crate) struct Team {
     state: Mutex<State>,
     pub(crate) workers: Box<[Worker]>,
     pub(crate) levels: Option<Levels>,
-    pub(crate) requests: Requests,
-    /// The number of the plan that runs.
-    pub(crate) plan: u64,
-    /// Changes whenever the release thread is to look at once.
-    pub(crate) alarm: AtomicU32,
+    pub(crate) cluster: ClusterId,
+    pub(crate) office: Arc<Office>,
     pub(crate) look_out: LookOut,
     /// When the release thread looks of its own accord.
     pub(crate) looks_at_ns: AtomicU64,
-    /// 1 when all jobs have ended.
-    pub(crate) over: AtomicU32,
     /// How many threads have begun.
     begun: AtomicU32,
     /// How often a completion gave its own core the next instance.
     pub(crate) hand_offs: AtomicU64,
     /// How often a worker was called, which is a wake of the kernel's.
     pub(crate) calls: AtomicU64,
-    /// Counts what the program has allocated so far.
-    count_allocations: fn() -> u64,
-    /// What it had when the run began; after the run, how much more it was in the end.
-    pub(crate) allocations: AtomicU64,
 }
 
 impl Team {
-    pub(crate) fn new(state: State, plan: u64, count_allocations: fn() -> u64) -> Self {
+    pub(crate) fn new(state: State, office: &Arc<Office>) -> Self {
         Self {
             workers: state.seats.iter().map(|_| Worker::default()).collect(),
             levels: state.levels,
-            requests: Requests::new(state.task_set.dags().len()),
-            plan,
-            alarm: AtomicU32::new(0),
+            cluster: state.cluster,
+            office: Arc::clone(office),
             look_out: LookOut::new(),
             looks_at_ns: AtomicU64::new(u64::MAX),
-            over: AtomicU32::new(0),
             begun: AtomicU32::new(0),
             hand_offs: AtomicU64::new(0),
             calls: AtomicU64::new(0),
-            count_allocations,
-            allocations: AtomicU64::new(0),
             state: Mutex::new(state),
         }
     }
@@ -80,10 +66,6 @@ impl Team {
     /// Takes the scheduler's lock. A panic under it would be ours, and was reported.
     pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(crate) fn is_over(&self) -> bool {
-        self.over.load(Ordering::Acquire) == 1
     }
 
     /// Says that a thread is ready for the run.
@@ -101,25 +83,6 @@ impl Team {
             }
             sys::wait(&self.begun, begun, None);
         }
-    }
-
-    /// Counts allocations from the last call on: for the run's begin and its end.
-    pub(crate) fn count_allocations(&self) {
-        let before = self.allocations.load(Ordering::Relaxed);
-        let now = (self.count_allocations)();
-        self.allocations.store(now - before, Ordering::Relaxed);
-    }
-
-    /// Leaves a request to the release thread.
-    pub(crate) fn request(&self, dag: sched_dag::DagId, request: Request) {
-        self.requests.leave(dag, request);
-        self.ring();
-    }
-
-    /// Makes the release thread look at once.
-    pub(crate) fn ring(&self) {
-        self.alarm.fetch_add(1, Ordering::Release);
-        sys::wake(&self.alarm, 1);
     }
 
     /// Works until all jobs have ended.
@@ -177,7 +140,7 @@ impl Team {
                 self.look_out.of_worker(core, next_ns)
             });
             let was_called = worker.wait_for_call(next_ns, lead);
-            if self.is_over() {
+            if self.office.is_over() {
                 break Woken::ToEnd;
             }
             if was_called {
@@ -356,7 +319,7 @@ impl Team {
         self.look_out.announce(next_ns);
         if LookOut::is_late(self.looks_at_ns.load(Ordering::SeqCst), next_ns) {
             self.looks_at_ns.store(next_ns, Ordering::SeqCst);
-            self.ring();
+            self.office.ring(self.cluster);
         }
     }
 }

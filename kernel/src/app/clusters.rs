@@ -3,13 +3,12 @@
 //! An app that does so depends on the kernel with the feature `clusters`. Without that an image
 //! has none of the code that divided cores need, and pays nothing for them.
 
-use alloc::vec::Vec;
-
-use crate::options::{Options, UsageError};
+use crate::options::UsageError;
 use executive::run::execution::{Division, set_division};
 use executive::run::platform::KERNEL;
 use fass::{Clusters, Platform};
 
+use super::division;
 use super::machine_handle::Machine;
 
 impl Machine {
@@ -48,7 +47,10 @@ impl Machine {
     /// }
     /// ```
     pub fn offer_clusters(&self) -> Result<(), UsageError> {
-        set_division(division(self.options())?);
+        match division::read(self.options())? {
+            Some(sizes) => self.divide(&sizes),
+            None => set_division(Division::ByCommit),
+        }
         Ok(())
     }
 
@@ -63,17 +65,4 @@ impl Machine {
     pub fn clusters(&self) -> Clusters {
         KERNEL.clusters()
     }
-}
-
-fn division(options: &Options<'_>) -> Result<Division, UsageError> {
-    if options.text("clusters") == Some("auto") {
-        return Ok(Division::ByCommit);
-    }
-    let sizes = options.numbers("clusters", 0..=u64::from(u32::MAX), &[])?;
-    let sizes = sizes.into_iter().map(u32::try_from);
-    let sizes: Vec<u32> = sizes.filter_map(Result::ok).collect();
-    Ok(Division::Into(match sizes.is_empty() {
-        true => Clusters::Undivided,
-        false => Clusters::Of(sizes),
-    }))
 }

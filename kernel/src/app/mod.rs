@@ -9,6 +9,8 @@ pub(crate) mod bound_verdict;
 mod calibration;
 #[cfg(feature = "clusters")]
 mod clusters;
+#[cfg(feature = "clusters")]
+mod division;
 pub(crate) mod ending;
 pub(crate) mod event;
 pub(crate) mod fault_verdict;

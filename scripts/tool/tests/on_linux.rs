@@ -78,6 +78,44 @@ fn fork_join_says_what_it_says_on_the_machine_and_its_trace_is_judged_and_drawn(
 }
 
 #[test]
+fn cores_are_divided_as_on_the_machine_and_the_trace_says_how() {
+    if linux_processors() < 2 {
+        return;
+    }
+    let (file, trace) = (fresh("divided.dag"), fresh("divided.log"));
+    for (cluster, clusters) in [(" cluster", "1,1"), ("", "auto")] {
+        // By the commit's own division one core does each of them, too.
+        let dag = |number: u32| {
+            let cluster = match cluster {
+                "" => String::new(),
+                stated => format!("{stated} {number}"),
+            };
+            format!("dag d{number} period 20ms{cluster}\nsubtask a wcet 12ms\nsubtask b wcet 1ms\n")
+        };
+        fs::write(&file, format!("{}{}end\n", dag(0), dag(1))).expect("a file of ours");
+        let said = succeed(&format!(
+            "run --dag {} --on linux --cores 2 --clusters {clusters} --jobs 5 --occupy hold \
+             --trace {}",
+            file.display(),
+            trace.display()
+        ));
+        let transcript = Transcript::read(&said);
+        assert_eq!(transcript.of_kind("dag_run").count(), 2, "{said}");
+        let written = fs::read_to_string(&trace).expect("it was written");
+        let model = Transcript::read(&written);
+        let begin = model.of_kind("trace_begin").next().expect("a trace");
+        assert!(begin.text.contains("\"clusters\":[1,1]"), "{}", begin.text);
+        let trace = trace.display();
+        succeed(&format!("check-trace --bound-us 5000000 {trace}"));
+    }
+}
+
+/// Returns how many processors this test may use.
+fn linux_processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+#[test]
 fn a_dag_file_is_run_and_a_graph_is_drawn() {
     let dot = fresh("on-linux.dot");
     let said = succeed(&format!(

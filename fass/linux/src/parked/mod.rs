@@ -16,16 +16,8 @@
 use sched_dag::journal::What;
 use sched_dag::{CoreId, Vertex};
 
-use crate::state::{Number, Runner, State};
+use crate::state::{Left, Number, Runner, State};
 use crate::worker::Worker;
-
-/// An instance that has finished, and is not reported yet.
-pub(crate) struct Left {
-    pub(crate) worker: Number,
-    pub(crate) runner: Box<Runner>,
-    /// When its function returned, on the clock.
-    pub(crate) finish_ns: u64,
-}
 
 impl State {
     /// Returns when the instance of a worker has ended whose function returned at a time. If it
@@ -89,6 +81,9 @@ impl State {
             let requests = &mut self.requests;
             let keep = &mut |request| requests.keep(request);
             runner.body.complete(finish_ns, keep);
+            // Those to other clusters are on their way then.
+            let (office, cluster) = (&self.office, self.cluster);
+            requests.give_away(|dag| office.send(cluster, dag));
         }
     }
 

@@ -56,7 +56,7 @@ impl Stage {
         dags[1].register_untyped_subtask(|_| (), urgent);
         dags[2].register_untyped_subtask(|_| (), attributes("first", 0));
         finish_create_dags(&dags).unwrap();
-        let team = HOST.take_launched().unwrap().team;
+        let team = HOST.take_launched().unwrap().teams.remove(0);
         drop((machine, right));
         team.workers.iter().for_each(|worker| worker.begin());
         let mut state = team.lock();

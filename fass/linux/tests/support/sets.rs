@@ -1,5 +1,5 @@
 //! Random sets of DAGs, with all that a run has to bear: preemption, overload, panics, exceeded
-//! budgets, and a thread that pauses, resumes and stops DAGs meanwhile.
+//! budgets, cores that are divided, and a thread that pauses, resumes and stops DAGs meanwhile.
 
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -46,6 +46,14 @@ pub(crate) fn run(machine: &Linux, random: &mut Random) -> (Run, u64) {
     let dags: Vec<Dag> = (0..1 + random.below(4))
         .map(|number| dag(number, random))
         .collect();
+    let sizes: &[u32] = match machine.cores() {
+        2 if random.one_in(2) => &[1, 1],
+        _ => &[],
+    };
+    machine.divide(sizes);
+    if !sizes.is_empty() {
+        dags.iter().for_each(|dag| _ = dag.cluster(random.small(2)));
+    }
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the set is sound");
     let control = machine.control().expect("it is committed");
     let meddler = meddle(control, dags.len() as u64, random.clone());

@@ -1,31 +1,35 @@
-//! Clusters, which Linux does not have: its cores are one.
+//! How an app divides the cores of Linux, or leaves that to the command line.
 
 use fass::Clusters;
 
+use super::division;
 use super::machine_handle::Machine;
 use crate::options::UsageError;
 
 impl Machine {
-    /// Divides nothing: a commit refuses a DAG in another cluster than 0.
-    pub const fn divide(&self, _sizes: &[u32]) {}
+    /// Divides the cores into clusters of so many each in the commits to come; no number: they
+    /// are not divided.
+    pub fn divide(&self, sizes: &[u32]) {
+        self.linux().divide(sizes);
+    }
 
-    /// Refuses the word `clusters`.
+    /// Leaves that to the command line's word `clusters`: numbers of cores, or `auto` for the
+    /// commit's own division.
     ///
     /// # Errors
     ///
-    /// If the word is given.
+    /// If the word is neither.
     pub fn offer_clusters(&self) -> Result<(), UsageError> {
-        self.options().text("clusters").map_or(Ok(()), |_| {
-            Err(UsageError::new(
-                "`clusters`: the cores of Linux are not divided; leave it out, or run the app on \
-                 the machine",
-            ))
-        })
+        match division::read(self.options())? {
+            Some(sizes) => self.linux().divide(&sizes),
+            None => self.linux().divide_by_commit(),
+        }
+        Ok(())
     }
 
-    /// Returns that they are not divided.
+    /// Returns how the cores are divided, unless the commit is to find that.
     #[must_use]
-    pub const fn clusters(&self) -> Clusters {
-        Clusters::Undivided
+    pub fn clusters(&self) -> Clusters {
+        self.linux().division()
     }
 }

@@ -89,6 +89,10 @@ impl Machine {
         self.module.get()
     }
 
+    pub(crate) const fn linux(&self) -> &Linux {
+        &self.linux
+    }
+
     /// Reports whether there is a file that the app has not asked for.
     pub(crate) fn has_spare_module(&self) -> bool {
         self.module.get().is_some() && !self.has_asked.get()

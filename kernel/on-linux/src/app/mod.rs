@@ -4,6 +4,8 @@
 #[path = "../../../src/app/bound_verdict.rs"]
 pub(crate) mod bound_verdict;
 mod clusters;
+#[path = "../../../src/app/division.rs"]
+mod division;
 #[path = "../../../src/app/ending.rs"]
 pub(crate) mod ending;
 pub(crate) mod ends;
