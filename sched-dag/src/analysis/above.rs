@@ -18,8 +18,8 @@ pub(super) trait Above {
         0
     }
 
-    /// Reports whether there are sums that tell about a window.
-    fn is_summed(&self, _window_ns: u64) -> bool {
+    /// Reports whether there are sums.
+    fn has_sums(&self) -> bool {
         false
     }
 

@@ -126,11 +126,12 @@ impl Other {
         (count, pieces.map(|piece| piece.value))
     }
 
-    /// Returns the workload on at most `cores` cores if the job waits for the whole window.
-    pub(super) fn while_waiting(&self, window_ns: u64, cores: usize) -> Piece {
-        let times = (window_ns, u64::MAX);
+    /// Returns the workload on at most `cores` cores, if that of each part is not clipped.
+    pub(super) fn unclipped(&self, cores: usize, of: impl Fn(&Workload) -> Piece) -> Piece {
         let count = cores.min(self.whole.len());
-        self.pieces(times, count, Some(self.of_chains(times)))[1]
+        let parts = self.chains.iter().chain(self.rest.get(count - 1));
+        let parts = parts.map(&of).fold(Piece::NONE, Piece::and);
+        of(&self.whole[count - 1]).least(parts)
     }
 
     /// Returns a window of which, as of all longer ones, a job up to a length may wait for as

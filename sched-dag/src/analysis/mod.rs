@@ -49,9 +49,8 @@
 //!   the result stays a bound, and an overflow is an error or "not proven".
 //! - *No recursion*, and every loop has a limit; a limit reached is "not
 //!   proven" ([`Reason::Limit`]), never a guess. Time is near linear in
-//!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks. In the number
-//!   of DAGs it is near linear where priorities do not interleave, and quadratic where each
-//!   may delay each other.
+//!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and in the number
+//!   of DAGs where workloads are added up, as [`answer()`] does.
 //! - *Evidence*: the property test in `tests/analysis` simulates thousands of
 //!   random sets and compares each observed response time with its bound.
 //!

@@ -82,7 +82,7 @@ impl Equations<'_> {
         let mut window = start_ns.max(start.unwrap_or(0)).max(waiting);
         while window <= self.limit_ns {
             *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
-            let mut by_sums = others.is_summed(window);
+            let mut by_sums = others.has_sums();
             let least = loop {
                 let forms = self.forms(others, window, by_sums);
                 let lacks = forms.map(|form| {

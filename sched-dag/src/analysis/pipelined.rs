@@ -49,8 +49,11 @@ use super::task::Task;
 use super::workload::Piece;
 
 /// The most evaluations of an equation's right-hand side in one analysis; a
-/// set that needs more is "not proven". Ordinary sets need tens.
+/// set that needs more is "not proven".
 pub(super) const STEP_LIMIT: u64 = 200_000;
+
+/// The same where that is more than the above, for each DAG. Ordinary sets need tens.
+pub(super) const STEPS_PER_DAG: u64 = 256;
 
 /// The most jobs of one DAG that a window may reach back over; a set that
 /// needs more (`R > 1024 T`) is "not proven".

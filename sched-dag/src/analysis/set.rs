@@ -22,22 +22,36 @@ use alloc::vec::Vec;
 use super::above::Above;
 use super::interference::{Clip, Other, Shape};
 use super::multi_path::{Equations, alone};
-use super::pipelined::{Figures, STEP_LIMIT, Unsolved};
+use super::pipelined::{Figures, STEP_LIMIT, STEPS_PER_DAG, Unsolved};
 use super::refusal::Refusal;
 use super::task::Task;
 use super::workload::Workload;
 
-/// What is above the next DAG of an order in which each may outrank those after it.
+/// The DAGs of an order with their bounds so far, and with sums of their workloads.
 pub(super) trait Front {
-    /// Returns the DAGs so far, or the first in the order of the commit that has no bound.
-    fn among(&self) -> Result<&dyn Above, usize>;
+    /// Reports whether each DAG may outrank those after it and no other.
+    fn goes_down(&self) -> bool;
 
-    /// Adds the next DAG of the order.
-    fn push(&mut self, set: &Set<'_>, dag: usize, response_ns: Option<u64>);
+    /// Returns those that may outrank a DAG, or the first of them in the order of the commit
+    /// that has no bound; with a limit only jobs that are due no later than that count.
+    ///
+    /// It knows of those before it in the order what was put since the last DAG of the order
+    /// was, and of those after it what was put until then.
+    fn among<'a>(
+        &'a self,
+        set: &'a Set<'a>,
+        dag: usize,
+        limit_ns: Option<u64>,
+    ) -> Result<Box<dyn Above + 'a>, usize>;
+
+    /// Takes the bound of a DAG; all are put in, in the order, and then again.
+    fn put(&mut self, set: &Set<'_>, dag: usize, response_ns: Option<u64>);
 }
 
-/// Makes a front before the first DAG of a set.
-pub(super) type NewFront = fn(&Set<'_>) -> Box<dyn Front>;
+/// Makes a front without bounds, by an order, by who may outrank whom, and by whether jobs count
+/// up to a deadline only.
+pub(super) type NewFront =
+    fn(&Set<'_>, &[usize], &dyn Fn(usize, usize) -> bool, bool) -> Box<dyn Front>;
 
 /// DAGs with what enters their equations.
 pub(super) struct Set<'a> {
@@ -104,8 +118,8 @@ impl<'a> Set<'a> {
         }
     }
 
-    /// Solves the equations, visiting the DAGs in `order` (of any sort; the
-    /// highest priority first is fastest).
+    /// Solves the equations, visiting the DAGs in `order`: of any sort where nothing is added up
+    /// (the highest priority first is fastest), else as [`front`](Self::front) has it.
     pub(super) fn solve(
         &self,
         order: &[usize],
@@ -116,31 +130,32 @@ impl<'a> Set<'a> {
             first_failing: None,
             failures: alloc::vec![None; self.tasks.len()],
         };
-        let mut steps = STEP_LIMIT;
-        if let Some(mut above) = self.above(order, &may_outrank) {
+        let mut steps = self.most_steps();
+        let mut front = self.front(order, &may_outrank, self.deadlines_limit);
+        let goes_down = front.as_ref().is_some_and(|front| front.goes_down());
+        if !goes_down {
+            self.put_all(&mut front, order, &solution.responses);
+        }
+        let mut is_done = false;
+        while !is_done {
+            is_done = true;
             for &dag in order {
-                if self.known[dag].is_none() {
-                    self.visit(dag, above.among(), &mut solution, &mut steps);
+                let before = solution.responses[dag];
+                if self.known[dag].is_none() && before.is_some() {
+                    let limit_ns = self.limit_ns(dag);
+                    let (bounds, front) = (&solution.responses, front.as_deref());
+                    let others = self.others(front, dag, limit_ns, bounds, &may_outrank);
+                    self.visit(dag, others, &mut solution, &mut steps);
                 }
-                above.push(self, dag, solution.responses[dag]);
-            }
-        } else {
-            let mut changed = true;
-            while changed {
-                changed = false;
-                for &dag in order.iter().filter(|&&dag| self.known[dag].is_none()) {
-                    if let before @ Some(_) = solution.responses[dag] {
-                        let others = self.interference(dag, &solution.responses, &may_outrank);
-                        let others = others.as_ref().map(|list| list as &dyn Above);
-                        let others = others.map_err(|&other| other);
-                        self.visit(dag, others, &mut solution, &mut steps);
-                        changed |= solution.responses[dag] != before;
-                    }
+                let after = solution.responses[dag];
+                is_done &= goes_down || after == before;
+                if let Some(front) = &mut front {
+                    front.put(self, dag, after);
                 }
             }
         }
         if let Some((_, Unsolved::Limit)) = solution.first_failing
-            && let Ok(coarse) = self.down_from_deadlines(&may_outrank)
+            && let Ok(coarse) = self.down_from_deadlines(order, &may_outrank)
         {
             solution.responses = coarse.into_iter().map(Some).collect();
             solution.first_failing = None;
@@ -154,14 +169,14 @@ impl<'a> Set<'a> {
     fn visit(
         &self,
         dag: usize,
-        others: Result<&dyn Above, usize>,
+        others: Result<Box<dyn Above + '_>, usize>,
         solution: &mut Solution,
         steps: &mut u64,
     ) {
         let start_ns = solution.responses[dag].unwrap_or(0);
         let after = match others {
             Err(other) => Err(Failure::Other(other)),
-            Ok(others) => self.respond(dag, others, start_ns, steps).map_err(|why| {
+            Ok(others) => (self.respond(dag, &*others, start_ns, steps)).map_err(|why| {
                 solution.first_failing.get_or_insert((dag, why));
                 Failure::Own(why)
             }),
@@ -170,20 +185,61 @@ impl<'a> Set<'a> {
         solution.responses[dag] = after.ok();
     }
 
-    /// Returns an empty front if each DAG of an order may outrank those after it and no other,
-    /// and workloads shall be added up.
-    ///
-    /// It is enough to look at neighbours: a DAG has its most and its least urgent priority,
-    /// and the order is by the most urgent one.
-    pub(super) fn above(
+    /// Returns a front without bounds, if workloads shall be added up. Those that may outrank a
+    /// DAG must be the first of the order, but for itself; so they are in the order of their most
+    /// urgent priorities, and in any order if all may outrank all.
+    pub(super) fn front(
         &self,
         order: &[usize],
         may_outrank: impl Fn(usize, usize) -> bool,
+        deadlines_limit: bool,
     ) -> Option<Box<dyn Front>> {
         let front = self.front.filter(|_| self.clip == Clip::Chains)?;
-        let goes_down =
-            |pair: &[usize]| may_outrank(pair[0], pair[1]) && !may_outrank(pair[1], pair[0]);
-        order.windows(2).all(goes_down).then(|| front(self))
+        Some(front(self, order, &may_outrank, deadlines_limit))
+    }
+
+    /// Tells a front all bounds.
+    pub(super) fn put_all(
+        &self,
+        front: &mut Option<Box<dyn Front>>,
+        order: &[usize],
+        responses: &[Option<u64>],
+    ) {
+        if let Some(front) = front {
+            order
+                .iter()
+                .for_each(|&dag| front.put(self, dag, responses[dag]));
+        }
+    }
+
+    /// Returns the DAGs that may outrank `dag`, by a front or one by one, or the first of these
+    /// that has no bound; with a limit only jobs that are due no later than that count.
+    pub(super) fn others<'s>(
+        &'s self,
+        front: Option<&'s (dyn Front + 's)>,
+        dag: usize,
+        limit_ns: Option<u64>,
+        responses: &[Option<u64>],
+        may_outrank: impl Fn(usize, usize) -> bool,
+    ) -> Result<Box<dyn Above + 's>, usize> {
+        match front {
+            Some(front) => front.among(self, dag, limit_ns),
+            None => {
+                let each = self.interference_up_to(dag, limit_ns, responses, may_outrank);
+                Ok(Box::new(each?))
+            }
+        }
+    }
+
+    /// Returns how often all equations together may be evaluated.
+    fn most_steps(&self) -> u64 {
+        STEP_LIMIT.max(STEPS_PER_DAG * self.tasks.len() as u64)
+    }
+
+    /// Returns the deadline up to which others' jobs count for a DAG's, if there is one.
+    fn limit_ns(&self, dag: usize) -> Option<u64> {
+        let deadline_ns = self.tasks[dag].relative_deadline_ns();
+        self.deadlines_limit.then_some(deadline_ns)
     }
 
     /// Returns the least response time of a DAG among others, if it is at least `start_ns`.
@@ -228,22 +284,26 @@ impl<'a> Set<'a> {
     /// comes near it. From there it goes down, as long as steps are left.
     pub(super) fn down_from_deadlines(
         &self,
+        order: &[usize],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Result<Vec<u64>, (usize, Unsolved)> {
-        let mut steps = STEP_LIMIT;
+        let mut steps = self.most_steps();
         let mut bounds: Vec<u64> = (self.known.iter().zip(self.tasks))
             .map(|(known, task)| known.unwrap_or(task.relative_deadline_ns()))
             .collect();
+        let mut front = self.front(order, &may_outrank, self.deadlines_limit);
         let mut has_round = false;
         loop {
             let responses: Vec<Option<u64>> = bounds.iter().copied().map(Some).collect();
+            self.put_all(&mut front, order, &responses);
             let lower = (0..self.tasks.len()).map(|dag| {
                 if let Some(known) = self.known[dag] {
                     return Ok(known);
                 }
-                let others = self.interference(dag, &responses, &may_outrank);
+                let (limit_ns, front) = (self.limit_ns(dag), front.as_deref());
+                let others = self.others(front, dag, limit_ns, &responses, &may_outrank);
                 let others = others.map_err(|_| (dag, Unsolved::Limit))?;
-                let response = self.respond(dag, &others, 0, &mut steps);
+                let response = self.respond(dag, &*others, 0, &mut steps);
                 response.map_err(|why| (dag, why))
             });
             match lower.collect::<Result<Vec<u64>, _>>() {
@@ -264,9 +324,7 @@ impl<'a> Set<'a> {
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Result<Vec<Other>, usize> {
-        let deadline_ns = self.tasks[dag].relative_deadline_ns();
-        let limit_ns = self.deadlines_limit.then_some(deadline_ns);
-        self.interference_up_to(dag, limit_ns, responses, may_outrank)
+        self.interference_up_to(dag, self.limit_ns(dag), responses, may_outrank)
     }
 
     /// Does the same; with a limit only jobs that are due no later than that count.

@@ -14,7 +14,10 @@
 //! a deadline no later count:
 //!
 //! - `N = max(0, (D_k - D) / T + 1)` (floor),
-//! - `WE = N V + min(V, p max(0, D_k - N T - (D - R)))`.
+//! - `WE = N V + min(V, p max(0, D_k - N T - (D - R)))`,
+//!
+//! which is the second line above with `A = p (D_k - D + R)`, if that is not below 0: so what
+//! counts in a window is that line with the smaller of both areas.
 //!
 //! Where sinks have deadlines of their own, `D` is the least of them and may be less than
 //! `R`: a job counts as soon as one of its subtasks may win, and then as a whole. The
@@ -91,14 +94,20 @@ impl Workload {
     ///
     /// Only for tasks with a relative deadline no longer than the period.
     pub(super) fn under_edf(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
-        let (own, other) = (u128::from(own_deadline_ns), u128::from(deadline_ns));
-        let jobs = other
-            .checked_sub(own)
-            .map_or(0, |gap| gap / self.period + 1);
-        let carried_in = (other + self.response).saturating_sub(own + jobs * self.period);
-        let carried = self.volume.min(self.parallelism * carried_in);
-        self.ceiling = Some(jobs.saturating_mul(self.volume).saturating_add(carried));
+        self.ceiling = Some(self.due(own_deadline_ns, deadline_ns).value);
         self
+    }
+
+    /// Returns that limit, and how it goes on for later deadlines than this one.
+    pub(super) fn due(&self, own_deadline_ns: u64, deadline_ns: u64) -> Piece {
+        let (own, other) = (u128::from(own_deadline_ns), u128::from(deadline_ns));
+        match (other + self.response).checked_sub(own) {
+            Some(time) => self.packed(self.parallelism * time),
+            None => Piece {
+                span: Some(own - other - self.response),
+                ..Piece::NONE
+            },
+        }
     }
 
     /// Returns the workload in a window.
@@ -143,9 +152,13 @@ impl Workload {
     fn lane(&self, window: u128) -> Piece {
         let area = self.parallelism * (window + self.response);
         // A job's volume fits into its response time.
-        let packed = area - self.volume;
+        self.packed(area - self.volume)
+    }
+
+    /// Returns what of an area is executed that has one job a period, packed to its beginning.
+    fn packed(&self, area: u128) -> Piece {
         let pitch = self.parallelism * self.period;
-        let (jobs, rest) = (packed / pitch, packed % pitch);
+        let (jobs, rest) = (area / pitch, area % pitch);
         let whole = jobs.saturating_mul(self.volume);
         if rest < self.volume {
             let piece = Piece {
@@ -229,6 +242,13 @@ impl Piece {
         }
     }
 
+    /// Returns this piece no further than it is sure to go on.
+    pub(super) fn up_to(self, span: u64) -> Self {
+        let span = u128::from(span);
+        let span = Some(self.span.map_or(span, |own| own.min(span)));
+        Self { span, ..self }.or_one_flat_step()
+    }
+
     /// Replaces an empty piece by a step of 1 ns without growth: never more
     /// than the workload, which never falls.
     fn or_one_flat_step(self) -> Self {
@@ -275,6 +295,27 @@ mod tests {
         assert_eq!(in_two.at(1000).value, 12);
         let in_one = Workload::new(&two, 11, 14, 2, 2).under_edf(20, 10);
         assert_eq!(in_one.at(1000).value, 8);
+    }
+
+    #[test]
+    fn the_limit_of_edf_is_the_one_that_is_published() {
+        for (response, own) in [(5, 9), (9, 9), (7, 4), (6, 6)] {
+            let task = Task::new(9, 9, vec![2, 3, 5], &[(0, 1)]).unwrap();
+            for parallelism in 1..4 {
+                let workload = Workload::new(&task, 10, response, parallelism, 3);
+                let volume = 10.min(parallelism * response);
+                for other in 0..60 {
+                    let jobs = if other < own {
+                        0
+                    } else {
+                        (other - own) / 9 + 1
+                    };
+                    let carried_in = (other + response).saturating_sub(jobs * 9 + own);
+                    let limit = jobs * volume + volume.min(parallelism * carried_in);
+                    assert_eq!(workload.due(own, other).value, u128::from(limit));
+                }
+            }
+        }
     }
 
     #[test]

@@ -70,7 +70,7 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
     answer_by(task_set, settings, Some(front))
 }
 
-/// Answers the same as [`answer`] by 6 KB of code less, in time quadratic in the number of
+/// Answers the same as [`answer`] by less code, in time quadratic in the number of
 /// DAGs: for images, which have little room and few DAGs.
 #[must_use]
 pub fn answer_compact(task_set: &TaskSet, settings: &Settings) -> Answer {

@@ -16,6 +16,7 @@
 //! which holds for all of them. The sink finishes no later than its job: the smaller of
 //! both bounds is taken. Evidence: `accepted_sets_keep_their_bounds` observes sinks, too.
 
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -43,14 +44,19 @@ pub(super) fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Opt
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
     let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
-    let mut above = case.set.above(&case.order, may_outrank);
+    let deadlines_limit = case.settings.policy == Policy::Edf
+        && case.relation.preemption != Mixture::Some
+        && constrained(case.tasks, case.settings.cores);
+    let mut front = case.set.front(&case.order, may_outrank, deadlines_limit);
+    case.set.put_all(&mut front, &case.order, &responses);
     for &dag in &case.order {
         if let Some(whole_ns) = responses[dag] {
-            let front = above.as_ref().map(|above| above.among());
-            bounds[case.members[dag]] = of_dag(case, dag, whole_ns, front, &responses);
-        }
-        if let Some(above) = &mut above {
-            above.push(&case.set, dag, responses[dag]);
+            let others = |deadline_ns| {
+                let limit_ns = deadlines_limit.then_some(deadline_ns);
+                let front = front.as_deref();
+                (case.set).others(front, dag, limit_ns, &responses, may_outrank)
+            };
+            bounds[case.members[dag]] = of_dag(case, dag, whole_ns, others);
         }
     }
     for (dag, &number) in case.members.iter().enumerate() {
@@ -78,20 +84,16 @@ fn is_certain(reason: Option<Reason>) -> bool {
     reason.is_some_and(|reason| reason.is_certain())
 }
 
-/// Returns the bounds of a DAG's sinks that their own equations give.
-fn of_dag(
+/// Returns the bounds of a DAG's sinks that their own equations give, among others that
+/// depend on the sink's deadline.
+fn of_dag<'a>(
     case: &Case<'_>,
     dag: usize,
     whole_ns: u64,
-    front: Option<Result<&dyn Above, usize>>,
-    responses: &[Option<u64>],
+    others: impl Fn(u64) -> Result<Box<dyn Above + 'a>, usize>,
 ) -> Vec<Option<u64>> {
     let (set, model) = (&case.set, case.dag(dag));
     let (policy, preemption) = (case.settings.policy, case.relation.preemption);
-    let deadlines_limit = policy == Policy::Edf
-        && preemption != Mixture::Some
-        && constrained(case.tasks, case.settings.cores);
-    let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
     let reaches = reaches(set.tasks[dag], model, policy, preemption);
     let sinks = model.sinks().iter().zip(reaches);
     let bound = sinks.map(
@@ -103,17 +105,9 @@ fn of_dag(
             },
         )| {
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
-            let limit_ns = deadlines_limit.then_some(deadline_ns);
-            let each;
-            let others: &dyn Above = match front {
-                Some(front) => front.ok()?,
-                None => {
-                    each = set.interference_up_to(dag, limit_ns, responses, may_outrank);
-                    each.as_ref().ok()?
-                }
-            };
+            let others = others(deadline_ns).ok()?;
             let figures = set.figures[dag].of_sink(length_ns, volume_ns, deadline_ns, whole_ns);
-            figures.solve(others, 0, &mut { STEP_LIMIT }).ok()
+            figures.solve(&*others, 0, &mut { STEP_LIMIT }).ok()
         },
     );
     bound.collect()
