@@ -259,6 +259,7 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
 }
 
 /// A file of ours, removed when it is of no more use.
+#[derive(Debug)]
 pub(crate) struct Temporary(pub(crate) Option<PathBuf>);
 
 impl Drop for Temporary {

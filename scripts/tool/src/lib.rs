@@ -38,6 +38,7 @@ pub mod output;
 pub mod bench;
 pub mod child;
 pub mod dag_file;
+pub mod debian;
 pub mod dot;
 pub mod efi;
 pub mod elf;

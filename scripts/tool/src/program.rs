@@ -29,6 +29,23 @@ pub fn run(
     limit: Duration,
     show: &mut impl FnMut(&str),
 ) -> Result<Outcome, String> {
+    run_for(program, words, stdin, log, limit, show, ExitStatus::code)
+}
+
+/// Works like [`run`], where `code` tells from the program's end the exit code of what it runs.
+///
+/// # Errors
+///
+/// As [`run`].
+pub fn run_for(
+    program: &Path,
+    words: &[OsString],
+    stdin: Stdio,
+    log: &Path,
+    limit: Duration,
+    show: &mut impl FnMut(&str),
+    code: impl FnOnce(&ExitStatus) -> Option<i32>,
+) -> Result<Outcome, String> {
     let place = log.display();
     let file = File::create(log)
         .map_err(|error| format!("cannot write `{place}`: {error}; name a file elsewhere"))?;
@@ -46,7 +63,7 @@ pub fn run(
     let serial = String::from_utf8_lossy(&bytes).into_owned();
     let transcript = Transcript::read(&serial);
     let ending = match waited {
-        Waited::Ended(status) => ending_of(status, &transcript),
+        Waited::Ended(status) => ending_of(status, code(&status), &transcript),
         Waited::TimedOut | Waited::GivenUp => Ending::Program(format!(
             "no end within {} s, the program was killed; {}; `--timeout SECONDS` gives it longer",
             limit.as_secs(),
@@ -64,9 +81,9 @@ pub fn run(
     })
 }
 
-fn ending_of(status: ExitStatus, transcript: &Transcript) -> Ending {
+fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> Ending {
     let has_verdict = transcript.of_kind("verdict").next().is_some();
-    match status.code().filter(|_| has_verdict) {
+    match code.filter(|_| has_verdict) {
         Some(0) => Ending::Guest(Status::Success),
         Some(1) => Ending::Guest(Status::Failure),
         Some(2) => Ending::Guest(Status::Usage),
@@ -89,7 +106,8 @@ mod tests {
     fn without_a_verdict_no_exit_code_counts() {
         let verdict = "{\"kind\":\"verdict\",\"status\":\"success\"}\n";
         let of = |wait_status, text| {
-            ending_of(ExitStatus::from_raw(wait_status), &Transcript::read(text))
+            let status = ExitStatus::from_raw(wait_status);
+            ending_of(status, status.code(), &Transcript::read(text))
         };
         assert_eq!(of(0, verdict), Ending::Guest(Status::Success));
         assert_eq!(of(2 << 8, verdict), Ending::Guest(Status::Usage));

@@ -208,12 +208,34 @@ fn what_is_wrong_has_the_exit_code_and_the_line_that_it_has_on_the_machine() {
         (
             "run --app fork-join --on linux --mode threads",
             2,
-            "`--mode` is for the bare machine; leave it or `--on linux` out",
+            "`--mode` is not for `--on linux`; leave it out, or give `--on debian`",
         ),
     ] {
         let output = tool(words);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(code), "{words}: {said}");
         assert!(said.contains(says), "{words}: {said}");
+    }
+}
+
+/// That the guest says success means that the policy was there until the program's end, and not after.
+#[test]
+#[ignore = "fetches 145 MB of Debian's; `cargo test -p tool --test on_linux -- --ignored` runs it"]
+fn in_a_guest_both_mechanisms_keep_the_rules() {
+    for mechanism in ["fifo", "sched_ext"] {
+        let trace = fresh(&format!("in-guest-{mechanism}.log"));
+        let trace = trace.display();
+        let said = succeed(&format!(
+            "run --on debian --mechanism {mechanism} --app fork-join --subtasks 2,4,6 --longest 5 \
+             --jobs 10 --trace {trace}"
+        ));
+        let transcript = Transcript::read(&said);
+        let lines: Vec<_> = transcript.of_kind("fork_join").collect();
+        assert_eq!(lines.len(), 3, "{said}");
+        for line in lines {
+            assert_eq!(line.number_at("joins"), Some(10), "{}", line.text);
+            assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+        }
+        succeed(&format!("check-trace --bound-us 5000000 {trace}"));
     }
 }

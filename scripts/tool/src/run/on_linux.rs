@@ -1,39 +1,68 @@
 //! `run --on linux`: the app as a program of this computer, built, started, shown and judged as
-//! a guest is.
+//! a guest is. With `--on debian` it is a program of Debian's Linux, in QEMU.
 
 use std::ffi::OsString;
 use std::process::Stdio;
 use std::thread;
+use std::time::Duration;
 
 use super::{Booted, Refusal, limit, prove, seeing, table, wire, written};
 use crate::dag_file::Prepared;
+use crate::debian::{Guest, Order};
 use crate::image;
 use crate::options::Parsed;
 use crate::program;
+use crate::qemu::{Ending, Mode};
 
 use super::handed::Handed;
 use super::log::Log;
 use super::screen::Screen;
 
 /// The options that are about QEMU, its guest, or what the kernel alone does.
-const FOREIGN: [&str; 11] = [
-    "boot", "console", "gdb", "image", "latest", "machine", "memory", "mode", "qemu", "record",
-    "replay",
+const FOREIGN: [&str; 10] = [
+    "boot", "console", "gdb", "image", "latest", "machine", "memory", "qemu", "record", "replay",
 ];
+
+/// Those of the rest that a guest has no way for, and those that only a guest has.
+const NOT_IN_GUEST: [&str; 2] = ["input", "output"];
+const ONLY_IN_GUEST: [&str; 2] = ["mode", "busy"];
+
+/// How much longer a guest may take: Linux has to start.
+const START: Duration = Duration::from_secs(120);
 
 /// Reports whether the options ask for Linux.
 pub(super) fn is_asked_for(options: &Parsed) -> bool {
-    options.text("on") == Some("linux")
+    options.text("on") == Some("linux") || is_in_guest(options)
+}
+
+/// Reports whether that Linux is a guest's.
+fn is_in_guest(options: &Parsed) -> bool {
+    options.text("on") == Some("debian")
 }
 
 /// Refuses what there is not on Linux, and settles how many cores there are.
 pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
+    let given = |names: &[&'static str]| names.iter().copied().find(|name| options.is_given(name));
     if !is_asked_for(options) {
-        return Ok(options.clone());
+        return match given(&["mechanism", "busy"]) {
+            None => Ok(options.clone()),
+            Some(name) => Err(Refusal::Usage(format!(
+                "`--{name}` is for Linux; leave it out, or give `--on linux` or `--on debian`"
+            ))),
+        };
     }
-    let foreign = FOREIGN.into_iter().find(|name| options.is_given(name));
-    if let Some(name) = foreign {
-        let line = format!("`--{name}` is for the bare machine; leave it or `--on linux` out");
+    let on = options.text("on").unwrap_or_default();
+    if let Some(name) = given(&FOREIGN) {
+        let line = format!("`--{name}` is for the bare machine; leave it or `--on {on}` out");
+        return Err(Refusal::Usage(line));
+    }
+    let (others, place) = match is_in_guest(options) {
+        true => (&NOT_IN_GUEST, "linux"),
+        false => (&ONLY_IN_GUEST, "debian"),
+    };
+    if let Some(name) = given(others) {
+        let line =
+            format!("`--{name}` is not for `--on {on}`; leave it out, or give `--on {place}`");
         return Err(Refusal::Usage(line));
     }
     if options.is_given("input") && !wire::is_live(options) {
@@ -44,10 +73,16 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     if options.is_given("cores") {
         return Ok(options.clone());
     }
+    if is_in_guest(options) {
+        return Ok(options.with("cores", GUEST_CORES));
+    }
     let usual = options.number("cores").unwrap_or(1);
     let there = thread::available_parallelism().map_or(1, |count| count.get() as u64);
     Ok(options.with("cores", usual.min(there).to_string()))
 }
+
+/// How many processors a guest has if nobody says.
+const GUEST_CORES: &str = "4";
 
 /// Builds the app's program, and runs it as the options say.
 pub(super) fn run_app(
@@ -74,7 +109,27 @@ pub(super) fn run_app(
     let built = image::build_linux(app);
     let image = built.map_err(|error| Refusal::Failure(error.to_string()))?;
     let mut screen = Screen::new(options, &image.path);
-    introduce(&screen, app, &words, options);
+    let mode = options.text("mode").and_then(Mode::from_name);
+    let mode = mode.unwrap_or(Mode::Deterministic);
+    let guest = is_in_guest(options).then(|| {
+        let order = Order {
+            program: &image.path,
+            words: &words,
+            with_policy: options.text("mechanism") == Some("sched_ext"),
+            busy: options.number("busy").unwrap_or(0),
+            mode,
+            cores: options.number("cores").unwrap_or(1),
+        };
+        Guest::new(&order, &log.path).map_err(Refusal::Failure)
+    });
+    let guest = guest.transpose()?;
+    introduce(
+        &screen,
+        app,
+        &words,
+        options,
+        guest.is_some().then_some(mode),
+    );
     let mut show = |line: &str| {
         if shows {
             let translated = dags.and_then(|dags| dags.translate(line));
@@ -86,9 +141,20 @@ pub(super) fn run_app(
         true => Stdio::inherit(),
         false => Stdio::null(),
     };
-    let outcome = program::run(&image.path, &words, stdin, &log.path, limit, &mut show);
+    let outcome = match &guest {
+        None => program::run(&image.path, &words, stdin, &log.path, limit, &mut show),
+        Some(guest) => {
+            let (limit, stdin) = (limit + START, Stdio::null());
+            let (qemu, words) = (&guest.program, &guest.words);
+            let code = |_: &_| guest.code();
+            program::run_for(qemu, words, stdin, &log.path, limit, &mut show, code)
+        }
+    };
     screen.end();
-    let outcome = outcome.map_err(Refusal::Failure)?;
+    let mut outcome = outcome.map_err(Refusal::Failure)?;
+    if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {
+        *why = format!("{why}; the guest's last words:\n{}", guest.said());
+    }
     written::say_trace(&screen, options);
     Ok(Booted {
         outcome,
@@ -98,18 +164,42 @@ pub(super) fn run_app(
 }
 
 /// Says which program is run, and what its times are worth.
-fn introduce(screen: &Screen, app: &str, words: &[OsString], options: &Parsed) {
+fn introduce(
+    screen: &Screen,
+    app: &str,
+    words: &[OsString],
+    options: &Parsed,
+    guest: Option<Mode>,
+) {
     let words: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
     screen.say(&format!("app {app}, words: {}", words.join(" ")));
     let cores = options.number("cores").unwrap_or(1);
+    if let Some(mode) = guest {
+        screen.say(&format!(
+            "on Debian's Linux in QEMU, mode {mode}, {cores} cores"
+        ));
+        screen.say(&format!("time: {}\n", meaning(mode)));
+        return;
+    }
     screen.say(&format!("on Linux, {cores} cores of this computer"));
     screen.say("time: real nanoseconds on real cores, whatever else this computer does\n");
+}
+
+/// Says what a time of a guest's is worth.
+fn meaning(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Deterministic => {
+            "two instructions are one virtual nanosecond, idle time is skipped, busy processors \
+             take turns"
+        }
+        other => other.meaning(),
+    }
 }
 
 /// Returns the program's words.
 fn words(options: &Parsed, dags: Option<&Prepared>) -> Vec<OsString> {
     let mut words = Vec::new();
-    for name in ["cores"].iter().chain(table::GUEST_WORDS) {
+    for name in ["cores", "mechanism"].iter().chain(table::GUEST_WORDS) {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
@@ -137,7 +227,7 @@ mod tests {
             ),
             (
                 "--on linux --mode threads",
-                "`--mode` is for the bare machine; ",
+                "`--mode` is not for `--on linux`; leave it out, or give `--on debian`",
             ),
             (
                 "--on linux --console",
@@ -146,6 +236,14 @@ mod tests {
             (
                 "--on linux --replay x",
                 "`--replay` is for the bare machine; ",
+            ),
+            (
+                "--on debian --output x",
+                "`--output` is not for `--on debian`; leave it out, or give `--on linux`",
+            ),
+            (
+                "--mechanism fifo",
+                "`--mechanism` is for Linux; leave it out, or give ",
             ),
             (
                 "--on linux --input x",

@@ -39,17 +39,28 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         .or("fork-join"),
         Opt::new(
             "on",
-            Takes::OneOf(&["machine", "linux"]),
-            "Where it runs: on the bare machine in QEMU, or as a program of this computer, see \
-             docs/linux.md.",
+            Takes::OneOf(&["machine", "linux", "debian"]),
+            "Where it runs: on the bare machine in QEMU, as a program of this computer, or as one \
+             of Debian's Linux in QEMU, see docs/linux.md.",
         )
         .or("machine"),
         Opt::new(
             "cores",
             Takes::number(1..=MOST_CORES),
-            "Processors of the guest; with --on linux no more than this computer has.",
+            "Processors of the guest, 4 with --on debian; with --on linux no more than this \
+             computer has.",
         )
         .or("8"),
+        Opt::new(
+            "mechanism",
+            Takes::OneOf(&["fifo", "sched_ext", "normal"]),
+            "On Linux: what carries the order out, see docs/linux.md; fifo if nothing is said.",
+        ),
+        Opt::new(
+            "busy",
+            Takes::number(0..=64),
+            "With --on debian: so many programs compute next to it.",
+        ),
         Opt::new(
             "jobs",
             Takes::number(0..=1_000_000),

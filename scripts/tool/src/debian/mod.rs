@@ -1,0 +1,224 @@
+//! A Linux of Debian's in QEMU, for programs of ours that need another kernel than this
+//! computer's: one with `sched_ext`, or one that grants SCHED_FIFO.
+//!
+//! Kernel and tools are Debian's packages (`packages`). What the guest has of files is in an
+//! archive that the kernel unpacks into memory (`archive`): the program, the libraries that it
+//! names, and a script that runs it. What it prints comes through a port of its own, as bytes
+//! and at any speed; its exit code through another one, into a file.
+
+mod archive;
+mod packages;
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::files::Temporary;
+use crate::install;
+use crate::lasting::Lasting;
+use crate::qemu::{Mode, PROGRAM};
+use crate::system;
+use archive::Archive;
+use packages::Packages;
+
+/// What the guest runs first, and all that it runs besides the program.
+const INIT: &str = include_str!("init.sh");
+
+/// The policy of `sched_ext`, as source.
+const POLICY: &str = "fass/linux/bpf/seats.bpf.c";
+
+/// Memory of a guest, in MiB.
+const MEMORY_MIB: u64 = 1024;
+
+/// A program to run in a guest.
+#[derive(Debug)]
+pub struct Order<'a> {
+    /// The program.
+    pub program: &'a Path,
+    /// Its words. One that begins with `module=` names a file of ours.
+    pub words: &'a [OsString],
+    /// Whether the policy is loaded before.
+    pub with_policy: bool,
+    /// How many programs compute next to it.
+    pub busy: u64,
+    /// What time means there.
+    pub mode: Mode,
+    /// The guest's processors.
+    pub cores: u64,
+}
+
+/// A guest that can be started: QEMU, and what it is told.
+#[derive(Debug)]
+pub struct Guest {
+    /// QEMU.
+    pub program: PathBuf,
+    /// Its words.
+    pub words: Vec<OsString>,
+    /// What the kernel and the script say.
+    console: PathBuf,
+    /// The program's exit code.
+    end: Temporary,
+    _archive: Temporary,
+}
+
+impl Guest {
+    /// Gets what the guest takes, compiles the policy if it is wanted, and makes the archive. The
+    /// guest's own files lie next to `log`.
+    ///
+    /// # Errors
+    ///
+    /// In words: something cannot be had, or the policy does not compile.
+    pub fn new(order: &Order<'_>, log: &Path) -> Result<Guest, String> {
+        install::ensure_qemu()?;
+        let packages = Packages::get()?;
+        let own = system::new_log("debian")?;
+        let place = |kind: &str| Temporary(Some(own.with_extension(kind)));
+        let (archive, end) = (place("cpio"), place("end"));
+        let console = log.with_extension("console");
+        let files = order.pack(&packages)?;
+        write(&own.with_extension("cpio"), files.finish())?;
+        write(&own.with_extension("end"), Vec::new())?;
+        let mut words: Vec<OsString> = Vec::new();
+        let accelerator: &[&str] = match order.mode {
+            Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
+            // Two instructions of Linux's a nanosecond are nearer to a PC than one.
+            Mode::Deterministic => &["-icount", "shift=1,sleep=off", "-cpu", "max"],
+            Mode::Threads => &["-accel", "tcg,thread=multi", "-cpu", "max"],
+        };
+        words.extend(accelerator.iter().map(OsString::from));
+        // Not by standard output: the port would be closed with the end of standard input.
+        for (port, path) in [("out", log), ("end", &own.with_extension("end"))] {
+            let file = file(&format!("file,id={port},path="), path);
+            words.extend(["-chardev".into(), file]);
+        }
+        let fixed = "-machine q35 -nodefaults -display none -no-reboot \
+                     -device virtio-serial-pci \
+                     -device virtserialport,nr=1,chardev=out \
+                     -device virtserialport,nr=2,chardev=end -append";
+        words.extend(fixed.split_whitespace().map(OsString::from));
+        words.push("console=ttyS0 quiet panic=-1".into());
+        for (option, value) in [
+            ("-smp", order.cores.to_string().into()),
+            ("-m", MEMORY_MIB.to_string().into()),
+            ("-kernel", packages.kernel.clone().into()),
+            ("-initrd", own.with_extension("cpio").into()),
+            ("-serial", file("file:", &console)),
+        ] {
+            words.extend([option.into(), value]);
+        }
+        Ok(Guest {
+            program: PROGRAM.into(),
+            words,
+            console,
+            end,
+            _archive: archive,
+        })
+    }
+
+    /// Returns the program's exit code; `None` if it has none: the guest did not get so far, or
+    /// Linux has ended the policy before the program's end.
+    #[must_use]
+    pub fn code(&self) -> Option<i32> {
+        let end = self.end.0.as_ref()?;
+        fs::read_to_string(end).ok()?.trim().parse().ok()
+    }
+
+    /// Returns the last lines of what the guest itself has said, and where all of it is.
+    #[must_use]
+    pub fn said(&self) -> String {
+        let bytes = fs::read(&self.console).unwrap_or_default();
+        let text = String::from_utf8_lossy(&bytes);
+        let lines: Vec<&str> = text.lines().rev().take(12).collect();
+        let lines: Vec<&str> = lines.into_iter().rev().map(str::trim_end).collect();
+        format!(
+            "{}\nits console: {}",
+            lines.join("\n"),
+            self.console.display()
+        )
+    }
+}
+
+impl Order<'_> {
+    /// Packs what the guest needs of files.
+    fn pack(&self, packages: &Packages) -> Result<Archive, String> {
+        let mut archive = Archive::default();
+        let mut words = Vec::new();
+        for word in self.words {
+            match word.to_str().and_then(|word| word.strip_prefix("module=")) {
+                Some(module) => {
+                    archive.add("module", &read(Path::new(module))?);
+                    words.push("module=/module".to_owned());
+                }
+                None => words.push(word.to_string_lossy().into_owned()),
+            }
+        }
+        archive.add("init", INIT.as_bytes());
+        archive.add("words", words.join("\n").as_bytes());
+        archive.add("busy", self.busy.to_string().as_bytes());
+        archive.add(
+            "bin/busybox",
+            &read(&packages.root.join("usr/bin/busybox"))?,
+        );
+        archive.add("program", &read(self.program)?);
+        let mut programs = vec![self.program.to_path_buf()];
+        if self.with_policy {
+            let bpftool = packages.root.join("usr/sbin/bpftool");
+            archive.add("bin/bpftool", &read(&bpftool)?);
+            archive.add("policy.o", &compile(packages)?);
+            programs.push(bpftool);
+        }
+        archive.add("lib64/ld-linux-x86-64.so.2", &read(&packages.loader())?);
+        for library in packages.libraries(&programs)? {
+            if let Some(name) = library.file_name().and_then(|name| name.to_str()) {
+                archive.add(&format!("lib/x86_64-linux-gnu/{name}"), &read(&library)?);
+            }
+        }
+        for folder in ["proc", "sys", "dev", "tmp"] {
+            archive.folder(folder);
+        }
+        Ok(archive)
+    }
+}
+
+/// Compiles the policy.
+fn compile(packages: &Packages) -> Result<Vec<u8>, String> {
+    let _lasting = Lasting::new("compiling the policy");
+    let object = system::new_log("policy")?.with_extension("o");
+    let object = Temporary(Some(object));
+    let place = object.0.as_deref().unwrap_or(Path::new(""));
+    let mut clang = packages.command("usr/lib/llvm-19/bin/clang");
+    clang.args("-target bpf -mcpu=v3 -O2 -g -Wall -Werror -D__TARGET_ARCH_x86 -c".split(' '));
+    clang.arg("-I").arg(packages.root.join("usr/include"));
+    clang.arg(system::workspace().join(POLICY));
+    run(clang.arg("-o").arg(place))?;
+    read(place)
+}
+
+/// Runs a command to its end, and returns what it has printed.
+fn run(command: &mut Command) -> Result<String, String> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let output = command.output();
+    let output = output.map_err(|why| format!("`{name}` did not start: {why}"))?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        false => Err(format!(
+            "`{name}` failed ({}): {}",
+            output.status,
+            String::from_utf8_lossy(&output.stderr).trim()
+        )),
+    }
+}
+
+/// A file as a value of QEMU's options, in which a comma is doubled.
+fn file(before: &str, path: &Path) -> OsString {
+    format!("{before}{}", path.to_string_lossy().replace(',', ",,")).into()
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    fs::read(path).map_err(|why| format!("cannot read `{}`: {why}", path.display()))
+}
+
+fn write(path: &Path, bytes: Vec<u8>) -> Result<(), String> {
+    fs::write(path, bytes).map_err(|why| format!("cannot write `{}`: {why}", path.display()))
+}
