@@ -185,3 +185,15 @@ fn hundreds_of_cores_are_served() {
         assert_eq!(scheduler.running(CoreId(core)), Some(instance(0, 0, core)));
     }
 }
+
+#[test]
+fn an_idle_core_that_the_driver_prefers_is_taken_first() {
+    // Core 1 would be; core 2 is taken if it is preferred, and a busy one is not.
+    for (preferred, taken) in [(0, 1), (1, 1), (2, 2)] {
+        let mut scheduler = preempted_at_2(3);
+        let mut moment = scheduler.at(2);
+        moment.prefer(CoreId(preferred));
+        let decisions = moment.release_due(&mut ()).dispatch();
+        assert_eq!(decisions, [start(taken, instance(1, 0, 0))]);
+    }
+}

@@ -4,8 +4,10 @@
 //! `linux::Linux`, once by a plain program: four threads at the same level of SCHED_FIFO,
 //! pinned, with a mutex and a condition variable at each edge. Both are measured by their
 //! functions: from the last branch's last act to the sink's first, and from the nominal release
-//! to the source's first act. The turns alternate, first with the computer as it is, then with one
-//! busy loop (of no level) for each processor.
+//! to the source's first act. The two take turns of half a second, so that both have what else the
+//! computer does, first with the computer as it is, then with one busy loop (of no level) for each
+//! processor. The threads of the plain program change processors from turn to turn, since
+//! interrupts mostly come to one; a DAG's source may begin on any.
 //!
 //! ```console
 //! # cargo run --release -p linux --example latency
@@ -20,8 +22,8 @@ use std::time::{Duration, Instant};
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::{Linux, Mechanism};
 
-const JOBS: usize = 400;
-const TURNS: usize = 3;
+const JOBS: usize = 100;
+const TURNS: usize = 24;
 const PERIOD: Duration = Duration::from_millis(5);
 const WORK: Duration = Duration::from_micros(300);
 /// The level at which the machine's workers are.
@@ -138,12 +140,13 @@ impl Edge {
 }
 
 /// Puts the calling thread at the level, on a processor.
-fn settle(processor: &str) {
+fn settle(processor: usize) {
     let link = std::fs::read_link("/proc/thread-self").expect("Linux has it");
     let thread = link.file_name().expect("it names a thread").to_owned();
+    let processor = processor.to_string();
     for words in [
         &["chrt", "-f", "-p", LEVEL][..],
-        &["taskset", "-pc", processor],
+        &["taskset", "-pc", &processor],
     ] {
         let mut command = Command::new(words[0]);
         command.args(&words[1..]).arg(&thread).stdout(Stdio::null());
@@ -152,13 +155,13 @@ fn settle(processor: &str) {
     }
 }
 
-/// The same by four threads.
-fn by_threads() -> [Vec<u64>; 2] {
+/// The same by four threads, of which source and sink are on a processor.
+fn by_threads(first: usize) -> [Vec<u64>; 2] {
     let stamps = Stamps::new();
     let edges: Arc<[Edge; 4]> = Arc::default();
     let begin = stamps.origin + Duration::from_millis(200);
     let mut threads = Vec::new();
-    for (number, processor) in [(0, "0"), (1, "1")] {
+    for (number, processor) in [(0, first), (1, 1 - first)] {
         let (stamps, edges) = (Arc::clone(&stamps), Arc::clone(&edges));
         threads.push(thread::spawn(move || {
             settle(processor);
@@ -172,7 +175,7 @@ fn by_threads() -> [Vec<u64>; 2] {
     }
     let (of_sink, ends) = (Arc::clone(&stamps), Arc::clone(&edges));
     threads.push(thread::spawn(move || {
-        settle("0");
+        settle(first);
         for job in 0..JOBS {
             ends[2].wait_for(job);
             ends[3].wait_for(job);
@@ -181,7 +184,7 @@ fn by_threads() -> [Vec<u64>; 2] {
     }));
     let of_source = Arc::clone(&stamps);
     threads.push(thread::spawn(move || {
-        settle("0");
+        settle(first);
         let mut release = begin;
         for job in 0..JOBS {
             thread::sleep(release.saturating_duration_since(Instant::now()));
@@ -222,10 +225,13 @@ fn main() {
             .collect();
         let mut found = [const { Vec::new() }; 4];
         let mut violations = 0;
-        for _ in 0..TURNS {
+        for turn in 0..TURNS {
             let (ours, wrong) = by_dag();
             violations += wrong;
-            for (all, new) in found.iter_mut().zip(ours.into_iter().chain(by_threads())) {
+            for (all, new) in found
+                .iter_mut()
+                .zip(ours.into_iter().chain(by_threads(turn % 2)))
+            {
                 all.extend(new);
             }
         }

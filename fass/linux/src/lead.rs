@@ -7,16 +7,23 @@
 
 /// The lead that a thread gives itself, learnt from how late it woke up.
 ///
-/// It follows the delay that four of five do not exceed: a step up after a longer one, a quarter
+/// It follows the delay that 19 of 20 do not exceed: a step up after a longer one, a nineteenth
 /// of it down after a shorter one. So a rare long delay moves it no further than a usual one.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Lead {
     ns: u64,
 }
 
+impl Default for Lead {
+    /// Begins with what it takes where it takes long, so that the first wake-ups are in time, too.
+    fn default() -> Self {
+        Self { ns: 60_000 }
+    }
+}
+
 impl Lead {
-    /// By how much a shorter delay changes it, and a longer one four times.
-    const STEP_NS: u64 = 500;
+    /// By how much a shorter delay changes it, and a longer one nineteen times.
+    const STEP_NS: u64 = 250;
     /// How much of each period a thread watches the clock at most.
     const MOST_NS: u64 = 100_000;
 
@@ -29,7 +36,7 @@ impl Lead {
     pub(crate) fn learn(&mut self, alarm_ns: u64, woke_ns: u64) {
         let late_ns = woke_ns.saturating_sub(alarm_ns);
         self.ns = match late_ns > self.ns {
-            true => (self.ns + 4 * Self::STEP_NS).min(Self::MOST_NS),
+            true => (self.ns + 19 * Self::STEP_NS).min(Self::MOST_NS),
             false => self.ns.saturating_sub(Self::STEP_NS),
         };
     }
@@ -42,8 +49,8 @@ mod tests {
     #[test]
     fn it_follows_the_usual_delays_and_no_single_one() {
         let mut lead = Lead::default();
-        for wake in 0..200_u64 {
-            let late_ns = if wake % 10 == 0 { 5_000_000 } else { 30_000 };
+        for wake in 0..400_u64 {
+            let late_ns = if wake % 50 == 0 { 5_000_000 } else { 30_000 };
             lead.learn(0, late_ns);
         }
         assert!((25_000..=35_000).contains(&lead.ns), "{lead:?}");

@@ -9,15 +9,24 @@
 //! - those of the other idle cores a little later, in case the first was taken meanwhile;
 //! - the release thread last, or at the event if no core is idle. Then it preempts.
 //!
-//! The first that comes makes the step. The others find no event due and sleep on, without the
-//! scheduler's lock.
+//! The first that comes *claims* the event, makes the step, and is the first to be given something.
+//! The others leave the event to it, find none due when it is done, and sleep on, without the
+//! scheduler's lock. Did two come at once, the one that gets the lock would have to wake the other
+//! one before it could begin.
+//!
+//! The release thread is above all that compute, so it should not wake up when a job begins. If no
+//! core is idle it looks a little before the event, too: if one is by then, it sleeps on.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use sched_dag::CoreId;
 
-/// How much later than the one before it a thread looks.
+/// How much later than the one before it a thread looks, and for how long others leave an event to
+/// the one that has claimed it.
 const PATIENCE_NS: u64 = 15_000;
+
+/// How long before an event the release thread looks whether a core has become idle.
+const EARLY_NS: u64 = 200_000;
 
 /// What those that look out share.
 #[derive(Debug)]
@@ -28,6 +37,8 @@ pub(crate) struct LookOut {
     idle: AtomicU64,
     /// The core that has become idle last.
     last: AtomicU32,
+    /// Until when the next event is left to the thread that has claimed it.
+    claimed_until_ns: AtomicU64,
 }
 
 impl LookOut {
@@ -36,6 +47,7 @@ impl LookOut {
             next_ns: AtomicU64::new(u64::MAX),
             idle: AtomicU64::new(0),
             last: AtomicU32::new(0),
+            claimed_until_ns: AtomicU64::new(0),
         }
     }
 
@@ -43,6 +55,19 @@ impl LookOut {
     #[inline]
     pub(crate) fn announce(&self, next_ns: u64) {
         self.next_ns.store(next_ns, Ordering::SeqCst);
+        self.claimed_until_ns.store(0, Ordering::Release);
+    }
+
+    /// Claims the next event, which is due now, and reports whether no other thread has.
+    pub(crate) fn claim(&self, now_ns: u64) -> bool {
+        let before_ns = self.claimed_until_ns.load(Ordering::Acquire);
+        let until_ns = now_ns.saturating_add(PATIENCE_NS);
+        let (won, lost) = (Ordering::AcqRel, Ordering::Relaxed);
+        let word = &self.claimed_until_ns;
+        before_ns <= now_ns
+            && word
+                .compare_exchange(before_ns, until_ns, won, lost)
+                .is_ok()
     }
 
     /// Returns when the next event is.
@@ -70,21 +95,25 @@ impl LookOut {
     pub(crate) fn of_worker(&self, core: CoreId, next_ns: u64) -> u64 {
         let last = CoreId(self.last.load(Ordering::Relaxed));
         let is_idle = |bit| self.idle.load(Ordering::Relaxed) & bit != 0;
-        match bit(core) {
+        let own_ns = match bit(core) {
             None => u64::MAX,
             // The release thread ends the run.
             _ if next_ns == 0 => u64::MAX,
             Some(_) if core == last || !bit(last).is_some_and(is_idle) => next_ns,
             Some(_) => next_ns.saturating_add(PATIENCE_NS),
-        }
+        };
+        own_ns.max(self.claimed_until_ns.load(Ordering::Acquire))
     }
 
-    /// Returns when the release thread looks at an event.
-    pub(crate) fn of_release(&self, next_ns: u64) -> u64 {
-        match self.idle.load(Ordering::Relaxed) {
+    /// Returns when the release thread looks at an event, or whether a core has become idle.
+    pub(crate) fn of_release(&self, next_ns: u64, now_ns: u64) -> u64 {
+        let early_ns = next_ns.saturating_sub(EARLY_NS);
+        let own_ns = match self.idle.load(Ordering::Relaxed) {
+            0 if now_ns < early_ns && next_ns < u64::MAX => return early_ns,
             0 => next_ns,
             _ => next_ns.saturating_add(2 * PATIENCE_NS),
-        }
+        };
+        own_ns.max(self.claimed_until_ns.load(Ordering::Acquire))
     }
 
     /// Reports whether the release thread, which looks at `looks_at_ns`, would come too late for
@@ -106,12 +135,12 @@ mod tests {
     #[test]
     fn the_core_that_became_idle_last_looks_first_and_the_release_thread_last() {
         let look_out = LookOut::new();
-        assert_eq!(look_out.of_release(7), 7, "nobody else is there");
+        assert_eq!(look_out.of_release(7, 0), 7, "nobody else is there");
         look_out.rest(CoreId(1));
         look_out.rest(CoreId(0));
         assert_eq!(look_out.of_worker(CoreId(0), 7), 7);
         assert_eq!(look_out.of_worker(CoreId(1), 7), 7 + PATIENCE_NS);
-        assert_eq!(look_out.of_release(7), 7 + 2 * PATIENCE_NS);
+        assert_eq!(look_out.of_release(7, 0), 7 + 2 * PATIENCE_NS);
         assert!(!LookOut::is_late(7 + 2 * PATIENCE_NS, 7));
         look_out.leave(CoreId(0));
         assert_eq!(
@@ -120,10 +149,44 @@ mod tests {
             "the first one has work"
         );
         look_out.leave(CoreId(1));
-        assert_eq!(look_out.of_release(7), 7);
+        assert_eq!(look_out.of_release(7, 0), 7);
         look_out.rest(CoreId(70));
-        assert_eq!(look_out.of_release(7), 7, "it has no bit");
+        assert_eq!(look_out.of_release(7, 0), 7, "it has no bit");
         assert_eq!(look_out.of_worker(CoreId(70), 7), u64::MAX);
         assert_eq!(look_out.of_worker(CoreId(0), 0), u64::MAX);
+    }
+
+    #[test]
+    fn one_thread_makes_the_step_and_the_others_leave_it_to_that_one_for_a_while() {
+        let look_out = LookOut::new();
+        look_out.announce(1_000);
+        look_out.rest(CoreId(1));
+        look_out.rest(CoreId(0));
+        assert!(look_out.claim(1_000));
+        // It wakes up, and looks no more: without the claim the other one would come at once.
+        look_out.leave(CoreId(0));
+        assert!(!look_out.claim(1_001));
+        let until_ns = 1_000 + PATIENCE_NS;
+        assert_eq!(look_out.of_worker(CoreId(1), 1_000), until_ns);
+        assert!(look_out.of_release(1_000, 1_001) >= until_ns);
+        assert!(look_out.claim(until_ns), "the first one did not come");
+        look_out.announce(2_000);
+        assert!(look_out.claim(2_000), "another event");
+    }
+
+    #[test]
+    fn the_release_thread_does_not_wake_up_at_an_event_that_an_idle_core_sees_to() {
+        let (look_out, next_ns) = (LookOut::new(), 1_000_000);
+        let early_ns = look_out.of_release(next_ns, 0);
+        assert!(early_ns < next_ns, "all cores are busy yet");
+        assert_eq!(look_out.of_release(next_ns, early_ns), next_ns);
+        look_out.rest(CoreId(0));
+        assert_eq!(
+            look_out.of_release(next_ns, early_ns),
+            next_ns + 2 * PATIENCE_NS
+        );
+        assert_eq!(look_out.of_release(u64::MAX, 0), u64::MAX);
+        look_out.leave(CoreId(0));
+        assert_eq!(look_out.of_release(u64::MAX, 0), u64::MAX);
     }
 }

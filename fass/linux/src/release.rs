@@ -130,8 +130,9 @@ impl Team {
                 let until_ns = (looks_at_ns < u64::MAX).then_some(looks_at_ns);
                 sys::wait(alarm, seen, until_ns);
             }
-            let due_ns = self.look_out.next_ns().min(budgets_ns);
-            if due_ns <= sys::now_ns() {
+            let now_ns = sys::now_ns();
+            let own_ns = self.look_out.of_release(self.look_out.next_ns(), now_ns);
+            if own_ns <= now_ns && self.look_out.claim(now_ns) || budgets_ns <= now_ns {
                 return;
             }
         }
@@ -142,7 +143,8 @@ impl Team {
     fn settle_look(&self, budgets_ns: u64) -> u64 {
         loop {
             let next_ns = self.look_out.next_ns();
-            let looks_at_ns = self.look_out.of_release(next_ns).min(budgets_ns);
+            let own_ns = self.look_out.of_release(next_ns, sys::now_ns());
+            let looks_at_ns = own_ns.min(budgets_ns);
             self.looks_at_ns.store(looks_at_ns, Ordering::SeqCst);
             if self.look_out.next_ns() == next_ns {
                 return looks_at_ns;
@@ -158,9 +160,11 @@ impl Team {
         rests: &mut bool,
     ) -> Option<u64> {
         if sys::now_ns() < state.epoch_ns {
-            // What is asked for before time 0 is done then.
+            // What is asked for before time 0 is done then. The workers look out from now on.
             self.look_out.announce(state.epoch_ns);
-            return Some(u64::MAX);
+            let active = state.active.iter();
+            active.for_each(|worker| self.workers[*worker].call());
+            return Some(state.epoch_ns);
         }
         let mut letters = 0;
         state.step(&self.workers, |moment, mut observer| {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use sched_dag::journal::What;
-use sched_dag::{ClusterId, HandOff};
+use sched_dag::{ClusterId, HandOff, Moment, Observer};
 
 use crate::lead::Lead;
 use crate::level::{Levels, Role};
@@ -114,8 +114,13 @@ impl Team {
                 }
                 Woken::ByTime => {
                     let mut state = self.lock();
-                    state.step(&self.workers, |_, _| ());
-                    match state.seats[me] {
+                    let core = state.seats[me];
+                    // The others' workers may still sleep.
+                    let prefer = |moment: &mut Moment<'_>, _: &mut dyn Observer| {
+                        core.into_iter().for_each(|core| moment.prefer(core));
+                    };
+                    state.step(&self.workers, prefer);
+                    match core {
                         Some(_) => self.go_on(me, state),
                         None => None,
                     }
@@ -149,7 +154,8 @@ impl Team {
             // The event may have been seen to, or another one is to look first.
             let next_ns = self.look_out.next_ns();
             let own_ns = core.map_or(u64::MAX, |core| self.look_out.of_worker(core, next_ns));
-            if own_ns <= sys::now_ns() {
+            let now_ns = sys::now_ns();
+            if own_ns <= now_ns && self.look_out.claim(now_ns) {
                 break Woken::ByTime;
             }
         };

@@ -2,7 +2,8 @@
 //!
 //! Idle cores form a stack: the core that has become idle last is taken first.
 //! The kernel asks for a dispatch on the core that has just completed, so the
-//! next instance in line starts there without an interrupt to another core.
+//! next instance in line starts there without an interrupt to another core. A driver
+//! that knows of a core that is awake says so ([`Cores::prefer`]).
 //!
 //! The core to be preempted first is looked for among all cores when there is
 //! need. That is rare: when no core is idle and something has become ready that
@@ -79,6 +80,13 @@ impl Cores {
         let place = self.idle.iter().rposition(|&idle| idle == core);
         let place = place.expect("the core that is to go on has to be idle");
         self.idle.remove(place);
+    }
+
+    /// Makes a core, if it is idle, the next one that is taken.
+    pub(super) fn prefer(&mut self, core: CoreId) {
+        if let Some(place) = self.idle.iter().rposition(|&idle| idle == core) {
+            self.idle[place..].rotate_left(1);
+        }
     }
 
     /// Gives a core, which is not among the idle ones, an instance.

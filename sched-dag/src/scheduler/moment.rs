@@ -1,7 +1,7 @@
 //! One instant, in the order that its types force.
 
 use super::{Decision, Observer, Scheduler};
-use crate::ids::{DagId, Instance, to_u32};
+use crate::ids::{CoreId, DagId, Instance, to_u32};
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]
@@ -129,6 +129,12 @@ impl<'s> Moment<'s> {
     /// If there is no such DAG, or it is not sporadic.
     pub fn signal(&mut self, dag: DagId, observer: &mut impl Observer) {
         self.scheduler.signal(dag, observer);
+    }
+
+    /// Makes a core, if it is idle, the first that is given an instance, instead of the one that
+    /// has become idle last: for drivers that know of one that is awake.
+    pub fn prefer(&mut self, core: CoreId) {
+        self.scheduler.cores.prefer(core);
     }
 
     /// Releases the jobs that are due, and notices deadlines that have passed.
