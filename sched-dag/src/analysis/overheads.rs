@@ -11,7 +11,8 @@
 //!   preempting one's second switch.
 //!
 //! Not covered: timer interrupts, caches refilled after a preemption, bus
-//! contention. Measure WCETs with these in them.
+//! contention. Measure WCETs with these in them. `docs/proving.md` has the argument for
+//! the charges, and the step of it that is not proven.
 
 use crate::law::Costs;
 use crate::policy::Preemption;
