@@ -109,7 +109,9 @@ A round draws a random set of 3 to 8 DAGs of 3 to 12 subtasks, whose execution
 times are random too, and runs it for the time of a round. Checked are: rules R1
 to R5, by the guest from its record and by the host from the trace; every job
 completed, skipped or aborted, as the overrun policy allows; no allocation while
-jobs run; heap and stacks as before. The last line is `N passed, M failed`, in
+jobs run; heap and stacks as before. Then it prints how many DAGs had which
+combination of policy, overrun policy, division of the cores, fault, restart and
+pause; one that no DAG had is `never`. The last line is `N passed, M failed`, in
 rounds; a failure is printed with the command that runs its round again.
 
 exit codes: 0 no round failed; 1 some did; 2 a refused command line
@@ -215,6 +217,10 @@ fn conclude(report: &Report) -> ExitCode {
         println!("{}", figures.row(name));
     }
     println!("{}", report.total.row("all"));
+    println!(
+        "DAGs by what happened to them:\n{}",
+        report.coverage.table()
+    );
     for line in &report.failures {
         println!("{line}");
     }

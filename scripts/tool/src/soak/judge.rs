@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use super::coverage::Coverage;
 use super::figures::Figures;
 use super::plan::Boot;
 use crate::outcome::Outcome;
@@ -16,6 +17,8 @@ use crate::protocol::MachineLine;
 pub(super) struct Judged {
     /// The figures of the rounds that left any.
     pub(super) figures: Figures,
+    /// What happened to their DAGs.
+    pub(super) coverage: Coverage,
     /// What is wrong, by round.
     pub(super) failures: BTreeMap<u64, Vec<String>>,
 }

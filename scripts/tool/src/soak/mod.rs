@@ -7,9 +7,11 @@
 //!
 //! - `plan`: which rounds, in which boots;
 //! - `judge`, `figures`: what became of a boot's rounds;
+//! - `coverage`: which combinations they came across;
 //! - `command`: the command line.
 
 mod command;
+mod coverage;
 mod figures;
 mod judge;
 pub mod plan;
@@ -31,6 +33,7 @@ use judge::{Judged, judge};
 use plan::{Boot, Part, Plan};
 
 pub use command::soak;
+pub use coverage::Coverage;
 pub use figures::Figures;
 
 /// The guest's memory, up to a quarter of which is for journals.
@@ -43,6 +46,8 @@ pub struct Report {
     pub parts: Vec<(String, Figures)>,
     /// Of all parts.
     pub total: Figures,
+    /// What can happen to a DAG, and how often it did.
+    pub coverage: Coverage,
     /// A line for each thing that is wrong, with the command that shows it again.
     pub failures: Vec<String>,
     /// The rounds in which nothing is wrong.
@@ -169,6 +174,7 @@ impl Report {
             figures.add(&judged.figures);
         }
         self.total.add(&judged.figures);
+        self.coverage.add(&judged.coverage);
         for (round, reasons) in &judged.failures {
             for reason in reasons {
                 self.failures

@@ -26,7 +26,10 @@ pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64, judged: &
     for round in boot.first..boot.first + boot.rounds {
         let position = usize::try_from(round - boot.first + 1).unwrap_or(usize::MAX);
         match runs.get(position) {
-            Some(run) => judge_run(run, round, bound_ns, judged),
+            Some(run) => {
+                judged.coverage.add_run(run);
+                judge_run(run, round, bound_ns, judged);
+            }
             None => judged.fail(round, "it has no trace".into()),
         }
     }
