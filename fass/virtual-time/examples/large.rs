@@ -1,0 +1,93 @@
+//! What large typed chains cost in virtual time: their commit, and an instance.
+//!
+//! Chains of 100 to 100,000 subtasks have a `u64` on each edge. Of the commit the whole is
+//! measured, from the registered functions to bodies that can run: verification, answer,
+//! slots. Of the instances, what a job takes from the source's function to the sink's: the
+//! scheduler, the journal, the values and the surroundings of a function. The
+//! first job is also the first to touch what the commit has made.
+//!
+//! A host that does other work takes its processor away from each of the large ones, and from
+//! hardly one of the small ones; so on such a host the former seem to be dearer. With
+//! `cargo run --release -p virtual-time --example large 1000` one size is measured alone.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use virtual_time::VirtualTime;
+
+const SUBTASKS: [u32; 4] = [100, 1_000, 10_000, 100_000];
+
+/// How many instances are run, at least.
+const INSTANCES: u32 = 200_000;
+
+fn main() {
+    let wanted = std::env::args().nth(1);
+    println!(
+        "subtasks: commit, ns a subtask; first job, later ones: least, median, ns an instance"
+    );
+    for subtasks in SUBTASKS {
+        if wanted
+            .as_ref()
+            .is_none_or(|wanted| *wanted == subtasks.to_string())
+        {
+            measure(subtasks);
+        }
+    }
+}
+
+fn measure(subtasks: u32) {
+    let jobs = (INSTANCES / subtasks).max(3);
+    let machine = VirtualTime::new();
+    let ends = Arc::new(Mutex::new(Vec::with_capacity(2 * jobs as usize)));
+    let dag = chain(subtasks, jobs, &ends);
+    let start = Instant::now();
+    finish_create_dags(&[dag]).expect("the chain is right");
+    let commit = each(start.elapsed(), subtasks);
+    machine.run();
+    let ends = ends.lock().unwrap_or_else(PoisonError::into_inner);
+    let of_jobs = ends.chunks_exact(2);
+    let mut of_jobs = of_jobs.map(|ends| each(ends[1] - ends[0], subtasks - 1));
+    let first = of_jobs.next().expect("each job has a source and a sink");
+    let mut later: Vec<f64> = of_jobs.collect();
+    later.sort_unstable_by(f64::total_cmp);
+    let (least, median) = (later[0], later[later.len() / 2]);
+    println!("{subtasks}: {commit:.0}; {first:.0}, {least:.0}, {median:.0}");
+}
+
+fn each(time: Duration, count: u32) -> f64 {
+    time.as_secs_f64() * 1e9 / f64::from(count)
+}
+
+/// Makes a chain whose source and sink note when they are called.
+fn chain(subtasks: u32, jobs: u32, ends: &Arc<Mutex<Vec<Instant>>>) -> Dag {
+    let end = || {
+        let ends = Arc::clone(ends);
+        move || {
+            let mut ends = ends.lock().unwrap_or_else(PoisonError::into_inner);
+            ends.push(Instant::now());
+        }
+    };
+    let period = Duration::from_secs(1);
+    let named = |number: u32| SubtaskAttributes::named(&format!("s{number}"));
+    let topic = |number: u32| format!("t{number}");
+    let dag = create_dag();
+    dag.name("large").jobs(jobs.into()).in_flight(1);
+    let (begin, finish) = (end(), end());
+    let source = move || {
+        execute_for(Duration::from_nanos(1), Occupation::Spin);
+        begin();
+        (1u64,)
+    };
+    let sink = subtasks - 1;
+    dag.register_periodic_subtask(source, vec!["t0"], period, named(0));
+    for number in 1..sink {
+        let (input, output) = (topic(number - 1), topic(number));
+        let body = |(value,): (u64,)| (value + 1,);
+        dag.register_subtask(body, vec![&input], vec![&output], named(number));
+    }
+    let input = topic(sink - 1);
+    let last = move |_: (u64,)| finish();
+    dag.register_sink_subtask(last, vec![&input], period, named(sink));
+    dag
+}
