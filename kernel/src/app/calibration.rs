@@ -3,8 +3,9 @@
 //! Their functions do next to nothing, so what passes between their instances is the platform's.
 //! In each period an instance is at work on every core when ten DAGs are released at one instant:
 //! one step releases all of them, and preempts an instance on every core. One of the ten forks to
-//! 16 subtasks and joins, one is a chain, the others have one subtask each. Then the preempted
-//! instances go on. All have budgets, so that each dispatch sets an alarm.
+//! 16 subtasks and joins, one is a chain, the others have one subtask each. Four more are due
+//! while the step has interrupts disabled, and so are released late. Then the preempted instances
+//! go on. All have budgets, so that each dispatch sets an alarm.
 //!
 //! Steps are the longer, the more becomes ready at once. What an app has more of than this is
 //! what the margin is for.
@@ -32,6 +33,9 @@ const INTO_IT: Duration = Duration::from_micros(100);
 const WIDE: usize = 16;
 const LONG: usize = 16;
 const AT_ONCE: usize = 8;
+/// How many are due while that is being decided, and how far from each other.
+const DURING_IT: u32 = 4;
+const APART: Duration = Duration::from_micros(2);
 /// Nothing comes near it.
 const BUDGET: Duration = Duration::from_secs(10);
 /// Time for the cores to get ready.
@@ -70,8 +74,10 @@ fn dags() -> Vec<Dag> {
         long.precede(&last, &next);
         last = next;
     }
-    let singles = (0..AT_ONCE).map(|_| {
-        let single = dag(INTO_IT, PERIOD);
+    let at_once = (0..AT_ONCE).map(|_| Duration::ZERO);
+    let during = (1..=DURING_IT).map(|number| APART * number);
+    let singles = at_once.chain(during).map(|later| {
+        let single = dag(INTO_IT + later, PERIOD);
         urgent(&single);
         single
     });
