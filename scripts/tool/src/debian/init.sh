@@ -11,6 +11,8 @@ finish() {
 	$b poweroff -f
 }
 $b sysctl -q -w kernel.sched_rt_runtime_us=-1
+# A kernel that has just started is late by tens of milliseconds for some seconds.
+$b sleep 3
 if [ -f /policy.o ]; then
 	$b mount -t bpf none /sys/fs/bpf
 	bpftool struct_ops register /policy.o || finish refused
