@@ -3,7 +3,6 @@
 use harness::Guest;
 use sched_dag::journal::What;
 use tool::Outcome;
-use tool::protocol::Status;
 
 fn number(outcome: &Outcome, kind: &str, name: &str) -> u64 {
     let mut lines = outcome.transcript.of_kind(kind);
@@ -13,8 +12,18 @@ fn number(outcome: &Outcome, kind: &str, name: &str) -> u64 {
 
 #[test]
 fn functions_pause_and_resume_a_dag_and_shut_the_run_down() {
-    for cores in [1, 2, 4] {
-        let guest = Guest::new("guest-tests").word("test=lifecycle");
+    lifecycle("test=lifecycle", &[1, 2, 4]);
+}
+
+#[test]
+fn requests_reach_other_clusters() {
+    lifecycle("test=lifecycle_divided", &[2]);
+    modes("test=modes_divided", &[2]);
+}
+
+fn lifecycle(test: &str, cores: &[u64]) {
+    for &cores in cores {
+        let guest = Guest::new("guest-tests").word(test);
         let outcome = guest.cores(cores).word("trace=dump").succeed();
         let number = |name| number(&outcome, "lifecycle", name);
         assert_eq!(number("violations"), 0);
@@ -40,8 +49,12 @@ fn functions_pause_and_resume_a_dag_and_shut_the_run_down() {
 
 #[test]
 fn modes_are_entered_at_once_and_when_what_leaves_is_idle() {
-    for cores in [1, 4] {
-        let guest = Guest::new("guest-tests").word("test=modes");
+    modes("test=modes", &[1, 4]);
+}
+
+fn modes(test: &str, cores: &[u64]) {
+    for &cores in cores {
+        let guest = Guest::new("guest-tests").word(test);
         let outcome = guest.cores(cores).word("trace=dump").succeed();
         assert_eq!(number(&outcome, "modes", "violations"), 0);
         assert_eq!(number(&outcome, "modes", "allocations"), 0);
@@ -75,12 +88,4 @@ fn modes_are_entered_at_once_and_when_what_leaves_is_idle() {
         let turns = entered.iter().enumerate();
         assert!(turns.clone().all(|(turn, mode)| turn % 2 == *mode));
     }
-}
-
-#[test]
-fn where_cores_are_divided_such_dags_are_refused() {
-    let guest = Guest::new("guest-tests").word("test=lifecycle_divided");
-    let outcome = guest.cores(2).end_in(Status::Failure);
-    let expected = "the cores are divided, and a subtask pauses DAGs, enters modes or ends the run";
-    assert!(outcome.serial.contains(expected), "{}", outcome.tail());
 }

@@ -9,11 +9,13 @@
 //!
 //! A cluster whose DAGs are over *rests*, and a signal may set it going again. The run is over when
 //! all of them rest and no letter is on its way. Both are one count, of *reasons to go on*: a
-//! letter adds to it before it can be taken, while its writer has not come to rest.
+//! cluster for which there are letters adds to it as one that does not rest, and the writer of a
+//! letter has not come to rest when it has added that.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
+use sched_dag::lifecycle::{self, Letters};
 use sched_dag::{ClusterId, DagId, Moment, Observer, TaskSet};
 
 use crate::level::Levels;
@@ -28,8 +30,9 @@ pub(crate) struct Office {
     pub(crate) levels: Option<Levels>,
     task_set: Arc<TaskSet>,
     requests: Requests,
+    pub(crate) letters: Letters,
     doors: Box<[Door]>,
-    /// How many clusters do not rest, and how many letters nobody has taken.
+    /// How many clusters do not rest, and how many have letters.
     reasons: AtomicU64,
     /// 1 when all jobs have ended.
     over: AtomicU32,
@@ -42,17 +45,25 @@ pub(crate) struct Office {
 struct Door {
     /// Changes whenever that is to look at once.
     alarm: AtomicU32,
+    /// Whether there may be letters.
+    has_letters: AtomicBool,
 }
 
 impl Office {
     /// Makes it for the clusters of a plan, none of which rests.
-    pub(crate) fn new(plan: u64, task_set: &Arc<TaskSet>, levels: Option<Levels>) -> Self {
+    pub(crate) fn new(
+        plan: u64,
+        task_set: &Arc<TaskSet>,
+        letters: Letters,
+        levels: Option<Levels>,
+    ) -> Self {
         let doors: Box<[Door]> = task_set.clusters().map(|_| Door::default()).collect();
         Self {
             plan,
             levels,
             task_set: Arc::clone(task_set),
             requests: Requests::new(task_set.dags().len()),
+            letters,
             reasons: AtomicU64::new(doors.len() as u64),
             doors,
             over: AtomicU32::new(0),
@@ -77,35 +88,40 @@ impl Office {
         self.ring(self.task_set.dag(dag).cluster());
     }
 
-    /// Sends a signal that a cluster raises, if the DAG is in another one, and reports whether it
-    /// is.
-    pub(crate) fn send(&self, from: ClusterId, dag: DagId) -> bool {
-        let cluster = self.task_set.dag(dag).cluster();
-        if cluster == from {
-            return false;
-        }
-        self.reasons.fetch_add(1, Ordering::AcqRel);
-        self.requests.leave_letter(dag);
-        self.ring(cluster);
-        true
+    /// Sends a request of one cluster's functions to the others that it concerns, and reports
+    /// whether it does not concern the cluster itself.
+    pub(crate) fn send(&self, from: ClusterId, request: lifecycle::Request) -> bool {
+        self.letters.send(from, request, |cluster| {
+            let has_letters = &self.doors[cluster.index()].has_letters;
+            if !has_letters.swap(true, Ordering::AcqRel) {
+                self.reasons.fetch_add(1, Ordering::AcqRel);
+            }
+            self.ring(cluster);
+        })
     }
 
-    /// Tells a cluster's scheduler all that is left for it, and returns how many letters that
-    /// were.
+    /// Reports whether a step of a cluster is to take letters, and that is a reason less to go on
+    /// once they are taken.
+    pub(crate) fn open(&self, cluster: ClusterId) -> bool {
+        let has_letters = &self.doors[cluster.index()].has_letters;
+        has_letters.load(Ordering::Relaxed) && has_letters.swap(false, Ordering::AcqRel)
+    }
+
+    /// Tells a cluster's scheduler all that was asked for from outside.
     pub(crate) fn serve(
         &self,
         cluster: ClusterId,
         moment: &mut Moment<'_>,
         observer: &mut impl Observer,
-    ) -> u64 {
+    ) {
         let is_here = |dag| self.task_set.dag(dag).cluster() == cluster;
-        self.requests.serve(is_here, moment, observer)
+        self.requests.serve(is_here, moment, observer);
     }
 
-    /// Takes note, after a step of a cluster's release thread, of the letters that it has taken,
-    /// and of whether all its DAGs are over. Reports whether the run is.
-    pub(crate) fn settle(&self, rests: &mut bool, is_finished: bool, letters: u64) -> bool {
-        let mut lost = letters;
+    /// Takes note, after a step of a cluster's release thread, of how often letters were taken, and
+    /// of whether all its DAGs are over. Reports whether the run is.
+    pub(crate) fn settle(&self, rests: &mut bool, is_finished: bool, opened: u64) -> bool {
+        let mut lost = opened;
         match (*rests, is_finished) {
             (true, false) => _ = self.reasons.fetch_add(1, Ordering::AcqRel),
             (false, true) => lost += 1,
@@ -136,6 +152,7 @@ impl Office {
 mod tests {
     use std::sync::Arc;
 
+    use sched_dag::lifecycle::{Request, divide};
     use sched_dag::{
         ClusterId, Clusters, CommitOptions, DagId, DagSpec, Policy, SubtaskSpec, verify,
     };
@@ -152,16 +169,18 @@ mod tests {
             ..DagSpec::default()
         };
         let options = CommitOptions::new(Policy::Edf, 2).with_clusters(Clusters::Of(vec![1, 1]));
-        let verified = verify(&[spec(0), spec(1)], &options).expect("it is right");
-        let office = Office::new(0, &Arc::new(verified.task_set), None);
+        let task_set = verify(&[spec(0), spec(1)], &options).expect("it is right");
+        let task_set = Arc::new(task_set.task_set);
+        let (letters, _) = divide(&task_set, None).expect("there are no modes");
+        let office = Office::new(0, &task_set, letters, None);
+        let [here, there] = [0, 1].map(ClusterId);
+        let signal = |dag| office.send(here, Request::Signal(DagId(dag)));
         let (mut first, mut second) = (false, false);
         assert!(!office.settle(&mut second, true, 0));
-        assert!(!office.send(ClusterId(0), DagId(0)), "it is its own");
-        assert!(office.send(ClusterId(0), DagId(1)));
-        assert!(
-            !office.settle(&mut first, true, 0),
-            "a letter is on its way"
-        );
+        assert!(!signal(0), "it is its own");
+        assert!(signal(1) && signal(1));
+        assert!(!office.settle(&mut first, true, 0), "there are letters");
+        assert!(office.open(there) && !office.open(there));
         assert!(!office.settle(&mut second, false, 1), "it goes on");
         assert!(office.settle(&mut second, true, 0));
     }

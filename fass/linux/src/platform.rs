@@ -7,7 +7,7 @@ use std::time::Duration;
 use fass::{
     Body, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
 };
-use sched_dag::lifecycle::Requests;
+use sched_dag::lifecycle::{self, Parts, Requests};
 use sched_dag::{Dag, DagId, Journal, OnFault, Scheduler, SchedulerOptions, TaskSet, Vertex};
 
 use crate::level::Levels;
@@ -184,13 +184,9 @@ impl Platform for Host {
         };
         let overhead_ns = terms.overheads.of_an_instance_ns(options.preemption);
         (terms.look_at_commit)(&plan, options, overhead_ns);
-        if plan.lifecycle.is_some() && plan.task_set.is_divided() {
-            return Err(LaunchError::new(
-                "the cores are divided, and a subtask pauses DAGs, enters modes or ends the run, \
-                 which reaches one cluster only; leave one of the two out",
-            ));
-        }
-        let office = Office::new(plan.number, &plan.task_set, terms.levels);
+        let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
+        let (letters, parts) = divided.map_err(LaunchError::new)?;
+        let office = Office::new(plan.number, &plan.task_set, letters, terms.levels);
         let office = Arc::new(office);
         if let Ok(mut place) = self.office.write() {
             *place = Some(Arc::clone(&office));
@@ -201,7 +197,7 @@ impl Platform for Host {
             options,
             budget_factor: terms.budget_factor,
             allocations: terms.allocations,
-            teams: teams(plan, options, &terms, &office),
+            teams: teams(plan, parts, options, &terms, &office),
             office,
         };
         let mut place = self.launched.lock().unwrap_or_else(PoisonError::into_inner);
@@ -212,7 +208,8 @@ impl Platform for Host {
 
 /// Makes what the threads of each cluster share.
 fn teams(
-    mut plan: Plan,
+    plan: Plan,
+    parts: Parts,
     options: SchedulerOptions,
     terms: &Terms,
     office: &Arc<Office>,
@@ -231,10 +228,10 @@ fn teams(
         );
     }
     let share = JOURNAL_BYTES / bodies.len();
-    let clusters = task_set.clusters().zip(bodies);
-    let team = |(cluster, bodies)| {
+    let clusters = task_set.clusters().zip(bodies).zip(parts);
+    let team = |((cluster, bodies), lifecycle)| {
         let cores = task_set.cores_of(cluster, options.cores);
-        let requests = Requests::new(dags, plan.lifecycle.take());
+        let requests = Requests::new(dags, lifecycle);
         let state = State::new(
             (cluster, office),
             Scheduler::of_cluster(Arc::clone(task_set), options, cluster),

@@ -166,9 +166,8 @@ impl Team {
             active.for_each(|worker| self.workers[*worker].call());
             return Some(state.epoch_ns);
         }
-        let mut letters = 0;
         state.step(&self.workers, |moment, mut observer| {
-            letters = self.office.serve(self.cluster, moment, &mut observer);
+            self.office.serve(self.cluster, moment, &mut observer);
         });
         let look_ns = loop {
             match budgets.look(self, state, sys::now_ns()) {
@@ -178,7 +177,8 @@ impl Team {
         };
         self.announce(state);
         let is_finished = state.scheduler.is_finished();
-        if !self.office.settle(rests, is_finished, letters) {
+        let opened = std::mem::take(&mut state.opened);
+        if !self.office.settle(rests, is_finished, opened) {
             if is_finished {
                 // This one rests.
                 self.look_out.announce(u64::MAX);

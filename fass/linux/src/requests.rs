@@ -4,8 +4,6 @@
 //! would lose its core with it. It leaves its request in a word for each DAG and wakes
 //! the release thread of the DAG's cluster, which serves it. What is asked for twice before that
 //! is done once.
-//!
-//! Signals from another cluster are *letters*: they are counted, so that each is a signal.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -31,18 +29,11 @@ pub(crate) enum Request {
 
 /// The requests that have not been served, by DAG.
 #[derive(Debug)]
-pub(crate) struct Requests(Box<[Left]>);
-
-/// What is left for one DAG.
-#[derive(Debug, Default)]
-struct Left {
-    bits: AtomicU32,
-    letters: AtomicU32,
-}
+pub(crate) struct Requests(Box<[AtomicU32]>);
 
 impl Requests {
     pub(crate) fn new(dags: usize) -> Self {
-        Self((0..dags).map(|_| Left::default()).collect())
+        Self((0..dags).map(|_| AtomicU32::new(0)).collect())
     }
 
     /// Leaves one. Of a pause and a resumption the later one counts.
@@ -54,39 +45,22 @@ impl Requests {
             Request::Stop => (STOP, 0),
         };
         let change = |bits: u32| Some(bits & !instead_of | bit);
-        let bits = &self.0[dag.index()].bits;
         // The change never refuses.
-        let _ = bits.fetch_update(Ordering::Release, Ordering::Relaxed, change);
+        let _ = self.0[dag.index()].fetch_update(Ordering::Release, Ordering::Relaxed, change);
     }
 
-    /// Leaves a signal from another cluster.
-    pub(crate) fn leave_letter(&self, dag: DagId) {
-        self.0[dag.index()].letters.fetch_add(1, Ordering::Release);
-    }
-
-    /// Tells the scheduler of these DAGs all that are left for it, and returns how many letters
-    /// that were.
+    /// Tells the scheduler of these DAGs all that are left for it.
     pub(crate) fn serve(
         &self,
         is_here: impl Fn(DagId) -> bool,
         moment: &mut Moment<'_>,
         observer: &mut impl Observer,
-    ) -> u64 {
-        let mut taken = 0;
-        for (dag, left) in (0..).map(DagId).zip(&self.0) {
-            if !is_here(dag) {
+    ) {
+        for (dag, place) in (0..).map(DagId).zip(&self.0) {
+            if place.load(Ordering::Relaxed) == 0 || !is_here(dag) {
                 continue;
             }
-            if left.letters.load(Ordering::Relaxed) > 0 {
-                // Acquire: for the latest values that were shown before.
-                let letters = left.letters.swap(0, Ordering::Acquire);
-                (0..letters).for_each(|_| moment.signal(dag, observer));
-                taken += u64::from(letters);
-            }
-            if left.bits.load(Ordering::Relaxed) == 0 {
-                continue;
-            }
-            let bits = left.bits.swap(0, Ordering::Acquire);
+            let bits = place.swap(0, Ordering::Acquire);
             if bits & RESUME != 0 {
                 moment.resume(dag, observer);
             }
@@ -100,6 +74,5 @@ impl Requests {
                 moment.stop(dag, observer);
             }
         }
-        taken
     }
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use fass::Body;
 use sched_dag::journal::What;
-use sched_dag::lifecycle::Requests;
+use sched_dag::lifecycle::{Request, Requests};
 use sched_dag::placement::{Next, Placement};
 use sched_dag::{
     ClusterId, CoreId, DagId, Decision, Instance, Journal, Moment, Observer, Recorder, Scheduler,
@@ -76,6 +76,8 @@ pub(crate) struct State {
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
     pub(crate) requests: Requests,
+    /// How often letters were taken that the release thread has not settled yet.
+    pub(crate) opened: u64,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
     pub(crate) faults: Vec<Fault>,
@@ -139,6 +141,7 @@ impl State {
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
             requests,
+            opened: 0,
             after_fault,
             faults: Vec::with_capacity(dags),
             called: Vec::with_capacity(2 * cores),
@@ -179,7 +182,13 @@ impl State {
         let mut observer = (&mut self.recorder, discard);
         let mut moment = self.scheduler.at(now_ns);
         event(&mut moment, &mut observer);
-        self.requests.serve(&mut moment, &mut observer);
+        if self.office.open(self.cluster) {
+            self.opened += 1;
+            let (letters, cluster) = (&self.office.letters, self.cluster);
+            (self.requests).serve_letters(letters, cluster, &mut moment, &mut observer);
+        } else {
+            self.requests.serve(&mut moment, &mut observer);
+        }
         let decisions = moment.release_due(&mut observer).dispatch();
         self.decisions.clear();
         self.decisions.extend_from_slice(decisions);
@@ -191,7 +200,8 @@ impl State {
         let instance = fault.instance;
         self.faults.push(fault);
         let handler = self.after_fault[instance.dag.index()];
-        let handler = handler.filter(|&handler| !self.office.send(self.cluster, handler));
+        let handler =
+            handler.filter(|&handler| !self.office.send(self.cluster, Request::Signal(handler)));
         self.step(workers, |moment, mut observer| {
             moment.fail(instance, &mut observer);
             if let Some(handler) = handler {

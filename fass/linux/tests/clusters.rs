@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use fass::{
-    Dag, Occupation, Policy, Raiser, Sample, Shutdown, SubtaskAttributes, create_dag, execute_for,
-    finish_create_dags, shutting_down,
+    Dag, Occupation, Policy, Raiser, Sample, SubtaskAttributes, create_dag, execute_for,
+    finish_create_dags,
 };
 use linux::{Linux, Mechanism, Run};
 use sched_dag::DagId;
@@ -246,19 +246,4 @@ fn a_cluster_is_paused_and_stopped_from_outside_like_any() {
         .events()
         .filter(|event| event.what == What::Stopped);
     assert_eq!(stopped.count(), 2);
-}
-
-#[test]
-fn what_would_reach_one_cluster_only_is_refused() {
-    let share = || Linux::sharing(2, Mechanism::Normal).expect("there is a processor");
-    let alone = alone_on(|| share().clusters(&[1, 1]));
-    let dag = create_dag();
-    dag.cluster(1).period(ms(1)).relative_deadline(ms(1));
-    let end = |mut shutdown: Shutdown<'_>, _job| shutdown.request();
-    dag.using(shutting_down())
-        .register_untyped_subtask(end, named("end"));
-    let error = finish_create_dags(&[dag]).expect_err("the cores are divided");
-    drop(alone);
-    let text = error.to_string();
-    assert!(text.contains("reaches one cluster only"), "{text}");
 }

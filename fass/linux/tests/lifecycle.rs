@@ -7,28 +7,49 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use fass::{Entrance, Modes, Shutdown, SubtaskAttributes, Switch};
 use fass::{create_dag, finish_create_dags, shutting_down};
-use linux::Mechanism;
+use linux::{Linux, Mechanism};
 use sched_dag::DagId;
 use sched_dag::journal::What;
-use support::{alone, ms};
+use support::{Alone, alone_on, ms};
+
+/// On one core, on two, and on two that are divided: there what asks is in cluster 0, and all that
+/// it asks for in the other one.
+const SETTINGS: [(Mechanism, &[u32]); 4] = [
+    (Mechanism::Normal, &[1]),
+    (Mechanism::Fifo, &[2]),
+    (Mechanism::Normal, &[1, 1]),
+    (Mechanism::Fifo, &[1, 1]),
+];
+
+fn machine(mechanism: Mechanism, sizes: &[u32]) -> Alone {
+    let share = || Linux::sharing(sizes.iter().sum(), mechanism);
+    alone_on(|| share().expect("there is a processor").clusters(sizes))
+}
+
+/// Returns the last cluster.
+fn last(sizes: &[u32]) -> u32 {
+    u32::try_from(sizes.len() - 1).expect("few")
+}
 
 #[test]
 fn functions_pause_and_resume_a_dag_and_shut_the_run_down() {
-    for (cores, mechanism) in [(1, Mechanism::Normal), (2, Mechanism::Fifo)] {
-        let alone = alone(cores, mechanism);
+    for (mechanism, sizes) in SETTINGS {
+        let alone = machine(mechanism, sizes);
         let named = SubtaskAttributes::named;
         let ticks = create_dag();
         ticks
             .name("ticks")
             .period(ms(1))
             .relative_deadline(ms(1))
-            .starts_paused();
+            .starts_paused()
+            .cluster(last(sizes));
         let ticked = Arc::new(AtomicU64::new(0));
         let count = Arc::clone(&ticked);
         let tick = move |_job| _ = count.fetch_add(1, Relaxed);
         ticks.register_untyped_subtask(tick, named("tick").priority(1));
         let asks = create_dag();
         asks.name("asks").period(ms(10)).relative_deadline(ms(10));
+        asks.cluster(0);
         let mut step = 0;
         let ask = move |(mut ticks, mut shutdown): (Switch<'_>, Shutdown<'_>), _job| {
             match step {
@@ -60,14 +81,15 @@ fn functions_pause_and_resume_a_dag_and_shut_the_run_down() {
 
 #[test]
 fn functions_enter_modes_when_idle_and_at_once() {
-    for (cores, mechanism) in [(1, Mechanism::Normal), (2, Mechanism::Fifo)] {
-        let alone = alone(cores, mechanism);
+    for (mechanism, sizes) in SETTINGS {
+        let alone = machine(mechanism, sizes);
         let named = SubtaskAttributes::named;
         let ticking = |name| {
             let ticked = Arc::new(AtomicU64::new(0));
             let count = Arc::clone(&ticked);
             let dag = create_dag();
             dag.name(name).period(ms(1)).relative_deadline(ms(1));
+            dag.cluster(last(sizes));
             let tick = move |_job| _ = count.fetch_add(1, Relaxed);
             dag.register_untyped_subtask(tick, named("tick").priority(1));
             (dag, ticked)
@@ -79,6 +101,7 @@ fn functions_enter_modes_when_idle_and_at_once() {
         let landing = modes.mode("landing", &[&descend]);
         let asks = create_dag();
         asks.name("asks").period(ms(10)).relative_deadline(ms(10));
+        asks.cluster(0);
         type Uses<'a> = (Entrance<'a>, Entrance<'a>, Shutdown<'a>);
         let mut step = 0;
         let ask = move |(mut flight, mut landing, mut shutdown): Uses<'_>, _job| {
@@ -102,4 +125,29 @@ fn functions_enter_modes_when_idle_and_at_once() {
         let entered: Vec<u64> = entered.map(|event| event.job).collect();
         assert_eq!(entered, [0, 1, 0]);
     }
+}
+
+#[test]
+fn dags_of_modes_are_in_one_cluster() {
+    let alone = machine(Mechanism::Normal, &[1, 1]);
+    let dags = [0, 1].map(|cluster| {
+        let dag = create_dag();
+        dag.name(&format!("dag {cluster}")).cluster(cluster);
+        dag.jobs(1).period(ms(1)).relative_deadline(ms(1));
+        dag
+    });
+    let modes = Modes::new();
+    let first = modes.mode("first", &[&dags[0]]);
+    modes.mode("second", &[&dags[1]]);
+    let ask = |mut first: Entrance<'_>, _job| first.at_once();
+    dags[0]
+        .using(first.entering())
+        .register_untyped_subtask(ask, SubtaskAttributes::named("ask"));
+    dags[1].register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
+    let error = finish_create_dags(&dags).expect_err("they are in two");
+    drop(alone);
+    let text = error.to_string();
+    let expected =
+        "DAGs of several clusters are in modes; put all DAGs that are in a mode into one";
+    assert!(text.contains(expected), "{text}");
 }

@@ -1,5 +1,6 @@
 //! Serves requests: which DAGs rest, which mode runs, and the end of the run.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::modes::Modes;
@@ -78,6 +79,23 @@ impl Lifecycle for Changes {
 
     fn add(&mut self, dag: DagId) {
         self.dags.push(dag);
+    }
+
+    fn dags_of_modes(&self) -> Vec<DagId> {
+        self.modes.dags().collect()
+    }
+
+    fn part(&self, is_here: &dyn Fn(DagId) -> bool, has_modes: bool) -> Box<dyn Lifecycle> {
+        let here = |dags: &[DagId]| dags.iter().copied().filter(|dag| is_here(*dag)).collect();
+        Box::new(Self {
+            dags: here(&self.dags),
+            paused: here(&self.paused),
+            modes: match has_modes {
+                true => self.modes.clone(),
+                false => Modes::default(),
+            },
+            ..*self
+        })
     }
 
     fn may_shut_down(&self) -> bool {

@@ -19,20 +19,24 @@
 //! - **L6, replays.** What came of a request to a DAG whose inputs are recorded is in the recording:
 //!   the jobs that were skipped. In a replay requests do not touch such a DAG.
 //!
+//! Where clusters have no instant in common, requests cross them as [`Letters`].
+//!
 //! A driver has [`Requests`], which keeps them from a completion to the scheduler's step, and
 //! the plan's [`Lifecycle`], which serves all but signals. It is behind a trait so that an
 //! image none of whose functions asks for such a thing has no code for it.
 
 mod changes;
+mod letters;
 mod modes;
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::fmt;
 
-use crate::ids::{DagId, ModeId};
+use crate::ids::{ClusterId, DagId, ModeId};
 use crate::scheduler::{Moment, Observer};
 pub use changes::Changes;
+pub use letters::{Letters, Parts, divide};
 
 /// What takes effect with a completion, besides values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,6 +94,13 @@ pub trait Lifecycle: fmt::Debug + Send {
     /// Takes note of a DAG that is added to the run (A1 to A4): a shutdown closes it, too.
     fn add(&mut self, dag: DagId);
 
+    /// Returns the DAGs that are in some mode.
+    fn dags_of_modes(&self) -> Vec<DagId>;
+
+    /// Returns what serves the requests that concern the DAGs of one cluster, before the run; the
+    /// modes are left to one cluster.
+    fn part(&self, is_here: &dyn Fn(DagId) -> bool, has_modes: bool) -> Box<dyn Lifecycle>;
+
     /// Reports whether a function may ask for the end of the run.
     fn may_shut_down(&self) -> bool;
 
@@ -136,10 +147,24 @@ impl Requests {
         self.kept.is_empty()
     }
 
-    /// Gives away the signals that `take` takes, which are another scheduler's.
-    pub fn give_away(&mut self, mut take: impl FnMut(DagId) -> bool) {
-        self.kept
-            .retain(|request| !matches!(request, Request::Signal(dag) if take(*dag)));
+    /// Gives away the requests that `take` takes, which concern other schedulers only.
+    pub fn give_away(&mut self, mut take: impl FnMut(Request) -> bool) {
+        self.kept.retain(|&request| !take(request));
+    }
+
+    /// Passes on what has come from other clusters, and what is kept.
+    pub fn serve_letters(
+        &mut self,
+        letters: &Letters,
+        cluster: ClusterId,
+        moment: &mut Moment<'_>,
+        observer: &mut impl Observer,
+    ) {
+        letters.take(cluster, |request| match request {
+            Request::Signal(dag) => moment.signal(dag, observer),
+            other => self.keep(other),
+        });
+        self.serve(moment, observer);
     }
 
     /// Passes the requests on, after the completions of the instant.

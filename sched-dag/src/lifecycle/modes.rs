@@ -67,6 +67,13 @@ impl Modes {
         self.modes.len()
     }
 
+    /// Returns the DAGs that are in some mode.
+    pub(super) fn dags(&self) -> impl Iterator<Item = DagId> {
+        // Each is in the first one, or leaves when that is entered.
+        let first = self.modes.first().into_iter();
+        first.flat_map(|mode| mode.joining.iter().chain(&mode.leaving).copied())
+    }
+
     /// Takes the request for a mode.
     pub(super) fn ask(&mut self, mode: ModeId, entry: Entry, changes: &mut Vec<Change>) {
         if let Some(asked) = self.modes.get(mode.index()) {

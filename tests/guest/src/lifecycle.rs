@@ -14,10 +14,26 @@ use sched_dag::DagId;
 
 /// Runs them, and prints what became of their jobs.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    report(machine, |_| ())
+}
+
+/// Does so on divided cores, where `ticks` is in another cluster than the others.
+pub(crate) fn divided(machine: &Machine) -> Result<(), Ending> {
+    machine.divide(&[1, 1]);
+    report(machine, |[ticks, asks, ends]| {
+        ticks.cluster(1);
+        asks.cluster(0);
+        ends.cluster(0);
+    })
+}
+
+fn report(machine: &Machine, place: impl FnOnce(&[Dag; 3])) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     let ticks = ticks();
     let asks = asks(&ticks);
-    finish_create_dags(&[ticks, asks, ends()])?;
+    let dags = [ticks, asks, ends()];
+    place(&dags);
+    finish_create_dags(&dags)?;
     let run = machine.run()?;
     let [ticks, asks, ends] = [0, 1, 2].map(|dag| *run.statistics(DagId(dag)));
     json::emit("lifecycle", |line| {
@@ -30,20 +46,6 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
             .number("violations", run.violations().count() as u64)
             .number("allocations", run.allocations());
     });
-    Ok(())
-}
-
-/// Commits such DAGs for divided cores, which is refused.
-pub(crate) fn divided(machine: &Machine) -> Result<(), Ending> {
-    machine.divide(&[1, 1]);
-    machine.options().finish(&["test"])?;
-    let ticks = ticks();
-    let asks = asks(&ticks);
-    let dags = [ticks, asks, ends()];
-    for dag in &dags {
-        dag.cluster(0);
-    }
-    finish_create_dags(&dags)?;
     Ok(())
 }
 

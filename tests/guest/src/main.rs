@@ -44,7 +44,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 44] = [
+const TESTS: [(&str, Test); 45] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -81,6 +81,7 @@ const TESTS: [(&str, Test); 44] = [
     ("lifecycle", lifecycle::run),
     ("lifecycle_divided", lifecycle::divided),
     ("modes", modes::run),
+    ("modes_divided", modes::divided),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),

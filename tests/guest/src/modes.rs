@@ -16,6 +16,20 @@ type Uses<'a> = (Entrance<'a>, Entrance<'a>, Shutdown<'a>);
 
 /// Runs them, and prints how that went.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    report(machine, |_| ())
+}
+
+/// Does so on divided cores, where the pilot is in another cluster than what it changes.
+pub(crate) fn divided(machine: &Machine) -> Result<(), Ending> {
+    machine.divide(&[1, 1]);
+    report(machine, |[cruise, descend, pilot]| {
+        cruise.cluster(1);
+        descend.cluster(1);
+        pilot.cluster(0);
+    })
+}
+
+fn report(machine: &Machine, place: impl FnOnce(&[Dag; 3])) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     let (cruise, descend) = (working("cruise"), working("descend"));
     let modes = Modes::new();
@@ -38,7 +52,9 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     pilot
         .using((flight.entering(), landing.entering(), shutting_down()))
         .register_periodic_subtask(fly, vec![], ms(6), taking("fly", 300));
-    finish_create_dags(&[cruise, descend, pilot])?;
+    let dags = [cruise, descend, pilot];
+    place(&dags);
+    finish_create_dags(&dags)?;
     let run = machine.run()?;
     json::emit("modes", |line| {
         line.number("violations", run.violations().count() as u64)

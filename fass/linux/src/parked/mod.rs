@@ -83,7 +83,7 @@ impl State {
             runner.body.complete(finish_ns, keep);
             // Those to other clusters are on their way then.
             let (office, cluster) = (&self.office, self.cluster);
-            requests.give_away(|dag| office.send(cluster, dag));
+            requests.give_away(|request| office.send(cluster, request));
         }
     }
 

@@ -1,10 +1,16 @@
 //! What only divided cores need: an image without the feature `clusters` has none of it.
 
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec;
 use core::sync::atomic::Ordering;
 
+use fass::LaunchError;
+use sched_dag::lifecycle::{self, Lifecycle, Parts};
 use sched_dag::{ClusterId, Clusters, DagId, TaskSet};
 
 use super::cluster::{BESIDES, Cluster, MAY_DIVIDE, OTHERS, nth};
+use super::letters::Letters;
 use super::{Execution, cluster};
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core;
@@ -34,8 +40,19 @@ pub fn division() -> Division {
     }
 }
 
-/// Divides the cores as a task set says. None of them runs anything.
-pub(super) fn divide(task_set: &TaskSet) {
+/// Divides the cores as a task set says, and what serves requests. None of them runs anything.
+pub(super) fn divide(
+    task_set: &TaskSet,
+    lifecycle: Option<Box<dyn Lifecycle>>,
+) -> Result<(Letters, Parts), LaunchError> {
+    let parts = match task_set.is_divided() {
+        true => {
+            let divided = lifecycle::divide(task_set, lifecycle.as_deref());
+            let (letters, parts) = divided.map_err(LaunchError::new)?;
+            (Some(Arc::new(letters)), parts)
+        }
+        false => (None, vec![lifecycle]),
+    };
     let cores = this_core::all();
     let count = task_set.clusters().count();
     if count > 1 && OTHERS.get().is_none() {
@@ -56,6 +73,7 @@ pub(super) fn divide(task_set: &TaskSet) {
     }
     let none = u32::try_from(count).unwrap_or(u32::MAX);
     rest.for_each(|core| core.group.store(none, Ordering::Relaxed));
+    Ok(parts)
 }
 
 /// Returns the cluster of a DAG; cluster 0 if there is no run that has it.

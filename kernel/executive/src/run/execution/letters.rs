@@ -1,48 +1,34 @@
-//! Signals from one cluster to a DAG of another.
+//! Requests of one cluster to others: signals, pauses, modes, the end.
 //!
-//! Such a signal is a *letter*: it is counted for the DAG, and the other
-//! cluster's first core is woken, which takes it in a step of its own. That takes no lock, so
-//! nobody waits; there are as many letters as signals, however late they are taken.
+//! They are [letters](sched_dag::lifecycle::Letters): the other cluster's first core is woken,
+//! which takes them in a step of its own. That takes no lock, so nobody waits.
 
 use alloc::sync::Arc;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::Ordering;
 
-use fass::Plan;
-use sched_dag::{ClusterId, DagId, Moment};
+use fass::Request;
+use sched_dag::{ClusterId, lifecycle};
 
 use super::cluster::{FIRST_SEAT, nth};
 use super::core_set::CoreSet;
-use super::watcher::Watcher;
 
-/// How many letters there are for each DAG; all clusters have the same ones.
-pub(super) type Letters = Arc<[AtomicU32]>;
+/// Those of a run; all clusters have the same ones. None where cores are not divided.
+pub(super) type Letters = Option<Arc<lifecycle::Letters>>;
 
-/// Makes room for the letters of a run.
-pub(super) fn room(plan: &Plan) -> Letters {
-    plan.bodies.iter().map(|_| AtomicU32::new(0)).collect()
-}
-
-/// Counts a signal to a DAG of another cluster, and adds the core that has to take it.
-pub(super) fn send(letters: &Letters, dag: DagId, there: ClusterId, woken: &mut CoreSet) {
-    let there = nth(there.index());
-    letters[dag.index()].fetch_add(1, Ordering::Relaxed);
-    // What was counted before is seen by the core that takes the letters.
-    there.has_letters.store(true, Ordering::Release);
-    woken.insert(there.core(FIRST_SEAT));
-}
-
-/// Takes the letters that have come.
-pub(super) fn take(
+/// Sends a request to the other clusters that it concerns, adds the cores that have to take it, and
+/// reports whether it does not concern the cluster itself.
+pub(super) fn send(
     letters: &Letters,
-    cluster: ClusterId,
-    moment: &mut Moment<'_>,
-    watcher: &mut Watcher,
-) {
-    watcher.cluster().has_letters.swap(false, Ordering::AcqRel);
-    for (dag, waiting) in (0..).map(DagId).zip(letters.iter()) {
-        if watcher.task_set.dag(dag).cluster() == cluster {
-            let count = waiting.swap(0, Ordering::Relaxed);
-            (0..count).for_each(|_| moment.signal(dag, watcher));
-        }
-    }
+    from: ClusterId,
+    request: Request,
+    woken: &mut CoreSet,
+) -> bool {
+    letters.as_ref().is_some_and(|letters| {
+        letters.send(from, request, |cluster| {
+            let there = nth(cluster.index());
+            // What was left before is seen by the core that takes the letters.
+            there.has_letters.store(true, Ordering::Release);
+            woken.insert(there.core(FIRST_SEAT));
+        })
+    })
 }

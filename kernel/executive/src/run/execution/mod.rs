@@ -29,6 +29,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
@@ -154,18 +155,13 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
             settled / 1024
         )));
     }
-    let mut lifecycle = plan.lifecycle.take();
-    if lifecycle.is_some() && plan.task_set.is_divided() {
-        return Err(LaunchError::new(
-            "the cores are divided, and a subtask pauses DAGs, enters modes or ends the run, which \
-             reaches one cluster only; leave one of the two out",
-        ));
-    }
+    let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
-    if cluster::MAY_DIVIDE {
-        divided::divide(task_set);
-    }
-    let letters = letters::room(&plan);
+    let (letters, lifecycles) = match cluster::MAY_DIVIDE {
+        true => divided::divide(task_set, lifecycle)?,
+        false => (None, vec![lifecycle]),
+    };
+    let mut lifecycles = lifecycles.into_iter();
     let proven = Arc::new(Proven {
         bounds_ns: plan.bounds_ns.clone(),
         sink_bounds_ns: plan.sink_bounds_ns.clone(),
@@ -189,7 +185,7 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
             coincidence_ns: terms.coincidence_ns,
             budget_factor: terms.budget_factor,
             may_hand_off: terms.coincidence_ns == 0,
-            signals: Signals::new(&plan, id, &letters, lifecycle.take()),
+            signals: Signals::new(&plan, id, &letters, lifecycles.next().flatten()),
             proven: Arc::clone(&proven),
         })
         .collect();

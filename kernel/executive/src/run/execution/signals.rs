@@ -2,12 +2,12 @@
 //!
 //! A completing instance's latest values show, and its requests are taken, signals among them,
 //! under the lock and before the scheduler's step; the step passes them on right after the
-//! completion. A signal from outside makes a step of its own. One to a DAG of another cluster
-//! is a letter ([`letters`]), which counts once that cluster takes it.
+//! completion. A signal from outside makes a step of its own. A request that concerns another
+//! cluster is a letter ([`letters`]), which counts once that cluster takes it.
 
 use alloc::boxed::Box;
-use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::sync::atomic::Ordering;
 
 use fass::{Body, Plan, Request};
 use sched_dag::lifecycle::{Lifecycle, Requests};
@@ -29,9 +29,8 @@ pub(super) struct Signals {
     has_begun: bool,
     requests: Requests,
     /// The cluster whose requests these are.
-    pub(super) cluster: ClusterId,
-    /// By DAG, how many letters wait for its cluster.
-    pub(super) letters: Letters,
+    cluster: ClusterId,
+    letters: Letters,
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
 }
@@ -46,7 +45,7 @@ impl Signals {
         Self {
             plan: plan.number,
             cluster,
-            letters: Arc::clone(letters),
+            letters: letters.clone(),
             has_begun: false,
             requests: Requests::new(plan.bodies.len(), lifecycle),
             after_fault: plan.after_fault.clone(),
@@ -79,14 +78,9 @@ impl Signals {
         woken: &mut CoreSet,
     ) {
         if MAY_DIVIDE {
-            self.requests.give_away(|dag| {
-                let there = watcher.task_set.dag(dag).cluster();
-                let is_away = there != self.cluster;
-                if is_away {
-                    letters::send(&self.letters, dag, there, woken);
-                }
-                is_away
-            });
+            let (letters, cluster) = (&self.letters, self.cluster);
+            self.requests
+                .give_away(|request| letters::send(letters, cluster, request, woken));
         }
         self.requests.serve(moment, watcher);
     }
@@ -99,11 +93,17 @@ impl Signals {
         watcher: &mut Watcher,
         woken: &mut CoreSet,
     ) {
-        let there = watcher.task_set.dag(dag).cluster();
-        if !MAY_DIVIDE || there == self.cluster {
+        let signal = Request::Signal(dag);
+        if !MAY_DIVIDE || !letters::send(&self.letters, self.cluster, signal, woken) {
             moment.signal(dag, watcher);
-        } else {
-            letters::send(&self.letters, dag, there, woken);
+        }
+    }
+
+    /// Takes the letters that have come.
+    pub(super) fn take_letters(&mut self, moment: &mut Moment<'_>, watcher: &mut Watcher) {
+        watcher.cluster().has_letters.swap(false, Ordering::AcqRel);
+        if let Some(letters) = &self.letters {
+            (self.requests).serve_letters(letters, self.cluster, moment, watcher);
         }
     }
 }

@@ -13,7 +13,7 @@ use super::core_set::CoreSet;
 use super::runner::Runner;
 use super::status::note_running;
 use super::time::{here, instance_time_ns, seat, since_epoch};
-use super::{EPOCH_NS, Execution, Occasion, Work, letters};
+use super::{EPOCH_NS, Execution, Occasion, Work};
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
@@ -126,7 +126,7 @@ impl Execution {
             Occasion::Control(control) => control.apply(&mut moment, watcher),
         }
         if has_letters {
-            letters::take(&signals.letters, signals.cluster, &mut moment, watcher);
+            signals.take_letters(&mut moment, watcher);
         }
         // What happens before time 0 releases nothing yet.
         let waits_until_ns = now_ns.saturating_add(*coincidence_ns);
