@@ -44,6 +44,12 @@ impl BitSet {
 
     #[inline]
     pub(super) fn insert(&mut self, number: usize) {
+        // Mostly one level is below the top, or none.
+        if let [level] = &mut *self.levels {
+            level[number / 64] |= 1 << (number % 64);
+            self.top |= 1 << (number / 64);
+            return;
+        }
         let mut place = number;
         for level in self.levels.iter_mut().rev() {
             let word = &mut level[place / 64];
@@ -69,6 +75,25 @@ impl BitSet {
             place /= 64;
         }
         self.top &= !(1 << (place % 64));
+    }
+
+    /// Takes the least number out.
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<usize> {
+        if let [level] = &mut *self.levels {
+            if self.top == 0 {
+                return None;
+            }
+            let place = self.top.trailing_zeros() as usize;
+            let word = &mut level[place];
+            let number = place * 64 + word.trailing_zeros() as usize;
+            *word &= *word - 1;
+            if *word == 0 {
+                self.top &= self.top - 1;
+            }
+            return Some(number);
+        }
+        self.first().inspect(|&number| self.remove(number))
     }
 
     /// Returns the least number.
@@ -100,12 +125,14 @@ mod tests {
                 set.insert(number);
                 assert_eq!(set.first(), Some(number), "limit {limit}");
             }
+            let mut popped = set.clone();
             for &number in numbers.iter().rev() {
                 assert_eq!(set.first(), Some(number), "limit {limit}");
                 set.remove(number);
                 set.remove(number);
+                assert_eq!(popped.pop(), Some(number), "limit {limit}");
             }
-            assert_eq!(set.first(), None, "limit {limit}");
+            assert_eq!((set.first(), popped.pop()), (None, None), "limit {limit}");
         }
     }
 }

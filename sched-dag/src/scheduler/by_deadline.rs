@@ -66,6 +66,18 @@ impl ByDeadline {
         Some(Key::of_job(job, vertex))
     }
 
+    /// Takes the instance with the smallest key out.
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<Key> {
+        let (job, slot) = self.jobs.peek()?;
+        let line = &mut self.lines[slot];
+        let vertex = line.first + to_u32(line.subtasks.pop()?);
+        if line.subtasks.is_empty() {
+            self.jobs.remove(slot);
+        }
+        Some(Key::of_job(job, vertex))
+    }
+
     #[inline]
     pub(super) fn remove(&mut self, key: Key) {
         let slot = key.slot();

@@ -15,7 +15,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::key::Key;
-use crate::ids::{CoreId, to_u32};
+use crate::ids::CoreId;
 
 /// The cores and their instances.
 #[derive(Clone, Debug, Hash)]
@@ -117,9 +117,13 @@ impl Cores {
     /// Returns the largest key among the instances that may be preempted.
     #[inline]
     pub(super) fn largest_preemptible(&self) -> Option<(CoreId, Key)> {
-        let occupations = self.occupations.iter().enumerate();
-        let preemptible = occupations.filter(|(_, occupation)| occupation.may_be_preempted);
-        let keys = preemptible.map(|(core, occupation)| (occupation.key, core));
-        keys.max().map(|(key, core)| (CoreId(to_u32(core)), key))
+        let mut largest = None;
+        for (core, occupation) in (0..).map(CoreId).zip(&self.occupations) {
+            let is_larger = largest.is_none_or(|(_, key)| key < occupation.key);
+            if occupation.may_be_preempted && is_larger {
+                largest = Some((core, occupation.key));
+            }
+        }
+        largest
     }
 }

@@ -57,7 +57,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
                 self.entries.push(entry);
                 self.rise(self.entries.len() - 1, entry);
             }
-            Some((old, _)) if *old < key => self.sink(position, entry),
+            Some((old, _)) if *old < key => self.sink_if_above(position, entry),
             Some(_) => self.rise(position, entry),
         }
     }
@@ -103,29 +103,26 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         self.put(position, entry);
     }
 
+    /// Puts an entry where `position` is, or below; at once if nothing is below.
+    #[inline]
+    fn sink_if_above(&mut self, position: usize, entry: (K, usize)) {
+        if BELOW * position + 1 < self.entries.len() {
+            self.sink(position, entry);
+        } else {
+            self.entries[position] = entry;
+        }
+    }
+
     /// Puts an entry where `position` is, or below.
     #[inline]
     fn sink(&mut self, mut position: usize, entry: (K, usize)) {
         while let first = BELOW * position + 1
-            && let Some(&(mut least)) = self.entries.get(first)
+            && let Some(below) = self.entries.get(first..)
+            && let Some((from, least)) = least(below)
+            && least.0 < entry.0
         {
-            let mut from = first;
-            for (place, below) in self
-                .entries
-                .iter()
-                .enumerate()
-                .skip(first + 1)
-                .take(BELOW - 1)
-            {
-                if below.0 < least.0 {
-                    (from, least) = (place, *below);
-                }
-            }
-            if entry.0 <= least.0 {
-                break;
-            }
             self.put(position, least);
-            position = from;
+            position = first + from;
         }
         self.put(position, entry);
     }
@@ -135,6 +132,28 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         self.entries[position] = entry;
         self.positions[entry.1] = position;
     }
+}
+
+/// Returns the smallest of the first [`BELOW`] entries, the first of equal ones, and where it is.
+#[inline]
+fn least<K: Ord + Copy>(entries: &[(K, usize)]) -> Option<(usize, (K, usize))> {
+    if let Some((four, _)) = entries.split_first_chunk::<BELOW>() {
+        // Which one it is cannot be foretold: places are calculated, and no jump depends on it.
+        let one = usize::from(four[1].0 < four[0].0);
+        let other = 2 + usize::from(four[3].0 < four[2].0);
+        let place = match four[other].0 < four[one].0 {
+            true => other,
+            false => one,
+        };
+        return Some((place, four[place]));
+    }
+    let mut least = (0, *entries.first()?);
+    for (place, &entry) in entries.iter().enumerate().skip(1) {
+        if entry.0 < least.1.0 {
+            least = (place, entry);
+        }
+    }
+    Some(least)
 }
 
 #[cfg(test)]

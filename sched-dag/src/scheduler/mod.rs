@@ -348,8 +348,8 @@ impl Scheduler {
         self.task_set.vertex(instance)
     }
 
-    /// Returns the instance that a vertex does, or has to do next. If its job is
-    /// not released yet, the number of the job means nothing.
+    /// Returns the instance that a vertex does, be it ready, running or preempted. If there
+    /// is none, the number of the job means nothing.
     ///
     /// # Panics
     ///
@@ -357,8 +357,7 @@ impl Scheduler {
     #[must_use]
     #[inline]
     pub fn instance_of(&self, vertex: Vertex) -> Instance {
-        let vertex = self.vertices.get(vertex.0);
-        vertex.instance(self.dags[vertex.dag.index()].jobs.job(vertex.progress))
+        self.vertices.get(vertex.0).present_instance()
     }
 }
 

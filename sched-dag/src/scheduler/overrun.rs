@@ -48,14 +48,19 @@ impl Scheduler {
     /// Releases all jobs of a DAG that are due, and notices deadlines that have
     /// passed.
     pub(super) fn serve(&mut self, dag: DagId, observer: &mut impl Observer) {
-        self.judge(dag, None, observer);
-        self.release_waiting(dag, observer);
+        // Mostly what is due is a release, and the job before it has ended.
+        if !self.dags[dag.index()].jobs.are_at_rest() {
+            self.judge(dag, None, observer);
+            self.release_waiting(dag, observer);
+        }
         while let Some((job, release_ns)) = self.take_due(dag) {
             self.release_or_overrun(dag, job, release_ns, observer);
-            self.dags[dag.index()].jobs.announce();
-            // Another one is due only if the driver came late. Then deadlines
-            // have passed that were not known of before.
-            self.judge(dag, None, observer);
+            let jobs = &mut self.dags[dag.index()].jobs;
+            jobs.announce();
+            // Only if the driver came late has a deadline passed that was not known of before.
+            if jobs.first_deadline_ns(release_ns) < self.now_ns {
+                self.judge(dag, None, observer);
+            }
         }
         self.set_timer(dag);
     }

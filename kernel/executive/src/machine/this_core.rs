@@ -34,6 +34,8 @@ pub struct Stacks {
 pub(super) enum Part {
     /// It takes no part.
     None,
+    /// It has been given an instance, and is on its way to it.
+    Comes,
     /// It waits for its first turn.
     Fresh,
     /// It has the turn.
@@ -69,6 +71,8 @@ pub struct Core {
     part: AtomicU8,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
     pub alarms: [AtomicU64; 4],
+    /// Whether the timer is armed at the end of the interrupt that is being handled.
+    pub(super) arms_later: AtomicBool,
     /// The number of timer interrupts taken.
     pub timer_interrupts: AtomicU64,
     /// When this core took its last interrupt, by its timer or from another core.
@@ -107,6 +111,7 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         watches: AtomicBool::new(false),
         part: AtomicU8::new(Part::None as u8),
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
+        arms_later: AtomicBool::new(false),
         timer_interrupts: AtomicU64::new(0),
         interrupted_ns: AtomicU64::new(0),
         accusation: Accusation::new(),
@@ -256,10 +261,12 @@ pub fn take_spare_context() -> Option<Parked> {
 impl Core {
     /// Returns the core's part in the turns.
     pub(super) fn part(&self) -> Part {
+        const COMES: u8 = Part::Comes as u8;
         const FRESH: u8 = Part::Fresh as u8;
         const COMPUTES: u8 = Part::Computes as u8;
         const WAITS: u8 = Part::Waits as u8;
         match self.part.load(Ordering::Relaxed) {
+            COMES => Part::Comes,
             FRESH => Part::Fresh,
             COMPUTES => Part::Computes,
             WAITS => Part::Waits,

@@ -60,18 +60,26 @@ pub fn is_set(alarm: Alarm) -> bool {
     this_core::get().alarms[alarm as usize].load(Ordering::Relaxed) != u64::MAX
 }
 
-/// Arms this core's timer for its earliest alarm. Interrupts are disabled.
+/// Ends a timer's interrupt: arms this core's timer for its earliest alarm. Interrupts are
+/// disabled.
 pub fn arm_earliest() {
-    arm(this_core::get());
+    let core = this_core::get();
+    core.arms_later.store(false, Ordering::Relaxed);
+    arm(core);
 }
 
 /// Begins a timer's interrupt: removes from its time what depends on the host, see
-/// [`counted_time`].
+/// [`counted_time`]. Until [`arm_earliest`] ends it, alarms that are set only become known.
 pub(super) fn settle() {
-    counted_time::settle(earliest_ns(this_core::get()));
+    let core = this_core::get();
+    counted_time::settle(earliest_ns(core));
+    core.arms_later.store(true, Ordering::Relaxed);
 }
 
 fn arm(core: &Core) {
+    if core.arms_later.load(Ordering::Relaxed) {
+        return;
+    }
     match earliest_ns(core) {
         u64::MAX => local_apic::start_timer(0),
         at_ns => {

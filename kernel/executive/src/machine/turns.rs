@@ -61,7 +61,7 @@ static HAS_TURN: AtomicU32 = AtomicU32::new(NONE);
 /// The core that has it next, if that waits and none is fresh.
 static NEXT: AtomicU32 = AtomicU32::new(NONE);
 
-/// How many cores are fresh.
+/// How many cores are fresh, or about to be.
 static FRESH: AtomicU32 = AtomicU32::new(0);
 
 /// How many cores handle an interrupt, or wake others.
@@ -92,11 +92,34 @@ pub fn end_urgent() {
     }
 }
 
+/// Notes in an interrupt that this core goes on with an instance after it. Until then no turn
+/// of another core begins, which the instance would have to wait for.
+#[inline]
+pub fn come(core: &Core) {
+    if is_enabled() && core.part() == Part::None {
+        set_part(core, Part::Comes);
+    }
+}
+
+/// Lets those first that have just got something to compute: in what a core does besides.
+/// Interrupts are enabled.
+pub fn give_way() {
+    if is_enabled() {
+        // One visit for all others: one that has been woken becomes fresh in it.
+        cpu::relax();
+        while FRESH.load(Ordering::Relaxed) != 0 {
+            cpu::relax();
+        }
+        // A core that begins its turn arms its timer, which ends its visit: it gets another one.
+        cpu::relax();
+    }
+}
+
 /// Makes this core fresh unless it takes part already: it goes on with an instance.
 /// Interrupts are disabled.
 #[inline]
 pub fn join(core: &Core) {
-    if is_enabled() && core.part() == Part::None {
+    if is_enabled() && matches!(core.part(), Part::None | Part::Comes) {
         set_part(core, Part::Fresh);
     }
 }
@@ -189,7 +212,7 @@ fn end_interrupt_in_turn() {
     URGENT.fetch_sub(1, Ordering::Relaxed);
     let core = this_core::get();
     match core.part() {
-        Part::None => return,
+        Part::None | Part::Comes => return,
         Part::Computes if timer::is_set(Alarm::Hold) => return,
         Part::Computes => pass(core),
         Part::Fresh | Part::Waits => {}
@@ -261,7 +284,8 @@ fn set_part(core: &Core, part: Part) {
         let (mine, order) = (core.index, Ordering::Relaxed);
         let _ = HAS_TURN.compare_exchange(mine, NONE, order, order);
     }
-    match (before == Part::Fresh, part == Part::Fresh) {
+    let is_fresh = |part| matches!(part, Part::Comes | Part::Fresh);
+    match (is_fresh(before), is_fresh(part)) {
         (false, true) => FRESH.fetch_add(1, Ordering::Relaxed),
         (true, false) => FRESH.fetch_sub(1, Ordering::Relaxed),
         _ => 0,

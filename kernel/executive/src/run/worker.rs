@@ -96,6 +96,7 @@ fn watch(core: &Core) {
 /// do at once.
 pub fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
     while !execution::is_finished() {
+        turns::give_way();
         let has_more = when_idle();
         if console::send_pending_byte() || has_more {
             continue;

@@ -89,6 +89,12 @@ impl Deadline {
 }
 
 impl Jobs {
+    /// Returns the first deadline of the job that is released at a time.
+    #[inline]
+    pub(in crate::scheduler) fn first_deadline_ns(&self, release_ns: u64) -> u64 {
+        release_ns + self.deadlines[0].relative_ns
+    }
+
     /// Returns when the first deadline has passed by which a job is not judged: the
     /// deadline itself is still in time.
     #[inline]

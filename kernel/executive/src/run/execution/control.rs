@@ -7,6 +7,7 @@ use alloc::sync::Arc;
 
 use sched_dag::{Dag, DagId, DagStatistics, Moment, Observer, Scheduler, TaskSet};
 
+use super::core_set::CoreSet;
 use super::{Occasion, cluster, divided};
 use crate::machine::clock;
 use crate::machine::timer::{self, Alarm};
@@ -127,7 +128,10 @@ pub fn control(control: Control) {
         return;
     };
     let occasion = Occasion::Control(control);
-    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), occasion));
+    let mut woken = CoreSet::default();
+    cluster::among(cluster, || {
+        execution.step(clock::now_ns(), occasion, &mut woken)
+    });
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.

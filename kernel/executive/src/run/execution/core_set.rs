@@ -11,14 +11,17 @@ impl CoreSet {
         self.0[(core / 64) as usize] |= 1 << (core % 64);
     }
 
-    pub(super) fn insert_all(&mut self, others: &Self) {
-        for (word, others) in self.0.iter_mut().zip(others.0) {
-            *word |= others;
+    /// Makes each of the cores look for work.
+    #[inline]
+    pub(super) fn wake(&self) {
+        // Mostly nobody is to be told.
+        if self.0.iter().fold(0, |all, word| all | word) != 0 {
+            self.wake_some();
         }
     }
 
-    /// Makes each of the cores look for work.
-    pub(super) fn wake(&self) {
+    #[inline(never)]
+    fn wake_some(&self) {
         for (word, first) in self.0.iter().zip((0..).step_by(64)) {
             let mut left = *word;
             while left != 0 {

@@ -62,14 +62,18 @@ pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     if execution.may_hand_off && execution.signals.are_none() {
         match execution.hand_off(core, vertex) {
             Ended::HandedOff(successor) => return Work::Run(successor),
-            Ended::Open => woken = Some(execution.step(finish_ns, Occasion::Time)),
-            Ended::WithNews => woken = Some(execution.announce()),
+            Ended::Open => {
+                let woken = woken.insert(CoreSet::default());
+                execution.step(finish_ns, Occasion::Time, woken);
+            }
+            Ended::WithNews => execution.announce(woken.insert(CoreSet::default())),
             Ended::Quiet => {}
         }
     } else {
         execution.watcher.settle(here);
         let instance = execution.scheduler.instance_of(vertex);
-        woken = Some(execution.step(finish_ns, Occasion::Completed(instance)));
+        let woken = woken.insert(CoreSet::default());
+        execution.step(finish_ns, Occasion::Completed(instance), woken);
     }
     let work = execution.find_work(core);
     drop(place);
@@ -101,7 +105,8 @@ pub fn fail(now_ns: u64) {
         .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
     edge::failed(instance, ended_ns, clock_ns);
-    let woken = execution.step(now_ns, Occasion::Failed(instance));
+    let mut woken = CoreSet::default();
+    execution.step(now_ns, Occasion::Failed(instance), &mut woken);
     drop(place);
     woken.wake();
 }
@@ -117,7 +122,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     };
     let mut woken = CoreSet::default();
     if is_event || cluster.may_have_letters() {
-        woken = execution.step(now_ns, Occasion::Time);
+        execution.step(now_ns, Occasion::Time, &mut woken);
     }
     if !section::puts_off(core, now_ns)
         && let Some(waiting) = execution.follow(interrupted, now_ns)

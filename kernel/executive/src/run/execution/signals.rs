@@ -158,7 +158,10 @@ pub fn raise_in_interrupt(plan: u64, dag: DagId) {
         return;
     }
     let occasion = Occasion::Signalled(dag);
-    let woken = cluster::among(cluster, || execution.step(clock::now_ns(), occasion));
+    let mut woken = CoreSet::default();
+    cluster::among(cluster, || {
+        execution.step(clock::now_ns(), occasion, &mut woken)
+    });
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.

@@ -81,9 +81,9 @@ impl Execution {
         }
     }
 
-    /// Makes one step of the scheduler and returns which other cores have to
+    /// Makes one step of the scheduler, and says which other cores have to
     /// look at what they should run.
-    pub(super) fn step(&mut self, now_ns: u64, occasion: Occasion) -> CoreSet {
+    pub(super) fn step(&mut self, now_ns: u64, occasion: Occasion, woken: &mut CoreSet) {
         let here = here();
         let Self {
             scheduler,
@@ -97,7 +97,6 @@ impl Execution {
         let has_letters = watcher.cluster().may_have_letters();
         // Nothing that they bring about was before they came.
         let now_ns = if has_letters { clock::now_ns() } else { now_ns };
-        let mut woken = CoreSet::default();
         let instant_ns = since_epoch(now_ns);
         watcher.instant_ns = instant_ns.max(scheduler.now_ns());
         let is_survived = match occasion {
@@ -111,7 +110,7 @@ impl Execution {
             Occasion::Time => {}
             Occasion::Completed(instance) => {
                 moment.complete(instance, watcher);
-                signals.send(&mut moment, watcher, &mut woken);
+                signals.send(&mut moment, watcher, woken);
             }
             Occasion::Failed(instance) if is_survived => {
                 moment.fail_replaceable(instance, watcher);
@@ -119,7 +118,7 @@ impl Execution {
             Occasion::Failed(instance) => {
                 moment.fail(instance, watcher);
                 if let Some(dag) = signals.after_fault(instance.dag) {
-                    signals.pass(dag, &mut moment, watcher, &mut woken);
+                    signals.pass(dag, &mut moment, watcher, woken);
                 }
             }
             Occasion::Signalled(dag) => moment.signal(dag, watcher),
@@ -134,8 +133,8 @@ impl Execution {
         let due_ns = *dispatch_due_ns.get_or_insert(waits_until_ns.max(epoch_ns));
         if now_ns < due_ns {
             self.may_hand_off = false;
-            woken.insert_all(&self.announce());
-            return woken;
+            self.announce(woken);
+            return;
         }
         *dispatch_due_ns = None;
         *may_hand_off = *coincidence_ns == 0;
@@ -159,14 +158,12 @@ impl Execution {
             }
         }
         watcher.has_job_news = false;
-        woken.insert_all(&self.announce());
-        woken
+        self.announce(woken);
     }
 
-    /// Publishes the next event, and sees to it that the first core waits for it: returns
-    /// it if it has to be woken for that, and core 0 if nothing is left to be done here.
-    pub(super) fn announce(&self) -> CoreSet {
-        let mut woken = CoreSet::default();
+    /// Publishes the next event, and sees to it that the first core waits for it: that is to
+    /// be woken if it has to be for that, and core 0 if nothing is left to be done here.
+    pub(super) fn announce(&self, woken: &mut CoreSet) {
         let cluster = self.watcher.cluster();
         let earlier_ns = cluster.next_event_ns();
         self.publish();
@@ -179,7 +176,6 @@ impl Execution {
         if MAY_DIVIDE && is_over() {
             woken.insert(0);
         }
-        woken
     }
 
     /// Shows all cores when the next event is, and whether nothing is left to be done.
@@ -256,7 +252,10 @@ impl Execution {
                 self.note_resumed(core, &context, now_ns);
                 context
             }
-            None => contexts::begin(),
+            None => {
+                turns::come(core);
+                contexts::begin()
+            }
         };
         note_running(core, self.current(here).map(Subject::of));
         let last = interrupted.exchange(next);
