@@ -276,6 +276,8 @@ fn every_reason_of_a_platform_is_listed() {
     let documented = table("| text | platform |").expect("the page");
     let sources = sources(&[
         "kernel/executive/src/run/execution/mod.rs",
+        "kernel/executive/src/run/execution/stacks.rs",
+        "kernel/executive/src/run/execution/adding.rs",
         "fass/virtual-time/src/platform.rs",
         "fass/src/commit/added.rs",
         "fass/virtual-time/src/additions.rs",

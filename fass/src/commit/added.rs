@@ -3,11 +3,12 @@
 //! The added DAGs are verified by themselves, and the answer is about all: those that run, and
 //! those that come. What was running is changed by neither, whether the addition is refused or not.
 
+use alloc::format;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, Verified, Warning};
+use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, TaskSet, Verified, Warning};
 
 use super::answer::Answers;
 use super::demands::{demands_of, lacking_proofs};
@@ -97,6 +98,7 @@ impl Commit {
         let is_there = |dag: &DagId| dag.index() >= first || additions.counts(self.number, *dag);
         let all = self.task_set.with_added(&added, 0);
         let there: Vec<DagId> = all.ids().filter(is_there).collect();
+        check_names(&all, &there, first).map_err(refused)?;
         let answered = all.only(|dag| there.contains(&dag));
         let answers = Answers::new(&answered, platform).put_into(&self.answers, &there);
         let certain = answers.certain_misses();
@@ -162,6 +164,20 @@ fn taking() -> Result<(&'static dyn Platform, &'static dyn Additions), LaunchErr
         LaunchError::new("this platform takes no dags during a run; commit all in one call")
     })?;
     Ok((platform, additions))
+}
+
+/// Refuses an added DAG that has the name of one that is there; people would mean either by it.
+fn check_names(all: &TaskSet, there: &[DagId], first: usize) -> Result<(), LaunchError> {
+    let (present, added): (Vec<DagId>, _) = there.iter().partition(|dag| dag.index() < first);
+    let name = |dag: &DagId| all.dag(*dag).name();
+    let is_taken = |of: &&str| !of.is_empty() && present.iter().any(|dag| name(dag) == *of);
+    match added.iter().map(name).find(is_taken) {
+        None => Ok(()),
+        Some(name) => Err(LaunchError::new(format!(
+            "dag `{name}` is added to a run that has one of this name, or had it and has jobs in \
+             flight since then; give it another name, or remove that one first"
+        ))),
+    }
 }
 
 /// Reports what a DAG states that none can that is added.

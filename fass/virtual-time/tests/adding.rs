@@ -238,3 +238,20 @@ fn an_added_dag_has_a_cluster_and_delays_no_other() {
     assert_eq!(report.statistics[0].completed, 5);
     assert_eq!(report.statistics[1].completed, 5);
 }
+
+#[test]
+fn a_name_that_is_in_the_run_is_not_added_again_before_nothing_is_left_of_it() {
+    let machine = machine();
+    let photo = dag("photo", 10, 2);
+    let mut commit = commit(&[dag("first", 20, 4)]);
+    machine.run_for(ms(5));
+    commit.add(slice::from_ref(&photo)).expect("there is room");
+    let again = |commit: &mut Commit| refusal(commit, &dag("photo", 10, 2));
+    assert!(again(&mut commit).contains("dag `photo` is added to a run that has one of this name"));
+    machine.run_for(ms(1)); // it executes
+    commit.remove(&photo).expect("it is there");
+    assert!(again(&mut commit).contains("remove that one first"));
+    machine.run_for(ms(10));
+    commit.add(&[dag("photo", 10, 2)]).expect("it has gone");
+    assert_eq!(machine.run_for(ms(20)).violations(), []);
+}

@@ -22,7 +22,7 @@ use executive::machine;
 use executive::machine::interrupts_off;
 use executive::memory::heap;
 use executive::run::platform::KERNEL;
-use executive::run::{contexts, edge, execution, heartbeat, worker};
+use executive::run::{edge, execution, heartbeat, worker};
 use executive::text::{console, json};
 
 /// The machine, lent to the app's function for the time of the run.
@@ -62,20 +62,6 @@ pub struct Machine {
     pub(crate) fault_verdict: FaultVerdict,
     /// Whether response times beyond their bounds do.
     pub(crate) bound_verdict: BoundVerdict,
-}
-
-/// What of the machine's memory is in use while nothing runs.
-///
-/// See [`Machine::resources`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Resources {
-    /// The bytes of the heap that are in use.
-    pub heap_bytes: usize,
-    /// The contexts, each with a stack, that there are for instances. (Those in
-    /// which faults have ended instances are lost and no longer count.)
-    pub contexts: usize,
-    /// How many of these can be taken: while nothing runs, all.
-    pub contexts_free: usize,
 }
 
 impl Machine {
@@ -213,9 +199,7 @@ impl Machine {
     ///
     /// See [`Run`].
     pub fn run(&self) -> Result<Run, Ending> {
-        /// Time for the cores to get ready between now and the first release.
-        const LEAD_NS: u64 = 100_000;
-        self.run_from(machine::clock::now_ns() + LEAD_NS)
+        self.run_from(soon_ns())
     }
 
     /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on
@@ -232,6 +216,15 @@ impl Machine {
     /// }
     /// ```
     pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
+        self.run_beside(epoch_ns, &mut || {})
+    }
+
+    /// Does so, and calls `background` whenever core 0 has nothing else to do.
+    pub(super) fn run_beside(
+        &self,
+        epoch_ns: u64,
+        background: &mut dyn FnMut(),
+    ) -> Result<Run, Ending> {
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
         let mut outgoing = edge::begin(epoch_ns);
@@ -239,11 +232,14 @@ impl Machine {
         let locks_before = execution::lock_acquisitions();
         console::defer();
         execution::arm_all();
-        let mut background = Background::begin(self.wishes.with_input(self.input.get()), total);
+        let mut own = Background::begin(self.wishes.with_input(self.input.get()), total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();
-        worker::wait_in_background(|| edge::send(&mut outgoing) | background.step());
-        let shuts_down = background.end();
+        worker::wait_in_background(|| {
+            background();
+            edge::send(&mut outgoing) | own.step()
+        });
+        let shuts_down = own.end();
         let longest = interrupts_off::take_longest();
         let allocations = heap::usage().allocations - allocations_before;
         let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
@@ -324,47 +320,12 @@ impl Machine {
     pub fn set_heartbeat(&self, period: Duration) {
         heartbeat::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
     }
+}
 
-    /// Returns what is in use and what is free between two runs: the same after
-    /// equal work, unless something leaks.
-    ///
-    /// ```no_run
-    /// fn leaks(machine: &kernel::Machine, work: impl Fn()) -> bool {
-    ///     work();
-    ///     let before = machine.resources();
-    ///     work();
-    ///     machine.resources() != before
-    /// }
-    /// ```
-    #[must_use]
-    pub fn resources(&self) -> Resources {
-        let (contexts, in_stock) = contexts::count();
-        let spare = machine::this_core::all()
-            .iter()
-            .filter(|core| core.has_spare());
-        Resources {
-            heap_bytes: heap::usage().in_use_bytes,
-            contexts,
-            contexts_free: in_stock + spare.count(),
-        }
-    }
-
-    /// Prints how much memory the run has needed, as a `memory` machine line.
-    ///
-    /// See [`Machine`].
-    pub fn report_memory(&self) {
-        let usage = heap::usage();
-        crate::println!(
-            "heap: {} KiB at its peak of {} KiB",
-            usage.peak_bytes.div_ceil(1024),
-            usage.capacity_bytes / 1024
-        );
-        json::emit("memory", |line| {
-            line.number("heap_peak_bytes", usage.peak_bytes as u64)
-                .number("heap_bytes", usage.capacity_bytes as u64)
-                .number("allocations", usage.allocations);
-        });
-    }
+/// Returns when a run can begin: in a time in which the cores get ready.
+pub(super) fn soon_ns() -> u64 {
+    const LEAD_NS: u64 = 100_000;
+    machine::clock::now_ns() + LEAD_NS
 }
 
 /// Reports a run that a person has ended, and returns how its app ends.

@@ -5,6 +5,7 @@
 //! what it says is verified before it goes on to `run`. Text, reports and figures that an app
 //! gets back are made below, in `report` and `text`.
 
+mod adding;
 pub(crate) mod bound_verdict;
 mod calibration;
 #[cfg(feature = "clusters")]
@@ -16,8 +17,10 @@ pub(crate) mod event;
 pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
+pub(crate) mod offers;
 mod overheads;
 mod parameters;
+pub(crate) mod resources;
 mod topics;
 mod wcet_notes;
 mod wires;

@@ -133,6 +133,33 @@ impl Requests {
         }
     }
 
+    /// Takes room for the requests of a run that has these, and of so many DAGs more.
+    #[must_use]
+    pub fn larger((kept, changes): (usize, usize), added: usize) -> Self {
+        // Of an added DAG a signal can be asked for, and each change comes to it, too.
+        Self {
+            kept: Vec::with_capacity(kept + added),
+            lifecycle: None,
+            changes: Vec::with_capacity(changes + 2 * added),
+        }
+    }
+
+    /// Returns the room that there is, for [`larger`](Self::larger).
+    #[must_use]
+    pub const fn room(&self) -> (usize, usize) {
+        (self.kept.capacity(), self.changes.capacity())
+    }
+
+    /// Goes on in the room of `larger`, with these DAGs more.
+    pub fn extend(&mut self, larger: &mut Self, added: impl Iterator<Item = DagId>) {
+        larger.kept.append(&mut self.kept);
+        larger.lifecycle = self.lifecycle.take();
+        if let Some(lifecycle) = &mut larger.lifecycle {
+            added.for_each(|dag| lifecycle.add(dag));
+        }
+        core::mem::swap(self, larger);
+    }
+
     /// Keeps a request until the next step.
     pub fn keep(&mut self, request: Request) {
         if !self.kept.contains(&request) {

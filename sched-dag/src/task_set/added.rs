@@ -48,7 +48,7 @@ impl TaskSet {
     }
 
     /// Returns the numbers of its DAGs.
-    pub fn ids(&self) -> impl Iterator<Item = DagId> + use<> {
+    pub fn ids(&self) -> impl Iterator<Item = DagId> + Clone + use<> {
         (0..to_u32(self.dags.len())).map(DagId)
     }
 }

@@ -26,7 +26,7 @@ use super::{contexts, execution};
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cut, interrupt_flag, section, this_core};
+use crate::machine::{cut, interrupt_flag, section, this_core};
 use crate::text::backtrace::Spot;
 use crate::text::excerpt::Excerpt;
 use crate::text::json;
@@ -76,7 +76,7 @@ pub fn end_panicked(info: &PanicInfo<'_>) {
         },
     );
     interrupt_flag::disable();
-    execution::fail(clock::now_ns());
+    execution::fail();
     contexts::lose();
     this_core::abandon_context(contexts::begin())
 }
@@ -105,7 +105,7 @@ pub fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupted) -> b
             },
         },
     );
-    end_interrupted(interrupted, clock::now_ns());
+    end_interrupted(interrupted);
     true
 }
 
@@ -156,14 +156,14 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
             },
         },
     );
-    end_interrupted(interrupted, now_ns);
+    end_interrupted(interrupted);
 }
 
 /// Ends this core's instance, whose context a handler has interrupted.
-fn end_interrupted(interrupted: &mut Interrupted, now_ns: u64) {
+fn end_interrupted(interrupted: &mut Interrupted) {
     // From here on the locks that it holds are lost.
     this_core::get().context().note_fault();
-    execution::fail(now_ns);
+    execution::fail();
     contexts::lose();
     // The context is leaked: what lies on its stack stays valid forever.
     let _ = interrupted.exchange(contexts::begin());

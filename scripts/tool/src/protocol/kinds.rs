@@ -41,6 +41,7 @@ const KERNELS: &[Kind] = &[
         ],
     ),
     ("console", &["command", "accepted"]),
+    ("offer", &["dag_name", "wish", "done"]),
     (
         "wire",
         &[

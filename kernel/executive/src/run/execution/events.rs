@@ -85,7 +85,7 @@ pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
 
 /// Ends this core's instance because of a fault, and with it its DAG or its job. The
 /// context that ran it must not be resumed. Interrupts are disabled.
-pub fn fail(now_ns: u64) {
+pub fn fail() {
     let core = this_core::get();
     let mut place = cluster::of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
@@ -96,7 +96,8 @@ pub fn fail(now_ns: u64) {
         return;
     };
     let instance = execution.scheduler.instance_of(vertex);
-    // Not when the interrupt came: a step may have left events since then.
+    // Not when the interrupt came: a step may have left events since then. Nor may what follows
+    // stand before this event.
     let clock_ns = clock::now_ns();
     let ended_ns = since_epoch(clock_ns);
     execution
@@ -106,7 +107,7 @@ pub fn fail(now_ns: u64) {
     note_running(core, None);
     edge::failed(instance, ended_ns, clock_ns);
     let mut woken = CoreSet::default();
-    execution.step(now_ns, Occasion::Failed(instance), &mut woken);
+    execution.step(clock_ns, Occasion::Failed(instance), &mut woken);
     drop(place);
     woken.wake();
 }

@@ -10,15 +10,18 @@
 //!
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
+mod adding;
 mod cluster;
 mod control;
 mod core_set;
 mod divided;
 mod ended;
 mod events;
+mod leaving;
 mod letters;
 mod runner;
 mod signals;
+mod stacks;
 mod status;
 mod step;
 mod time;
@@ -27,25 +30,26 @@ mod watcher;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use alloc::boxed::Box;
-use alloc::format;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
-use sched_dag::{Dag, DagId, Instance, Journal, OnFault, Preemption, Scheduler};
+use sched_dag::{DagId, Instance, Journal, Scheduler};
 use sched_dag::{SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
-use crate::run::contexts;
+pub use adding::add;
 pub use cluster::{count as clusters, first_core};
 pub use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
 pub use divided::{Division, division, is_finished, set_division};
 pub use ended::Ended;
 pub use events::{complete, fail, find_work, interrupt};
+pub use leaving::{counts, forget as forget_removals, let_go, remove};
 pub use runner::Runner;
 use signals::Signals;
 pub use signals::{raise, raise_in_interrupt};
+use stacks::Stacks;
 pub use status::{
     Cost, budget_ns, cost_of_fault, jobs_ended, lock_acquisitions, next_event_ns, running,
     try_journal, try_names, with_journal,
@@ -125,36 +129,7 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
             "other DAGs are committed already; run them first, or commit all in one call",
         ));
     }
-    let subtasks: usize = plan.bodies.iter().map(|bodies| bodies.len()).sum();
-    let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
-    let faults = plan.task_set.dags().iter().map(survived_faults);
-    let faults = faults.fold(0, usize::saturating_add);
-    let suspended = match options.preemption {
-        Preemption::Enabled => plan.task_set.most_suspended(),
-        Preemption::Disabled => 0,
-    };
-    let total = cores.saturating_mul(2).saturating_add(suspended);
-    let total = total.saturating_add(faults);
-    let needed = contexts::stack_bytes(&plan.task_set);
-    let kib = needed / 1024;
-    let settled = contexts::settle(needed).and_then(|settled| {
-        contexts::provide(total)?;
-        Ok(settled)
-    });
-    let settled = settled.map_err(|_| {
-        LaunchError::new(format!(
-            "{subtasks} subtasks, {cores} cores and {faults} survived faults need {total} stacks \
-             of {kib} KiB, more than there is memory for; register fewer subtasks, survive fewer \
-             faults, or give the machine more memory"
-        ))
-    })?;
-    if settled < needed {
-        return Err(LaunchError::new(format!(
-            "a subtask states a stack of {kib} KiB, and the first commit has settled {} KiB; \
-             state as much there",
-            settled / 1024
-        )));
-    }
+    Stacks::of(&plan.task_set, options).provide()?;
     let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
     let (letters, lifecycles) = match cluster::MAY_DIVIDE {
@@ -190,11 +165,11 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
         })
         .collect();
     let number_of = |runner: &Runner| task_set.dag(runner.instance.dag).cluster().index();
-    for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
+    for runner in runner::runners(task_set, DagId(0), plan.bodies, terms.budget_factor) {
         let watcher = &mut executions[number_of(&runner)].watcher;
         watcher.placement.replace(runner.vertex, runner);
     }
-    for others in runner::others(task_set, plan.others, terms.budget_factor) {
+    for others in runner::others(task_set, DagId(0), plan.others, terms.budget_factor) {
         if let Some(any) = others.first() {
             let (number, vertex) = (number_of(any), any.vertex.index());
             executions[number].watcher.others[vertex] = others;
@@ -204,14 +179,6 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
         *cluster::nth(number).execution.lock() = Some(execution);
     }
     Ok(())
-}
-
-/// Returns how many faults a DAG survives, each of which keeps a context for good.
-fn survived_faults(dag: &Dag) -> usize {
-    match dag.on_fault() {
-        OnFault::EndDag => 0,
-        OnFault::DropJob(of) => of.in_all as usize,
-    }
 }
 
 /// Sets time 0 of the prepared run, from which the releases count. Returns the

@@ -39,7 +39,7 @@ const STEPS: [(&str, &[&str]); 11] = [
         "scheduler: completion, join, line",
         &["sched-dag/src/scheduler/"],
     ),
-    ("places of bodies", &["sched-dag/src/placement.rs"]),
+    ("places of bodies", &["sched-dag/src/placement/"]),
     (
         "budget and alarm",
         &[

@@ -1,0 +1,153 @@
+//! Tests of what cores have and should have.
+
+use super::*;
+
+type Cores = Placement<char, &'static str>;
+
+const X: Vertex = Vertex(0);
+const Y: Vertex = Vertex(1);
+
+impl Cores {
+    /// Notes a decision to run, or to preempt if `target` is `None`.
+    fn decide(&mut self, core: u32, target: Option<Vertex>) {
+        self.set_target(CoreId(core), target);
+    }
+}
+
+/// Two cores; core 0 runs `X`, and the scheduler wants `Y` there instead.
+fn about_to_preempt() -> Cores {
+    let mut cores = Cores::new(['x', 'y'].into_iter(), 2);
+    cores.decide(0, Some(X));
+    assert_eq!(cores.next(0), Next::Start(X, 'x'));
+    assert!(!cores.must_suspend(0));
+    cores.decide(0, None);
+    cores.decide(0, Some(Y));
+    assert!(cores.must_suspend(0));
+    cores
+}
+
+/// Core 0 leaves what it has.
+fn suspend(cores: &mut Cores, context: &'static str) -> Option<CoreId> {
+    let instance = cores.detach(0).unwrap();
+    assert_eq!(cores.take_suspended(0), None);
+    cores.suspend(instance, context)
+}
+
+#[test]
+fn what_finishes_while_it_is_parked_is_wanted_nowhere() {
+    let mut cores = about_to_preempt();
+    assert_eq!(suspend(&mut cores, "the thread of x"), None);
+    cores.decide(1, Some(X));
+    cores.finish_parked(X, 'x');
+    assert!(!cores.is_wanted(1));
+    assert_eq!(cores.next(1), Next::Nothing);
+    assert_eq!(cores.resting(X), Some(&mut 'x'));
+}
+
+#[test]
+fn a_preempted_instance_continues_on_any_core() {
+    let mut cores = about_to_preempt();
+    assert_eq!(suspend(&mut cores, "context of x"), None);
+    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+    cores.decide(1, Some(X));
+    assert!(cores.is_wanted(1));
+    assert_eq!(cores.next(1), Next::Continue("context of x"));
+    cores.finish(1, X, 'x');
+    assert_eq!(cores.next(1), Next::Nothing);
+    assert_eq!(cores.current(0), Some(Y));
+}
+
+#[test]
+fn a_core_exchanges_what_it_has_finished_for_what_it_should_have() {
+    let mut cores = Cores::new(['x', 'y'].into_iter(), 2);
+    cores.decide(0, Some(X));
+    assert_eq!(cores.next(0), Next::Start(X, 'x'));
+    assert_eq!(cores.exchange(CoreId(0), X, 'x', Y), Some('y'));
+    assert_eq!(
+        (cores.current(0), cores.resting(X)),
+        (Some(Y), Some(&mut 'x'))
+    );
+    // The next job's instance of the same subtask.
+    assert_eq!(cores.exchange(CoreId(0), Y, 'y', Y), Some('y'));
+    let mut cores = about_to_preempt();
+    suspend(&mut cores, "context of x");
+    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+    assert_eq!(cores.exchange(CoreId(0), Y, 'y', X), None);
+    assert!(cores.current(0).is_none() && cores.is_wanted(0));
+    assert_eq!(cores.next(0), Next::Continue("context of x"));
+}
+
+#[test]
+fn an_instance_that_finishes_before_its_preemption_makes_way() {
+    let mut cores = about_to_preempt();
+    cores.finish(0, X, 'x');
+    assert!(!cores.must_suspend(0));
+    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+}
+
+#[test]
+fn a_core_waits_for_an_instance_that_another_still_has() {
+    let mut cores = about_to_preempt();
+    cores.decide(1, Some(X));
+    assert_eq!(cores.next(1), Next::Nothing);
+    assert_eq!(suspend(&mut cores, "context of x"), Some(CoreId(1)));
+    assert_eq!(cores.next(1), Next::Continue("context of x"));
+}
+
+#[test]
+fn an_instance_wanted_elsewhere_may_finish_where_it_is() {
+    let mut cores = about_to_preempt();
+    cores.decide(1, Some(X));
+    cores.finish(0, X, 'x');
+    assert_eq!(cores.next(1), Next::Nothing);
+    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+}
+
+#[test]
+fn a_preemption_that_is_taken_back_changes_nothing() {
+    let mut cores = about_to_preempt();
+    cores.decide(0, None);
+    cores.decide(0, Some(X));
+    assert!(!cores.must_suspend(0));
+    cores.decide(1, Some(Y));
+    assert_eq!(cores.next(1), Next::Start(Y, 'y'));
+}
+
+#[test]
+fn a_lost_instance_is_never_run_again_but_another_body_takes_its_place() {
+    let mut cores = about_to_preempt();
+    assert_eq!(cores.lose(0), Some(X));
+    cores.decide(1, Some(X));
+    assert_eq!(cores.next(1), Next::Nothing);
+    assert!(cores.resting(X).is_none());
+    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+    cores.replace(X, 'z');
+    assert_eq!(cores.next(1), Next::Start(X, 'z'));
+}
+
+#[test]
+fn an_extension_changes_nothing_of_what_was_there() {
+    const Z: Vertex = Vertex(2);
+    let mut cores = about_to_preempt();
+    let mut larger = Cores::empty(3, 2);
+    larger.replace(Z, 'z');
+    cores.extend(&mut larger);
+    assert_eq!(cores.current(0), Some(X));
+    assert!(cores.must_suspend(0) && cores.is_started(X));
+    assert_eq!(suspend(&mut cores, "context of x"), None);
+    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+    cores.decide(1, Some(Z));
+    assert_eq!(cores.next(1), Next::Start(Z, 'z'));
+    assert!(larger.resting(Y).is_none());
+}
+
+#[test]
+fn a_body_is_taken_away_only_while_it_rests() {
+    let mut cores = about_to_preempt();
+    assert_eq!((cores.take_resting(X), cores.is_started(X)), (None, true));
+    suspend(&mut cores, "context of x");
+    assert_eq!((cores.take_resting(X), cores.is_started(X)), (None, true));
+    assert_eq!(cores.take_resting(Y), Some('y'));
+    assert_eq!((cores.take_resting(Y), cores.is_started(Y)), (None, false));
+    assert_eq!(cores.next(0), Next::Nothing);
+}
