@@ -4,7 +4,9 @@
 # specification 2.0, 3.3). Both enter with paging off, flat segments, interrupts off, and
 # in ebx the physical address of what they tell, by which Rust tells them apart.
 
-.section .note.pvh, "a", @note
+# In a group, since a linker keeps any other note, with all that it names. A host program that
+# links the kernel's logic may take this file along, and has no use for it.
+.section .note.pvh, "aG", @note, pvh, comdat
     .balign 4
     .long 4                         # size of the name
     .long 8                         # size of the descriptor

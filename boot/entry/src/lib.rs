@@ -6,8 +6,8 @@
 //!
 //! This is a crate of its own, and has nothing else in it, for the sake of host
 //! programs that link the kernel's logic: the code here has fixed addresses, so it
-//! fits into no other program than an image. A linker takes it out of the library
-//! for an image only, which asks for `pvh_entry` (`image.ld`).
+//! fits into no other program than an image. A linker keeps it for an image only, which asks
+//! for `pvh_entry` (`image.ld`).
 
 #![no_std]
 #![allow(

@@ -17,7 +17,7 @@ use graphs::{chain, checking, commit_divided, fork_join, layered, spec};
 use native::{Closure, Native, Report, Setting};
 use sched_dag::{ClusterId, DagSpec};
 
-const JOBS: u64 = 300;
+const JOBS: u64 = 100;
 const PERIOD: Duration = Duration::from_micros(10);
 const SHORTER: Duration = Duration::from_micros(3);
 

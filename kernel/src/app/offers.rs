@@ -8,7 +8,7 @@ use executive::text::json;
 use fass::{Commit, Dag};
 
 use crate::report::Ns;
-use crate::watch::background::asked::{ASKED, Wish};
+use crate::watch::background::asked::{Asked, Wish};
 use crate::watch::background::more;
 
 /// DAGs that an app offers: at the console `offers` lists them, `add DAG` adds one to the run and
@@ -27,7 +27,7 @@ use crate::watch::background::more;
 /// ```
 #[derive(Default)]
 pub struct Offers {
-    /// In the order of the names in [`ASKED`].
+    /// In the order of the names in [`Asked`].
     offers: Vec<Offer>,
 }
 
@@ -51,9 +51,9 @@ impl Offers {
     /// See [`Offers`].
     #[must_use]
     pub fn new() -> Self {
-        ASKED.clear();
+        Asked.clear();
         // Once is enough.
-        let _ = more::OFFERS.set(&ASKED);
+        let _ = more::OFFERS.set(&Asked);
         Self::default()
     }
 
@@ -62,7 +62,7 @@ impl Offers {
     ///
     /// See [`Offers`].
     pub fn dag(&mut self, name: &'static str, build: impl FnMut() -> Dag + 'static) -> &mut Self {
-        ASKED.offer(name);
+        Asked.offer(name);
         self.offers.push(Offer {
             name,
             build: Box::new(build),
@@ -78,7 +78,7 @@ impl Offers {
     /// See [`Offers`].
     pub fn serve(&mut self, commit: &mut Commit) {
         for (place, offer) in self.offers.iter_mut().enumerate() {
-            match ASKED.take(place) {
+            match Asked.take(place) {
                 None => {}
                 Some(Wish::Add) => offer.add(commit),
                 Some(Wish::Remove) => offer.remove(commit),

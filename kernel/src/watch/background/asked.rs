@@ -20,36 +20,36 @@ pub(crate) enum Wish {
 }
 
 /// The names of the DAGs that are offered, and the latest wish for each.
-pub(crate) struct Asked(SpinLock<Vec<(&'static str, Option<Wish>)>>);
+static ASKED: SpinLock<Vec<(&'static str, Option<Wish>)>> = SpinLock::new(Vec::new());
 
-/// Those of this image.
-pub(crate) static ASKED: Asked = Asked(SpinLock::new(Vec::new()));
+/// What is asked of the DAGs of this image.
+pub(crate) struct Asked;
 
 impl Asked {
     /// Offers nothing any more.
     pub(crate) fn clear(&self) {
-        let offered = core::mem::take(&mut *self.0.lock());
+        let offered = core::mem::take(&mut *ASKED.lock());
         drop(offered);
     }
 
     /// Offers one more.
     pub(crate) fn offer(&self, name: &'static str) {
-        self.0.lock().push((name, None));
+        ASKED.lock().push((name, None));
     }
 
     /// Takes the wish for the DAG in a place.
     pub(crate) fn take(&self, place: usize) -> Option<Wish> {
-        self.0.lock().get_mut(place)?.1.take()
+        ASKED.lock().get_mut(place)?.1.take()
     }
 
     /// Returns the name in a place.
     fn name(&self, place: usize) -> Option<&'static str> {
-        self.0.lock().get(place).map(|(name, _)| *name)
+        ASKED.lock().get(place).map(|(name, _)| *name)
     }
 
     /// Notes a wish, and reports whether there is such a DAG.
     fn note(&self, name: &str, wish: Wish) -> bool {
-        let mut offered = self.0.lock();
+        let mut offered = ASKED.lock();
         let place = offered.iter_mut().find(|(offered, _)| *offered == name);
         place.map(|(_, place)| *place = Some(wish)).is_some()
     }

@@ -99,7 +99,9 @@ impl Above for Asked<'_> {
         let mut sum = [Piece::NONE; CURVES];
         let add = |sums: &Sums| {
             let is_settled = by_sums && sums.settled_ns <= times.0;
-            let by = sums.by(self, times.0).filter(|_| is_settled);
+            let by = sums
+                .by(self.tree, self.limit_ns, times.0)
+                .filter(|_| is_settled);
             if let Some(by) = by {
                 sum = [0, 1, 2, 3].map(|curve| sum[curve].and(sums.at(by, curve, times.0)));
             }
@@ -123,7 +125,7 @@ impl Above for Asked<'_> {
     fn on_all_cores(&self, window_ns: u64) -> Piece {
         let (mut sum, mut rest) = (Piece::NONE, Piece::NONE);
         let add = |sums: &Sums| {
-            let by = sums.by(self, window_ns);
+            let by = sums.by(self.tree, self.limit_ns, window_ns);
             sum = by.map_or(sum, |by| sum.and(sums.at(by, 0, window_ns)));
             by.is_some()
         };

@@ -1,7 +1,6 @@
 //! The sums of a stretch, as curves: those of one DAG, those of two stretches, and what they tell.
 
 use super::Tree;
-use super::asked::Asked;
 use super::curve::Curve;
 use crate::analysis::set::Set;
 use crate::analysis::workload::{Piece, Workload};
@@ -76,6 +75,7 @@ impl Sums {
             due,
         })
     }
+
     /// Returns the sums of two stretches.
     pub(super) fn and(&self, other: &Self) -> Self {
         let curves = |of: fn(&Self) -> &[Curve; CURVES]| {
@@ -93,10 +93,11 @@ impl Sums {
         }
     }
 
-    /// Returns which curves tell about a window, if any do.
-    pub(super) fn by(&self, asked: &Asked<'_>, window_ns: u64) -> Option<By> {
-        let until_ns = asked.tree.until_ns.checked_sub(window_ns)?;
-        let Some(limit_ns) = asked.limit_ns else {
+    /// Returns which curves of a tree tell about a window, if any do; where there is a limit, of
+    /// jobs that are due by then.
+    pub(super) fn by(&self, tree: &Tree, limit_ns: Option<u64>, window_ns: u64) -> Option<By> {
+        let until_ns = tree.until_ns.checked_sub(window_ns)?;
+        let Some(limit_ns) = limit_ns else {
             return Some(By::Window(until_ns + 1));
         };
         if let Some(before_ns) = limit_ns.checked_sub(window_ns)

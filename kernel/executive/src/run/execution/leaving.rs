@@ -10,8 +10,8 @@ use alloc::vec::Vec;
 use fass::LaunchError;
 use sched_dag::{ClusterId, DagId, Instance, SubtaskId, TaskSet};
 
-use super::adding::Present;
 use super::control::{Control, control};
+use super::present::Present;
 use super::{Execution, cluster};
 use crate::machine::interrupt_flag;
 use crate::machine::spinlock::SpinLock;

@@ -19,6 +19,7 @@ mod ended;
 mod events;
 mod leaving;
 mod letters;
+mod present;
 mod runner;
 mod signals;
 mod stacks;
