@@ -14,6 +14,7 @@ use sched_dag::law::Record;
 use sched_dag::{DagId, DagStatistics, JobOutcome, TaskSet};
 
 use crate::dags::Executed;
+use crate::trouble::{Then, Trouble};
 
 /// The counts of one round, over all DAGs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,6 +37,10 @@ pub struct Account {
     pub instances: u64,
     /// How often an instance has lost its core.
     pub preemptions: u64,
+    /// Instances that a fault has ended, as drawn.
+    pub faults: u64,
+    /// Faults after which the DAG went on.
+    pub restarts: u64,
 }
 
 /// Something that does not add up, in words.
@@ -60,6 +65,8 @@ impl Account {
         self.queued += other.queued;
         self.instances += other.instances;
         self.preemptions += other.preemptions;
+        self.faults += other.faults;
+        self.restarts += other.restarts;
     }
 
     /// Draws up the account of a run that has ended, and finds what does not add
@@ -69,6 +76,7 @@ impl Account {
         task_set: &TaskSet,
         record: &Record,
         statistics: impl Fn(DagId) -> &'a DagStatistics,
+        trouble: &Trouble,
         executed: &Executed,
     ) -> (Self, Vec<Discrepancy>) {
         let mut total = Self::default();
@@ -85,8 +93,13 @@ impl Account {
                 queued: statistics.queued,
                 instances: 0,
                 preemptions: 0,
+                faults: statistics.faults,
+                restarts: statistics.restarts,
             };
-            let wrong = of_dag.wrong(model.overrun(), statistics, record, dag);
+            let of_jobs = of_dag.wrong(model.overrun(), statistics, record, dag, trouble);
+            let panics = executed.panics(dag.index());
+            let of_faults = of_dag.wrong_faults(model.overrun(), statistics, dag, trouble, panics);
+            let wrong = of_jobs.chain(of_faults);
             found.extend(wrong.map(|text| Discrepancy(format!("{}: {text}", model.name()))));
             total.add(&of_dag);
         }
@@ -104,13 +117,14 @@ impl Account {
         (total, found)
     }
 
-    /// Returns what does not add up for one DAG.
+    /// Returns what does not add up for one DAG's jobs.
     fn wrong(
         self,
         overrun: OverrunPolicy,
         statistics: &DagStatistics,
         record: &Record,
         dag: DagId,
+        trouble: &Trouble,
     ) -> impl Iterator<Item = String> {
         let count = |wanted: &[JobOutcome]| {
             let outcomes = record.jobs(dag).iter().filter_map(|job| job.outcome);
@@ -119,7 +133,8 @@ impl Account {
         let complete = count(&[JobOutcome::Met, JobOutcome::Missed]);
         let late = count(&[JobOutcome::Missed]);
         let aborted = count(&[JobOutcome::Aborted]);
-        let ended = statistics.faults + statistics.cut_short + statistics.dropped;
+        let failed = count(&[JobOutcome::Failed]);
+        let cut_short = count(&[JobOutcome::DagEnded]);
         let Self {
             jobs,
             released,
@@ -130,18 +145,21 @@ impl Account {
             queued,
             ..
         } = self;
-        let may_skip = overrun != OverrunPolicy::Queue;
+        let is_ended = statistics.faults > statistics.restarts;
+        let lost = statistics.failed + statistics.cut_short;
+        let may_skip = overrun != OverrunPolicy::Queue || trouble.pauses(dag.index());
         let may_abort = overrun == OverrunPolicy::Abort;
         let may_queue = overrun != OverrunPolicy::Skip;
         let claims = [
             (
-                jobs == released + skips,
+                jobs == released + skips || is_ended && jobs > released + skips,
                 format!("{jobs} jobs are {released} released and {skips} skipped ones"),
             ),
             (
-                released == completed + aborts,
+                released == completed + aborts + lost,
                 format!(
-                    "{released} released jobs are {completed} complete and {aborts} aborted ones"
+                    "{released} released jobs are {completed} complete ones, {aborts} aborted ones \
+                     and {lost} that a fault cost"
                 ),
             ),
             (
@@ -170,8 +188,48 @@ impl Account {
                 format!("{queued} jobs are queued under {overrun:?}"),
             ),
             (
-                ended == 0,
-                format!("faults have ended the DAG: {statistics:?}"),
+                statistics.failed == failed && statistics.cut_short == cut_short,
+                format!("faults cost {failed} and {cut_short} jobs: {statistics:?}"),
+            ),
+        ];
+        let broken = claims.into_iter().filter(|(holds, _)| !holds);
+        broken.map(|(_, claim)| format!("it does not hold that {claim}"))
+    }
+
+    /// Returns what does not add up for one DAG's faults, of which it has told so many itself.
+    fn wrong_faults(
+        self,
+        overrun: OverrunPolicy,
+        statistics: &DagStatistics,
+        dag: DagId,
+        trouble: &Trouble,
+        panics: u64,
+    ) -> impl Iterator<Item = String> {
+        let fault = trouble.of(dag.index()).fault;
+        let drawn = fault.map_or(0, |fault| u64::from(fault.call.is_some()));
+        let survives = fault.is_some_and(|fault| fault.then != Then::End);
+        // All its jobs run, so the fatal one does.
+        let is_certain = overrun == OverrunPolicy::Queue && !trouble.pauses(dag.index());
+        let Self {
+            faults, restarts, ..
+        } = self;
+        let cost = statistics.cut_short + statistics.dropped;
+        let claims = [
+            (
+                faults == panics,
+                format!("{panics} instances panicked, and {faults} faults are counted"),
+            ),
+            (
+                faults == drawn || !is_certain && faults < drawn,
+                format!("{faults} of {drawn} faults came about"),
+            ),
+            (
+                restarts == if survives { faults } else { 0 } && statistics.failed <= restarts,
+                format!("the DAG went on after {restarts} of {faults} faults: {statistics:?}"),
+            ),
+            (
+                faults > restarts || cost == 0,
+                format!("without a fault the DAG was ended: {statistics:?}"),
             ),
         ];
         let broken = claims.into_iter().filter(|(holds, _)| !holds);

@@ -6,6 +6,7 @@
 //! set ran, and that all memory and all stacks are there again.
 //!
 //! - [`draw_set`]: a random set for a load, the same for the same seed;
+//! - [`Trouble`]: what befalls it, of faults, pauses and clusters;
 //! - [`build`]: DAGs that execute for random times, and count what they did;
 //! - [`Account`]: what became of all jobs, and what does not add up.
 //!
@@ -21,7 +22,9 @@ mod dags;
 mod graph;
 mod set;
 mod shares;
+mod trouble;
 
 pub use account::{Account, Discrepancy};
 pub use dags::{Executed, build};
 pub use set::{DagPlan, LEAST_PERCENT, MOST_OF_PERIOD, SubtaskPlan, draw_set, largest_set};
+pub use trouble::{DagTrouble, FaultPlan, Then, Trouble};

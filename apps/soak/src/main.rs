@@ -2,7 +2,7 @@
 //!
 //! Words of the command line: `rounds` of `round_ms` each, from round `first`
 //! on, at `load` percent of the cores, with what `overrun` says; `work`, which is `hold`
-//! or `compute`; and `seed`. The policy is the kernel's word.
+//! or `compute`; `trouble`, which is `none` or `drawn`; and `seed`. The policy is the kernel's word.
 
 #![no_std]
 #![no_main]
@@ -11,12 +11,14 @@ extern crate alloc;
 
 use alloc::format;
 use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::ops::Range;
 use core::time::Duration;
 
 use fass::{ConstructionPolicy, OverrunPolicy, finish_create_dags_with};
 use fork_join::Pace;
 use kernel::{Ending, Machine, Resources, Run, json, println};
-use soak::{Account, DagPlan, Executed, build, draw_set, largest_set};
+use soak::{Account, DagPlan, Executed, Trouble, build, draw_set, largest_set};
 
 kernel::entry!(main);
 
@@ -29,6 +31,9 @@ const OVERRUNS: [(&str, OverrunPolicy); 3] = [
 /// How many breaches of the rules are printed in words.
 const SHOWN: usize = 10;
 
+/// How much of the heap a fault keeps for good, at most: its body, and what that owns.
+const KEPT_BYTES: usize = 1024;
+
 /// What the command line says.
 struct Soak<'a> {
     seed: u64,
@@ -39,6 +44,8 @@ struct Soak<'a> {
     overrun: OverrunPolicy,
     overrun_name: &'a str,
     policy_name: &'a str,
+    /// Whether faults, pauses and clusters are drawn.
+    has_trouble: bool,
 }
 
 /// What a round has come to.
@@ -63,13 +70,18 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         overrun,
         overrun_name: options.text("overrun").unwrap_or(OVERRUNS[0].0),
         policy_name: options.text("policy").unwrap_or("static"),
+        has_trouble: options.choice("trouble", &[("none", false), ("drawn", true)])?,
     };
     options.finish(&[
-        "first", "rounds", "overrun", "seed", "load", "round_ms", "work",
+        "first", "rounds", "overrun", "seed", "load", "round_ms", "work", "trouble",
     ])?;
     if soak.round_ns.is_some() {
         // The WCETs are those of a core that computes alone.
         machine.accept_exceeded_bounds();
+    }
+    if soak.has_trouble {
+        // Each one is held against what was drawn.
+        machine.accept_faults();
     }
     println!(
         "{rounds} rounds of {} ms at {} % load of {} cores, overrun: {}",
@@ -78,12 +90,13 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         machine.cores(),
         soak.overrun_name
     );
-    let baseline = soak.warm_up(machine)?;
+    let all = first..first.saturating_add(rounds);
+    let mut baseline = soak.warm_up(machine, all.clone())?;
     let mut total = Account::default();
     let mut violations = 0;
     let mut complaint = None;
-    for round in first..first.saturating_add(rounds) {
-        let outcome = soak.round(machine, round, baseline)?;
+    for round in all {
+        let outcome = soak.round(machine, round, &mut baseline)?;
         total.add(&outcome.account);
         violations += outcome.violations;
         if let Some(text) = outcome.complaint {
@@ -98,11 +111,43 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 impl Soak<'_> {
-    /// Runs the largest set for a moment, so that all memory that is kept from
-    /// run to run is there. Returns what then is in use.
-    fn warm_up(&self, machine: &Machine) -> Result<Resources, Ending> {
-        self.run(machine, &largest_set(), Duration::ZERO)?;
+    /// Runs the largest set for a moment, on divided cores, in either cluster, and on others, so that all memory
+    /// that is kept from run to run is there, with a stack for each fault of the rounds to
+    /// come. Returns what then is in use.
+    fn warm_up(&self, machine: &Machine, rounds: Range<u64>) -> Result<Resources, Ending> {
+        let mut trouble = Trouble::default();
+        if self.has_trouble {
+            let faults: usize = rounds
+                .map(|round| self.draw(machine, round).1.faults())
+                .sum();
+            let plans = largest_set();
+            trouble = Trouble::stock(u32::try_from(faults).unwrap_or(u32::MAX));
+            for most_in in [0, 1] {
+                let mut divided = trouble.clone().divided(&plans, machine.cores());
+                for (number, dag) in divided.dags.iter_mut().enumerate() {
+                    dag.cluster = if number > 0 { most_in } else { 1 - most_in };
+                }
+                self.run(machine, &plans, Duration::ZERO, &divided)?;
+            }
+        }
+        self.run(machine, &largest_set(), Duration::ZERO, &trouble)?;
+        drop(trouble);
         Ok(machine.resources())
+    }
+
+    /// Draws a round's set, and what befalls it.
+    fn draw(&self, machine: &Machine, round: u64) -> (Vec<DagPlan>, Trouble) {
+        // Where instructions are counted, all cores together compute as much as one.
+        let load = match self.round_ns {
+            None => self.load,
+            Some(_) => (self.load / u64::from(machine.cores())).max(1),
+        };
+        let plans = draw_set(self.seed, round, load, machine.cores());
+        let trouble = match self.has_trouble {
+            true => Trouble::draw(self.seed, round, &plans, machine.cores()),
+            false => Trouble::default(),
+        };
+        (plans, trouble)
     }
 
     fn run(
@@ -110,45 +155,53 @@ impl Soak<'_> {
         machine: &Machine,
         plans: &[DagPlan],
         length: Duration,
+        trouble: &Trouble,
     ) -> Result<(Run, Executed), Ending> {
-        let executed = self
+        let mut executed = self
             .round_ns
             .map_or_else(Executed::default, Executed::by_computing);
-        let dags = build(plans, length, self.overrun, &executed);
+        let dags = build(plans, length, self.overrun, trouble, &mut executed);
+        machine.divide(&trouble.clusters);
         finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
-        Ok((machine.run()?, executed))
+        let run = machine.run()?;
+        machine.divide(&[]); // its list of clusters is not to count as in use
+        Ok((run, executed))
     }
 
-    fn round(&self, machine: &Machine, round: u64, baseline: Resources) -> Result<Outcome, Ending> {
-        // Where instructions are counted, all cores together compute as much as one.
-        let load = match self.round_ns {
-            None => self.load,
-            Some(_) => (self.load / u64::from(machine.cores())).max(1),
-        };
-        let plans = draw_set(self.seed, round, load, machine.cores());
+    fn round(
+        &self,
+        machine: &Machine,
+        round: u64,
+        baseline: &mut Resources,
+    ) -> Result<Outcome, Ending> {
+        let (plans, trouble) = self.draw(machine, round);
         let subtasks: usize = plans.iter().map(|dag| dag.subtasks.len()).sum();
-        let (run, executed) = self.run(machine, &plans, self.length)?;
+        let (run, executed) = self.run(machine, &plans, self.length, &trouble)?;
         let dags = plans.len();
         let (account, discrepancies) = Account::of_run(
             run.task_set(),
             run.record(),
             |dag| run.statistics(dag),
+            &trouble,
             &executed,
         );
         let violations = count_violations(&run);
         let (span_ns, executed_ns) = (span_ns(&run), executed.ns());
         let allocations = run.allocations();
-        drop((plans, run, executed));
+        let clusters = trouble.clusters.len().max(1);
+        drop((plans, trouble, run, executed));
         let mut complaint = (!discrepancies.is_empty()).then(|| {
-            let lines: alloc::vec::Vec<_> = discrepancies.iter().map(ToString::to_string).collect();
+            let lines: Vec<_> = discrepancies.iter().map(ToString::to_string).collect();
             lines.join("; ")
         });
         drop(discrepancies);
         // From here on nothing of the round is left but the complaint, if any.
         let resources = machine.resources();
+        let expected = after_faults(*baseline, resources, account.faults);
         if complaint.is_none() {
-            complaint = wrong(violations, allocations, resources, baseline);
+            complaint = wrong(violations, allocations, resources, expected);
         }
+        *baseline = expected;
         let available_ns = (span_ns / 100).saturating_mul(machine.cores().into());
         json::emit("soak", |line| {
             line.number("round", round)
@@ -166,6 +219,9 @@ impl Soak<'_> {
                 .number("queued", account.queued)
                 .number("instances", account.instances)
                 .number("preemptions", account.preemptions)
+                .number("faults", account.faults)
+                .number("restarts", account.restarts)
+                .number("clusters", clusters as u64)
                 .number("violations", violations)
                 .number("allocations", allocations)
                 .number("span_ns", span_ns)
@@ -182,6 +238,18 @@ impl Soak<'_> {
             violations,
             complaint,
         })
+    }
+}
+
+/// Returns what is to be in use after a round with so many faults: each has lost its stack, and
+/// kept some of the heap, how much to the byte depends on the heap's holes.
+fn after_faults(before: Resources, now: Resources, faults: u64) -> Resources {
+    let faults = usize::try_from(faults).unwrap_or(usize::MAX);
+    let most = before.heap_bytes + faults.saturating_mul(KEPT_BYTES);
+    Resources {
+        heap_bytes: now.heap_bytes.clamp(before.heap_bytes, most),
+        contexts: before.contexts.saturating_sub(faults),
+        contexts_free: before.contexts_free.saturating_sub(faults),
     }
 }
 
@@ -222,7 +290,8 @@ fn wrong(
             resources.contexts, resources.contexts_free
         ));
     }
-    (resources != baseline).then(|| format!("in use are {resources:?}, at first {baseline:?}"))
+    (resources != baseline)
+        .then(|| format!("in use are {resources:?}, that should be {baseline:?}"))
 }
 
 fn print_total(rounds: u64, total: &Account, violations: u64) {
@@ -231,7 +300,7 @@ fn print_total(rounds: u64, total: &Account, violations: u64) {
         total.jobs, total.completed, total.misses, total.skips, total.aborts
     );
     println!(
-        "{} instances, {} preemptions, {violations} breaches of the rules",
-        total.instances, total.preemptions
+        "{} instances, {} preemptions, {} faults, {violations} breaches of the rules",
+        total.instances, total.preemptions, total.faults
     );
 }

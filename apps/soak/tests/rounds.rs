@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use fass::{ConstructionPolicy, OverrunPolicy, Policy, Preemption, finish_create_dags_with};
-use soak::{Account, Executed, build, draw_set, largest_set};
+use soak::{Account, DagPlan, Executed, Trouble, build, draw_set, largest_set};
 use virtual_time::VirtualTime;
 
 const LENGTH: Duration = Duration::from_millis(400);
@@ -16,22 +16,46 @@ fn round(
     preemption: Preemption,
     overrun: OverrunPolicy,
 ) -> Account {
+    let plans = draw_set(1, round, load, cores);
+    let case = (round, load, cores, policy, preemption, overrun);
+    let quiet = judged(case, &plans, &Trouble::default());
+    assert_eq!(quiet.faults, 0);
+    let trouble = Trouble::draw(1, round, &plans, cores);
+    let troubled = judged(case, &plans, &trouble);
+    // Every fault that was drawn, at least where all jobs run, is in the account.
+    assert!(
+        troubled.faults > 0 || trouble.faults() == 0,
+        "{case:?}, {trouble:?}"
+    );
+    quiet
+}
+
+type Case = (u64, u64, u32, Policy, Preemption, OverrunPolicy);
+
+/// Runs a set with some trouble, in which nothing may be wrong.
+fn judged(case: Case, plans: &[DagPlan], trouble: &Trouble) -> Account {
+    let (_, _, cores, policy, preemption, overrun) = case;
     let machine = VirtualTime::new()
         .cores(cores)
         .policy(policy)
-        .preemption(preemption);
-    let executed = Executed::default();
-    let plans = draw_set(1, round, load, cores);
-    let dags = build(&plans, LENGTH, overrun, &executed);
+        .preemption(preemption)
+        .clusters(&trouble.clusters)
+        .contain_panics();
+    let mut executed = Executed::default();
+    let dags = build(plans, LENGTH, overrun, trouble, &mut executed);
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph())
         .expect("a drawn set has no fault");
     let report = machine.run();
-    let case = format!("round {round}, load {load}, {policy:?}, {preemption:?}, {overrun:?}");
-    assert_eq!(report.violations(), [], "{case}");
+    assert_eq!(report.violations(), [], "{case:?}");
     let statistics = |dag: sched_dag::DagId| &report.statistics[dag.index()];
-    let (account, discrepancies) =
-        Account::of_run(report.task_set(), &report.record(), statistics, &executed);
-    assert_eq!(discrepancies, [], "{case}");
+    let (account, discrepancies) = Account::of_run(
+        report.task_set(),
+        &report.record(),
+        statistics,
+        trouble,
+        &executed,
+    );
+    assert_eq!(discrepancies, [], "{case:?}, {trouble:?}");
     account
 }
 
@@ -86,12 +110,13 @@ fn every_job_is_accounted_for_in_overload() {
 #[test]
 fn the_largest_set_can_be_committed_and_run() {
     let machine = VirtualTime::new().cores(4);
-    let executed = Executed::default();
+    let mut executed = Executed::default();
     let dags = build(
         &largest_set(),
         Duration::ZERO,
         OverrunPolicy::Queue,
-        &executed,
+        &Trouble::default(),
+        &mut executed,
     );
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph())
         .expect("a drawn set has no fault");

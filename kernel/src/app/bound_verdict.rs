@@ -65,7 +65,10 @@ impl BoundVerdict {
         });
         for exceeded in ends.filter_map(|(dag, sink)| Exceeded::find(run, dag, sink)) {
             let text = exceeded.report(run.task_set());
-            self.complaint.borrow_mut().get_or_insert(text);
+            // What the app judges itself is not kept: it would count as in use.
+            if self.are_judged.get() {
+                self.complaint.borrow_mut().get_or_insert(text);
+            }
         }
     }
 

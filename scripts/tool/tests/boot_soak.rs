@@ -27,6 +27,8 @@ fn random_sets_break_no_rule_and_leave_nothing_behind() {
     assert!(report.total.jobs > 2000, "{:?}", report.total);
     assert!(report.total.preemptions > 2000, "{:?}", report.total);
     assert!(report.total.events > 50_000, "{:?}", report.total);
+    let coverage = &report.coverage;
+    assert!(coverage.hit() > 24, "{}", coverage.table());
     for policy in ["static", "edf"] {
         assert!(figures(&format!("{policy}-130-queue")).misses > 0);
         assert!(figures(&format!("{policy}-130-skip")).skips > 0);

@@ -25,7 +25,7 @@ static SOAK: Command = Command {
         Opt::new(
             "short",
             Takes::Nothing,
-            "8 s of guest time instead of 14 minutes, of the same kinds; the host takes longer.",
+            "16 s of guest time instead of 14 minutes, of the same kinds; the host takes longer.",
         ),
         Opt::new(
             "cores",
@@ -106,10 +106,12 @@ static SOAK: Command = Command {
     ],
     notes: "\
 A round draws a random set of 3 to 8 DAGs of 3 to 12 subtasks, whose execution
-times are random too, and runs it for the time of a round. Checked are: rules R1
+times are random too, and runs it for the time of a round. Where instances hold
+their cores, some rounds have faults, pauses and clusters. Checked are: rules R1
 to R5, by the guest from its record and by the host from the trace; every job
-completed, skipped or aborted, as the overrun policy allows; no allocation while
-jobs run; heap and stacks as before. Then it prints how many DAGs had which
+completed, skipped or aborted, as the overrun policy allows, or lost by a fault
+that was drawn; no allocation while jobs run; heap and stacks as before, but for
+what a fault keeps. Then it prints how many DAGs had which
 combination of policy, overrun policy, division of the cores, fault, restart and
 pause; one that no DAG had is `never`. The last line is `N passed, M failed`, in
 rounds; a failure is printed with the command that runs its round again.

@@ -70,6 +70,13 @@ impl Coverage {
         }
     }
 
+    /// Returns how many combinations at least one DAG had.
+    #[must_use]
+    pub fn hit(&self) -> usize {
+        let counts = self.0.as_flattened().iter();
+        counts.filter(|count| **count > 0).count()
+    }
+
     /// Returns the table, and how many combinations there were.
     #[must_use]
     pub fn table(&self) -> String {
@@ -91,9 +98,7 @@ impl Coverage {
                 let _ = write!(text, "{count:>14}");
             }
         }
-        let counts = self.0.as_flattened();
-        let hit = counts.iter().filter(|count| **count > 0).count();
-        let all = counts.len();
+        let (hit, all) = (self.hit(), self.0.as_flattened().len());
         let _ = write!(text, "\n{hit} of {all} combinations were hit");
         text
     }

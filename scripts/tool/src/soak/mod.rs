@@ -144,6 +144,11 @@ fn words(plan: &Plan, boot: &Boot<'_>) -> String {
         work,
         ..
     } = boot.part;
+    let trouble = if boot.part.has_trouble() {
+        "drawn"
+    } else {
+        "none"
+    };
     // In real time the host's noise would exceed budgets that nobody asked for.
     let budget_factor = match plan.mode {
         Mode::Deterministic => 10,
@@ -151,7 +156,7 @@ fn words(plan: &Plan, boot: &Boot<'_>) -> String {
     };
     format!(
         "mode={} policy={policy} load={load} overrun={overrun} work={work} first={} rounds={} round_ms={} \
-         seed={} trace=dump budget_factor={budget_factor}",
+         seed={} trouble={trouble} trace=dump budget_factor={budget_factor}",
         plan.mode,
         boot.first,
         boot.rounds,

@@ -58,6 +58,14 @@ const WORKS: [&str; 2] = ["hold", "compute"];
 /// The words for the overrun policies.
 pub(super) const OVERRUNS: [&str; 3] = ["queue", "skip", "abort"];
 
+impl Part {
+    /// Reports whether faults, pauses and clusters are drawn. Not where instances compute: there
+    /// cores take turns, and the report of a fault is a longer turn than a wait may be.
+    pub(super) fn has_trouble(&self) -> bool {
+        self.work == WORKS[0]
+    }
+}
+
 impl fmt::Display for Part {
     /// Writes it as it is written for `--only`: `edf-130-skip`, `edf-90-queue-compute`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -116,7 +124,7 @@ impl Length {
     /// Some seconds, for a test.
     pub const SHORT: Length = Length {
         seconds: 4,
-        overload_seconds: 1,
+        overload_seconds: 3,
         round: Duration::from_millis(500),
         rounds_a_boot: 4,
     };
@@ -232,9 +240,9 @@ mod tests {
     }
 
     #[test]
-    fn the_short_form_is_eight_seconds() {
+    fn the_short_form_is_sixteen_seconds() {
         let plan = Plan::new(Length::SHORT, 90, 130);
-        assert_eq!(u128::from(plan.rounds()) * plan.round.as_millis(), 8000);
+        assert_eq!(u128::from(plan.rounds()) * plan.round.as_millis(), 16_000);
     }
 
     #[test]

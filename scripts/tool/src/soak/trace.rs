@@ -1,7 +1,7 @@
 //! The traces of one boot, held against the rules.
 //!
-//! The guest prints a trace for each run: the first is its warm-up, which is
-//! judged as if it belonged to the boot's first round; then comes one a round.
+//! The guest prints a trace for each run: first those of its warm-up, which are
+//! judged as if they belonged to the boot's first round; then comes one a round.
 
 use super::judge::Judged;
 use super::plan::Boot;
@@ -11,6 +11,11 @@ use crate::trace::{check, read};
 
 /// How many breaches of a round are told in words.
 const SHOWN: usize = 5;
+
+/// The runs before the first round, all of the largest set: with trouble on divided cores, too.
+fn warm_ups(boot: &Boot<'_>) -> usize {
+    if boot.part.has_trouble() { 3 } else { 1 }
+}
 
 /// Judges the traces of all rounds that have left one, in which nothing may wait longer
 /// than `bound_ns` for what it is owed.
@@ -23,8 +28,10 @@ pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64, judged: &
             return;
         }
     };
+    let warm_ups = warm_ups(boot);
     for round in boot.first..boot.first + boot.rounds {
-        let position = usize::try_from(round - boot.first + 1).unwrap_or(usize::MAX);
+        let position = usize::try_from(round - boot.first)
+            .map_or(usize::MAX, |round| round.saturating_add(warm_ups));
         match runs.get(position) {
             Some(run) => {
                 judged.coverage.add_run(run);
@@ -33,7 +40,7 @@ pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64, judged: &
             None => judged.fail(round, "it has no trace".into()),
         }
     }
-    if let Some(warm_up) = runs.first() {
+    for warm_up in runs.iter().take(warm_ups) {
         judge_run(warm_up, boot.first, bound_ns, judged);
     }
 }
