@@ -278,6 +278,7 @@ fn every_reason_of_a_platform_is_listed() {
         "kernel/executive/src/run/execution/mod.rs",
         "kernel/executive/src/run/execution/stacks.rs",
         "kernel/executive/src/run/execution/adding.rs",
+        "kernel/executive/src/run/execution/present.rs",
         "fass/virtual-time/src/platform.rs",
         "fass/src/commit/added.rs",
         "fass/virtual-time/src/additions.rs",

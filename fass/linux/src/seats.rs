@@ -1,7 +1,7 @@
 //! The policy of `sched_ext` that `bpf/seats.bpf.c` is, as this program sees it: a table of
 //! threads, in which one that is higher comes before a lower one on the same processor.
 //!
-//! Whoever may load policies loads it, before; we take it for as long as we live. Putting a
+//! It is loaded by a person who may; this program then has it to its own end. Putting a
 //! thread somewhere is a store. It needs no system call, as what follows does for it: a
 //! preemption wakes the worker that takes the core over, and where a demoted one goes on, the
 //! worker that had the core sleeps. Both have Linux ask the policy.
