@@ -16,7 +16,7 @@
 //!   [`output`], [`progress`], [`lasting`]: printing without a panic, and while it takes long;
 //!   [`random`]: sets that are drawn;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
-//! - [`markdown`], [`fault_page`], [`promises`]: pages that tests hold to their word;
+//! - [`markdown`], [`fault_page`]: pages that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`recordings`]: what entered a run, and other formats of that;
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
@@ -59,7 +59,6 @@ pub mod places;
 pub mod probe;
 pub mod program;
 pub mod progress;
-pub mod promises;
 pub mod proof;
 pub mod protocol;
 pub mod qemu;

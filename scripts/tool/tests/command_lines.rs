@@ -130,19 +130,6 @@ fn what_is_no_image_is_2_before_anything_boots() {
 }
 
 #[test]
-fn the_promises_are_listed_with_their_tests() {
-    let output = output("test --promises");
-    assert!(output.status.success());
-    let listed = String::from_utf8_lossy(&output.stdout);
-    let promise = "README.md: Nothing of job k runs before its release at O + kT, a grid that \
-                   never drifts.\n    sched-dag/tests/rules.rs::r1_nothing_of_a_job_runs_before_its_release\n";
-    assert!(listed.contains(promise), "{listed}");
-    let of_a_fault =
-        "docs/errors.md: the commit has no dag; create one and register its subtasks\n";
-    assert!(listed.contains(of_a_fault), "{listed}");
-}
-
-#[test]
 fn that_another_command_builds_is_said() {
     let target = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("locked");
     let folder = target.join("tool");

@@ -26,7 +26,6 @@ use std::process::ExitCode;
 
 use crate::image;
 use crate::install;
-use crate::promises;
 use libtest::Plan;
 
 pub use table::TEST;
@@ -39,9 +38,6 @@ pub fn test(words: &[OsString]) -> ExitCode {
         Ok(options) => options,
         Err(code) => return code,
     };
-    if options.is_given("promises") {
-        return list_promises();
-    }
     if let Err(line) = disk::check() {
         return TEST.fail(&line);
     }
@@ -65,17 +61,6 @@ pub fn test(words: &[OsString]) -> ExitCode {
         Some(line) => TEST.refuse(&line),
         None if tally.failed() > 0 => ExitCode::FAILURE,
         None => ExitCode::SUCCESS,
-    }
-}
-
-/// Prints what the pages promise, each with its tests.
-fn list_promises() -> ExitCode {
-    match promises::all() {
-        Ok(promises) => {
-            promises.iter().for_each(|promise| print!("{promise}"));
-            ExitCode::SUCCESS
-        }
-        Err(line) => TEST.fail(&line),
     }
 }
 

@@ -17,11 +17,6 @@ pub static TEST: Command = Command {
             "Only what runs on the host: no guests, no images, no lints.",
         ),
         Opt::new(
-            "promises",
-            Takes::Nothing,
-            "Run nothing; list what the pages promise, and the tests that hold them to it.",
-        ),
-        Opt::new(
             "verbose",
             Takes::Nothing,
             "Show every test by name, not only those that fail.",
