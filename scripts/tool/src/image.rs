@@ -24,13 +24,12 @@ use crate::system;
 
 /// Returns the most that an app's stripped image may weigh. Two measure, and carry all their
 /// workloads and baselines besides what every image has. The drone has three DAGs and their
-/// mathematics; three can divide their cores; four others record and replay. What computes with
-/// images is compiled for speed.
+/// mathematics; three can divide their cores; three others record and replay.
 #[must_use]
 pub fn most_stripped_bytes(app: &str) -> u64 {
     match app {
         "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" | "soak" => 576 << 10,
-        "autoware" | "cruise" | "gait" | "vision" => 640 << 10,
+        "autoware" | "cruise" | "gait" => 640 << 10,
         _ => 512 << 10,
     }
 }

@@ -184,17 +184,4 @@ pub(super) const APPS: &[(&str, &[&str])] = &[
         ],
     ),
     ("storm", &["cpus", "interrupts", "rounds", "diverged"]),
-    (
-        "vision",
-        &[
-            "frames",
-            "seen",
-            "error_permille",
-            "gap_mm",
-            "speed_mm_s",
-            "deadline_misses",
-            "violations",
-            "allocations",
-        ],
-    ),
 ];
