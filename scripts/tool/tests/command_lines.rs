@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 23] = [
+const COMMANDS: [&str; 22] = [
     "run",
     "boot",
     "test",
@@ -20,7 +20,6 @@ const COMMANDS: [&str; 23] = [
     "soak",
     "bench",
     "bench build",
-    "bench scheduler",
     "bench hand-off",
     "bench join-latency",
     "bench makespan",

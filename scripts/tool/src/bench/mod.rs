@@ -8,7 +8,6 @@
 //!
 //! - [`build`]: what compiling takes, from a clone and after a change;
 //! - [`bounds`]: random sets of DAGs that the analysis proves;
-//! - [`scheduler`]: the commit, and the cost of a dispatched instance;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
 //! - [`makespan`]: task graphs on the machine, next to their published optima;
@@ -23,12 +22,10 @@ pub mod join_latency;
 pub mod makespan;
 pub mod native;
 mod plots;
-pub mod scheduler;
 pub mod sizes;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 use crate::lasting::Lasting;
 use crate::options::{Choice, Command, Menu, Parsed};
@@ -47,11 +44,6 @@ static BENCH: Menu = Menu {
             name: "build",
             about: "what compiling takes: from a clone to the first boot, and after a change",
             work: build::run,
-        },
-        Choice {
-            name: "scheduler",
-            about: "the commit of a large DAG, and the cost of a dispatched instance",
-            work: scheduler::run,
         },
         Choice {
             name: "hand-off",
@@ -83,7 +75,7 @@ static BENCH: Menu = Menu {
 };
 
 /// The measurements that print nothing before they have a result.
-const SILENT: [&str; 4] = ["bounds", "build", "scheduler", "sizes"];
+const SILENT: [&str; 3] = ["bounds", "build", "sizes"];
 
 /// Runs the subcommand.
 #[must_use]
@@ -116,21 +108,4 @@ fn by_plan<Plan>(
         Ok(false) => ExitCode::FAILURE,
         Err(line) => table.fail(&line),
     }
-}
-
-/// Returns how long `work` takes.
-fn time<T>(work: impl FnOnce() -> T) -> Duration {
-    let start = Instant::now();
-    std::hint::black_box(work());
-    start.elapsed()
-}
-
-/// Returns the shortest, for what else the host does only adds.
-fn shortest(durations: Vec<Duration>) -> Duration {
-    durations.into_iter().min().unwrap_or_default()
-}
-
-/// Returns how many times `one` is as long as `other`.
-fn ratio(one: Duration, other: Duration) -> f64 {
-    one.as_secs_f64() / other.as_secs_f64()
 }
