@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 22] = [
+const COMMANDS: [&str; 21] = [
     "run",
     "boot",
     "test",
@@ -19,7 +19,6 @@ const COMMANDS: [&str; 22] = [
     "recording",
     "soak",
     "bench",
-    "bench build",
     "bench hand-off",
     "bench join-latency",
     "bench makespan",

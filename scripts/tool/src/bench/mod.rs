@@ -6,7 +6,6 @@
 //! virtual time have. The exit code is 0 if all limits hold, 1 if one does not, and 2
 //! for a refused command line.
 //!
-//! - [`build`]: what compiling takes, from a clone and after a change;
 //! - [`bounds`]: random sets of DAGs that the analysis proves;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
@@ -15,7 +14,6 @@
 //! - [`sizes`]: what each part of an image takes of its room.
 
 pub mod bounds;
-pub mod build;
 mod code;
 pub mod hand_off;
 pub mod join_latency;
@@ -39,11 +37,6 @@ static BENCH: Menu = Menu {
             name: "bounds",
             about: "random sets that the analysis proves, by load and cores",
             work: bounds::run,
-        },
-        Choice {
-            name: "build",
-            about: "what compiling takes: from a clone to the first boot, and after a change",
-            work: build::run,
         },
         Choice {
             name: "hand-off",
@@ -75,7 +68,7 @@ static BENCH: Menu = Menu {
 };
 
 /// The measurements that print nothing before they have a result.
-const SILENT: [&str; 3] = ["bounds", "build", "sizes"];
+const SILENT: [&str; 2] = ["bounds", "sizes"];
 
 /// Runs the subcommand.
 #[must_use]
