@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use tool::system::workspace;
 
 /// Every command, by the words that name it.
-const COMMANDS: [&str; 21] = [
+const COMMANDS: &[&str] = &[
     "run",
     "boot",
     "test",
@@ -26,7 +26,6 @@ const COMMANDS: [&str; 21] = [
     "bench sizes",
     "oracle",
     "oracle bounds",
-    "oracle phasings",
     "oracle responses",
     "oracle schedules",
     "oracle schedules --in-kernel",

@@ -11,12 +11,12 @@
 //! - [`in_kernel`]: the same cases on the bare machine;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline.
 //!
-//! Two kinds read no files: what the analysis accepts of random sets is simulated
-//! (`random_sets`).
+//! One kind reads no files: what the analysis accepts of random sets is simulated
+//! (`responses`).
 
 pub mod bounds;
 pub mod in_kernel;
-mod random_sets;
+mod responses;
 pub mod schedules;
 pub mod synchronizer;
 mod table;
@@ -58,14 +58,9 @@ static ORACLE: Menu = Menu {
             },
         },
         Choice {
-            name: "phasings",
-            about: "small random sets accepted, next to those that no simulation refutes",
-            work: random_sets::phasings,
-        },
-        Choice {
             name: "responses",
             about: "random accepted sets in virtual time, with overheads, against their bounds",
-            work: random_sets::responses,
+            work: responses::command,
         },
         Choice {
             name: "schedules",

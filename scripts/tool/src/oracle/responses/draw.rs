@@ -74,34 +74,23 @@ fn draw_dag(random: &mut Random, cores: u64, share: u64, pipelined: bool) -> Dag
         let period = period.max(volume / cores + 2 * longest);
         (period, period - random.within(0, period / 4))
     };
-    let mut spec = dag(period, deadline, &wcets_ns, edges);
-    spec.offset_ns = random.within(0, 2) * random.within(0, period);
-    spec
-}
-
-/// Draws edges from subtasks to later ones.
-pub(super) fn edges(random: &mut Random, subtasks: usize) -> Vec<(usize, usize)> {
-    let density = random.within(1, 6);
-    let pairs = (1..subtasks).flat_map(|to| (0..to).map(move |from| (from, to)));
-    pairs.filter(|_| random.within(0, density) == 0).collect()
-}
-
-/// Returns a DAG of WCETs and edges.
-pub(super) fn dag(
-    period_ns: u64,
-    deadline_ns: u64,
-    wcets_ns: &[u64],
-    edges: Vec<(usize, usize)>,
-) -> DagSpec {
     let subtask = |&wcet_ns: &u64| SubtaskSpec {
         wcet_ns: Some(wcet_ns),
         ..SubtaskSpec::default()
     };
     DagSpec {
-        period_ns: Some(period_ns),
-        relative_deadline_ns: Some(deadline_ns),
+        period_ns: Some(period),
+        relative_deadline_ns: Some(deadline),
+        offset_ns: random.within(0, 2) * random.within(0, period),
         subtasks: wcets_ns.iter().map(subtask).collect(),
         edges,
         ..DagSpec::default()
     }
+}
+
+/// Draws edges from subtasks to later ones.
+fn edges(random: &mut Random, subtasks: usize) -> Vec<(usize, usize)> {
+    let density = random.within(1, 6);
+    let pairs = (1..subtasks).flat_map(|to| (0..to).map(move |from| (from, to)));
+    pairs.filter(|_| random.within(0, density) == 0).collect()
 }

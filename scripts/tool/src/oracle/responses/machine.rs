@@ -19,7 +19,7 @@ use sched_dag::{
 use crate::random::Random;
 
 /// What the platform's own work takes at most.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Costs {
     pub(super) switch_ns: u64,
     pub(super) dispatch_ns: u64,

@@ -1,4 +1,11 @@
 //! `oracle responses`: random accepted sets on a machine whose work takes time.
+//!
+//! No response of a set that the analysis accepts is above its bound, where the machine's own
+//! work takes what is charged for it. The sets come from `draw`; `machine` is the machine, in
+//! virtual time.
+
+mod draw;
+mod machine;
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -8,11 +15,11 @@ use std::sync::Arc;
 use sched_dag::analysis::{Settings, answer};
 use sched_dag::{CommitOptions, ConstructionPolicy, verify};
 
-use super::draw::{Sample, sample};
-use super::machine::{Takes, longest_responses_ns};
 use crate::options::{Command, Opt, Takes as Value};
 use crate::progress::Progress;
 use crate::random::Random;
+use draw::{Sample, sample};
+use machine::{Takes, longest_responses_ns};
 
 static TABLE: Command = Command {
     invocation: "./scripts/oracle responses",
@@ -57,7 +64,7 @@ struct Seen {
 }
 
 /// Runs `oracle responses` with the words after its name.
-pub(crate) fn command(words: &[OsString]) -> ExitCode {
+pub(super) fn command(words: &[OsString]) -> ExitCode {
     let options = match TABLE.read(words) {
         Ok(options) => options,
         Err(code) => return code,
