@@ -15,7 +15,7 @@ use core::fmt;
 use core::time::Duration;
 
 use recording::Channel;
-use sched_dag::analysis::{self, Answer, OverheadSource, Overheads, Settings};
+use sched_dag::analysis::{OverheadSource, Overheads};
 use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::edge::Begin;
@@ -94,12 +94,6 @@ pub trait Platform: Sync {
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
         let _ = task_set;
         Ok(())
-    }
-
-    /// Answers about deadlines. A platform with little room for code and few DAGs has
-    /// [`answer_compact`](sched_dag::analysis::answer_compact) do it, which is slower.
-    fn answer(&self, task_set: &TaskSet, settings: &Settings) -> Answer {
-        analysis::answer(task_set, settings)
     }
 
     /// Returns what the platform's own work costs an instance at most, as

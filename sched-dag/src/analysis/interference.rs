@@ -48,6 +48,26 @@ impl Shape {
     }
 }
 
+/// Adds what DAGs may execute on `m - j` cores, as [`Other::add_to`] does.
+pub(super) fn add_to(
+    others: &[Other],
+    times: (u64, u64),
+    clip: Clip,
+    cores: usize,
+    [plain, clipped]: [&mut [Piece]; 2],
+) {
+    for other in others {
+        other.add_to(times, clip, cores, plain, clipped);
+    }
+}
+
+/// Returns what DAGs may execute on all cores within a window.
+pub(super) fn on_all_cores(others: &[Other], window_ns: u64) -> Piece {
+    let pieces = others.iter();
+    let pieces = pieces.map(|other| other.on_all_cores().at(window_ns));
+    pieces.fold(Piece::NONE, Piece::and)
+}
+
 /// A DAG that may outrank the one under analysis.
 pub(super) struct Other {
     /// All of it, on at most 1, 2, .. cores.
@@ -124,23 +144,6 @@ impl Other {
         let count = cores.min(self.whole.len());
         let pieces = self.pieces(times, count, Some(self.of_chains(times)));
         (count, pieces.map(|piece| piece.value))
-    }
-
-    /// Returns the workload on at most `cores` cores, if that of each part is not clipped.
-    pub(super) fn unclipped(&self, cores: usize, of: impl Fn(&Workload) -> Piece) -> Piece {
-        let count = cores.min(self.whole.len());
-        let parts = self.chains.iter().chain(self.rest.get(count - 1));
-        let parts = parts.map(&of).fold(Piece::NONE, Piece::and);
-        of(&self.whole[count - 1]).least(parts)
-    }
-
-    /// Returns a window of which, as of all longer ones, a job up to a length may wait for as
-    /// long as any of the workloads lasts; `None` if there is none within the limit.
-    pub(super) fn settled_ns(&self, longest_ns: u64, until_ns: u64) -> Option<u64> {
-        let all = || self.whole.iter().chain(&self.rest).chain(&self.chains);
-        let doubled = core::iter::successors(Some(longest_ns.max(1)), |ns| ns.checked_mul(2));
-        let mut windows = doubled.take_while(|&window_ns| window_ns <= until_ns);
-        windows.find(|&window_ns| all().all(|one| one.fits(window_ns, window_ns - longest_ns)))
     }
 
     fn of_chains(&self, (window_ns, waiting_ns): (u64, u64)) -> Piece {

@@ -17,7 +17,6 @@
 //! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
 //! | `set` | the equations of all DAGs, solved exactly | |
-//! | `above`, `sums` | the others, one by one or added up | derived here |
 //! | `non_preemptive` | subtasks that keep their core | derived here |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
@@ -49,8 +48,8 @@
 //!   the result stays a bound, and an overflow is an error or "not proven".
 //! - *No recursion*, and every loop has a limit; a limit reached is "not
 //!   proven" ([`Reason::Limit`]), never a guess. Time is near linear in
-//!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and in the number
-//!   of DAGs where workloads are added up, as [`answer()`] does.
+//!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and quadratic in the
+//!   number of DAGs.
 //! - *Evidence*: the property test in `tests/analysis` simulates thousands of
 //!   random sets and compares each observed response time with its bound.
 //!
@@ -64,7 +63,6 @@
 //!   evidence, not on a reviewed proof. The multi-path bound is proven in
 //!   `docs/multi-path-bound.md`.
 
-mod above;
 mod answer;
 mod assign;
 mod bonifaci;
@@ -85,7 +83,6 @@ mod ratio;
 mod refusal;
 mod relation;
 mod set;
-mod sums;
 mod task;
 mod width;
 mod witness;
@@ -100,7 +97,7 @@ pub use cover::covers;
 pub use federated::{Federation, federated, federated_multi_path};
 pub use interference::Clip;
 pub use intra_task::{PATH_LIMIT, assign_intra_task, intra_task};
-pub use judge::{answer, answer_compact};
+pub use judge::answer;
 pub use multi_path::multi_path;
 pub use multi_path_sets::{multi_path_edf, multi_path_fp};
 pub use overheads::{OverheadSource, Overheads};

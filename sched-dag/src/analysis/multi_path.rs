@@ -24,9 +24,8 @@
 
 use alloc::vec;
 
-use super::above::Above;
 use super::cover::covers;
-use super::interference::Clip;
+use super::interference::{Clip, Other, add_to};
 use super::non_preemptive::Blocking;
 use super::pipelined::Unsolved;
 use super::task::Task;
@@ -72,33 +71,21 @@ impl Equations<'_> {
     /// Returns the least response time that some form proves, if it is at least `start_ns`.
     pub(super) fn solve(
         &self,
-        others: &dyn Above,
+        others: &[Other],
         start_ns: u64,
         steps: &mut u64,
     ) -> Result<u64, Unsolved> {
         let start = alone(self.task, self.covers, self.cores as u64);
         let length = self.task.length_ns();
-        let waiting = length.saturating_add(others.least_waiting_ns(self.cores));
-        let mut window = start_ns.max(start.unwrap_or(0)).max(waiting);
+        let mut window = start_ns.max(start.unwrap_or(0)).max(length);
         while window <= self.limit_ns {
             *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
-            let mut by_sums = others.has_sums();
-            let least = loop {
-                let forms = self.forms(others, window, by_sums);
-                let lacks = forms.map(|form| {
-                    let lack = form.busy.lacks(form.cores, u128::from(window - length));
-                    // By sums, only what is said about all cores is exact.
-                    (
-                        lack.unwrap_or(0),
-                        by_sums && form.cores != self.cores as u128,
-                    )
-                });
-                // Without subtasks there are no forms, and nothing to wait for.
-                match lacks.min().unwrap_or((0, false)) {
-                    (0, true) => by_sums = false,
-                    (least, _) => break least,
-                }
-            };
+            let lacks = self.forms(others, window).map(|form| {
+                let lack = form.busy.lacks(form.cores, u128::from(window - length));
+                lack.unwrap_or(0)
+            });
+            // Without subtasks there are no forms, and nothing to wait for.
+            let least = lacks.min().unwrap_or(0);
             match least {
                 0 => return Ok(window),
                 lack => {
@@ -110,19 +97,13 @@ impl Equations<'_> {
         Err(Unsolved::BeyondDeadline)
     }
 
-    /// Returns the forms at a window of at least the length; `by_sums`, those on fewer than
-    /// all cores are busy for less than they may be.
-    pub(super) fn forms(
-        &self,
-        others: &dyn Above,
-        window_ns: u64,
-        by_sums: bool,
-    ) -> impl Iterator<Item = Form> {
+    /// Returns the forms at a window of at least the length.
+    pub(super) fn forms(&self, others: &[Other], window_ns: u64) -> impl Iterator<Item = Form> {
         let times = (window_ns, window_ns - self.task.length_ns());
         let mut plain = vec![Piece::NONE; self.covers.len()];
         let mut clipped = plain.clone();
         let sums = [&mut plain[..], &mut clipped];
-        others.add_to(times, self.clip, self.cores, by_sums, sums);
+        add_to(others, times, self.clip, self.cores, sums);
         let has_clipped = !others.is_empty() && self.clip != Clip::Window;
         let sums = plain.into_iter().zip(clipped).enumerate();
         sums.flat_map(move |(j, (plain, clipped))| {

@@ -39,8 +39,7 @@ pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64
     let mut set = Set::new(tasks, cores);
     set.clip = clip;
     set.deadlines_limit = true;
-    let order: Vec<usize> = (0..tasks.len()).collect();
-    set.down_from_deadlines(&order, |_, _| true)
+    set.down_from_deadlines(|_, _| true)
         .map_err(|(position, why)| why.at(position))
 }
 

@@ -42,18 +42,17 @@
 
 use alloc::vec::Vec;
 
-use super::above::Above;
-use super::interference::Shape;
+use super::interference::{Other, Shape, on_all_cores};
 use super::non_preemptive::Blocking;
 use super::task::Task;
 use super::workload::Piece;
 
-/// The most evaluations of an equation's right-hand side in one analysis; a
-/// set that needs more is "not proven".
+/// The most evaluations of equations' right-hand sides that the DAGs of one analysis share; a
+/// DAG that needs more is "not proven".
 pub(super) const STEP_LIMIT: u64 = 200_000;
 
-/// The same where that is more than the above, for each DAG. Ordinary sets need tens.
-pub(super) const STEPS_PER_DAG: u64 = 256;
+/// The same for each DAG alone, besides the shared ones. Ordinary sets need tens.
+pub(super) const OWN_STEPS: u64 = 256;
 
 /// The most jobs of one DAG that a window may reach back over; a set that
 /// needs more (`R > 1024 T`) is "not proven".
@@ -140,7 +139,7 @@ impl Figures {
     /// must not exceed the least solution (0 always is right).
     pub(super) fn solve(
         &self,
-        others: &dyn Above,
+        others: &[Other],
         start_ns: u64,
         steps: &mut u64,
     ) -> Result<u64, Unsolved> {
@@ -162,7 +161,7 @@ impl Figures {
     /// jobs before the chain's first can run.
     pub(super) fn windows(
         &self,
-        others: &dyn Above,
+        others: &[Other],
         response_ns: u64,
     ) -> Result<(Vec<u128>, u128), Unsolved> {
         let (mut windows, mut steps) = (Vec::new(), STEP_LIMIT);
@@ -176,7 +175,7 @@ impl Figures {
         &self,
         windows: &mut Vec<u128>,
         response: u128,
-        others: &dyn Above,
+        others: &[Other],
         steps: &mut u64,
     ) -> Result<(), Unsolved> {
         let own = self.other_jobs(self.whole.unwrap_or(response))?;
@@ -218,15 +217,14 @@ impl Figures {
         &self,
         back: u64,
         own: u128,
-        others: &dyn Above,
+        others: &[Other],
         start: u128,
         steps: &mut u64,
     ) -> Result<u128, Unsolved> {
         let back = u128::from(back);
         let limit = self.deadline + back * self.period;
         let cores = self.cores as u128;
-        let waiting = u128::from(others.least_waiting_ns(self.cores));
-        let mut window = start.max(self.chain(back) + waiting);
+        let mut window = start.max(self.chain(back));
         while window <= limit {
             *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
             let length = u64::try_from(window).map_err(|_| Unsolved::Limit)?;
@@ -245,11 +243,11 @@ impl Figures {
     }
 
     /// Returns what the cores execute at most while a chain over `back` releases waits.
-    pub(super) fn busy(&self, back: u128, own: u128, others: &dyn Above, window_ns: u64) -> Piece {
+    pub(super) fn busy(&self, back: u128, own: u128, others: &[Other], window_ns: u64) -> Piece {
         let constant = (back * self.volume + self.last_volume - self.chain(back))
             .saturating_add(own)
             .saturating_add(self.blocking.along_a_chain(self.cores, back));
-        let sum = others.on_all_cores(window_ns);
+        let sum = on_all_cores(others, window_ns);
         let value = sum.value.saturating_add(constant);
         Piece { value, ..sum }
     }

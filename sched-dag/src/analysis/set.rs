@@ -16,42 +16,14 @@
 //! A DAG that fails takes those with it that it may outrank, since their
 //! workloads would rest on a bound that does not exist; others keep theirs.
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use super::above::Above;
 use super::interference::{Clip, Other, Shape};
 use super::multi_path::{Equations, alone};
-use super::pipelined::{Figures, STEP_LIMIT, STEPS_PER_DAG, Unsolved};
+use super::pipelined::{Figures, OWN_STEPS, STEP_LIMIT, Unsolved};
 use super::refusal::Refusal;
 use super::task::Task;
 use super::workload::Workload;
-
-/// The DAGs of an order with their bounds so far, and with sums of their workloads.
-pub(super) trait Front {
-    /// Reports whether each DAG may outrank those after it and no other.
-    fn goes_down(&self) -> bool;
-
-    /// Returns those that may outrank a DAG, or the first of them in the order of the commit
-    /// that has no bound; with a limit only jobs that are due no later than that count.
-    ///
-    /// It knows of those before it in the order what was put since the last DAG of the order
-    /// was, and of those after it what was put until then.
-    fn among<'a>(
-        &'a self,
-        set: &'a Set<'a>,
-        dag: usize,
-        limit_ns: Option<u64>,
-    ) -> Result<Box<dyn Above + 'a>, usize>;
-
-    /// Takes the bound of a DAG; all are put in, in the order, and then again.
-    fn put(&mut self, set: &Set<'_>, dag: usize, response_ns: Option<u64>);
-}
-
-/// Makes a front without bounds, by an order, by who may outrank whom, and by whether jobs count
-/// up to a deadline only.
-pub(super) type NewFront =
-    fn(&Set<'_>, &[usize], &dyn Fn(usize, usize) -> bool, bool) -> Box<dyn Front>;
 
 /// DAGs with what enters their equations.
 pub(super) struct Set<'a> {
@@ -65,8 +37,6 @@ pub(super) struct Set<'a> {
     pub(super) clip: Clip,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
-    /// How workloads are added up, if they shall be.
-    pub(super) front: Option<NewFront>,
 }
 
 /// What is known about each DAG of a set.
@@ -114,12 +84,11 @@ impl<'a> Set<'a> {
             deadlines_limit: false,
             clip: Clip::Chains,
             known: alloc::vec![None; tasks.len()],
-            front: None,
         }
     }
 
-    /// Solves the equations, visiting the DAGs in `order`: of any sort where nothing is added up
-    /// (the highest priority first is fastest), else as [`front`](Self::front) has it.
+    /// Solves the equations, visiting the DAGs in `order`: any will do, and the highest priority
+    /// first is fastest.
     pub(super) fn solve(
         &self,
         order: &[usize],
@@ -130,32 +99,21 @@ impl<'a> Set<'a> {
             first_failing: None,
             failures: alloc::vec![None; self.tasks.len()],
         };
-        let mut steps = self.most_steps();
-        let mut front = self.front(order, &may_outrank, self.deadlines_limit);
-        let goes_down = front.as_ref().is_some_and(|front| front.goes_down());
-        if !goes_down {
-            self.put_all(&mut front, order, &solution.responses);
-        }
+        let mut steps = Steps::of(self.tasks.len());
         let mut is_done = false;
         while !is_done {
             is_done = true;
             for &dag in order {
                 let before = solution.responses[dag];
                 if self.known[dag].is_none() && before.is_some() {
-                    let limit_ns = self.limit_ns(dag);
-                    let (bounds, front) = (&solution.responses, front.as_deref());
-                    let others = self.others(front, dag, limit_ns, bounds, &may_outrank);
+                    let others = self.interference(dag, &solution.responses, &may_outrank);
                     self.visit(dag, others, &mut solution, &mut steps);
                 }
-                let after = solution.responses[dag];
-                is_done &= goes_down || after == before;
-                if let Some(front) = &mut front {
-                    front.put(self, dag, after);
-                }
+                is_done &= solution.responses[dag] == before;
             }
         }
         if let Some((_, Unsolved::Limit)) = solution.first_failing
-            && let Ok(coarse) = self.down_from_deadlines(order, &may_outrank)
+            && let Ok(coarse) = self.down_from_deadlines(&may_outrank)
         {
             solution.responses = coarse.into_iter().map(Some).collect();
             solution.first_failing = None;
@@ -169,71 +127,20 @@ impl<'a> Set<'a> {
     fn visit(
         &self,
         dag: usize,
-        others: Result<Box<dyn Above + '_>, usize>,
+        others: Result<Vec<Other>, usize>,
         solution: &mut Solution,
-        steps: &mut u64,
+        steps: &mut Steps,
     ) {
         let start_ns = solution.responses[dag].unwrap_or(0);
         let after = match others {
             Err(other) => Err(Failure::Other(other)),
-            Ok(others) => (self.respond(dag, &*others, start_ns, steps)).map_err(|why| {
+            Ok(others) => (self.respond(dag, &others, start_ns, steps)).map_err(|why| {
                 solution.first_failing.get_or_insert((dag, why));
                 Failure::Own(why)
             }),
         };
         solution.failures[dag] = after.err();
         solution.responses[dag] = after.ok();
-    }
-
-    /// Returns a front without bounds, if workloads shall be added up. Those that may outrank a
-    /// DAG must be the first of the order, but for itself; so they are in the order of their most
-    /// urgent priorities, and in any order if all may outrank all.
-    pub(super) fn front(
-        &self,
-        order: &[usize],
-        may_outrank: impl Fn(usize, usize) -> bool,
-        deadlines_limit: bool,
-    ) -> Option<Box<dyn Front>> {
-        let front = self.front.filter(|_| self.clip == Clip::Chains)?;
-        Some(front(self, order, &may_outrank, deadlines_limit))
-    }
-
-    /// Tells a front all bounds.
-    pub(super) fn put_all(
-        &self,
-        front: &mut Option<Box<dyn Front>>,
-        order: &[usize],
-        responses: &[Option<u64>],
-    ) {
-        if let Some(front) = front {
-            order
-                .iter()
-                .for_each(|&dag| front.put(self, dag, responses[dag]));
-        }
-    }
-
-    /// Returns the DAGs that may outrank `dag`, by a front or one by one, or the first of these
-    /// that has no bound; with a limit only jobs that are due no later than that count.
-    pub(super) fn others<'s>(
-        &'s self,
-        front: Option<&'s (dyn Front + 's)>,
-        dag: usize,
-        limit_ns: Option<u64>,
-        responses: &[Option<u64>],
-        may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<Box<dyn Above + 's>, usize> {
-        match front {
-            Some(front) => front.among(self, dag, limit_ns),
-            None => {
-                let each = self.interference_up_to(dag, limit_ns, responses, may_outrank);
-                Ok(Box::new(each?))
-            }
-        }
-    }
-
-    /// Returns how often all equations together may be evaluated.
-    fn most_steps(&self) -> u64 {
-        STEP_LIMIT.max(STEPS_PER_DAG * self.tasks.len() as u64)
     }
 
     /// Returns the deadline up to which others' jobs count for a DAG's, if there is one.
@@ -243,20 +150,22 @@ impl<'a> Set<'a> {
     }
 
     /// Returns the least response time of a DAG among others, if it is at least `start_ns`.
-    pub(super) fn respond(
+    fn respond(
         &self,
         dag: usize,
-        others: &dyn Above,
+        others: &[Other],
         start_ns: u64,
-        steps: &mut u64,
+        steps: &mut Steps,
     ) -> Result<u64, Unsolved> {
         let (equations, figures) = (self.equations(dag), &self.figures[dag]);
-        match equations.solve(others, start_ns, steps) {
-            Err(Unsolved::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
-                figures.solve(others, start_ns, steps)
+        steps.spend(dag, |steps| {
+            match equations.solve(others, start_ns, steps) {
+                Err(Unsolved::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
+                    figures.solve(others, start_ns, steps)
+                }
+                solved => solved,
             }
-            solved => solved,
-        }
+        })
     }
 
     /// Returns the equations of a DAG's jobs one at a time.
@@ -284,26 +193,22 @@ impl<'a> Set<'a> {
     /// comes near it. From there it goes down, as long as steps are left.
     pub(super) fn down_from_deadlines(
         &self,
-        order: &[usize],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Result<Vec<u64>, (usize, Unsolved)> {
-        let mut steps = self.most_steps();
+        let mut steps = Steps::of(self.tasks.len());
         let mut bounds: Vec<u64> = (self.known.iter().zip(self.tasks))
             .map(|(known, task)| known.unwrap_or(task.relative_deadline_ns()))
             .collect();
-        let mut front = self.front(order, &may_outrank, self.deadlines_limit);
         let mut has_round = false;
         loop {
             let responses: Vec<Option<u64>> = bounds.iter().copied().map(Some).collect();
-            self.put_all(&mut front, order, &responses);
             let lower = (0..self.tasks.len()).map(|dag| {
                 if let Some(known) = self.known[dag] {
                     return Ok(known);
                 }
-                let (limit_ns, front) = (self.limit_ns(dag), front.as_deref());
-                let others = self.others(front, dag, limit_ns, &responses, &may_outrank);
+                let others = self.interference(dag, &responses, &may_outrank);
                 let others = others.map_err(|_| (dag, Unsolved::Limit))?;
-                let response = self.respond(dag, &*others, 0, &mut steps);
+                let response = self.respond(dag, &others, 0, &mut steps);
                 response.map_err(|why| (dag, why))
             });
             match lower.collect::<Result<Vec<u64>, _>>() {
@@ -351,6 +256,33 @@ impl<'a> Set<'a> {
             None => workload,
         };
         Other::new(task, shape, response_ns, self.cores.into(), limit)
+    }
+}
+
+/// How often equations may be evaluated yet. A DAG takes the shared steps first and then its
+/// own, so that one which comes near its solution slowly takes no other's bound away.
+struct Steps {
+    shared: u64,
+    /// By DAG.
+    own: Vec<u64>,
+}
+
+impl Steps {
+    fn of(dags: usize) -> Self {
+        Self {
+            shared: STEP_LIMIT,
+            own: alloc::vec![OWN_STEPS; dags],
+        }
+    }
+
+    /// Lets a DAG take steps from those that it may.
+    fn spend<T>(&mut self, dag: usize, work: impl FnOnce(&mut u64) -> T) -> T {
+        let own = self.own[dag];
+        let mut left = self.shared + own;
+        let result = work(&mut left);
+        self.own[dag] = left.min(own);
+        self.shared = left - self.own[dag];
+        result
     }
 }
 

@@ -40,7 +40,6 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::Write;
 
-use super::above::Above;
 use super::answer::{DagBound, Settings, Test};
 use super::cover::{Chain, covering, heaviest, peel};
 use super::interference::Other;
@@ -71,31 +70,25 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> Stri
     text.hash("hash");
     let all: Vec<usize> = (0..dags.len()).collect();
     let mut reasons = alloc::vec![None; dags.len()];
-    with_case(
-        dags,
-        &all,
-        (settings, None),
-        &mut reasons,
-        |case, reasons| {
-            let bounds = case.verdict().bounds;
-            for dag in 0..case.members.len() {
-                text.graph(case, dag);
+    with_case(dags, &all, settings, &mut reasons, |case, reasons| {
+        let bounds = case.verdict().bounds;
+        for dag in 0..case.members.len() {
+            text.graph(case, dag);
+        }
+        for (dag, bound) in bounds.iter().enumerate() {
+            match bound {
+                Some(bound) => text.bound(case, &bounds, dag, *bound),
+                None => text.line(format_args!("unproven {}", case.members[dag])),
             }
-            for (dag, bound) in bounds.iter().enumerate() {
-                match bound {
-                    Some(bound) => text.bound(case, &bounds, dag, *bound),
-                    None => text.line(format_args!("unproven {}", case.members[dag])),
-                }
-            }
-            for (dag, _) in reasons
-                .iter()
-                .enumerate()
-                .filter(|(_, reason)| reason.is_some())
-            {
-                text.line(format_args!("unproven {dag}"));
-            }
-        },
-    );
+        }
+        for (dag, _) in reasons
+            .iter()
+            .enumerate()
+            .filter(|(_, reason)| reason.is_some())
+        {
+            text.line(format_args!("unproven {dag}"));
+        }
+    });
     text.hash("seal");
     text.0
 }
@@ -229,14 +222,14 @@ impl Text {
         case: &Case<'_>,
         dag: usize,
         bound_ns: u64,
-        others: &dyn Above,
+        others: &[Other],
         listed: &[Listed<'_>],
     ) {
         let (id, task) = (case.members[dag], case.tasks[dag]);
         let equations = case.set.equations(dag);
         let waiting = bound_ns - task.length_ns();
         let enough = |cores: u128| cores * u128::from(waiting);
-        let mut forms = equations.forms(others, bound_ns, false);
+        let mut forms = equations.forms(others, bound_ns);
         let Some(form) = forms.find(|form| form.busy.value <= enough(form.cores)) else {
             return;
         };
@@ -271,7 +264,7 @@ impl Text {
         case: &Case<'_>,
         dag: usize,
         bound_ns: u64,
-        others: &dyn Above,
+        others: &[Other],
         listed: &[Listed<'_>],
     ) {
         let figures = &case.set.figures[dag];

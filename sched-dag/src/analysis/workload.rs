@@ -94,20 +94,15 @@ impl Workload {
     ///
     /// Only for tasks with a relative deadline no longer than the period.
     pub(super) fn under_edf(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
-        self.ceiling = Some(self.due(own_deadline_ns, deadline_ns).value);
+        self.ceiling = Some(self.due(own_deadline_ns, deadline_ns));
         self
     }
 
-    /// Returns that limit, and how it goes on for later deadlines than this one.
-    pub(super) fn due(&self, own_deadline_ns: u64, deadline_ns: u64) -> Piece {
+    /// Returns that limit.
+    fn due(&self, own_deadline_ns: u64, deadline_ns: u64) -> u128 {
         let (own, other) = (u128::from(own_deadline_ns), u128::from(deadline_ns));
-        match (other + self.response).checked_sub(own) {
-            Some(time) => self.packed(self.parallelism * time),
-            None => Piece {
-                span: Some(own - other - self.response),
-                ..Piece::NONE
-            },
-        }
+        let time = (other + self.response).checked_sub(own);
+        time.map_or(0, |time| self.packed(self.parallelism * time).value)
     }
 
     /// Returns the workload in a window.
@@ -139,13 +134,6 @@ impl Workload {
             slope: self.cap,
             span: None,
         }
-    }
-
-    /// Reports whether what executes in a window fits into some time on its cores; not of jobs
-    /// that overlap, nor under a limit, of which more may be said.
-    pub(super) fn fits(&self, window_ns: u64, time_ns: u64) -> bool {
-        let is_plain = self.lanes == 1 && self.ceiling.is_none();
-        is_plain && self.at(window_ns).value <= self.over(time_ns).value
     }
 
     /// Returns the closed form for one lane, without the cap.
@@ -242,13 +230,6 @@ impl Piece {
         }
     }
 
-    /// Returns this piece no further than it is sure to go on.
-    pub(super) fn up_to(self, span: u64) -> Self {
-        let span = u128::from(span);
-        let span = Some(self.span.map_or(span, |own| own.min(span)));
-        Self { span, ..self }.or_one_flat_step()
-    }
-
     /// Replaces an empty piece by a step of 1 ns without growth: never more
     /// than the workload, which never falls.
     fn or_one_flat_step(self) -> Self {
@@ -312,7 +293,7 @@ mod tests {
                     };
                     let carried_in = (other + response).saturating_sub(jobs * 9 + own);
                     let limit = jobs * volume + volume.min(parallelism * carried_in);
-                    assert_eq!(workload.due(own, other).value, u128::from(limit));
+                    assert_eq!(workload.due(own, other), u128::from(limit));
                 }
             }
         }

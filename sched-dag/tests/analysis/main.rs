@@ -8,7 +8,6 @@
 //! The other tests are worked examples, and the counterexamples to forms that
 //! look like bounds and are not.
 
-mod many;
 mod random;
 mod simulate;
 mod witnesses;

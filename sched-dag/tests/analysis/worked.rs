@@ -1,13 +1,13 @@
 //! Worked examples: values from the papers, and schedules that show them.
 
 use sched_dag::analysis::{
-    Clip, Refusal, Task, assign_intra_task, covers, intra_task, multi_path, multi_path_edf,
-    multi_path_fp, width,
+    Clip, Reason, Refusal, Task, answer, assign_intra_task, covers, intra_task, multi_path,
+    multi_path_edf, multi_path_fp, width,
 };
 use sched_dag::{DagSpec, Policy, Preemption, Priority};
 
-use crate::DIAMOND;
 use crate::simulate::{commit, responses, spec};
+use crate::{DIAMOND, FP, settings};
 
 fn fork_join() -> Task {
     let edges: Vec<(usize, usize)> = (1..5).flat_map(|v| [(0, v), (v, 5)]).collect();
@@ -138,4 +138,24 @@ fn e12_graham_anomalies() {
     assert_eq!(finish(&wcets.map(|wcet| wcet - 1), &edges, 3), 13);
     assert_eq!(finish(&wcets, &edges, 4), 15);
     assert_eq!(finish(&wcets, &[(0, 8), (3, 6), (3, 7)], 3), 16);
+}
+
+#[test]
+fn a_dag_near_its_bound_slowly_leaves_a_more_urgent_one_its_own() {
+    // The urgent one takes four fifths of a core: the other's equations grow by 10 us a step,
+    // for 30 s and more.
+    let edges = [(1, 3), (1, 2), (3, 0), (3, 4)];
+    let urgent = spec(50_000, 60_000, &[10_000; 5], &edges, 0);
+    let path = [10_000_000_000; 3];
+    let slow = spec(
+        150_000_000_000,
+        150_000_000_000,
+        &path,
+        &[(0, 1), (1, 2)],
+        1,
+    );
+    let task_set = commit(&[urgent, slow], FP.0, 2);
+    let answer = answer(&task_set, &settings(FP, 2));
+    assert_eq!(answer.bounds[0].map(|bound| bound.bound_ns), Some(40_000));
+    assert_eq!(answer.reasons, [None, Some(Reason::Limit)]);
 }

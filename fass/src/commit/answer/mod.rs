@@ -288,7 +288,7 @@ impl Answers {
             cores: platform.cores(),
             overheads: platform.overheads(),
         };
-        let answer = platform.answer(task_set, &settings);
+        let answer = analysis::answer(task_set, &settings);
         let found = answer.bounds.iter().zip(&answer.reasons);
         let of_dags = (0..).map(DagId).zip(found).map(|(dag, (bound, reason))| {
             let verdict = match (bound, reason) {

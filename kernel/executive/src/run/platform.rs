@@ -9,7 +9,7 @@ use fass::{
     Additions, Channel, Clock, Clusters, Cutter, LaunchError, Occupation, Overheads, Plan,
     Platform, Policy, Preemption, Recorded,
 };
-use sched_dag::analysis::{self, Answer, OverheadSource, Settings};
+use sched_dag::analysis::OverheadSource;
 use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
 use super::execution::{self, Division, Terms};
@@ -166,10 +166,6 @@ impl Platform for Kernel {
             Division::ByCommit => fass::assign_clusters(self, task_set),
             Division::Into(_) => Ok(()),
         }
-    }
-
-    fn answer(&self, task_set: &TaskSet, settings: &Settings) -> Answer {
-        analysis::answer_compact(task_set, settings)
     }
 
     fn overheads(&self) -> Overheads {

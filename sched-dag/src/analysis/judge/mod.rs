@@ -53,8 +53,7 @@ use super::non_preemptive::Blocking;
 use super::pipelined::Unsolved;
 use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
-use super::set::{Failure, NewFront, Set, constrained};
-use super::sums::front;
+use super::set::{Failure, Set, constrained};
 use super::task::Task;
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
@@ -67,17 +66,6 @@ use crate::task_set::{Dag, TaskSet};
 /// no term: a sporadic DAG counts as if signals came as fast as they may.
 #[must_use]
 pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
-    answer_by(task_set, settings, Some(front))
-}
-
-/// Answers the same as [`answer`] by less code, in time quadratic in the number of
-/// DAGs: for images, which have little room and few DAGs.
-#[must_use]
-pub fn answer_compact(task_set: &TaskSet, settings: &Settings) -> Answer {
-    answer_by(task_set, settings, None)
-}
-
-fn answer_by(task_set: &TaskSet, settings: &Settings, front: Option<NewFront>) -> Answer {
     let dags = task_set.dags();
     let unknown = dags.iter().map(|dag| vec![None; dag.sinks().len()]);
     let mut answer = Answer {
@@ -97,7 +85,7 @@ fn answer_by(task_set: &TaskSet, settings: &Settings, front: Option<NewFront>) -
         with_case(
             dags,
             &own,
-            (&settings, front),
+            &settings,
             &mut answer.reasons,
             |case, reasons| {
                 let mut verdict = case.verdict();
@@ -119,7 +107,7 @@ fn answer_by(task_set: &TaskSet, settings: &Settings, front: Option<NewFront>) -
 pub(super) fn with_case(
     dags: &[Dag],
     own: &[usize],
-    (settings, front): (&Settings, Option<NewFront>),
+    settings: &Settings,
     reasons: &mut [Option<Reason>],
     work: impl FnOnce(&Case<'_>, &mut [Option<Reason>]),
 ) {
@@ -133,8 +121,7 @@ pub(super) fn with_case(
         .collect();
     let is_only_one = own.len() == 1;
     let relation = relation.among(&members);
-    let mut case = Case::new(dags, (&members, &tasks), is_only_one, relation, settings);
-    case.set.front = front;
+    let case = Case::new(dags, (&members, &tasks), is_only_one, relation, settings);
     work(&case, reasons);
 }
 

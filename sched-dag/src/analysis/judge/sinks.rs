@@ -16,13 +16,12 @@
 //! which holds for all of them. The sink finishes no later than its job: the smaller of
 //! both bounds is taken. Evidence: `accepted_sets_keep_their_bounds` observes sinks, too.
 
-use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::Case;
-use crate::analysis::above::Above;
 use crate::analysis::answer::{Answer, DagBound, NotProven, Reason};
+use crate::analysis::interference::Other;
 use crate::analysis::pipelined::STEP_LIMIT;
 use crate::analysis::relation::Mixture;
 use crate::analysis::set::constrained;
@@ -47,14 +46,11 @@ pub(super) fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Opt
     let deadlines_limit = case.settings.policy == Policy::Edf
         && case.relation.preemption != Mixture::Some
         && constrained(case.tasks, case.settings.cores);
-    let mut front = case.set.front(&case.order, may_outrank, deadlines_limit);
-    case.set.put_all(&mut front, &case.order, &responses);
     for &dag in &case.order {
         if let Some(whole_ns) = responses[dag] {
             let others = |deadline_ns| {
                 let limit_ns = deadlines_limit.then_some(deadline_ns);
-                let front = front.as_deref();
-                (case.set).others(front, dag, limit_ns, &responses, may_outrank)
+                (case.set).interference_up_to(dag, limit_ns, &responses, may_outrank)
             };
             bounds[case.members[dag]] = of_dag(case, dag, whole_ns, others);
         }
@@ -86,11 +82,11 @@ fn is_certain(reason: Option<Reason>) -> bool {
 
 /// Returns the bounds of a DAG's sinks that their own equations give, among others that
 /// depend on the sink's deadline.
-fn of_dag<'a>(
+fn of_dag(
     case: &Case<'_>,
     dag: usize,
     whole_ns: u64,
-    others: impl Fn(u64) -> Result<Box<dyn Above + 'a>, usize>,
+    others: impl Fn(u64) -> Result<Vec<Other>, usize>,
 ) -> Vec<Option<u64>> {
     let (set, model) = (&case.set, case.dag(dag));
     let (policy, preemption) = (case.settings.policy, case.relation.preemption);
@@ -107,7 +103,7 @@ fn of_dag<'a>(
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
             let others = others(deadline_ns).ok()?;
             let figures = set.figures[dag].of_sink(length_ns, volume_ns, deadline_ns, whole_ns);
-            figures.solve(&*others, 0, &mut { STEP_LIMIT }).ok()
+            figures.solve(&others, 0, &mut { STEP_LIMIT }).ok()
         },
     );
     bound.collect()
