@@ -1,28 +1,159 @@
-//! Random sets of DAGs under preemption, overload, faults, pauses and stops: all rules hold in
-//! each run. `examples/soak.rs` goes on with it for minutes.
+//! Random sets of DAGs, with all that a run has to bear: preemption, overload, panics, exceeded
+//! budgets, cores that are divided, and a thread that pauses, resumes and stops DAGs meanwhile.
+//! All rules hold in each run, and in the end the program has the threads and files that it
+//! began with.
 //!
 //! `LINUX_SETS` says how many sets (12), `LINUX_SEED` which (1).
 
 mod support;
 
-use linux::Mechanism;
-use support::sets::{self, Random};
-use support::{alone, breaches};
+use std::fs;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use fass::{
+    ConstructionPolicy, Dag, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag,
+    execute_for, finish_create_dags_with,
+};
+use linux::{Control, Linux, Mechanism, Run};
+use sched_dag::DagId;
+use support::{alone, breaches, ms, spin};
+
+#[test]
+fn random_sets_keep_the_rules() {
+    let (sets, first) = (number("LINUX_SETS", 12), number("LINUX_SEED", 1));
+    let before = held();
+    for seed in first..first + sets {
+        let mut random = Random(seed);
+        let (policy, cores) = terms(&mut random);
+        let alone = alone(cores, Mechanism::Fifo).with(|machine| machine.policy(policy));
+        let run = run(&alone.machine, &mut random);
+        let found = breaches(&run);
+        assert!(found.is_empty(), "LINUX_SEED={seed}: {found:?}");
+    }
+    // A thread whose budget was exceeded ends after the run.
+    let begin = Instant::now();
+    while held() != before && begin.elapsed() < Duration::from_secs(10) {
+        thread::sleep(ms(10));
+    }
+    assert_eq!(held(), before, "threads and files");
+}
 
 fn number(name: &str, otherwise: u64) -> u64 {
     let text = std::env::var(name).ok();
     text.map_or(otherwise, |text| text.parse().expect("a whole number"))
 }
 
-#[test]
-fn random_sets_keep_the_rules() {
-    let (sets, first) = (number("LINUX_SETS", 12), number("LINUX_SEED", 1));
-    for seed in first..first + sets {
-        let mut random = Random(seed);
-        let (policy, cores) = sets::terms(&mut random);
-        let alone = alone(cores, Mechanism::Fifo).with(|machine| machine.policy(policy));
-        let (run, _) = sets::run(&alone.machine, &mut random);
-        let found = breaches(&run);
-        assert!(found.is_empty(), "LINUX_SEED={seed}: {found:?}");
+/// Counts the program's threads and files.
+fn held() -> [usize; 2] {
+    ["/proc/self/task", "/proc/self/fd"]
+        .map(|folder| fs::read_dir(folder).expect("Linux has it").count())
+}
+
+/// SplitMix64 (doi 10.1145/2660193.2660195).
+#[derive(Clone)]
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ (mixed >> 31)) % limit
     }
+
+    fn small(&mut self, limit: u64) -> u32 {
+        u32::try_from(self.below(limit)).unwrap_or(0)
+    }
+
+    fn one_in(&mut self, count: u64) -> bool {
+        self.below(count) == 0
+    }
+}
+
+/// Draws the policy of a set and the number of its cores.
+fn terms(random: &mut Random) -> (Policy, u32) {
+    let policy = [Policy::StaticPriority, Policy::Edf][usize::from(random.one_in(2))];
+    (policy, 1 + random.small(2))
+}
+
+/// Commits a drawn set on the machine and runs it.
+fn run(machine: &Linux, random: &mut Random) -> Run {
+    let dags: Vec<Dag> = (0..1 + random.below(4))
+        .map(|number| dag(number, random))
+        .collect();
+    let sizes: &[u32] = match machine.cores() {
+        2 if random.one_in(2) => &[1, 1],
+        _ => &[],
+    };
+    machine.divide(sizes);
+    if !sizes.is_empty() {
+        dags.iter().for_each(|dag| _ = dag.cluster(random.small(2)));
+    }
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the set is sound");
+    let control = machine.control().expect("it is committed");
+    let meddler = meddle(control, dags.len() as u64, random.clone());
+    let run = machine.run().expect("it is committed");
+    meddler.join().expect("it does not panic");
+    run
+}
+
+fn dag(number: u64, random: &mut Random) -> Dag {
+    let dag = create_dag();
+    let period = ms(2 + random.below(9));
+    dag.name(&format!("dag {number}"))
+        .jobs(5 + random.below(20));
+    dag.period(period).relative_deadline(period);
+    dag.in_flight(1 + random.small(3));
+    let overruns = [
+        OverrunPolicy::Queue,
+        OverrunPolicy::Skip,
+        OverrunPolicy::Abort,
+    ];
+    dag.overrun(overruns[random.small(3) as usize]);
+    let faulty = random.one_in(8).then(|| random.below(10));
+    let subtasks: Vec<_> = (0..1 + random.below(6))
+        .map(|subtask| {
+            let us = random.below(1_500);
+            let mut attributes =
+                SubtaskAttributes::named(&format!("subtask {subtask}")).priority(random.small(10));
+            if random.one_in(5) {
+                attributes = attributes.non_preemptive();
+            }
+            if random.one_in(20) {
+                // Sometimes it is exceeded.
+                attributes = attributes.budget(ms(1));
+            }
+            let holds = random.one_in(4);
+            let function = move |job| {
+                match holds {
+                    true => execute_for(Duration::from_micros(us), Occupation::Hold),
+                    false => spin(us),
+                }
+                assert!(subtask > 0 || faulty != Some(job), "meant");
+            };
+            dag.register_untyped_subtask(function, attributes)
+        })
+        .collect();
+    for (place, later) in subtasks.iter().enumerate().skip(1) {
+        let earlier = usize::try_from(random.below(place as u64)).unwrap_or(0);
+        dag.precede(&subtasks[earlier], later);
+    }
+    dag
+}
+
+/// Pauses, resumes and stops DAGs for a while.
+fn meddle(control: Control, dags: u64, mut random: Random) -> JoinHandle<()> {
+    thread::spawn(move || {
+        for _ in 0..random.below(8) {
+            thread::sleep(ms(1 + random.below(8)));
+            let dag = DagId(random.small(dags));
+            match random.below(10) {
+                0 => control.stop(dag),
+                1..5 => control.pause(dag),
+                _ => control.resume(dag),
+            }
+        }
+    })
 }

@@ -2,8 +2,6 @@
 
 #![allow(dead_code, reason = "each test program uses its part of it")]
 
-pub(crate) mod sets;
-
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
