@@ -1,16 +1,12 @@
 //! From a set to DAGs that execute for its times.
 //!
-//! Instances occupy their cores for their execution times. To compare a schedule
-//! with one that was computed, where nothing but execution takes time, a run can
-//! have a *grid*: execution then comes in whole units that end with units of
-//! time, as in the app `replay`, which explains it.
+//! Instances occupy their cores for their execution times.
 
 use alloc::vec::Vec;
 use core::time::Duration;
 
 use common::random::nth;
 use fass::{Dag, Occupation, SubtaskAttributes, Untyped, create_dag};
-use replay::{Epoch, Scale};
 use sched_dag::DagSpec;
 
 use crate::execution::{Execution, Times};
@@ -36,8 +32,6 @@ pub struct Settings {
     pub occupation: Occupation,
     /// How many jobs there are.
     pub length: Length,
-    /// Whole units of execution and their length, if wanted.
-    pub grid: Option<Scale>,
 }
 
 impl Length {
@@ -56,19 +50,17 @@ impl Length {
 }
 
 /// Builds the DAGs of a set, to be committed with any shape of graph allowed.
-/// `epoch` counts only with a grid and is then to be set before they run.
 #[must_use]
-pub fn build(set: &Set, settings: &Settings, epoch: &Epoch) -> Vec<Dag> {
+pub fn build(set: &Set, settings: &Settings) -> Vec<Dag> {
     let mut seeds = (0..).map(|n| nth(settings.seed, n));
     let dags = set.dags.iter();
-    dags.map(|dag| build_dag(dag, settings, epoch, &mut seeds))
+    dags.map(|dag| build_dag(dag, settings, &mut seeds))
         .collect()
 }
 
 fn build_dag(
     described: &FileDag,
     settings: &Settings,
-    epoch: &Epoch,
     seeds: &mut impl Iterator<Item = u64>,
 ) -> Dag {
     let spec = &described.spec;
@@ -104,13 +96,9 @@ fn build_dag(
                 samples_ns: more.samples_ns.clone(),
                 seed,
             };
-            let (grid, occupation, epoch) = (settings.grid, settings.occupation, epoch.clone());
+            let occupation = settings.occupation;
             let execute = move |job| {
-                let ns = times.of_job(job);
-                match grid {
-                    Some(scale) => scale.execute(ns.div_ceil(scale.unit_ns), &epoch),
-                    None => fass::execute_for(Duration::from_nanos(ns), occupation),
-                }
+                fass::execute_for(Duration::from_nanos(times.of_job(job)), occupation);
             };
             dag.register_untyped_subtask(execute, attributes)
         })
@@ -135,7 +123,7 @@ mod tests {
 
     fn run(text: &str, cores: u32, settings: &Settings) -> Report {
         let machine = VirtualTime::new().cores(cores);
-        let dags = build(&parse(text).unwrap().sets[0], settings, &Epoch::default());
+        let dags = build(&parse(text).unwrap().sets[0], settings);
         finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
         let report = machine.run();
         assert_eq!(report.violations(), []);
@@ -147,7 +135,6 @@ mod tests {
         seed: 1,
         occupation: Occupation::Hold,
         length: Length::Jobs(3),
-        grid: None,
     };
 
     /// A fork and a join, and a pair without any edge.
@@ -185,7 +172,7 @@ mod tests {
             subtask c wcet 3ms
             end";
         let machine = VirtualTime::new().cores(2).clusters(&[1, 1]);
-        let dags = build(&parse(text).unwrap().sets[0], &WCET, &Epoch::default());
+        let dags = build(&parse(text).unwrap().sets[0], &WCET);
         finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
         let report = machine.run();
         assert_eq!(report.violations(), []);

@@ -15,7 +15,6 @@ use dag_file::{DagFile, Execution, Length, Settings, build, check, parse};
 use fass::{ConstructionPolicy, Occupation, finish_create_dags_with};
 use kernel::options::UsageError;
 use kernel::{Ending, Machine, println};
-use replay::{Epoch, Scale};
 use sched_dag::{CommitOptions, Policy};
 
 use report::Report;
@@ -23,7 +22,7 @@ use report::Report;
 kernel::entry!(main);
 
 /// The app's words of the command line.
-const WORDS: [&str; 11] = [
+const WORDS: [&str; 9] = [
     "overheads",
     "overheads_margin",
     "clusters",
@@ -32,21 +31,14 @@ const WORDS: [&str; 11] = [
     "jobs",
     "seconds",
     "occupy",
-    "grid_ns",
     "deadlines",
-    "show",
 ];
-
-/// Time for the cores to get ready.
-const LEAD_NS: u64 = 1_000_000;
 
 /// What the command line says besides how a set is run.
 struct Wishes {
     settings: Settings,
     /// Whether a deadline miss makes the run a failure.
     is_strict: bool,
-    /// Whether people want to read, or only programs.
-    for_people: bool,
 }
 
 fn main(machine: &Machine) -> Result<(), Ending> {
@@ -56,26 +48,19 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let file = read(machine, wishes.settings.length)?;
     let mut reports = Vec::new();
     for set in &file.sets {
-        let (settings, epoch) = (&wishes.settings, Epoch::default());
-        let dags = build(set, settings, &epoch);
+        let dags = build(set, &wishes.settings);
         // What is wrong with the DAGs is wrong with the file that we were given.
         let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph())
             .map_err(|error| usage(format!("DAG file: {error}")))?;
-        if wishes.for_people {
-            for warning in commit.warnings() {
-                println!("warning: {warning}");
-            }
+        for warning in commit.warnings() {
+            println!("warning: {warning}");
         }
-        let epoch_ns = fass::now_ns() + LEAD_NS;
-        epoch.set(epoch_ns);
-        let run = machine.run_from(epoch_ns)?;
+        let run = machine.run()?;
         let report = Report::new(set, commit.answers(), &run);
         report.emit();
         reports.push(report);
     }
-    if wishes.for_people {
-        reports.iter().for_each(Report::print_table);
-    }
+    reports.iter().for_each(Report::print_table);
     machine.report_memory();
     let complaint = |report: &Report| report.complaint(wishes.is_strict);
     let complaint = reports.iter().find_map(complaint);
@@ -129,12 +114,6 @@ fn wishes(machine: &Machine) -> Result<Wishes, Ending> {
         }
         (_, None) => Length::Jobs(options.number("jobs", 1..=1_000_000, 50)?),
     };
-    let grid_ns = options.number("grid_ns", 0..=10_000_000_000, 0)?;
-    let grid = (grid_ns > 0).then_some(Scale {
-        unit_ns: grid_ns,
-        guard_ns: grid_ns / 500,
-    });
-    machine.set_coincidence(core::time::Duration::from_nanos(grid_ns / 100));
     let occupations = [("hold", Occupation::Hold), ("spin", Occupation::Spin)];
     let wishes = Wishes {
         settings: Settings {
@@ -142,10 +121,8 @@ fn wishes(machine: &Machine) -> Result<Wishes, Ending> {
             seed: options.number("seed", 0..=u64::MAX, 1)?,
             occupation: options.choice("occupy", &occupations)?,
             length,
-            grid,
         },
         is_strict: options.choice("deadlines", &[("count", false), ("strict", true)])?,
-        for_people: options.choice("show", &[("all", true), ("lines", false)])?,
     };
     options.finish(&WORDS)?;
     Ok(wishes)

@@ -69,8 +69,7 @@ impl Epoch {
 impl Scale {
     /// Returns how long a unit of execution lasts that starts `start_ns` after
     /// time 0.
-    #[must_use]
-    pub fn unit_from(self, start_ns: u64) -> u64 {
+    fn unit_from(self, start_ns: u64) -> u64 {
         let nearest = start_ns.saturating_add(self.unit_ns / 2) / self.unit_ns;
         let end_ns = nearest.saturating_add(1).saturating_mul(self.unit_ns);
         end_ns
@@ -79,7 +78,7 @@ impl Scale {
     }
 
     /// Executes for `units` units, inside a subtask. The core is held meanwhile.
-    pub fn execute(self, units: u64, epoch: &Epoch) {
+    fn execute(self, units: u64, epoch: &Epoch) {
         for _ in 0..units {
             let ns = self.unit_from(epoch.elapsed_ns());
             fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);

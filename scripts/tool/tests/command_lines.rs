@@ -21,7 +21,6 @@ const COMMANDS: &[&str] = &[
     "bench",
     "bench hand-off",
     "bench join-latency",
-    "bench makespan",
     "bench native",
     "bench sizes",
     "oracle",

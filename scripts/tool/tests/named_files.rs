@@ -41,10 +41,7 @@ fn demo() -> String {
 #[test]
 fn no_input_and_no_other_output_is_overwritten() {
     let folder = folder("overwritten");
-    let graphs =
-        fs::read(workspace().join("apps/dag-file/examples/stg50.json")).expect("the graphs");
     fs::write(folder.join("f.dag"), demo()).expect("a file");
-    fs::write(folder.join("g.json"), &graphs).expect("a file");
     fs::hard_link(folder.join("f.dag"), folder.join("h.log")).expect("a link");
     let run = "run --mode deterministic --timeout 5 ";
     for (line, both) in [
@@ -69,10 +66,6 @@ fn no_input_and_no_other_output_is_overwritten() {
             "`--serial new` and `--dot new`",
         ),
         ("trace f.dag -o f.dag", "`f.dag` and `--out f.dag`"),
-        (
-            "bench makespan --file g.json --out g.json",
-            "`--file g.json` and `--out g.json`",
-        ),
     ] {
         let line = line.replace("run ", run);
         let said = refusal(&line, &folder);
@@ -81,14 +74,13 @@ fn no_input_and_no_other_output_is_overwritten() {
     }
     let kept = fs::read_to_string(folder.join("f.dag"));
     assert_eq!(kept.expect("the file"), demo());
-    assert_eq!(fs::read(folder.join("g.json")).expect("the file"), graphs);
     assert!(!folder.join("new").exists());
 }
 
 #[test]
 fn a_refused_command_empties_no_file() {
     let folder = folder("emptied");
-    for name in ["old.log", "old.csv", "old.dot", "base.json"] {
+    for name in ["old.log", "old.dot", "base.json"] {
         fs::write(folder.join(name), "kept").expect("a file");
     }
     fs::write(folder.join("bad.dag"), "dag x period 0\nend\n").expect("a file");
@@ -97,13 +89,12 @@ fn a_refused_command_empties_no_file() {
         "run --serial old.log --app none",
         "run --serial old.log --dot old.dot --image bad.dag",
         "run --serial old.log --qemu /none",
-        "bench makespan --graphs none --out old.csv",
         "bench hand-off --save-baseline --baseline base.json --jobs 5",
         "trace bad.dag -o old.log",
     ] {
         refusal(line, &folder);
     }
-    for name in ["old.log", "old.csv", "old.dot", "base.json"] {
+    for name in ["old.log", "old.dot", "base.json"] {
         assert_eq!(
             fs::read(folder.join(name)).expect("the file"),
             b"kept",
@@ -120,7 +111,6 @@ fn an_output_that_cannot_be_written_is_2_before_the_work() {
         "run --serial file/x",
         "run --trace none/x",
         "run --dot file/x",
-        "bench makespan --out file/x",
         "bench join-latency --deterministic --out file/x",
         "bench hand-off --save-baseline --mode deterministic --baseline none/x",
     ] {
@@ -144,11 +134,7 @@ fn what_is_no_file_is_named_and_2_at_once() {
         ("run --serial /dev/full", "it is a device or a pipe"),
         ("run --trace pipe", "it is a named pipe"),
         ("run --dot pipe", "it is a named pipe"),
-        (
-            "bench makespan --file /dev/zero",
-            "it is a device or a pipe",
-        ),
-        ("bench makespan --file sub.json", "it is a folder"),
+        ("check-trace sub.json", "it is a folder"),
         ("check-trace /dev/zero", "it is a device or a pipe"),
         ("trace pipe", "it is a device or a pipe"),
         ("oracle bounds /dev/zero", "it is a device or a pipe"),
@@ -225,11 +211,7 @@ fn a_file_that_is_given_twice_is_counted_once_or_not_at_all() {
         assert!(said.ends_with(" are one file; give it once\n"), "{said}");
     }
     for (line, twice) in [
-        ("bench makespan --cores 2,2", "`--cores`: `2` stands twice"),
-        (
-            "bench makespan --graphs a,a",
-            "`--graphs`: `a` stands twice",
-        ),
+        ("bench bounds --cores 2,2", "`--cores`: `2` stands twice"),
         (
             "bench native --only join,join",
             "`--only`: `join` stands twice",

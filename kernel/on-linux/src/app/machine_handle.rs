@@ -120,7 +120,7 @@ impl Machine {
     /// they are.
     pub fn set_coincidence(&self, window: Duration) {
         if window > Duration::ZERO {
-            let line = "events are taken together on the machine only; leave `grid_ns` out";
+            let line = "events are taken together on the machine only; choose a window of 0";
             self.refusal.replace(Some(UsageError::new(line)));
         }
     }

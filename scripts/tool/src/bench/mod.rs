@@ -2,14 +2,12 @@
 //!
 //! `bench WHAT` measures one part of the project on this host, in this build,
 //! and prints a table and one JSON object a figure. Times depend on the host and on
-//! what else it does, so none of them has a limit; counted instructions and makespans in
-//! virtual time have. The exit code is 0 if all limits hold, 1 if one does not, and 2
-//! for a refused command line.
+//! what else it does, so none of them has a limit; counted instructions have. The exit code is
+//! 0 if all limits hold, 1 if one does not, and 2 for a refused command line.
 //!
 //! - [`bounds`]: random sets of DAGs that the analysis proves;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
-//! - [`makespan`]: task graphs on the machine, next to their published optima;
 //! - [`native`]: the scheduler on this host's own processors;
 //! - [`sizes`]: what each part of an image takes of its room.
 
@@ -17,7 +15,6 @@ pub mod bounds;
 mod code;
 pub mod hand_off;
 pub mod join_latency;
-pub mod makespan;
 pub mod native;
 mod plots;
 pub mod sizes;
@@ -47,11 +44,6 @@ static BENCH: Menu = Menu {
             name: "join-latency",
             about: "the paper's evaluation: samples, figures, plots and a report",
             work: join_latency::run,
-        },
-        Choice {
-            name: "makespan",
-            about: "task graphs with published optimal makespans, on the machine",
-            work: makespan::run,
         },
         Choice {
             name: "native",

@@ -3,7 +3,7 @@
 //! The kernel reads one format, `docs/dag-file.md`. Here others become that one:
 //!
 //! - [`rd_gen`]: RD-Gen's YAML, by [`yaml`], with several rates split by [`rates`];
-//! - [`stg`]: task graphs with published makespans, from JSON;
+//! - [`stg`]: task graphs, from JSON;
 //! - [`load()`]: whichever of them a file is, checked as the commit will check it;
 //! - [`prepare()`]: what `./scripts/run --dag FILE` boots;
 //! - [`batch`]: a folder of files, one boot each, in one table.

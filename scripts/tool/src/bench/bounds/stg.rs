@@ -5,7 +5,7 @@ use std::fmt::Write;
 use sched_dag::analysis::{Task, multi_path};
 use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Order, Policy, verify};
 
-use crate::dag_file::stg::read_graphs;
+use crate::dag_file::stg;
 use crate::oracle::bounds::older::{graham, long_paths};
 
 const GRAPHS: &str = include_str!("../../../../../apps/dag-file/examples/stg50.json");
@@ -26,15 +26,16 @@ pub(super) struct Means {
 ///
 /// In words: a graph that is wrong.
 pub(super) fn measure() -> Result<Vec<Means>, String> {
-    let graphs = read_graphs(GRAPHS).map_err(|malformed| malformed.reason)?;
-    let specs = graphs.iter().map(|graph| graph.dag(1));
-    let specs = specs.collect::<Result<Vec<_>, _>>();
-    let specs = specs.map_err(|malformed| malformed.reason)?;
+    let file = stg::read(GRAPHS, None, 1).map_err(|malformed| malformed.reason)?;
+    let specs: Vec<DagSpec> = (file.sets.into_iter())
+        .flat_map(|set| set.dags)
+        .map(|dag| dag.spec)
+        .collect();
     let of_cores = |cores: u32| {
         let mut sums = [0.0; 3];
         for spec in &specs {
-            let free = task(&spec.spec, Order::Free, cores)?;
-            let fixed = task(&spec.spec, Order::Fixed, cores)?;
+            let free = task(spec, Order::Free, cores)?;
+            let fixed = task(spec, Order::Fixed, cores)?;
             let base = graham(&free, cores) as f64;
             let bounds = [
                 Some(long_paths(&free, cores)),

@@ -1,17 +1,13 @@
-//! Reading task graphs with published makespans, as `apps/dag-file/examples/stg50.json` has
-//! them: Kasahara's Standard Task Graph Set.
+//! Reading task graphs, as `apps/dag-file/examples/stg50.json` has them: Kasahara's Standard Task
+//! Graph Set.
 //!
-//! A graph has a `name`, the costs `c` of its vertices, `edges` and, by number of
-//! processors, the `optimal` length of a schedule without preemption. Vertices
-//! without cost are the format's own entry and exit; they take no time and order
+//! A graph has a `name`, the costs `c` of its vertices, and `edges`. Vertices without cost are the format's own entry and exit; they take no time and order
 //! nothing that the others do not, so they are left out. In the middle of a graph
 //! such a vertex would order others, and is refused. What else is stated, such as
-//! where the graphs come from, is not needed here.
+//! where the graphs come from and how long published schedules of them are, is not needed here.
 //!
 //! A graph becomes a DAG of one job at a time: its period and its deadline are the
 //! sum of its costs.
-
-use std::collections::BTreeMap;
 
 use dag_file::{DagFile, FileDag, FileSubtask, Malformed, Set, is_name, no_name, quoted, repeated};
 use sched_dag::{DagSpec, SubtaskSpec};
@@ -23,18 +19,13 @@ use crate::options::nearest;
 const MOST_VERTICES: usize = 100_000;
 
 /// A task graph.
-#[derive(Clone, Debug)]
-pub struct TaskGraph {
-    /// Its name.
-    pub name: String,
+struct TaskGraph {
+    name: String,
     /// The line on which it stands.
-    pub line: usize,
+    line: usize,
     /// The cost of each vertex, in units of time.
-    pub costs: Vec<u64>,
-    /// The edges between vertices.
-    pub edges: Vec<(usize, usize)>,
-    /// The shortest makespan known to be possible, by the number of processors.
-    pub optimal: BTreeMap<u64, u64>,
+    costs: Vec<u64>,
+    edges: Vec<(usize, usize)>,
 }
 
 /// Reads a file into one set a graph, or the one that is named.
@@ -68,12 +59,8 @@ pub fn read(text: &str, graph: Option<&str>, unit_ns: u64) -> Result<DagFile, Ma
     Ok(DagFile { sets })
 }
 
-/// Reads all graphs of a file.
-///
-/// # Errors
-///
-/// The first thing that is not as described, with its line.
-pub fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
+/// Reads all graphs of a file, or says the first thing that is not as described, with its line.
+fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
     let (document, places) = parse_with_places(text, "graphs").map_err(|error| {
         let line = line_at(text, error.column.saturating_sub(1));
         let reason = format!("this is no JSON: {}", error.message);
@@ -140,9 +127,9 @@ impl Graph<'_> {
         }
         for (key, _) in members {
             if !["name", "c", "edges", "optimal", "check"].contains(&key.as_str()) {
-                let known = "name, c, edges, optimal";
                 let key = quoted(key);
-                return Err(self.malformed(format!("unknown key {key}; a graph has {known}")));
+                let reason = format!("unknown key {key}; a graph has name, c, edges");
+                return Err(self.malformed(reason));
             }
         }
         let costs = self.costs(name)?;
@@ -150,7 +137,6 @@ impl Graph<'_> {
         let graph = TaskGraph {
             name: name.into(),
             line: self.line,
-            optimal: self.optimal(name)?,
             costs,
             edges,
         };
@@ -228,86 +214,29 @@ impl Graph<'_> {
             }
         }
     }
-
-    fn optimal(&self, name: &str) -> Result<BTreeMap<u64, u64>, Malformed> {
-        let members = match self.value.get("optimal") {
-            None => &[][..],
-            Some(Value::Object(members)) => members,
-            Some(_) => return Err(self.no_optimal(name)),
-        };
-        let pairs = members.iter().map(|(cores, length)| {
-            let cores = cores.parse().ok().filter(|&cores| cores > 0);
-            cores.zip(length.as_u64())
-        });
-        let pairs: Option<BTreeMap<u64, u64>> = pairs.collect();
-        pairs.ok_or_else(|| self.no_optimal(name))
-    }
-
-    fn no_optimal(&self, name: &str) -> Malformed {
-        self.malformed(format!(
-            "graph `{name}`: `optimal` must map numbers of processors from 1 on to lengths, as in \
-             {{\"2\":9}}"
-        ))
-    }
 }
 
 impl TaskGraph {
-    /// Makes sure that every vertex without cost is an entry or an exit, and that no
-    /// optimum is impossible.
+    /// Makes sure that every vertex without cost is an entry or an exit.
     fn check(&self) -> Result<(), String> {
-        let name = &self.name;
         let mut has = vec![(false, false); self.costs.len()];
-        let mut waits_for = vec![0_usize; self.costs.len()];
-        let mut after = vec![Vec::new(); self.costs.len()];
         for &(earlier, later) in &self.edges {
             has[later].0 = true;
             has[earlier].1 = true;
-            waits_for[later] += 1;
-            after[earlier].push(later);
         }
         let is_amid = |vertex: &usize| self.costs[*vertex] == 0 && has[*vertex] == (true, true);
-        if let Some(vertex) = (0..self.costs.len()).find(is_amid) {
-            return Err(format!(
-                "graph `{name}`: vertex {vertex} has cost 0 and stands between others, which only \
-                 an entry or an exit may; give it a cost of at least 1, or join its edges"
-            ));
+        match (0..self.costs.len()).find(is_amid) {
+            None => Ok(()),
+            Some(vertex) => Err(format!(
+                "graph `{}`: vertex {vertex} has cost 0 and stands between others, which only \
+                 an entry or an exit may; give it a cost of at least 1, or join its edges",
+                self.name
+            )),
         }
-        // Each free vertex ends the longest path to it; what a cycle keeps from being
-        // free is for the commit to tell.
-        let mut ends = vec![0_u128; self.costs.len()];
-        let is_free = |vertex: &usize| waits_for[*vertex] == 0;
-        let mut free: Vec<usize> = (0..self.costs.len()).filter(is_free).collect();
-        let mut longest = 0;
-        while let Some(vertex) = free.pop() {
-            let end = ends[vertex] + u128::from(self.costs[vertex]);
-            longest = longest.max(end);
-            for &later in &after[vertex] {
-                ends[later] = ends[later].max(end);
-                waits_for[later] -= 1;
-                if waits_for[later] == 0 {
-                    free.push(later);
-                }
-            }
-        }
-        let volume: u128 = self.costs.iter().map(|cost| u128::from(*cost)).sum();
-        for (&cores, &length) in &self.optimal {
-            let least = longest.max(volume.div_ceil(u128::from(cores)));
-            if u128::from(length) < least {
-                return Err(format!(
-                    "graph `{name}`: its optimum of {length} on {cores} processors is less than \
-                     {least}, which its longest path and its costs take"
-                ));
-            }
-        }
-        Ok(())
     }
 
-    /// Makes a DAG of it, with units of so many nanoseconds.
-    ///
-    /// # Errors
-    ///
-    /// Its times do not fit 64 bits.
-    pub fn dag(&self, unit_ns: u64) -> Result<FileDag, Malformed> {
+    /// Makes a DAG of it, with units of so many nanoseconds, unless its times do not fit 64 bits.
+    fn dag(&self, unit_ns: u64) -> Result<FileDag, Malformed> {
         let total: u128 = self.costs.iter().map(|cost| u128::from(*cost)).sum();
         let volume_ns = total.checked_mul(u128::from(unit_ns));
         let volume_ns = volume_ns.and_then(|ns| u64::try_from(ns).ok());

@@ -15,7 +15,6 @@ fn the_published_graphs_are_read() {
         (graphs[0].name.as_str(), graphs[0].costs.len()),
         ("50/rand0000", 52)
     );
-    assert_eq!(graphs[0].optimal[&4], 66);
     assert!(graphs[1].line > graphs[0].line);
     let all = read(&set(), None, 1000).unwrap();
     assert_eq!((all.sets.len(), all.most_subtasks()), (45, 50));
@@ -112,22 +111,6 @@ fn a_refusal_names_line_offender_and_remedy() {
         (
             r#"{"graphs":[{"name":"a","c":[3,0],"edges":[[1,1]]}]}"#,
             "graph `a`: vertex 1 has cost 0 and stands between others",
-        ),
-        (
-            r#"{"graphs":[{"name":"a","c":[1],"optimal":5}]}"#,
-            "`optimal` must map numbers of processors from 1 on to lengths",
-        ),
-        (
-            r#"{"graphs":[{"name":"a","c":[1],"optimal":{"0":5}}]}"#,
-            "`optimal` must map numbers of processors from 1 on to lengths",
-        ),
-        (
-            r#"{"graphs":[{"name":"a","c":[3,4],"edges":[[0,1]],"optimal":{"2":6}}]}"#,
-            "its optimum of 6 on 2 processors is less than 7, which its longest path",
-        ),
-        (
-            r#"{"graphs":[{"name":"a","c":[3,4],"optimal":{"1":6}}]}"#,
-            "its optimum of 6 on 1 processors is less than 7, which its longest path",
         ),
     ] {
         let message = read(text, None, 1).unwrap_err().to_string();
