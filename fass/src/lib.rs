@@ -71,8 +71,6 @@
 //!   it into precedence, bounded staleness, or a minimum distance of releases.
 //! - What a function may change of the run is stated, too: which DAGs rest ([`Switch`]), and
 //!   when it ends ([`Shutdown`]).
-//! - DAGs are added to a run, and removed, with an answer about all of them before the switch
-//!   ([`Commit::add`]).
 //! - What comes from outside and goes there while DAGs run passes a [`Wire`], or is a
 //!   [`Parameter`].
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
@@ -132,8 +130,8 @@ pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
 pub use draft::modes::ModeFault;
 pub use platform::{
-    Additions, AlreadyInstalled, Clock, LaunchError, Occupation, Platform, execute_for, install,
-    now_ns, set_clock,
+    AlreadyInstalled, Clock, LaunchError, Occupation, Platform, execute_for, install, now_ns,
+    set_clock,
 };
 pub use recording::Channel;
 pub use run::crossing::Recorded;

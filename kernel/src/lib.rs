@@ -64,7 +64,6 @@ pub use app::ending::Ending;
 pub use app::event::Event;
 pub use app::lock::Lock;
 pub use app::machine_handle::Machine;
-pub use app::offers::Offers;
 pub use app::resources::Resources;
 pub use executive::memory::heap::KernelHeap;
 pub use executive::{print, println};

@@ -57,9 +57,6 @@
 //! their tests in `tests/ending.rs`; those for a fault that costs only its job, D1 to D7,
 //! in `scheduler/dropping.rs` and `tests/dropping.rs`.
 //!
-//! DAGs can be added to those that are scheduled, and removed: the rules A1 to A6 stand in
-//! `scheduler/adding.rs`, their tests in `tests/adding.rs`.
-//!
 //! # The parts, in the order of their use
 //!
 //! 1. [`DagSpec`]: what an app states. It may be wrong in every way.

@@ -68,11 +68,6 @@ impl<J> Recorder<J> {
         }
     }
 
-    /// Goes on with more DAGs: the same, and others behind them.
-    pub fn extend(&mut self, task_set: Arc<TaskSet>) {
-        self.task_set = task_set;
-    }
-
     /// Writes nothing down any more.
     pub const fn close(&mut self) {
         self.is_closed = true;

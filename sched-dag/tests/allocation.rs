@@ -157,32 +157,6 @@ fn nothing_is_allocated_when_dags_are_ended() {
 }
 
 #[test]
-fn a1_the_switch_to_more_dags_allocates_nothing() {
-    let mut random = Random::new(1);
-    let mut commit = || {
-        let options =
-            CommitOptions::new(Policy::Edf, 4).with_construction(ConstructionPolicy::any_graph());
-        let specs = [dag(&mut random, OverrunPolicy::Queue)];
-        verify(&specs, &options).expect("a right DAG").task_set
-    };
-    let options = SchedulerOptions {
-        policy: Policy::Edf,
-        preemption: Preemption::Enabled,
-        cores: 4,
-    };
-    let (first, later) = (commit(), commit());
-    let all = first.with_added(&later, 0);
-    let mut scheduler = Scheduler::new(Arc::new(first), options);
-    assert!(!scheduler.at(0).release_due(&mut ()).dispatch().is_empty());
-    let mut larger = Scheduler::new(Arc::new(all), options);
-
-    let before = ALLOCATIONS.get();
-    scheduler.extend(&mut larger);
-    assert_eq!(ALLOCATIONS.get() - before, 0);
-    assert_eq!(scheduler.task_set().dags().len(), 2);
-}
-
-#[test]
 fn the_counter_counts() {
     let before = ALLOCATIONS.get();
     drop(std::hint::black_box(Box::new(1)));

@@ -277,12 +277,7 @@ fn every_reason_of_a_platform_is_listed() {
     let sources = sources(&[
         "kernel/executive/src/run/execution/mod.rs",
         "kernel/executive/src/run/execution/stacks.rs",
-        "kernel/executive/src/run/execution/adding.rs",
-        "kernel/executive/src/run/execution/present.rs",
         "fass/virtual-time/src/platform.rs",
-        "fass/src/commit/added.rs",
-        "fass/virtual-time/src/additions.rs",
-        "fass/virtual-time/src/session/adding.rs",
         "fass/native/src/platform.rs",
         "fass/linux/src/platform.rs",
         "sched-dag/src/lifecycle/letters.rs",

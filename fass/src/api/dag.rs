@@ -339,7 +339,7 @@ impl Dag {
     pub(crate) fn open(&self) -> RefMut<'_, Draft> {
         let draft = self.draft.borrow_mut();
         assert!(
-            draft.committed.is_none(),
+            !draft.is_committed,
             "dag `{}` is committed and cannot be changed; build a new DAG and commit that",
             draft.spec.name
         );

@@ -11,15 +11,11 @@
 //!    the commit as a fault does.
 //! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 5. *Launch.* The platform takes the plan.
-//!
-//! A commit of DAGs that are added to a run (`added`) goes the same way, with the answer about all.
 
-pub(crate) mod added;
 pub(crate) mod answer;
 pub(crate) mod assign;
 pub(crate) mod chains;
 mod count;
-mod demands;
 pub(crate) mod error;
 pub(crate) mod fault;
 mod missing;
@@ -40,10 +36,9 @@ use crate::api::dag::Dag;
 use crate::platform;
 use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
-use demands::{demands_of, lacking_proofs};
 use error::CommitError;
 use fault::Fault;
-use tie::{next_plan, tie};
+use tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
 ///
@@ -155,30 +150,19 @@ pub fn finish_create_dags_with(
     let answers = Answers::new(&task_set, platform);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
-    let demands = demands_of(dags);
-    let faults = lacking_proofs(&demands, &answers);
+    let faults = lacking_proofs(dags, &answers);
     if !faults.is_empty() {
         return Err(CommitError { faults, warnings });
     }
     let staleness = staleness::of_all(dags, &task_set, &answers.of_dags);
     let task_set = Arc::new(task_set);
-    let number = next_plan();
-    let plan = tie(
-        dags,
-        (number, 0),
-        Arc::clone(&task_set),
-        &answers,
-        staleness.clone(),
-    );
+    let plan = tie(dags, Arc::clone(&task_set), &answers, staleness.clone());
     match platform.launch(plan) {
         Ok(()) => Ok(Commit {
             warnings,
             answers,
             staleness,
-            task_set: Arc::clone(&task_set),
-            answered: task_set,
-            number,
-            demands,
+            task_set,
         }),
         Err(error) => Err(CommitError {
             faults: Vec::from([Fault::NotLaunched(error)]),
@@ -213,12 +197,6 @@ pub struct Commit {
     answers: Answers,
     staleness: Vec<Staleness>,
     task_set: Arc<TaskSet>,
-    /// Those DAGs that the answers were made about.
-    answered: Arc<TaskSet>,
-    /// The plan's number.
-    number: u64,
-    /// By DAG, whether it demands a proof.
-    demands: Vec<bool>,
 }
 
 impl Commit {
@@ -284,7 +262,7 @@ impl Commit {
     /// ```
     #[must_use]
     pub fn witnesses(&self) -> String {
-        self.answers.witness(&self.answered)
+        self.answers.witness(&self.task_set)
     }
 
     /// Returns for each subtask that samples a latest value, in the order of the
@@ -318,6 +296,19 @@ impl Commit {
     }
 }
 
+/// Returns a fault for each DAG that demands a proof and has none.
+fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
+    let demanding =
+        (dags.iter().zip(&answers.of_dags)).filter(|(dag, _)| dag.draft.borrow().demands_proof);
+    let lacking = demanding.filter_map(|(_, answer)| {
+        Some(Fault::NotProven {
+            dag: answer.dag.clone(),
+            unproven: answer.verdict.unproven()?.clone(),
+        })
+    });
+    lacking.collect()
+}
+
 /// Verifies all DAGs, and collects the faults of both crates.
 fn verify(
     dags: &[Dag],
@@ -337,7 +328,7 @@ fn verify(
             faults.push(Fault::GivenTwice { dag: label });
             continue;
         }
-        if draft.committed.is_some() {
+        if draft.is_committed {
             faults.push(Fault::AlreadyCommitted { dag: label });
             continue;
         }

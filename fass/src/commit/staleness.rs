@@ -44,7 +44,7 @@ pub(crate) fn of_all(dags: &[Dag], task_set: &TaskSet, answers: &[Answer]) -> Ve
 }
 
 /// Returns how old a value of a DAG can be, by the answer about that.
-pub(crate) fn bound(writer: &sched_dag::Dag, answer: &Answer) -> Option<Duration> {
+fn bound(writer: &sched_dag::Dag, answer: &Answer) -> Option<Duration> {
     let response = answer.verdict.bound().filter(|_| !writer.is_sporadic())?;
     Duration::from_nanos(writer.period_ns()).checked_add(response)
 }

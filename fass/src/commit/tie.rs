@@ -26,27 +26,21 @@ use crate::run::topic::Wiring;
 /// The plans made so far.
 static PLANS: AtomicU64 = AtomicU64::new(0);
 
-/// Returns the number of a new plan.
-pub(crate) fn next_plan() -> u64 {
-    PLANS.fetch_add(1, Ordering::Relaxed) + 1
-}
-
-/// Turns verified DAGs into the plan of a number, in which they stand from the place `first` on,
-/// and closes their handles.
+/// Turns verified DAGs into a plan, and closes their handles.
 pub(crate) fn tie(
     dags: &[Dag],
-    (number, first): (u64, u32),
     task_set: Arc<TaskSet>,
     answers: &Answers,
     staleness: Vec<Staleness>,
 ) -> Plan {
+    let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
     let recorded = dags
         .iter()
         .map(|dag| core::mem::take(&mut dag.draft.borrow_mut().recorded));
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
     let mut lines = Vec::new();
-    let (bodies, others) = ((first..)
+    let (bodies, others) = ((0..)
         .map(DagId)
         .zip(dags)
         .zip(task_set.dags())
@@ -54,7 +48,7 @@ pub(crate) fn tie(
     .map(|(((id, dag), verified), of_dag)| {
         let (spec, make_bodies, latest, effects, resets) = {
             let mut draft = dag.draft.borrow_mut();
-            draft.committed = Some((number, id));
+            draft.is_committed = true;
             let name = draft.spec.name.clone();
             let named = DagSpec {
                 name,

@@ -22,7 +22,7 @@ use core::fmt;
 use core::time::Duration;
 
 use sched_dag::lifecycle::Lifecycle;
-use sched_dag::{Activation, DagId, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId};
+use sched_dag::{Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
 use crate::platform::LaunchError;
@@ -52,8 +52,7 @@ pub(crate) struct Draft {
     pub(crate) make_bodies: Vec<MakeBody>,
     /// What only this crate can find wrong.
     pub(crate) flaws: Vec<Flaw>,
-    /// The number of its plan, and its own there, once it is committed.
-    pub(crate) committed: Option<(u64, DagId)>,
+    pub(crate) is_committed: bool,
     /// Whether the relative deadline is the DAG's own, rather than its sinks' longest.
     pub(crate) states_deadline: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
@@ -340,7 +339,7 @@ impl fmt::Debug for Draft {
         f.debug_struct("Draft")
             .field("spec", &self.spec)
             .field("flaws", &self.flaws)
-            .field("committed", &self.committed)
+            .field("is_committed", &self.is_committed)
             .finish_non_exhaustive()
     }
 }

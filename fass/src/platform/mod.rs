@@ -5,7 +5,6 @@
 //! commits its DAGs. The commit asks it for the policy and the cores to verify
 //! against, and leaves the [`Plan`] with it.
 
-mod additions;
 mod clock;
 mod installed;
 
@@ -23,7 +22,6 @@ use crate::run::crossing::Recorded;
 use crate::run::cutter::Cutter;
 use crate::run::plan::Plan;
 
-pub use additions::Additions;
 pub use clock::{Clock, now_ns, set_clock};
 pub use installed::{AlreadyInstalled, install};
 pub(crate) use installed::{expect_installed, installed, record};
@@ -194,11 +192,6 @@ pub trait Platform: Sync {
     /// Lends the recorded value of a channel and a job to `take`, if there is one.
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         let _ = (channel, job, take);
-    }
-
-    /// Returns what takes DAGs during a run; a platform that takes none does not define this.
-    fn additions(&self) -> Option<&dyn Additions> {
-        None
     }
 
     /// Takes a plan over. Its first release is the platform's to time.

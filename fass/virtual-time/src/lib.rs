@@ -31,7 +31,6 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
-mod additions;
 mod command;
 mod disturbed;
 mod edge;

@@ -13,8 +13,8 @@ use std::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Additions, Clusters, Cutter, LaunchError, Occupation, Overheads, Plan, Platform, Policy,
-    Preemption, Recorded,
+    Clusters, Cutter, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
+    Recorded,
 };
 
 use recording::Channel;
@@ -42,9 +42,9 @@ pub(crate) struct Machine {
     pub(crate) wcets: RefCell<Option<String>>,
     /// What it shares with its run.
     pub(crate) surroundings: Surroundings,
-    pub(crate) session: RefCell<Option<Session>>,
+    session: RefCell<Option<Session>>,
     /// The number of the launched plan.
-    pub(crate) plan: Cell<Option<u64>>,
+    plan: Cell<Option<u64>>,
     has_launched: Cell<bool>,
 }
 
@@ -126,7 +126,7 @@ impl Machine {
 }
 
 /// The installed platform, which has no state of its own.
-pub(crate) struct HostPlatform;
+struct HostPlatform;
 
 impl Platform for HostPlatform {
     fn policy(&self) -> Policy {
@@ -229,10 +229,6 @@ impl Platform for HostPlatform {
         expect_current().surroundings.edge.lend(channel, job, take);
     }
 
-    fn additions(&self) -> Option<&dyn Additions> {
-        Some(self)
-    }
-
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
         let Some(machine) = current() else {
             return Err(LaunchError::new(
@@ -273,7 +269,7 @@ impl Platform for HostPlatform {
     }
 }
 
-pub(crate) fn current() -> Option<Rc<Machine>> {
+fn current() -> Option<Rc<Machine>> {
     CURRENT.with_borrow(Weak::upgrade)
 }
 

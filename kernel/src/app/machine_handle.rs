@@ -199,7 +199,9 @@ impl Machine {
     ///
     /// See [`Run`].
     pub fn run(&self) -> Result<Run, Ending> {
-        self.run_from(soon_ns())
+        /// Time for the cores to get ready between now and the first release.
+        const LEAD_NS: u64 = 100_000;
+        self.run_from(machine::clock::now_ns() + LEAD_NS)
     }
 
     /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on
@@ -216,15 +218,6 @@ impl Machine {
     /// }
     /// ```
     pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
-        self.run_beside(epoch_ns, &mut || {})
-    }
-
-    /// Does so, and calls `background` whenever core 0 has nothing else to do.
-    pub(super) fn run_beside(
-        &self,
-        epoch_ns: u64,
-        background: &mut dyn FnMut(),
-    ) -> Result<Run, Ending> {
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
         let mut outgoing = edge::begin(epoch_ns);
@@ -232,14 +225,11 @@ impl Machine {
         let locks_before = execution::lock_acquisitions();
         console::defer();
         execution::arm_all();
-        let mut own = Background::begin(self.wishes.with_input(self.input.get()), total);
+        let mut background = Background::begin(self.wishes.with_input(self.input.get()), total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();
-        worker::wait_in_background(|| {
-            background();
-            edge::send(&mut outgoing) | own.step()
-        });
-        let shuts_down = own.end();
+        worker::wait_in_background(|| edge::send(&mut outgoing) | background.step());
+        let shuts_down = background.end();
         let longest = interrupts_off::take_longest();
         let allocations = heap::usage().allocations - allocations_before;
         let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
@@ -320,12 +310,6 @@ impl Machine {
     pub fn set_heartbeat(&self, period: Duration) {
         heartbeat::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
     }
-}
-
-/// Returns when a run can begin: in a time in which the cores get ready.
-pub(super) fn soon_ns() -> u64 {
-    const LEAD_NS: u64 = 100_000;
-    machine::clock::now_ns() + LEAD_NS
 }
 
 /// Reports a run that a person has ended, and returns how its app ends.

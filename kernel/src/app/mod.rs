@@ -5,7 +5,6 @@
 //! what it says is verified before it goes on to `run`. Text, reports and figures that an app
 //! gets back are made below, in `report` and `text`.
 
-mod adding;
 pub(crate) mod bound_verdict;
 mod calibration;
 #[cfg(feature = "clusters")]
@@ -17,7 +16,6 @@ pub(crate) mod event;
 pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
-pub(crate) mod offers;
 mod overheads;
 mod parameters;
 pub(crate) mod resources;

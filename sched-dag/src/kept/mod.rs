@@ -37,9 +37,6 @@ const EVENTS_WITHOUT_END: usize = 1 << 18;
 /// The finest resolution of statistics: 32 buckets a doubling.
 const FINEST: u32 = 5;
 
-/// The resolution of those of DAGs that are added: doublings.
-const ADDED: u32 = 0;
-
 /// The events of a run, the latest ones if it is long.
 #[derive(Debug)]
 pub struct Journal {
@@ -152,24 +149,6 @@ impl Journal {
         if let (Some(tally), Some(event)) = (&mut self.tally, Event::unpack(words)) {
             tally.take(&event);
         }
-    }
-
-    /// Goes on with more DAGs. Its room stays as it is; so older events may have to make way, which
-    /// `larger`, of all these DAGs and [empty](Self::empty_tally), counts from now on. What is
-    /// not needed any more is left there.
-    pub fn extend(&mut self, larger: &mut Option<Tally>) {
-        if let (Some(tally), Some(larger)) = (&mut self.tally, &mut *larger) {
-            tally.extend(larger);
-        } else if self.has_room() {
-            self.tally = larger.take();
-        }
-    }
-
-    /// Makes what [`extend`](Self::extend) needs. Times of added DAGs are told apart less finely, for
-    /// their statistics stay when they are removed.
-    #[must_use]
-    pub fn empty_tally(task_set: &Arc<TaskSet>) -> Option<Tally> {
-        Some(Tally::new(task_set, ADDED))
     }
 
     /// Records events from now on, or forgets those so far and records no more.

@@ -21,11 +21,7 @@ fn task_set(jobs: Option<u64>) -> Arc<TaskSet> {
 
 /// Writes a job down that runs for 3 to 5 ns.
 fn run(journal: &mut Journal, job: u64) {
-    run_of(DagId(0), journal, job);
-}
-
-fn run_of(dag: DagId, journal: &mut Journal, job: u64) {
-    let subtask = SubtaskId(0);
+    let (dag, subtask) = (DagId(0), SubtaskId(0));
     let (of_job, instance) = (
         Subject::of_job(dag, job),
         Subject::of(Instance { dag, job, subtask }),
@@ -145,24 +141,4 @@ fn events_are_copied_from_the_latest_one_back() {
     // Only four more are left.
     assert_eq!(journal.copy_back(oldest, &mut buffer), 5 * JOBS - 12);
     assert_eq!(buffer.iter().flatten().count(), 4);
-}
-
-#[test]
-fn what_makes_way_for_events_of_added_dags_is_counted() {
-    let first = task_set(Some(JOBS));
-    let mut journal = Journal::new(&first, 1 << 20, u64::MAX);
-    (0..JOBS).for_each(|job| run(&mut journal, job));
-    let both = Arc::new(first.with_added(&task_set(None), 0));
-    journal.extend(&mut Journal::empty_tally(&both));
-    (0..4 * JOBS).for_each(|job| run_of(DagId(1), &mut journal, job));
-    let lost = journal.lost();
-    assert!(lost > 0, "the room is the first one's");
-    // A second time the tally goes on.
-    let three = Arc::new(both.with_added(&task_set(None), 0));
-    journal.extend(&mut Journal::empty_tally(&three));
-    (0..JOBS).for_each(|job| run_of(DagId(2), &mut journal, job));
-    let all = journal.statistics(&three).expect("each was counted");
-    let counts = [0, 1, 2].map(|dag| all.dag(DagId(dag)).response_time.count());
-    assert_eq!(counts, [JOBS, 4 * JOBS, JOBS]);
-    assert!(journal.lost() > lost);
 }

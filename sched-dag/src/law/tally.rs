@@ -157,15 +157,6 @@ impl Tally {
         }
     }
 
-    /// Goes on as `larger`, an empty one of the same DAGs and others behind them, and leaves there
-    /// what is not needed any more.
-    pub(crate) fn extend(&mut self, larger: &mut Self) {
-        let (dags, subtasks) = (self.dags.len(), self.subtasks.len());
-        larger.dags[..dags].swap_with_slice(&mut self.dags);
-        larger.subtasks[..subtasks].swap_with_slice(&mut self.subtasks);
-        core::mem::swap(self, larger);
-    }
-
     /// Forgets the jobs in flight, because events of them are missing.
     pub fn skip(&mut self) {
         for dag in &mut self.dags {

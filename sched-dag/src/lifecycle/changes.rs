@@ -77,10 +77,6 @@ impl Lifecycle for Changes {
         self.modes.leave_alone(dag);
     }
 
-    fn add(&mut self, dag: DagId) {
-        self.dags.push(dag);
-    }
-
     fn dags_of_modes(&self) -> Vec<DagId> {
         self.modes.dags().collect()
     }

@@ -91,9 +91,6 @@ pub trait Lifecycle: fmt::Debug + Send {
     /// Leaves a DAG alone from now on (L6).
     fn leave_alone(&mut self, dag: DagId);
 
-    /// Takes note of a DAG that is added to the run (A1 to A4): a shutdown closes it, too.
-    fn add(&mut self, dag: DagId);
-
     /// Returns the DAGs that are in some mode.
     fn dags_of_modes(&self) -> Vec<DagId>;
 
@@ -131,33 +128,6 @@ impl Requests {
             lifecycle,
             changes: Vec::with_capacity(changes),
         }
-    }
-
-    /// Takes room for the requests of a run that has these, and of so many DAGs more.
-    #[must_use]
-    pub fn larger((kept, changes): (usize, usize), added: usize) -> Self {
-        // Of an added DAG a signal can be asked for, and each change comes to it, too.
-        Self {
-            kept: Vec::with_capacity(kept + added),
-            lifecycle: None,
-            changes: Vec::with_capacity(changes + 2 * added),
-        }
-    }
-
-    /// Returns the room that there is, for [`larger`](Self::larger).
-    #[must_use]
-    pub const fn room(&self) -> (usize, usize) {
-        (self.kept.capacity(), self.changes.capacity())
-    }
-
-    /// Goes on in the room of `larger`, with these DAGs more.
-    pub fn extend(&mut self, larger: &mut Self, added: impl Iterator<Item = DagId>) {
-        larger.kept.append(&mut self.kept);
-        larger.lifecycle = self.lifecycle.take();
-        if let Some(lifecycle) = &mut larger.lifecycle {
-            added.for_each(|dag| lifecycle.add(dag));
-        }
-        core::mem::swap(self, larger);
     }
 
     /// Keeps a request until the next step.

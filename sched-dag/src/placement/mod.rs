@@ -266,33 +266,6 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Goes on with more vertices: `larger` has the same ones, without bodies, and others behind
-    /// them, with bodies; what is not needed any more is left there.
-    pub fn extend(&mut self, larger: &mut Self) {
-        let known = self.places.len();
-        larger.places[..known].swap_with_slice(&mut self.places);
-        larger.seats.swap_with_slice(&mut self.seats);
-        core::mem::swap(self, larger);
-    }
-
-    /// Takes the body of a subtask away for good, if no instance of it has started.
-    pub fn take_resting(&mut self, vertex: Vertex) -> Option<Body> {
-        let place = self.place(vertex);
-        match core::mem::replace(place, Place::Lost) {
-            Place::Resting(body) => Some(body),
-            other => {
-                *place = other;
-                None
-            }
-        }
-    }
-
-    /// Reports whether a started instance of the subtask has its body.
-    pub fn is_started(&self, vertex: Vertex) -> bool {
-        let place = &self.places[vertex.index()];
-        matches!(place, Place::Running | Place::Suspended(_))
-    }
-
     fn place(&mut self, vertex: Vertex) -> &mut Place<Body, Parked> {
         &mut self.places[vertex.index()]
     }

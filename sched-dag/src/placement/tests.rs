@@ -124,30 +124,3 @@ fn a_lost_instance_is_never_run_again_but_another_body_takes_its_place() {
     cores.replace(X, 'z');
     assert_eq!(cores.next(1), Next::Start(X, 'z'));
 }
-
-#[test]
-fn an_extension_changes_nothing_of_what_was_there() {
-    const Z: Vertex = Vertex(2);
-    let mut cores = about_to_preempt();
-    let mut larger = Cores::empty(3, 2);
-    larger.replace(Z, 'z');
-    cores.extend(&mut larger);
-    assert_eq!(cores.current(0), Some(X));
-    assert!(cores.must_suspend(0) && cores.is_started(X));
-    assert_eq!(suspend(&mut cores, "context of x"), None);
-    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
-    cores.decide(1, Some(Z));
-    assert_eq!(cores.next(1), Next::Start(Z, 'z'));
-    assert!(larger.resting(Y).is_none());
-}
-
-#[test]
-fn a_body_is_taken_away_only_while_it_rests() {
-    let mut cores = about_to_preempt();
-    assert_eq!((cores.take_resting(X), cores.is_started(X)), (None, true));
-    suspend(&mut cores, "context of x");
-    assert_eq!((cores.take_resting(X), cores.is_started(X)), (None, true));
-    assert_eq!(cores.take_resting(Y), Some('y'));
-    assert_eq!((cores.take_resting(Y), cores.is_started(Y)), (None, false));
-    assert_eq!(cores.next(0), Next::Nothing);
-}

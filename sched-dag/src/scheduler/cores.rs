@@ -105,15 +105,6 @@ impl Cores {
         self.idle.push(core);
     }
 
-    /// Replaces the key of each instance that runs.
-    pub(super) fn change_keys(&mut self, change: impl Fn(Key) -> Key) {
-        for occupation in &mut self.occupations {
-            if !occupation.key.is_none() {
-                occupation.key = change(occupation.key);
-            }
-        }
-    }
-
     /// Returns the largest key among the instances that may be preempted.
     #[inline]
     pub(super) fn largest_preemptible(&self) -> Option<(CoreId, Key)> {

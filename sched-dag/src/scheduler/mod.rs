@@ -36,7 +36,6 @@
 //! core (or, preempted, its place in line). It does not measure, it believes
 //! the driver's times; a time earlier than one before counts as that one.
 
-mod adding;
 mod bits;
 mod by_deadline;
 mod closing;

@@ -127,18 +127,6 @@ impl Vertices {
         all
     }
 
-    /// Takes over the state of the same vertices elsewhere, which are the first here; the ranks
-    /// are those of here.
-    pub(super) fn take_over(&mut self, elsewhere: &Self) {
-        for (vertex, from) in self.vertices.iter_mut().zip(&elsewhere.vertices) {
-            *vertex = Vertex {
-                rank: vertex.rank,
-                ..*from
-            };
-        }
-        self.counters[..elsewhere.counters.len()].copy_from_slice(&elsewhere.counters);
-    }
-
     /// Returns the number of vertices.
     #[inline]
     pub(super) const fn len(&self) -> usize {

@@ -3,7 +3,6 @@
 //! Only the verification makes a [`TaskSet`], so its holder may rely on
 //! acyclic graphs, non-zero periods and deadlines, and indices in range.
 
-mod added;
 mod clusters;
 mod suspended;
 

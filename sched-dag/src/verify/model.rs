@@ -29,7 +29,7 @@ pub(super) fn build(
     shapes: Vec<Shape>,
     findings: &mut Findings,
 ) -> Option<TaskSet> {
-    let bases = priority_bases(specs, options.priorities_after, findings);
+    let bases = priority_bases(specs, findings);
     if findings.has_faults() {
         return None;
     }
@@ -40,14 +40,13 @@ pub(super) fn build(
 
 /// Returns for each DAG without priorities the number of its first one:
 /// deadline monotonic, after all that are given.
-fn priority_bases(specs: &[DagSpec], after: Option<Priority>, findings: &mut Findings) -> Vec<u32> {
+fn priority_bases(specs: &[DagSpec], findings: &mut Findings) -> Vec<u32> {
     let given = specs
         .iter()
         .filter(|spec| has_priorities(spec))
         .flat_map(|spec| &spec.subtasks);
     let largest = given
         .filter_map(|subtask| subtask.priority)
-        .chain(after)
         .map(|Priority(number)| number)
         .max();
     let mut next = largest.map_or(0, |number| u64::from(number) + 1);

@@ -5,7 +5,7 @@
 //! writer a topic. Every relaxation is a choice that the caller writes down.
 
 use crate::clusters::Clusters;
-use crate::policy::{Policy, Priority};
+use crate::policy::Policy;
 
 /// What the verification is told besides the DAGs.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,8 +23,6 @@ pub struct CommitOptions {
     /// over the DAGs of jobs in flight times subtasks. It bounds the memory that
     /// the scheduler and the edges' slots take. Default: 2^20.
     pub instance_limit: u32,
-    /// After which priority those begin that are derived; for DAGs that are added to others.
-    pub priorities_after: Option<Priority>,
 }
 
 /// Which shapes of graph a commit accepts.
@@ -65,7 +63,6 @@ impl CommitOptions {
             clusters: Clusters::Undivided,
             construction: ConstructionPolicy::paper(),
             instance_limit: 1 << 20,
-            priorities_after: None,
         }
     }
 
@@ -80,13 +77,6 @@ impl CommitOptions {
     #[must_use]
     pub fn with_clusters(mut self, clusters: Clusters) -> Self {
         self.clusters = clusters;
-        self
-    }
-
-    /// Returns the same options with derived priorities behind those of DAGs that are there.
-    #[must_use]
-    pub const fn with_priorities_after(mut self, last: Option<Priority>) -> Self {
-        self.priorities_after = last;
         self
     }
 

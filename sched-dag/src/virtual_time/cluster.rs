@@ -5,7 +5,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 
 use super::Workload;
-use crate::ids::{ClusterId, CoreId, Instance};
+use crate::ids::{CoreId, Instance};
 use crate::scheduler::heap::IndexedHeap;
 use crate::scheduler::{Decision, Scheduler};
 use crate::task_set::TaskSet;
@@ -46,20 +46,6 @@ impl Cluster {
             },
             scheduler,
         }
-    }
-}
-
-impl Cluster {
-    /// Goes on with more DAGs.
-    pub(super) fn extend(&mut self, cluster: ClusterId, task_set: &Arc<TaskSet>) {
-        let options = self.scheduler.options();
-        let mut larger = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
-        self.scheduler.extend(&mut larger);
-        let mut remaining_ns = vec![0; task_set.vertices()];
-        let known = self.cores.remaining_ns.len();
-        remaining_ns[..known].copy_from_slice(&self.cores.remaining_ns);
-        self.cores.remaining_ns = remaining_ns.into_boxed_slice();
-        self.cores.task_set = Arc::clone(task_set);
     }
 }
 

@@ -40,7 +40,6 @@
 //! assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).misses, 0);
 //! ```
 
-mod adding;
 mod cluster;
 mod serving;
 

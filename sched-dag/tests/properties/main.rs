@@ -1,8 +1,5 @@
 //! The scheduler against a brute-force reference, on random sets of DAGs.
 //!
-//! DAGs that are added later are compared with the reference of a set that has them from the
-//! beginning.
-//!
 //! Each set is run twice: in virtual time, and by a driver that takes every way that
 //! the scheduler offers (`drive.rs`). Starts, finishes, preemptions, all that is
 //! reported and all counters have to be those of the reference.
@@ -12,7 +9,6 @@
 //! other sets: `SCHED_DAG_SETS=100000 SCHED_DAG_SEED=7 cargo test -p sched-dag
 //! --test properties`.
 
-mod adding;
 mod drive;
 mod pair;
 #[path = "../support/random.rs"]
@@ -167,11 +163,6 @@ fn ended_dags_leave_the_others_alone() {
 #[test]
 fn signals_pauses_and_stops_are_those_of_the_rules() {
     compare("disturbances", 10_000, set::draw_disturbed);
-}
-
-#[test]
-fn a3_added_dags_are_scheduled_as_if_they_had_been_there() {
-    look_for(adding::difference, "added", 10_000, set::draw_added);
 }
 
 #[test]

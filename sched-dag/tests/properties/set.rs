@@ -145,22 +145,6 @@ pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
     set
 }
 
-/// Draws a set in which instances fail, the offsets of whose DAGs ascend.
-pub(crate) fn draw_added(random: &mut Random) -> Set {
-    let mut set = draw_failing(random);
-    for dag in &mut set.dags {
-        dag.offset_ns += random.between(0, 30);
-    }
-    set.dags.sort_by_key(|dag| dag.offset_ns);
-    if random.chance(30) {
-        let signals_ns = (0..random.between(0, 6)).map(|_| random.between(0, 60));
-        let mut signals_ns: Vec<u64> = signals_ns.collect();
-        signals_ns.sort_unstable();
-        set.dags[0].signals_ns = Some(signals_ns);
-    }
-    set
-}
-
 fn draw_dag(random: &mut Random, overruns: Overruns) -> Dag {
     let count = random.between(1, 7);
     let jobs = random.between(1, 6);

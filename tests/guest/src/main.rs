@@ -5,7 +5,6 @@
 
 extern crate alloc;
 
-mod adding;
 mod attacks;
 mod busy;
 mod checksum;
@@ -45,9 +44,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 48] = [
-    ("adding", adding::run),
-    ("adding_divided", adding::divided),
+const TESTS: [(&str, Test); 45] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -85,7 +82,6 @@ const TESTS: [(&str, Test); 48] = [
     ("lifecycle_divided", lifecycle::divided),
     ("modes", modes::run),
     ("modes_divided", modes::divided),
-    ("offers", adding::offers),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),

@@ -20,7 +20,6 @@
 //! - A DAG without all its WCETs is not analysed, and neither are those that
 //!   it may delay; they are not proven. A WCET of 0 is none.
 
-mod moved;
 mod text;
 
 use alloc::string::{String, ToString};

@@ -295,12 +295,8 @@ impl Edge {
             let is_sporadic = task_set.dag(event.dag).is_sporadic();
             let what = edge::recorded(event.what, is_sporadic)?;
             let dag = u16::try_from(event.dag.0).ok()?;
-            // What was skipped or cut in the recorded run is not so here; DAGs that were added are
-            // not in the recording.
-            if usize::from(dag) >= header.dags.len()
-                || self.is_replayed(event.dag)
-                || !is_kept(event.dag.index(), event.job)
-            {
+            // What was skipped or cut in the recorded run is not so here.
+            if self.is_replayed(event.dag) || !is_kept(event.dag.index(), event.job) {
                 return None;
             }
             Some(Entry {

@@ -4,7 +4,6 @@
 //! asks for the execution time of each instance at its start. [`Runner`] answers
 //! by running the instance's real body and adding up what it executed.
 
-mod adding;
 mod runner;
 
 use std::collections::BTreeMap;
@@ -22,7 +21,6 @@ use crate::error::RunError;
 use crate::record::{JobRecord, PanicRecord};
 use crate::report::Report;
 use crate::surroundings::Surroundings;
-use adding::Removal;
 use runner::{Recording, Runner};
 
 /// A plan that runs, or can go on running.
@@ -41,8 +39,6 @@ pub(crate) struct Session {
     /// What replaces them after faults.
     others: Vec<Vec<Vec<Body>>>,
     recording: Recording,
-    /// For each DAG what has become of its removal.
-    removals: Vec<Removal>,
 }
 
 impl Session {
@@ -60,7 +56,6 @@ impl Session {
                 degraded: vec![false; task_set.dags().len()],
                 run_until_ns: 0,
             },
-            removals: vec![Removal::default(); task_set.dags().len()],
             bodies: plan.bodies,
             after_fault: plan.after_fault,
             others: plan.others,
@@ -107,11 +102,18 @@ impl Session {
             let is_behind = |job: &JobRecord| job.dag == dag && job.job >= last;
             (report().jobs.iter()).any(|job| is_behind(job) && job.finish_ns.is_some())
         });
-        let (driver, mut runner) = self.parts(machine);
-        runner.has_arrived = has_arrived;
-        let end = driver.run_until(until_ns, &mut runner);
+        let mut runner = Runner {
+            task_set: &self.task_set,
+            machine,
+            bodies: &mut self.bodies,
+            after_fault: &self.after_fault,
+            others: &mut self.others,
+            recording: &mut self.recording,
+            panic: None,
+            has_arrived,
+        };
+        let end = self.driver.run_until(until_ns, &mut runner);
         let panic = runner.panic;
-        self.let_go();
         self.recording.run_until_ns = match end {
             End::Stopped => self.recording.journal.now_ns,
             _ => until_ns,
@@ -141,26 +143,11 @@ impl Session {
         }
     }
 
-    /// Returns the driver, and what it drives.
-    fn parts<'s>(&'s mut self, machine: &'s Surroundings) -> (&'s mut Driver, Runner<'s>) {
-        let runner = Runner {
-            task_set: &self.task_set,
-            machine,
-            bodies: &mut self.bodies,
-            after_fault: &self.after_fault,
-            others: &mut self.others,
-            recording: &mut self.recording,
-            panic: None,
-            has_arrived: false,
-        };
-        (&mut self.driver, runner)
-    }
-
     fn require_end(&self) -> Result<(), RunError> {
         let mut dags = (0..).map(DagId).zip(self.task_set.dags());
         let is_endless =
             |dag: &Dag| dag.jobs().is_none() && !dag.is_sporadic() && !self.may_shut_down;
-        match dags.find(|(id, dag)| is_endless(dag) && !self.is_closed(*id)) {
+        match dags.find(|(_, dag)| is_endless(dag)) {
             None => Ok(()),
             Some((dag, _)) => Err(RunError::Endless {
                 dag: self.dag_label(dag),

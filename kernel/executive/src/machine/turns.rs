@@ -29,8 +29,7 @@
 //! uses up no budget. It does pass on the clock, for all.
 //!
 //! A core that halts for an instance or watches the clock (`occupation`, `Event::wait`)
-//! takes no part. Nor does core 0's background, except while it computes for long
-//! ([`let_background_compute`]). All this is off unless [`enable`] is called: real cores compute at the
+//! takes no part. All this is off unless [`enable`] is called: real cores compute at the
 //! same time, and a core that is alone need not share. The statics here need no order
 //! among each other: instructions of one core at a time are executed.
 
@@ -42,7 +41,7 @@ use super::timer::{self, Alarm};
 use super::{clock, cpu, interrupt_flag, interrupts_off, local_apic, vector};
 
 /// How long a turn is. Its end costs some 250 instructions.
-pub const TURN_NS: u64 = 8_000;
+const TURN_NS: u64 = 8_000;
 
 /// How long the first turn of a fresh core is, if others are fresh, too.
 const FIRST_TURN_NS: u64 = 2_000;
@@ -219,33 +218,6 @@ fn end_interrupt_in_turn() {
         Part::Fresh | Part::Waits => {}
     }
     wait(core);
-}
-
-/// Whether core 0's background takes turns.
-static BACKGROUND: AtomicBool = AtomicBool::new(false);
-
-/// Makes the background, which executes this, take turns from its next heartbeat on, or no
-/// more. Reports whether there are any.
-pub fn let_background_compute(does: bool) -> bool {
-    BACKGROUND.store(does, Ordering::Relaxed);
-    if !does {
-        let were_enabled = interrupt_flag::disable();
-        rest(this_core::get());
-        if were_enabled {
-            interrupt_flag::enable();
-        }
-    }
-    is_enabled()
-}
-
-/// Has the background take part, if it computes. In a heartbeat of its core.
-pub fn join_in_background() {
-    if BACKGROUND.load(Ordering::Relaxed) {
-        let core = this_core::get();
-        if core.context().is_background() {
-            join(core);
-        }
-    }
 }
 
 /// Ends this core's turn.

@@ -65,13 +65,6 @@ impl Frames {
         Some(taken)
     }
 
-    /// Returns how often so many adjacent frames can be taken.
-    pub(crate) fn room(&self, count: u64) -> u64 {
-        let bytes = count.saturating_mul(FRAME).max(FRAME);
-        let of = |(start, end): &(u64, u64)| (end - start) / bytes;
-        self.free.as_slice().iter().map(of).sum()
-    }
-
     /// Takes the upper three quarters of the largest free range, for the heap.
     pub(crate) fn take_heap(&mut self) -> Option<Range<u64>> {
         let (start, end) = self

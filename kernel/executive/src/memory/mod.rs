@@ -213,16 +213,6 @@ pub fn new_stack(bytes: u64, room: u64) -> Result<u64, OutOfMemory> {
     Ok(top)
 }
 
-/// Reports whether there are frames for so many stacks of `bytes`, whole pages, and for the tables
-/// that map them.
-pub fn can_make_stacks(count: usize, bytes: u64) -> bool {
-    let memory = MEMORY.lock();
-    let room = memory.as_ref().map_or(0, |of| of.frames.room(bytes / PAGE));
-    // A table of 4 KiB maps 2 MiB, so less than a hundredth of the stacks' size goes into tables.
-    let count = count as u64;
-    count == 0 || count.saturating_add(count / 64 + 2) <= room
-}
-
 /// Makes a stack reach down from `from`, where it has room, to `to`.
 pub fn grow_stack(from: u64, to: u64) -> Result<(), OutOfMemory> {
     let mut memory = MEMORY.lock();

@@ -83,19 +83,6 @@ pub fn settle(bytes: u64) -> Result<u64, OutOfMemory> {
     Ok(bytes)
 }
 
-/// Returns how large all stacks are; 0 before the first commit.
-pub fn settled_bytes() -> u64 {
-    STOCK.lock().stack_bytes
-}
-
-/// Reports whether there is memory for so many contexts in all.
-pub fn can_provide(total: usize) -> bool {
-    let stock = STOCK.lock();
-    let (missing, bytes) = (total.saturating_sub(stock.total), stock.stack_bytes);
-    drop(stock);
-    memory::can_make_stacks(missing, bytes)
-}
-
 /// Makes sure that there are `total` contexts in the stock or in use from it.
 pub fn provide(total: usize) -> Result<(), OutOfMemory> {
     let stock = STOCK.lock();

@@ -2,9 +2,8 @@
 //!
 //! `platform` takes what an app commits. `execution` holds the scheduler and brings each core
 //! to what it decides, `worker` is each core's loop, `containment` ends what is at fault.
-//! `additions` changes the DAGs of a run. `contexts` keeps stacks. `heartbeat` has a core take interrupts now and then; `occupation` holds a core for an instance that only stands for work.
+//! `contexts` keeps stacks. `heartbeat` has a core take interrupts now and then; `occupation` holds a core for an instance that only stands for work.
 
-pub mod additions;
 pub mod containment;
 pub mod contexts;
 pub mod edge;

@@ -6,8 +6,8 @@ use core::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Additions, Channel, Clock, Clusters, Cutter, LaunchError, Occupation, Overheads, Plan,
-    Platform, Policy, Preemption, Recorded,
+    Channel, Clock, Clusters, Cutter, LaunchError, Occupation, Overheads, Plan, Platform, Policy,
+    Preemption, Recorded,
 };
 use sched_dag::analysis::OverheadSource;
 use sched_dag::{DagId, SchedulerOptions, TaskSet};
@@ -39,9 +39,6 @@ pub struct Kernel {
     calibrates: AtomicBool,
     /// A file of WCETs that were observed.
     wcets: Once<&'static str>,
-    /// What changes the DAGs of a run. It is reached through this only, so that an image whose
-    /// app never does so has no code for it.
-    additions: Once<&'static (dyn Additions + Sync)>,
 }
 
 /// The platform that apps on this machine are built for.
@@ -55,7 +52,6 @@ pub static KERNEL: Kernel = Kernel {
     measured: [const { AtomicU64::new(0) }; 2],
     calibrates: AtomicBool::new(false),
     wcets: Once::new(),
-    additions: Once::new(),
 };
 
 impl Kernel {
@@ -94,12 +90,6 @@ impl Kernel {
     pub fn set_wcets(&self, file: &'static str) {
         // Only the first one counts.
         let _ = self.wcets.set(file);
-    }
-
-    /// Lets DAGs of runs be changed from now on.
-    pub(super) fn set_additions(&self, additions: &'static (dyn Additions + Sync)) {
-        // There is one.
-        let _ = self.additions.set(additions);
     }
 
     /// Chooses the budget of subtasks that have a WCET only, in WCETs; 0 for none.
@@ -242,10 +232,6 @@ impl Platform for Kernel {
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         edge::lend(channel, job, take);
-    }
-
-    fn additions(&self) -> Option<&dyn Additions> {
-        self.additions.get().map(|additions| *additions as _)
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

@@ -14,7 +14,6 @@
 //! does the slices instead. The heartbeat also notices that an instance keeps its core for
 //! long ([`stall`]).
 
-pub(crate) mod asked;
 mod command;
 mod input;
 mod listener;
@@ -36,7 +35,6 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use executive::machine::clock;
 use executive::machine::once::Once;
 use executive::machine::spinlock::SpinLock;
-use executive::machine::turns;
 use executive::run::heartbeat;
 use executive::text::console;
 use listener::Listener;
@@ -125,7 +123,6 @@ impl Sliced {
 /// Does in core 0's heartbeat what is its own, and a slice if the background does not
 /// come to it.
 pub(crate) fn beat(now_ns: u64) {
-    turns::join_in_background();
     if let Some(line) = LINE.get() {
         line.beat(now_ns);
     }

@@ -22,15 +22,12 @@ pub(crate) trait Commands: Sync {
 /// Those about parameters.
 pub(crate) static PARAMETERS: Once<&'static dyn Commands> = Once::new();
 
-/// Those about DAGs that can be added.
-pub(crate) static OFFERS: Once<&'static dyn Commands> = Once::new();
-
 /// Those about topics.
 pub(crate) static TOPICS: Once<&'static dyn Commands> = Once::new();
 
 /// Returns all that there are.
 pub(super) fn all() -> impl Iterator<Item = &'static dyn Commands> {
-    [&PARAMETERS, &TOPICS, &OFFERS]
+    [&PARAMETERS, &TOPICS]
         .into_iter()
         .filter_map(|once| once.get().copied())
 }

@@ -289,8 +289,7 @@ fn change(line: &str, task_set: &TaskSet, name: &str, how: fn(DagId) -> Control,
 
 /// Finds a DAG by its name or, if none has it, by its number.
 fn find(task_set: &TaskSet, name: &str) -> Option<DagId> {
-    // Of those that were removed, and added anew, the latest one.
-    let by_name = (ids(task_set).filter(|dag| task_set.dag(*dag).name() == name)).last();
+    let by_name = ids(task_set).find(|dag| task_set.dag(*dag).name() == name);
     let number = whole_number(name);
     by_name.or_else(|| ids(task_set).find(|dag| number == Some(u64::from(dag.0))))
 }

@@ -41,7 +41,6 @@ const KERNELS: &[Kind] = &[
         ],
     ),
     ("console", &["command", "accepted"]),
-    ("offer", &["dag_name", "wish", "done"]),
     (
         "wire",
         &[

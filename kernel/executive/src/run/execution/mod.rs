@@ -10,16 +10,13 @@
 //!
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
-mod adding;
 mod cluster;
 mod control;
 mod core_set;
 mod divided;
 mod ended;
 mod events;
-mod leaving;
 mod letters;
-mod present;
 mod runner;
 mod signals;
 mod stacks;
@@ -40,17 +37,14 @@ use sched_dag::{DagId, Instance, Journal, Scheduler};
 use sched_dag::{SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
-pub use adding::add;
 pub use cluster::{count as clusters, first_core};
 pub use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
 pub use divided::{Division, division, is_finished, set_division};
 pub use ended::Ended;
 pub use events::{complete, fail, find_work, interrupt};
-pub use leaving::{counts, forget as forget_removals, let_go, remove};
 pub use runner::Runner;
 use signals::Signals;
 pub use signals::{raise, raise_in_interrupt};
-use stacks::Stacks;
 pub use status::{
     Cost, budget_ns, cost_of_fault, jobs_ended, lock_acquisitions, next_event_ns, running,
     try_journal, try_names, with_journal,
@@ -130,7 +124,7 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
             "other DAGs are committed already; run them first, or commit all in one call",
         ));
     }
-    Stacks::of(&plan.task_set, options).provide()?;
+    stacks::provide(&plan.task_set, options)?;
     let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
     let (letters, lifecycles) = match cluster::MAY_DIVIDE {
@@ -166,11 +160,11 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
         })
         .collect();
     let number_of = |runner: &Runner| task_set.dag(runner.instance.dag).cluster().index();
-    for runner in runner::runners(task_set, DagId(0), plan.bodies, terms.budget_factor) {
+    for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
         let watcher = &mut executions[number_of(&runner)].watcher;
         watcher.placement.replace(runner.vertex, runner);
     }
-    for others in runner::others(task_set, DagId(0), plan.others, terms.budget_factor) {
+    for others in runner::others(task_set, plan.others, terms.budget_factor) {
         if let Some(any) = others.first() {
             let (number, vertex) = (number_of(any), any.vertex.index());
             executions[number].watcher.others[vertex] = others;

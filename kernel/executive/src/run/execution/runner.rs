@@ -63,14 +63,13 @@ impl Runner {
     }
 }
 
-/// Makes a runner for each body, by vertex, of the DAGs from the first one on.
+/// Makes a runner for each body, by vertex.
 pub(super) fn runners(
     task_set: &TaskSet,
-    first: DagId,
     bodies: Vec<Vec<Body>>,
     budget_factor: u64,
 ) -> impl Iterator<Item = Box<Runner>> {
-    let of_subtasks = by_subtask(first, bodies);
+    let of_subtasks = by_subtask(bodies);
     of_subtasks.map(move |(any, body)| runner(task_set, any, body, budget_factor))
 }
 
@@ -82,11 +81,10 @@ pub(super) type Others = Box<[Vec<Box<Runner>>]>;
 #[allow(clippy::vec_box, reason = "at the fault nothing may be boxed any more")]
 pub(super) fn others(
     task_set: &TaskSet,
-    first: DagId,
     bodies: Vec<Vec<Vec<Body>>>,
     budget_factor: u64,
 ) -> impl Iterator<Item = Vec<Box<Runner>>> {
-    by_subtask(first, bodies).map(move |(any, bodies): (Instance, Vec<Body>)| {
+    by_subtask(bodies).map(move |(any, bodies): (Instance, Vec<Body>)| {
         let bodies = bodies.into_iter();
         let runners = bodies.map(|body| runner(task_set, any, body, budget_factor));
         runners.collect()
@@ -94,8 +92,8 @@ pub(super) fn others(
 }
 
 /// Returns what there is of each subtask, with any instance of that.
-fn by_subtask<T>(first: DagId, of_dags: Vec<Vec<T>>) -> impl Iterator<Item = (Instance, T)> {
-    let of_dags = (first.0..).map(DagId).zip(of_dags);
+fn by_subtask<T>(of_dags: Vec<Vec<T>>) -> impl Iterator<Item = (Instance, T)> {
+    let of_dags = (0..).map(DagId).zip(of_dags);
     of_dags.flat_map(|(dag, of_dag)| {
         let of_subtasks = (0..).map(SubtaskId).zip(of_dag);
         of_subtasks.map(move |(subtask, of)| {

@@ -7,7 +7,6 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
-use core::mem::swap;
 use core::sync::atomic::Ordering;
 
 use fass::{Body, Plan, Request};
@@ -63,25 +62,6 @@ impl Signals {
     #[inline(never)]
     pub(super) fn take(&mut self, body: &mut Body, completed_ns: u64) {
         body.complete(completed_ns, &mut |request| self.requests.keep(request));
-    }
-
-    /// Reports whether a run goes on that has the plan with this number.
-    pub(super) const fn are_of(&self, plan: u64) -> bool {
-        self.plan == plan && self.has_begun
-    }
-
-    /// Returns the room for requests that there is.
-    pub(super) const fn room(&self) -> (usize, usize) {
-        self.requests.room()
-    }
-
-    /// Goes on with more DAGs, in the room of others; what is not needed any more is left there.
-    pub(super) fn extend(&mut self, requests: &mut Requests, after_fault: &mut Vec<Option<DagId>>) {
-        let known = self.after_fault.len();
-        let added = (0..).map(DagId).take(after_fault.len()).skip(known);
-        self.requests.extend(requests, added);
-        after_fault[..known].copy_from_slice(&self.after_fault);
-        swap(&mut self.after_fault, after_fault);
     }
 
     /// Reports whether none is on its way.

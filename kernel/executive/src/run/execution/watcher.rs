@@ -1,6 +1,5 @@
 //! What the scheduler reports while it takes a step.
 
-use core::mem::swap;
 use core::sync::atomic::Ordering;
 
 use alloc::boxed::Box;
@@ -40,22 +39,6 @@ pub(super) struct Watcher {
     pub(super) finish_ns: u64,
 }
 
-/// The places of more bodies.
-pub(super) struct Larger {
-    pub(super) placement: Placement<Box<Runner>, Parked>,
-    pub(super) others: Others,
-}
-
-impl Larger {
-    /// Makes room for the bodies of so many vertices on so many cores.
-    pub(super) fn new(vertices: usize, cores: usize) -> Self {
-        Self {
-            placement: Placement::empty(vertices, cores),
-            others: (0..vertices).map(|_| Vec::new()).collect(),
-        }
-    }
-}
-
 impl Watcher {
     /// Makes one of a cluster, without a body.
     pub(super) fn new(id: ClusterId, task_set: &Arc<TaskSet>, journal: Journal) -> Self {
@@ -72,14 +55,6 @@ impl Watcher {
             finished: None,
             finish_ns: 0,
         }
-    }
-
-    /// Goes on with more DAGs, which `larger` has besides the same ones; what is not needed any
-    /// more is left there.
-    pub(super) fn extend(&mut self, larger: &mut Larger) {
-        self.placement.extend(&mut larger.placement);
-        larger.others[..self.others.len()].swap_with_slice(&mut self.others);
-        swap(&mut self.others, &mut larger.others);
     }
 
     /// Returns the cluster that it reports of.
