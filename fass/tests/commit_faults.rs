@@ -1,5 +1,5 @@
-//! Every fault that `fass` itself finds, with its text, and that all faults of
-//! all DAGs come at once.
+//! Faults that `fass` itself finds, besides one of each code, whose texts `docs/errors.md`
+//! shows, and that all faults of all DAGs come at once.
 
 mod support;
 
@@ -62,17 +62,13 @@ fn arity_faults_name_subtask_and_both_numbers_and_nothing_else_is_blamed() {
     dag.register_sink_subtask(|_: (i32,)| (), vec!["next"], PERIOD, named("sink"));
     let error = refuse(&[dag]);
     let texts: Vec<String> = error.faults().iter().map(ToString::to_string).collect();
-    assert_eq!(
-        texts[..3],
-        [
-            "subtask `source` of dag `demo` returns 2 outputs but lists 1 output topic; \
-             list one topic for each element of its result tuple",
-            "subtask `middle` of dag `demo` takes 1 input but lists 2 input topics; \
-             list one topic for each element of its argument tuple",
-            "subtask `middle` of dag `demo` returns 1 output but lists 2 output topics; \
-             list one topic for each element of its result tuple",
-        ]
-    );
+    for (text, numbers) in texts.iter().zip([
+        "subtask `source` of dag `demo` returns 2 outputs but lists 1 output topic;",
+        "subtask `middle` of dag `demo` takes 1 input but lists 2 input topics;",
+        "subtask `middle` of dag `demo` returns 1 output but lists 2 output topics;",
+    ]) {
+        assert!(text.starts_with(numbers), "{text}");
+    }
     // The surplus topic really is written by its own reader; no type is blamed.
     assert!(!codes(&error).contains(&"type_mismatch"), "{error}");
 }
@@ -87,18 +83,15 @@ fn a_duration_beyond_64_bits_of_nanoseconds_is_a_fault_and_never_wraps() {
     dag.register_sink_subtask(|_: (i32,)| (), vec!["number"], long, named("sink"));
     let error = refuse(&[dag]);
     assert_eq!(codes(&error), ["duration_too_long"; 4]);
-    let limit = "give at most 18446744073709551615 ns";
-    let texts: Vec<String> = error.to_string().lines().map(String::from).collect();
-    assert_eq!(
-        texts[0],
-        format!("the offset of dag `slow` is too long; {limit}")
-    );
-    let of = |what, subtask| {
-        format!("the {what} of subtask `{subtask}` of dag `slow` is too long; {limit}")
-    };
-    assert_eq!(texts[1], of("WCET", "source"));
-    assert_eq!(texts[2], of("period", "source"));
-    assert_eq!(texts[3], of("relative deadline", "sink"));
+    let texts = error.to_string();
+    for (text, what) in texts.lines().zip([
+        "the offset of dag `slow` ",
+        "the WCET of subtask `source` of dag `slow` ",
+        "the period of subtask `source` of dag `slow` ",
+        "the relative deadline of subtask `sink` of dag `slow` ",
+    ]) {
+        assert!(text.starts_with(what), "{text}");
+    }
 }
 
 #[test]
@@ -116,21 +109,6 @@ fn two_periods_are_a_fault_and_two_deadlines_are_none() {
         codes.iter().all(|code| !code.contains("deadline")),
         "{error}"
     );
-    assert_eq!(
-        error.faults()[0].to_string(),
-        "subtask `second source` gives dag `twice` a period of 20ms where 10ms \
-         were given before; a DAG has one period, make two DAGs or give the same period"
-    );
-}
-
-#[test]
-fn a_dag_given_twice_is_a_fault() {
-    let dag = faultless("once");
-    let error = refuse(&[dag.clone(), dag]);
-    assert_eq!(
-        error.to_string(),
-        "dag `once` is given twice in one commit; give it once"
-    );
 }
 
 #[test]
@@ -146,10 +124,7 @@ fn a_dag_committed_before_is_a_fault_and_cannot_be_changed() {
     let dag = faultless("done");
     drop(support::commit(slice::from_ref(&dag)));
     let error = refuse(slice::from_ref(&dag));
-    assert_eq!(
-        error.to_string(),
-        "dag `done` is committed already; build a new DAG and commit that"
-    );
+    assert_eq!(codes(&error), ["already_committed"]);
     let late = || dag.register_sink_subtask(|()| (), vec![], PERIOD, named("late"));
     let payload = catch_unwind(AssertUnwindSafe(late)).expect_err("it panics");
     assert_eq!(
@@ -193,9 +168,10 @@ fn a_platform_that_refuses_is_quoted() {
     finish_create_dags(&[faultless("first")]).expect("the platform keeps one plan");
     let error = refuse(&[faultless("second")]);
     assert_eq!(codes(&error), ["not_launched"]);
-    assert_eq!(
-        error.to_string(),
-        "the platform did not take the plan: a plan is kept already; take it first"
+    let text = error.to_string();
+    assert!(
+        text.ends_with(": a plan is kept already; take it first"),
+        "{text}"
     );
 }
 

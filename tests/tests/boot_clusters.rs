@@ -98,27 +98,19 @@ fn the_commit_divides_the_cores_where_the_app_offers_it() {
 
 #[test]
 fn a_division_that_cannot_be_is_refused_with_what_to_do() {
-    for (words, expected) in [
-        ("clusters=2,0", "cluster 1 has no cores; give it one"),
-        (
-            "clusters=3,3",
-            "the clusters have 6 cores, and the machine has 4; give them fewer",
-        ),
-        (
-            "clusters=4",
-            "dag `answers` is in cluster 1, and there is none; state one up to cluster 0",
-        ),
-        ("policy=static", "this machine's cores are not divided"),
+    for (words, code) in [
+        ("test=clusters clusters=2,0", "cluster_without_cores"),
+        ("test=clusters clusters=3,3", "clusters_beyond_cores"),
+        ("test=clusters clusters=4", "unknown_cluster"),
+        ("test=clusters policy=static", "unknown_cluster"),
+        ("test=clusters_auto clusters=2,2", "no_cluster"),
     ] {
-        let outcome = clusters("test=clusters")
-            .word(words)
-            .end_in(Status::Failure);
-        assert!(outcome.serial.contains(expected), "{}", outcome.tail());
+        let (test, word) = words.split_once(' ').expect("two words");
+        let outcome = clusters(test).word(word).end_in(Status::Failure);
+        let fault = outcome.transcript.of_kind("commit_fault").next();
+        let found = fault.and_then(|line| line.text_at("fault"));
+        assert_eq!(found, Some(code), "{}", outcome.tail());
     }
-    let auto = clusters("test=clusters_auto").word("clusters=2,2");
-    let outcome = auto.end_in(Status::Failure);
-    let expected = "dag `light` is in no cluster, and the cores are divided; state one";
-    assert!(outcome.serial.contains(expected), "{}", outcome.tail());
     let outcome = clusters("test=clusters").word("clusters=2,two");
     let outcome = outcome.end_in(Status::Usage);
     assert!(

@@ -8,6 +8,7 @@ use std::process::Command;
 use dag_file::Length;
 use harness::Guest;
 use tool::dag_file::{Import, load};
+use tool::golden::Golden;
 use tool::protocol::Status;
 use tool::{Outcome, system};
 
@@ -313,7 +314,12 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
     }
     let demo = system::workspace().join(&commands[0][1]);
     let demo = fs::read_to_string(demo).expect("it is there");
-    assert_eq!(of_info("text").expect("the example").text, demo);
+    let golden = Golden {
+        file: "docs/dag-file.md",
+        below: "```text\n",
+        text: &of_info("text").expect("the example").text,
+    };
+    golden.assert_is(&demo);
 
     let written = ["dot", "trace"].map(|option| {
         let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("demo.{option}"));

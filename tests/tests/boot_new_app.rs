@@ -11,6 +11,7 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use harness::guide::{documented_output, without_numbers};
+use tool::golden::{Golden, excerpt};
 use tool::markdown::blocks;
 use tool::new_app::{self, Source};
 use tool::system::{self, workspace};
@@ -79,14 +80,16 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
     let said = boot(&app);
     let documented = documented_output("new-app").expect("the guide shows it");
     // The bound does not depend on the kernel's speed, so it is exact.
-    let bound = documented.lines().next().expect("the bound");
-    assert!(bound.contains("takes at most"), "{bound}");
-    assert!(said.lines().any(|line| line == bound), "{bound}");
-    let lines: Vec<String> = said.lines().map(without_numbers).collect();
-    for line in documented.lines().map(without_numbers) {
-        let is_said = lines.contains(&line);
-        assert!(is_said, "the guide shows `{line}`, the app says:\n{said}");
-    }
+    let shown = |line: &str| match line.contains("takes at most") {
+        true => line.into(),
+        false => without_numbers(line),
+    };
+    let golden = Golden {
+        file: "docs/guide.md",
+        below: "```text output-new-app\n",
+        text: &documented,
+    };
+    golden.assert_is(&excerpt(&documented, &said, shown));
 
     // The same lines on Linux, whatever it takes there. Without preemption the bound is another.
     let said = cargo(
@@ -224,9 +227,10 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
     let shown = (blocks.iter().map(|block| &block.text))
         .find(|text| text.contains("vision: "))
         .expect("what the app says");
-    let said = boot(&app);
-    for line in shown.lines() {
-        let is_said = said.lines().any(|said| said == line);
-        assert!(is_said, "`{line}` is not in:\n{said}");
-    }
+    let golden = Golden {
+        file: "README.md",
+        below: place,
+        text: shown,
+    };
+    golden.assert_is(&excerpt(shown, &boot(&app), str::to_string));
 }

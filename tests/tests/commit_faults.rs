@@ -15,7 +15,8 @@ use sched_dag::{
     CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
 };
-use tool::fault_page::{documented_faults, function_bodies, is_said_by, table};
+use tool::fault_page::{self, documented_faults, function_bodies, is_said_by, table};
+use tool::golden::Golden;
 use tool::system::workspace;
 
 /// The files whose functions the page shows, each named as its fault.
@@ -203,8 +204,7 @@ fn every_fault_is_found_and_said_as_documented() {
         said.insert(fault.to_string(), text.to_string());
     });
     for (code, text) in &said {
-        let entry = documented.get(code);
-        assert_eq!(Some(text), entry.map(|entry| &entry.text), "{code}");
+        fault_page::assert_is(code, &documented[code].text, text);
     }
     // The last one needs a program of its own: `commit_without_platform.rs`.
     let mut missing: Vec<&String> = documented.keys().collect();
@@ -251,7 +251,7 @@ fn every_example_is_the_code_that_is_tested() {
     for (code, entry) in documented_faults().expect("the page") {
         let body = bodies.get(&code);
         let body = body.unwrap_or_else(|| panic!("no function `{code}` has the fault"));
-        assert_eq!(&entry.example, body, "the page shows other code: {code}");
+        fault_page::assert_is(&code, &entry.example, body);
     }
 }
 
@@ -362,8 +362,25 @@ fn every_reason_against_a_proof_is_listed() {
     }
     assert_eq!(texts.len(), documented.len());
     for (text, pattern) in texts.iter().zip(documented) {
-        assert!(is_said_by(text, &pattern), "`{text}` is not `{pattern}`");
+        if !is_said_by(text, &pattern) {
+            let golden = Golden {
+                file: "docs/errors.md",
+                below: "| text | what to do |",
+                text: &pattern,
+            };
+            golden.assert_is(&with_dots(text));
+        }
     }
+}
+
+/// Returns a text as the table has it: with `...` for names and numbers.
+fn with_dots(text: &str) -> String {
+    let varies = |c: char| c == '`' || c.is_ascii_digit();
+    let words = text.split(' ').map(|word| match word.contains(varies) {
+        true => format!("...{}", &word[word.trim_end_matches([',', ';']).len()..]),
+        false => word.into(),
+    });
+    words.collect::<Vec<String>>().join(" ")
 }
 
 /// Returns sources, with texts that go on in the next line behind a backslash joined.

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use fass::{CommitError, SubtaskAttributes, create_dag, finish_create_dags};
-use tool::fault_page::documented_faults;
+use tool::fault_page::{self, documented_faults};
 
 fn no_platform() -> Result<fass::Commit, CommitError> {
     // No `VirtualTime::new()` before this.
@@ -23,8 +23,6 @@ fn a_commit_without_platform_is_refused_as_documented() {
     let error = no_platform().expect_err("there is none");
     assert_eq!(error.faults()[0].code(), "no_platform");
     let documented = documented_faults().expect("the page");
-    assert_eq!(
-        Some(&error.to_string()),
-        documented.get("no_platform").map(|entry| &entry.text)
-    );
+    let entry = &documented["no_platform"];
+    fault_page::assert_is("no_platform", &entry.text, &error.to_string());
 }

@@ -46,8 +46,14 @@ fn reason(answer: &Answer) -> Option<Reason> {
     answer.verdict.unproven().map(fass::Unproven::reason)
 }
 
-fn texts(answers: &[Answer]) -> Vec<String> {
-    answers.iter().map(ToString::to_string).collect()
+/// Compares what answers say: for each its beginning, and a part of the rest.
+#[track_caller]
+fn assert_said(answers: &[Answer], expected: &[[&str; 2]]) {
+    assert_eq!(answers.len(), expected.len());
+    for (answer, [start, part]) in answers.iter().zip(expected) {
+        let text = answer.to_string();
+        assert!(text.starts_with(start) && text.contains(part), "{text}");
+    }
 }
 
 #[test]
@@ -112,16 +118,12 @@ fn not_proven_is_accepted_and_says_why() {
     let late = chain("late", ms(10), ms(4), [ms(2), ms(1)]);
     let busy = chain("busy", ms(10), ms(9), [ms(3), ms(3)]);
     let commit = finish_create_dags(&[late, busy]).expect("a proof is not demanded");
-    assert_eq!(
-        texts(commit.answers()),
-        [
-            "dag `late` is not proven to meet its deadlines: no test bounds its response time by \
-             its relative deadline (it may still meet it); add cores, raise its priority or relax \
-             the deadline",
-            "dag `busy` is not proven to meet its deadlines: dag `late`, which may delay it, is \
-             not proven itself; see to that one first",
-        ]
-    );
+    let expected = [
+        ["dag `late` is not proven", ""],
+        ["dag `busy` is not proven", "`late`"],
+    ];
+    assert_said(commit.answers(), &expected);
+    assert_eq!(reason(&commit.answers()[0]), Some(Reason::NoBound));
     let first = commit.first_unproven().expect("one fails first");
     assert_eq!(first.dag.name, "late");
     assert!(commit.warnings().is_empty(), "nothing is certain");
@@ -139,10 +141,10 @@ fn a_demanded_proof_that_is_missing_refuses_the_commit() {
     let error = finish_create_dags(&[late.clone(), busy.clone()]).expect_err("it is demanded");
     let codes: Vec<_> = error.faults().iter().map(Fault::code).collect();
     assert_eq!(codes, ["not_proven"], "of `late` nothing is demanded");
-    assert_eq!(
-        error.to_string(),
-        "dag `busy` demands a proof that it meets its deadlines, and there is none: dag `late`, \
-         which may delay it, is not proven itself; see to that one first"
+    let text = error.to_string();
+    assert!(
+        text.starts_with("dag `busy` ") && text.contains("dag `late`"),
+        "{text}"
     );
     late.demand_proof();
     let error = finish_create_dags(&[late.clone(), busy]).expect_err("both demand it");
@@ -175,16 +177,15 @@ fn dags_without_all_wcets_say_so() {
     let urgent = ranked("urgent", 0, ms(10), [ms(1), ms(1)]);
     let lax = ranked("lax", 2, ms(10), [ms(1), ms(1)]);
     let commit = finish_create_dags(&[unknown, urgent, lax]).expect("WCETs are optional");
-    assert_eq!(
-        texts(commit.answers()),
+    let expected = [
         [
-            "dag `unknown` is not proven to meet its deadlines: no WCET above 0 is given for \
-             subtask `sink`; give every subtask one to have the DAG analysed",
-            "dag `urgent` takes at most 2ms, by multiple paths",
-            "dag `lax` is not proven to meet its deadlines: dag `unknown`, which may delay it, is \
-             not proven itself; see to that one first",
-        ]
-    );
+            "dag `unknown` is not proven",
+            "no WCET above 0 is given for subtask `sink`",
+        ],
+        ["dag `urgent` takes at most 2ms", ""],
+        ["dag `lax` is not proven", "dag `unknown`"],
+    ];
+    assert_said(commit.answers(), &expected);
     assert_eq!(
         commit
             .first_unproven()
@@ -199,7 +200,7 @@ fn an_answer_says_which_wcets_are_observed_ones() {
         let dag = chain("seen", ms(10), ms(9), [ms(3), ms(3)]);
         let commit = finish_create_dags(&[dag]).expect("the DAG is right");
         let hash = machine.run().task_set().dags()[0].graph_hash();
-        (texts(commit.answers()).remove(0), hash)
+        (commit.answers()[0].to_string(), hash)
     };
     let (stated, hash) = said_and_hash(VirtualTime::new());
     assert_eq!(stated, "dag `seen` takes at most 6ms, by multiple paths");
@@ -289,12 +290,9 @@ fn a_wcet_of_zero_proves_nothing() {
             .policy(policy)
             .preemption(Preemption::Disabled);
         let commit = finish_create_dags(&[star([2, 2, 2, 1, 1, 1, 2], 0)]).expect("accepted");
-        assert_eq!(
-            texts(commit.answers()),
-            [
-                "dag `star` is not proven to meet its deadlines: no WCET above 0 is given for \
-                 subtask `sink`; give every subtask one to have the DAG analysed"
-            ]
+        assert_said(
+            commit.answers(),
+            &[["dag `star` is not proven", "subtask `sink`"]],
         );
         assert_eq!(commit.warnings()[0].code(), "zero_wcet");
         let report = machine.run();

@@ -165,9 +165,7 @@ fn the_writers_dag_must_be_in_the_commit() {
     let (write, latest) = writer(10, 3);
     let (read, _) = reader(&latest, 10, 3);
     let error = finish_create_dags(&[read]).unwrap_err();
-    let text = "subtask `read` of dag `reader` samples the latest value of topic `count`, whose \
-                dag is not in the commit; commit both dags in one call";
-    assert_eq!(error.to_string(), text);
+    assert_eq!(error.faults()[0].code(), "latest_not_committed");
     drop(write);
 }
 

@@ -326,11 +326,7 @@ fn what_a_subtask_may_pause_is_in_the_commit() {
     let asks = asking(&elsewhere, 1, 1, |mut switch, _| switch.pause());
     let error = finish_create_dags(&[asks]).unwrap_err();
     drop(machine);
-    assert_eq!(
-        error.to_string(),
-        "subtask `ask` of dag `asks` may pause a dag that is not in the commit; commit both dags in \
-         one call"
-    );
+    assert_eq!(error.faults()[0].code(), "switched_not_committed");
 }
 
 #[test]

@@ -8,8 +8,11 @@
 use std::collections::BTreeMap;
 use std::fs;
 
+use crate::golden::Golden;
 use crate::markdown::blocks;
 use crate::system;
+
+const PAGE: &str = "docs/errors.md";
 
 /// What the page says of one fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,8 +88,37 @@ pub fn function_bodies(source: &str) -> BTreeMap<String, String> {
     bodies
 }
 
+/// Holds a part of a fault's entry, its text or its example, to what it is now.
+///
+/// # Panics
+///
+/// Panics if it is another; see [`Golden::assert_is`].
+#[track_caller]
+pub fn assert_is(fault: &str, part: &str, now: &str) {
+    let golden = Golden {
+        file: PAGE,
+        below: &format!("\n### `{fault}`\n"),
+        text: part,
+    };
+    golden.assert_is(now);
+}
+
+/// Returns a fault's text with the names, in backquotes, that another text has.
+#[must_use]
+pub fn with_names_of(other: &str, text: &str) -> String {
+    let mut names = other.split('`').skip(1).step_by(2);
+    let parts = text
+        .split('`')
+        .enumerate()
+        .map(|(index, part)| match index % 2 {
+            0 => part,
+            _ => names.next().unwrap_or(part),
+        });
+    parts.collect::<Vec<_>>().join("`")
+}
+
 fn page() -> Result<String, String> {
-    let path = system::workspace().join("docs/errors.md");
+    let path = system::workspace().join(PAGE);
     fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
 }
 
@@ -125,7 +157,7 @@ fn read_entry(section: &str) -> Result<Entry, &'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{function_bodies, is_said_by, read};
+    use super::{function_bodies, is_said_by, read, with_names_of};
 
     const ENTRY: &str = "# Errors\n\n### `cycle`\n\nA circle.\n\n    a -> b; cut it\n\n\
                          Cut it.\n\n```rust\nlet dag = cycle();\n```\n\n## More\n";
@@ -153,6 +185,12 @@ mod tests {
         let bodies = function_bodies(source);
         assert_eq!(bodies.len(), 1);
         assert_eq!(bodies["a"], "if true {\n    1\n}\n");
+    }
+
+    #[test]
+    fn names_are_those_of_the_other_text() {
+        let text = with_names_of("an older `a` and `b` text", "dag `x` has `y`; cut it");
+        assert_eq!(text, "dag `a` has `b`; cut it");
     }
 
     #[test]

@@ -16,7 +16,7 @@
 //!   [`output`], [`progress`], [`lasting`]: printing without a panic, and while it takes long;
 //!   [`random`]: sets that are drawn;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
-//! - [`markdown`], [`fault_page`]: pages that tests hold to their word;
+//! - [`markdown`], [`fault_page`], [`golden`]: pages that tests hold to their word;
 //! - [`trace`]: what happened in a run, held against the model's rules;
 //! - [`recordings`]: what entered a run, and other formats of that;
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
@@ -44,6 +44,7 @@ pub mod efi;
 pub mod elf;
 pub mod fault_page;
 pub mod files;
+pub mod golden;
 pub mod image;
 pub mod install;
 pub mod iso;

@@ -5,6 +5,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use super::{PAGES, read, without_numbers};
+use tool::fault_page::{documented_faults, with_names_of};
+use tool::golden::Golden;
 use tool::markdown::{Block, blocks};
 use tool::new_app::NEW_APP;
 use tool::options::{Command, Request};
@@ -12,6 +14,10 @@ use tool::run::RUN;
 use tool::system::workspace;
 use tool::test::TEST;
 use tool::trace::{CHECK_TRACE, TRACE};
+
+#[path = "../../../fass/virtual-time/examples/vision.rs"]
+#[allow(dead_code, reason = "its `main` prints what `run` returns")]
+mod vision;
 
 /// The scripts that the guide may name.
 const COMMANDS: [&Command; 5] = [&RUN, &TEST, &NEW_APP, &CHECK_TRACE, &TRACE];
@@ -28,7 +34,7 @@ fn every_block_is_of_a_kind_that_is_checked() {
             // Doctests; `rust,no_run` is for what only the machine can run.
             "rust" | "rust,no_run" => examples += 1,
             "console" | "cpp" | "text diagnostic" => {}
-            output if output.starts_with("text output-") => {}
+            text if text.starts_with("text output-") || text.starts_with("text fault-") => {}
             other => panic!("a block of the kind `{other}` is checked by nobody:\n{text}"),
         }
     }
@@ -88,6 +94,41 @@ fn what_it_says_of_the_compiler_is_what_the_compilers_test_expects() {
         lines += 1;
     }
     assert!(lines >= 5, "{lines} lines are left");
+}
+
+#[test]
+fn what_they_say_of_a_fault_is_its_entrys_text_with_names_of_their_own() {
+    let faults = documented_faults().expect("the page");
+    for file in ["README.md", "docs/guide.md"] {
+        let page = fs::read_to_string(workspace().join(file)).expect("the page");
+        let mut blocks = blocks(&page).into_iter();
+        let quoted = |block: &Block| block.info.starts_with("text fault-");
+        let Block { info, text } = blocks.find(quoted).expect("it shows a fault");
+        let fault = &faults[info.trim_start_matches("text fault-")];
+        let said = with_names_of(&text, &fault.text) + "\n";
+        let below = &info;
+        Golden {
+            file,
+            below,
+            text: &text,
+        }
+        .assert_is(&said);
+    }
+}
+
+#[test]
+fn the_readme_shows_what_the_first_command_prints() {
+    let readme = fs::read_to_string(workspace().join("README.md")).expect("the page");
+    let mut blocks = blocks(&readme).into_iter();
+    let shown = blocks
+        .find(|block| block.info == "text")
+        .expect("it is there");
+    let golden = Golden {
+        file: "README.md",
+        below: "The first command prints",
+        text: &shown.text,
+    };
+    golden.assert_is(&vision::run().expect("the DAG is sound"));
 }
 
 #[test]

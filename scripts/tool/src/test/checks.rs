@@ -70,7 +70,7 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     }
     let name = "the hand-off takes no more instructions than its baseline";
     if plan.wants(name) {
-        tally.run(name, hand_off::check);
+        tally.run(name, || hand_off::check(plan.blessed.as_deref()));
     }
     let name = "a guest runs under KVM";
     if plan.wants(name) {

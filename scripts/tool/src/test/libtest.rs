@@ -6,13 +6,14 @@
 //! are summed. Output is shown in full if something failed.
 
 use std::fs::{self, File};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use super::crates::{self, TestBinary};
 use super::tally::Tally;
 use crate::child::{Child, Waited, bound_to_us};
+use crate::golden;
 use crate::system;
 use crate::tail::Tail;
 
@@ -30,6 +31,8 @@ pub(super) struct Plan {
     pub(super) verbose: bool,
     /// Whether guests can be booted, or why not.
     pub(super) boots: Result<(), String>,
+    /// The list of rewritten files, if what differs is to be rewritten.
+    pub(super) blessed: Option<PathBuf>,
 }
 
 impl Plan {
@@ -175,6 +178,7 @@ fn run_logged(
         .map_err(error)?;
     let same = file.try_clone().map_err(error)?;
     command.stdin(Stdio::null()).stdout(file).stderr(same);
+    command.envs(plan.blessed.iter().map(|list| (golden::BLESSED, list)));
     let program = command.get_program().display().to_string();
     let started = Child::start(command);
     let mut child = started.map_err(|error| format!("cannot start `{program}`: {error}"))?;

@@ -22,10 +22,12 @@ mod table;
 mod tally;
 
 use std::ffi::OsString;
+use std::fs;
 use std::process::ExitCode;
 
 use crate::image;
 use crate::install;
+use crate::system;
 use libtest::Plan;
 
 pub use table::TEST;
@@ -41,16 +43,29 @@ pub fn test(words: &[OsString]) -> ExitCode {
     if let Err(line) = disk::check() {
         return TEST.fail(&line);
     }
+    let list = options
+        .is_given("bless")
+        .then(|| system::new_log("blessed"));
+    let blessed = match list.transpose() {
+        Ok(list) => list,
+        Err(line) => return TEST.fail(&line),
+    };
     let plan = Plan {
         filter: options.positional().map(String::from),
         quick: options.is_given("quick"),
         verbose: options.is_given("verbose"),
         boots: install::ensure_qemu(),
+        blessed,
     };
     let mut tally = Tally::default();
     build_images(&plan, &mut tally);
     libtest::run_all(&plan, &mut tally);
     checks::run_all(&plan, &mut tally);
+    if let Some(list) = &plan.blessed {
+        // There is none if nothing was rewritten.
+        tally.bless(&fs::read_to_string(list).unwrap_or_default());
+        let _ = fs::remove_file(list);
+    }
 
     // A filter without a match ends in the complaint alone: `0 passed, 0 failed`
     // would look like success.

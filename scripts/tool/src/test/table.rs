@@ -17,6 +17,11 @@ pub static TEST: Command = Command {
             "Only what runs on the host: no guests, no images, no lints.",
         ),
         Opt::new(
+            "bless",
+            Takes::Nothing,
+            "Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.",
+        ),
+        Opt::new(
             "verbose",
             Takes::Nothing,
             "Show every test by name, not only those that fail.",
@@ -26,6 +31,9 @@ pub static TEST: Command = Command {
     notes: "\
 The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
 the reasons above it; above these stand the parts that took longest, in seconds.
+
+With --bless the files that were rewritten stand there, too; `git diff` shows what
+has changed in them. What cannot be rewritten still fails.
 
 exit codes: 0 nothing failed; 1 something failed; 2 a refused command line, or
 a FILTER by which nothing has run

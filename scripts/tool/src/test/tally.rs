@@ -1,5 +1,6 @@
 //! The count of everything that ran, failed, or could not run.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::time::{Duration, Instant};
 
@@ -13,6 +14,7 @@ pub struct Tally {
     failures: Vec<String>,
     skips: Vec<String>,
     parts: Vec<(String, Duration)>,
+    blessed: BTreeSet<String>,
 }
 
 impl Tally {
@@ -59,6 +61,11 @@ impl Tally {
         self.skips.push(format!("{name}: {why}"));
     }
 
+    /// Notes the files of a list, a line each, as rewritten.
+    pub fn bless(&mut self, list: &str) {
+        self.blessed.extend(list.lines().map(String::from));
+    }
+
     /// Returns the number of failures.
     #[must_use]
     pub fn failed(&self) -> usize {
@@ -87,6 +94,9 @@ impl fmt::Display for Tally {
         }
         for failure in &self.failures {
             writeln!(f, "failed: {failure}")?;
+        }
+        for file in &self.blessed {
+            writeln!(f, "blessed: {file}; read `git diff`")?;
         }
         write!(f, "{} passed, {} failed", self.passed, self.failures.len())?;
         match self.skips.len() {
@@ -156,5 +166,8 @@ mod tests {
             "\nskipped: c: there is no /dev/kvm\nfailed: a::b: left is not right\n\
              12 passed, 1 failed, 1 skipped\n"
         );
+        tally.bless("b.md\na.md\nb.md\n");
+        let blessed = "blessed: a.md; read `git diff`\nblessed: b.md; read `git diff`\n12 passed";
+        assert!(tally.to_string().contains(blessed));
     }
 }

@@ -72,21 +72,25 @@ pub(super) fn read(file: &Path) -> Result<Vec<Figure>, String> {
         .ok_or_else(|| format!("the baseline `{place}` holds no figures; {again}"))
 }
 
-/// Writes a baseline, a line a figure.
+/// Writes a baseline.
 ///
 /// # Errors
 ///
 /// In words: the file cannot be written.
 pub(super) fn write(file: &Path, figures: &[Figure]) -> Result<(), String> {
+    let failed = |error| format!("cannot write the baseline `{}`: {error}", file.display());
+    fs::write(file, text(figures)).map_err(failed)
+}
+
+/// Returns a baseline's text, a line a figure.
+pub(super) fn text(figures: &[Figure]) -> String {
     let mut text = String::from("{\"counts\":\"instructions\",\"figures\":[\n");
     for (number, figure) in figures.iter().enumerate() {
         let end = if number + 1 < figures.len() { "," } else { "" };
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{{{}}}{end}", figure.json_members());
     }
-    text.push_str("]}\n");
-    let failed = |error| format!("cannot write the baseline `{}`: {error}", file.display());
-    fs::write(file, text).map_err(failed)
+    text + "]}\n"
 }
 
 /// Compares a figure with that of the baseline.

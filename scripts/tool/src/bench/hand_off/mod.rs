@@ -30,6 +30,7 @@ use figure::Figure;
 use plan::{Boot, Plan};
 
 use super::by_plan;
+use crate::golden::Golden;
 use crate::options::Request;
 use crate::outcome::boot;
 use crate::progress::Progress;
@@ -44,12 +45,13 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     by_plan(&table::TABLE, words, Plan::new, measure_all)
 }
 
-/// Measures as `--compare` does, and prints the table.
+/// Measures as `--compare` does, and prints the table; rewrites the baseline if figures have
+/// grown and there is a `list` of rewritten files.
 ///
 /// # Errors
 ///
 /// In words: a guest failed, there is no baseline, or which figures have grown.
-pub fn check() -> Result<(), String> {
+pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     let plan = match table::TABLE.parse(&["--compare".into(), "--mode=deterministic".into()]) {
         Ok(Request::Work(options)) => Plan::new(&options)?,
         Ok(Request::Help(_)) => return Err("the options of the check ask for help".into()),
@@ -64,7 +66,12 @@ pub fn check() -> Result<(), String> {
     if comparison.complaints.is_empty() {
         return Ok(());
     }
-    Err(comparison.complaints.join("; "))
+    if list.is_none() {
+        return Err(comparison.complaints.join("; "));
+    }
+    let (file, text) = (plan::BASELINE, &*baseline::text(before));
+    let below = "";
+    Golden { file, below, text }.compare(&baseline::text(&now), list)
 }
 
 /// Measures and reports. Returns whether nothing has grown.

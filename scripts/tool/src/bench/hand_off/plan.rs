@@ -10,6 +10,9 @@ use crate::options::Parsed;
 use crate::qemu::{Mode, Qemu};
 use crate::system;
 
+/// The baseline that is kept, from the workspace's root.
+pub(super) const BASELINE: &str = "tests/baselines/hand-off.json";
+
 /// The options of a baseline: it is of the defaults of these.
 const SIZES: &[&str] = &["jobs", "chain", "branches", "layered", "seed", "append"];
 
@@ -103,10 +106,9 @@ impl Plan {
                 ));
             }
         }
-        let baseline = options.path("baseline").map_or_else(
-            || system::workspace().join("tests/baselines/hand-off.json"),
-            PathBuf::from,
-        );
+        let baseline = options
+            .path("baseline")
+            .map_or_else(|| system::workspace().join(BASELINE), PathBuf::from);
         let listing = options.path("listing").map(PathBuf::from);
         let outputs = [
             ("baseline", saves.map(|_| &baseline)),

@@ -1,0 +1,146 @@
+//! Goldens: texts that the tree keeps of what its programs say.
+//!
+//! A *golden* is a fault's text in its page, an output or code that a page shows, a baseline,
+//! the table of budgets. A test compares it with what is said now. Under
+//! `./scripts/test --bless` a golden that differs is rewritten in its file, and the test
+//! passes, so that a person reads the change in `git diff`; the command ends with the files
+//! that were rewritten. It guarantees that nothing else of a file changes. A golden that its
+//! file does not hold letter by letter cannot be rewritten: its test still fails.
+
+use std::env;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::Mutex;
+
+use crate::system::workspace;
+
+/// The variable by which `--bless` reaches test programs: it names the file that lists what
+/// they have rewritten.
+pub(crate) const BLESSED: &str = "TOOL_BLESSED";
+
+/// A text that a file keeps.
+#[derive(Clone, Copy, Debug)]
+pub struct Golden<'t> {
+    /// The file, from the workspace's root.
+    pub file: &'t str,
+    /// The nearest text above the golden that stands there once, such as a heading.
+    pub below: &'t str,
+    /// The golden.
+    pub text: &'t str,
+}
+
+impl Golden<'_> {
+    /// Compares the golden with what a program says now.
+    ///
+    /// # Panics
+    ///
+    /// Panics if they differ, and the golden is not to be rewritten, or cannot be.
+    #[track_caller]
+    pub fn assert_is(&self, said: &str) {
+        let list = env::var_os(BLESSED);
+        if let Err(why) = self.compare(said, list.as_deref().map(Path::new)) {
+            panic!("{why}");
+        }
+    }
+
+    /// Compares the golden with what a program says now; rewrites it if there is a `list` of
+    /// rewritten files.
+    ///
+    /// # Errors
+    ///
+    /// In words: they differ, and the golden was not rewritten.
+    pub(crate) fn compare(&self, said: &str, list: Option<&Path>) -> Result<(), String> {
+        let Golden { file, below, text } = self;
+        if *text == said {
+            return Ok(());
+        }
+        let remedy = match list.map(|list| self.rewrite(said, list)) {
+            Some(Ok(())) => return Ok(()),
+            Some(Err(error)) => format!("it cannot be rewritten: {error}"),
+            None => "if that is meant, rewrite it by `./scripts/test --bless FILTER`".into(),
+        };
+        let [below, text, said] = [below, text, said].map(str::trim_end);
+        Err(format!(
+            "{file}, below \"{}\":\n{text}\nNow it is:\n{said}\n{remedy}",
+            below.trim()
+        ))
+    }
+
+    fn rewrite(&self, said: &str, list: &Path) -> io::Result<()> {
+        // The tests of a program are threads, and some have goldens in one file.
+        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+        let _one = ONE_AT_A_TIME.lock();
+        let file = workspace().join(self.file);
+        let page = fs::read_to_string(&file)?;
+        let place = page.find(self.below).and_then(|start| {
+            let start = start + self.below.len();
+            Some(start + page[start..].find(self.text)?)
+        });
+        let place = place.ok_or_else(|| io::Error::other("it does not stand there"))?;
+        let rest = &page[place + self.text.len()..];
+        fs::write(&file, [&page[..place], said, rest].concat())?;
+        let mut list = File::options().create(true).append(true).open(list)?;
+        writeln!(list, "{}", self.file)
+    }
+}
+
+/// Returns an excerpt of an output: where a line of `kept` is said no more, the line that
+/// begins most like it. Lines are the same if `shown` makes them so.
+#[must_use]
+pub fn excerpt(kept: &str, output: &str, shown: impl Fn(&str) -> String) -> String {
+    let common = |a: &str, b: &str| a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
+    let line = |kept| {
+        let is_said = output.lines().any(|line| shown(line) == shown(kept));
+        let nearest = output.lines().max_by_key(|line| common(line, kept));
+        format!("{}\n", nearest.filter(|_| !is_said).unwrap_or(kept))
+    };
+    kept.lines().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Golden, excerpt};
+    use std::fs;
+
+    #[test]
+    fn what_differs_fails_and_is_rewritten_in_its_place_when_blessed() {
+        let folder = std::env::temp_dir().join(format!("golden-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let (page, list) = (folder.join("page.md"), folder.join("list"));
+        let before = "# a\nsaid\n# b\nsaid\nmore\n";
+        fs::write(&page, before).unwrap();
+        let file = page.to_str().unwrap();
+        let golden = |below, text| Golden { file, below, text };
+        let of_b = golden("# b", "said\n");
+
+        assert_eq!(of_b.compare("said\n", None), Ok(()));
+        let why = of_b.compare("altered\n", None).unwrap_err();
+        let words = ", below \"# b\":\nsaid\nNow it is:\naltered\nif that is meant, rewrite it by";
+        assert!(why.contains(words), "{why}");
+        assert_eq!(fs::read_to_string(&page).unwrap(), before);
+
+        assert_eq!(of_b.compare("altered\n", Some(&list)), Ok(()));
+        let rewritten = fs::read_to_string(&page).unwrap();
+        assert_eq!(rewritten, "# a\nsaid\n# b\naltered\nmore\n");
+        assert_eq!(fs::read_to_string(&list).unwrap(), format!("{file}\n"));
+
+        // Both words are there, but not one below the other.
+        for unknown in [golden("# c", "said"), golden("more", "said")] {
+            let why = unknown.compare("altered", Some(&list)).unwrap_err();
+            assert!(why.ends_with("rewritten: it does not stand there"), "{why}");
+        }
+        assert_eq!(fs::read_to_string(&page).unwrap(), rewritten);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn an_excerpt_keeps_what_is_said_and_takes_the_nearest_for_the_rest() {
+        let said = "boots\ndag `x` takes at most 7ms\nx: 5 jobs\nx: 9 ms\nends\n";
+        let kept = "dag `x` takes at most 6ms\nx: 8 ms\nends\n";
+        let digits = |line: &str| line.replace(|c: char| c.is_ascii_digit(), "N");
+        assert_eq!(excerpt(kept, said, digits), kept);
+        let now = "dag `x` takes at most 7ms\nx: 9 ms\nends\n";
+        assert_eq!(excerpt(kept, said, str::to_string), now);
+    }
+}
