@@ -169,7 +169,7 @@ def distribution(samples, policies, parallel, colours, jobs):
     histogram.set_yscale("log")
     cumulative.set_ylim(0, 1.02)
     # Between what joins at once and what waits for messages nothing is drawn.
-    cumulative.legend(loc="center", bbox_to_anchor=(0.4, 0.55))
+    cumulative.legend(loc="center", bbox_to_anchor=(0.57, 0.55))
 
 
 def gantt(out, summary, policies, parallel, colours):

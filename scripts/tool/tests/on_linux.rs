@@ -174,7 +174,7 @@ fn the_evaluation_is_repeated_with_its_baselines_without_qemu() {
             "{row}"
         );
     }
-    assert!(out.join("report.html").is_file());
+    assert!(out.join("summary.json").is_file());
 }
 
 #[test]

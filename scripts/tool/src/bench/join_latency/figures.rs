@@ -9,32 +9,8 @@ use join_latency::Samples;
 /// The time between two releases, in nanoseconds.
 pub(super) const PERIOD_NS: u64 = 25_000_000;
 
-/// The metrics: a name for files, a title, and what it measures.
-pub(super) const METRICS: [(&str, &str, &str); 4] = [
-    (
-        "join_latency",
-        "join latency, literal",
-        "from the last publication of index i to the i-th join's being ready",
-    ),
-    (
-        "cover_delay",
-        "cover delay",
-        "from the last publication of index i to the first join in which every index is at \
-         least i",
-    ),
-    (
-        "join_to_start",
-        "join to start",
-        "from the last publication among a join's own values to the first instruction of the \
-         function that uses them",
-    ),
-    (
-        "response",
-        "end-to-end response",
-        "from the release of job i to the end of the first join in which every index is at \
-         least i",
-    ),
-];
+/// The names of the metrics.
+pub(super) const METRICS: [&str; 4] = ["join_latency", "cover_delay", "join_to_start", "response"];
 
 /// What one condition, or several of one kind, amount to.
 #[derive(Clone, Debug, Default)]

@@ -32,7 +32,7 @@ pub(super) fn samples_csv(measured: &Measured) -> String {
             subtasks,
             seed,
         } = condition;
-        for ((metric, ..), samples) in METRICS.iter().zip(&figures.samples) {
+        for (metric, samples) in METRICS.iter().zip(&figures.samples) {
             for (index, value_ns) in samples {
                 // Writing into a `String` cannot fail.
                 let _ = writeln!(
@@ -105,7 +105,7 @@ fn result_json(policy: Policy, subtasks: usize, figures: &Figures) -> String {
         let _ = write!(text, ", \"{name}\": {count}");
     }
     let _ = write!(text, ", \"joins_per_job\": {:.4}", figures.joins_per_job());
-    for (position, (metric, ..)) in METRICS.iter().enumerate() {
+    for (position, metric) in METRICS.iter().enumerate() {
         let of = figures.distribution(position);
         let _ = write!(
             text,

@@ -3,7 +3,7 @@
 //! A *condition* is what joins, the number N of parallel subtasks, and a seed. Each
 //! is one boot of the app `join-latency`, which prints the times of all executions
 //! and joins. They are kept as one file a condition, from which all else is
-//! computed: samples, summary, pictures, report. So nothing is lost if this is
+//! computed: samples, summary, pictures, table. So nothing is lost if this is
 //! interrupted, and what is there already is not measured again, as long as it was
 //! measured under the same conditions (image, QEMU, all options).
 //!
@@ -15,7 +15,6 @@
 mod condition;
 mod figures;
 mod files;
-mod page;
 mod plan;
 mod plots;
 mod progress;
@@ -108,14 +107,11 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
         write_whole(&plan.out.join("summary.json"), &summary)?;
         write_whole(&plan.out.join("samples.csv"), &samples_csv(&measured))?;
     }
-    let drawn = plots::draw(&plan.out);
-    if let Err(line) = &drawn {
+    if let Err(line) = plots::draw(&plan.out) {
         eprintln!("{line}");
     }
-    let page = report::page(plan, &provenance, &measured, drawn.err().as_deref());
-    write_whole(&plan.out.join("report.html"), &page)?;
     print!("{}", report::table(&files::pooled(plan, &measured)));
-    println!("written: {}", plan.out.join("report.html").display());
+    println!("written: {}", plan.out.display());
     Ok(())
 }
 

@@ -113,7 +113,6 @@ pub(super) static TABLE: Command = Command {
     ],
     notes: "\
 writes into DIR:
-  report.html         everything, in one file to show around
   summary.json        counts, median, mean, p99, max of each condition
   samples.csv         each sample of each metric
   conditions/*.csv    each condition's raw times, written when it is complete
