@@ -93,7 +93,7 @@
 //! once for each instance; the [`Platform`] gets the [`Plan`] and runs bodies
 //! when its scheduler says so. Values travel in rings that have a slot for each
 //! job that may be in flight. The crate names no kernel and needs only `alloc`;
-//! its `unsafe` is in `run/cell/mod.rs`, and where a function says that it can be cut.
+//! its `unsafe` is in `run/cell/mod.rs`.
 //!
 //! `docs/paper-map.md` relates the paper's figures 3 and 4 to this code.
 #![cfg_attr(not(test), no_std)]
@@ -112,7 +112,6 @@ pub use api::latest::{Latest, Sample, Sampling};
 pub use api::lifecycle::{Shutdown, ShuttingDown, Switch, Switching, shutting_down};
 pub use api::modes::{Entering, Entrance, Mode, Modes};
 pub use api::parameter::{Parameter, ParameterValue, Reading, Tunable, Unsettable};
-pub use api::refining::{Refinements, Refining};
 pub use api::replaceable::Replaceable;
 pub use api::signal::{Raiser, Raising, Signal};
 pub use api::state::{Read, State, StateValue, Update};
@@ -135,7 +134,6 @@ pub use platform::{
 };
 pub use recording::Channel;
 pub use run::crossing::Recorded;
-pub use run::cutter::Cutter;
 pub use run::latest_jobs::LatestJobs;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan};

@@ -75,28 +75,6 @@ fn a_dag_that_would_survive_faults_is_refused() {
 }
 
 #[test]
-#[allow(unsafe_code, reason = "what is refused cuts nothing")]
-fn o7_a_subtask_that_refines_is_refused() {
-    let _alone = alone(1, Mechanism::Normal);
-    let dag = create_dag();
-    dag.name("arm").jobs(1);
-    let attributes = SubtaskAttributes::named;
-    dag.register_periodic_subtask(|| (1_u32,), vec!["seed"], ms(5), attributes("read"));
-    // SAFETY: it has nothing but a number.
-    unsafe { dag.refining(ms(1), |seed: &(u32,)| *seed, |_, _| None) }.register_subtask(
-        vec!["seed"],
-        vec!["best"],
-        attributes("plan"),
-    );
-    dag.register_sink_subtask(|(_,): (u32,)| (), vec!["best"], ms(5), attributes("move"));
-    let refused = finish_create_dags(&[dag]);
-    let text = refused.expect_err("Linux cannot").to_string();
-    let says =
-        "subtask `plan` of dag `arm` refines its result, and this platform cuts no refinement";
-    assert!(text.contains(says), "{text}");
-}
-
-#[test]
 fn an_endless_function_loses_its_core_after_its_budget() {
     for mechanism in BOTH {
         let alone = alone(1, mechanism);

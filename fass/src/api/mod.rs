@@ -9,11 +9,6 @@ pub(crate) mod lifecycle;
 pub(crate) mod modes;
 pub(crate) mod parameter;
 pub(crate) mod record;
-#[allow(
-    unsafe_code,
-    reason = "refinements are given up as they are, which their author states"
-)]
-pub(crate) mod refining;
 pub(crate) mod replaceable;
 pub(crate) mod signal;
 pub(crate) mod state;

@@ -1,5 +1,4 @@
-//! What may be wrong with the functions that subtasks have besides their first ones: those for
-//! after faults, and refinements.
+//! Checks the functions that subtasks have for after faults.
 
 use alloc::vec::Vec;
 
@@ -32,10 +31,6 @@ pub(super) fn check(draft: &Draft, label: &DagLabel) -> Vec<Fault> {
                 state: state.name.clone(),
             });
         }
-    }
-    // Called by a pointer: an image without refinements has nothing of it.
-    if let Some((subtask, check)) = draft.refines {
-        faults.extend(check(draft, subtask, label).err().map(Fault::NotLaunched));
     }
     faults
 }

@@ -22,10 +22,9 @@ use core::fmt;
 use core::time::Duration;
 
 use sched_dag::lifecycle::Lifecycle;
-use sched_dag::{Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId};
+use sched_dag::{Activation, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
-use crate::platform::LaunchError;
 use crate::run::effect::Effect;
 use crate::run::latest::AnyLatest;
 use crate::run::message::MessageType;
@@ -40,9 +39,6 @@ use flaw::Flaw;
 
 /// Makes of all drafts of a commit what serves their requests.
 pub(crate) type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
-
-/// Looks whether the platform can run a subtask of a DAG that refines.
-pub(crate) type CheckRefining = fn(&Draft, usize, &DagLabel) -> Result<(), LaunchError>;
 
 /// A DAG as registered so far.
 #[derive(Default)]
@@ -84,8 +80,6 @@ pub(crate) struct Draft {
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// The subtasks whose functions can be replaced.
     pub(crate) replaceable: Vec<usize>,
-    /// The first subtask that refines its result, and what looks whether the platform can.
-    pub(crate) refines: Option<(usize, CheckRefining)>,
     /// What provides so many values of a state for after faults.
     pub(crate) resets: BTreeMap<usize, Box<dyn FnOnce(u32)>>,
     /// Which DAG it is, for others that send it signals, or pause it.

@@ -19,7 +19,6 @@ use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::edge::Begin;
 use crate::run::crossing::Recorded;
-use crate::run::cutter::Cutter;
 use crate::run::plan::Plan;
 
 pub use clock::{Clock, now_ns, set_clock};
@@ -132,13 +131,6 @@ pub trait Platform: Sync {
 
     /// Occupies the calling instance's core for `duration` of execution time.
     fn execute_for(&self, duration: Duration, how: Occupation);
-
-    /// Returns what runs the optional parts of subtasks
-    /// ([`Dag::refining`](crate::Dag::refining)); without it a commit with such a subtask is
-    /// refused.
-    fn cutter(&self) -> Option<Cutter> {
-        None
-    }
 
     /// Takes a signal to a sporadic DAG of the plan with a number, from outside all
     /// subtasks ([`Signal::raise`](crate::Signal::raise)); does nothing if that plan

@@ -11,7 +11,6 @@
 )]
 pub(crate) mod cell;
 pub(crate) mod crossing;
-pub(crate) mod cutter;
 pub(crate) mod effect;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;

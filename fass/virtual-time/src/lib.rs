@@ -36,7 +36,6 @@ mod disturbed;
 mod edge;
 mod error;
 mod job;
-mod optional;
 mod platform;
 mod record;
 mod report;

@@ -13,8 +13,7 @@ use std::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Clusters, Cutter, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
-    Recorded,
+    Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
 };
 
 use recording::Channel;
@@ -23,7 +22,6 @@ use sched_dag::{DagId, SchedulerOptions, TaskSet};
 use crate::disturbed;
 use crate::error::RunError;
 use crate::job::JobShown;
-use crate::optional;
 use crate::report::Report;
 use crate::session::Session;
 use crate::surroundings::Surroundings;
@@ -178,20 +176,10 @@ impl Platform for HostPlatform {
         // A sum that does not fit is reported by the driver as a finish beyond
         // the last time there is.
         let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
-        let within_ns = ns.min(optional::left_ns(surroundings, executed_ns));
-        let executed_ns = Some(executed_ns.saturating_add(within_ns));
+        let executed_ns = Some(executed_ns.saturating_add(ns));
         surroundings.executed_ns.set(executed_ns);
         let now_ns = &surroundings.now_ns;
-        now_ns.set(now_ns.get().saturating_add(within_ns));
-        if within_ns < ns {
-            optional::cut();
-        }
-    }
-
-    fn cutter(&self) -> Option<Cutter> {
-        Some(|most_ns, refinements| {
-            optional::run(&expect_current().surroundings, most_ns, refinements)
-        })
+        now_ns.set(now_ns.get().saturating_add(ns));
     }
 
     fn raise(&self, plan: u64, dag: DagId) {

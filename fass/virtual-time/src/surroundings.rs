@@ -33,8 +33,6 @@ pub(crate) struct Surroundings {
     pub(crate) now_ns: Cell<u64>,
     /// What the running function has executed; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
-    /// What it may have executed at the end of its optional part; `None` outside that.
-    pub(crate) optional_end_ns: Cell<Option<u64>>,
     /// The requests to come, by time and in the order in which they were made.
     requests: RefCell<BTreeMap<(u64, usize), Request>>,
 }

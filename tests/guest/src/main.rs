@@ -24,8 +24,6 @@ mod occupation;
 mod overrun;
 mod preemption;
 mod recorded;
-#[allow(unsafe_code, reason = "refinements that may be cut")]
-mod refining;
 mod sharing;
 mod stacks;
 mod stalled;
@@ -44,7 +42,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 45] = [
+const TESTS: [(&str, Test); 43] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -86,8 +84,6 @@ const TESTS: [(&str, Test); 45] = [
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),
     ("recorded_long", recorded::long),
-    ("refining", refining::run),
-    ("refining_in_section", refining::run_in_section),
     ("sharing", sharing::run),
     ("stacks", stacks::run),
     ("stacks_of_chain", stacks::chain),

@@ -132,8 +132,6 @@ pub struct Context {
     /// When the execution of what it runs reaches its budget, if it is not
     /// suspended any more until then.
     budget_end_ns: AtomicU64,
-    /// How far the stack is given up by a cut; 0 if nothing can be cut ([`cut`](super::cut)).
-    cut_stack: AtomicU64,
     /// Whether what it runs has been found at fault.
     is_at_fault: AtomicBool,
     sections: Sections,
@@ -214,11 +212,6 @@ impl Context {
         self.budget_end_ns.load(Ordering::Relaxed)
     }
 
-    /// Returns how far the stack is given up by a cut; 0 if nothing can be cut.
-    pub(super) const fn cut_stack(&self) -> &AtomicU64 {
-        &self.cut_stack
-    }
-
     /// Notes that what the context runs is at fault, and reports whether that was
     /// known.
     pub fn note_fault(&self) -> bool {
@@ -279,7 +272,6 @@ impl Parked {
             suspended_at_ns: AtomicU64::new(0),
             suspended_ns: AtomicU64::new(0),
             budget_end_ns: AtomicU64::new(u64::MAX),
-            cut_stack: AtomicU64::new(0),
             is_at_fault: AtomicBool::new(false),
             sections: Sections::new(),
         })))

@@ -12,8 +12,8 @@ use super::fault::{self, Exception};
 use super::once::Once;
 use super::this_core::Core;
 use super::{
-    cpu, cut, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core,
-    timer, turns, vector,
+    cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core, timer,
+    turns, vector,
 };
 
 global_asm!(
@@ -65,14 +65,6 @@ impl Interrupted {
         let registers = this_core::get().context().registers();
         // SAFETY: as for `instruction`.
         unsafe { (*registers).rsp }
-    }
-
-    /// Gives up what the context runs that can be cut: when the handler returns, its call
-    /// does ([`cut`]). Reports whether there is such a call.
-    pub fn cut(&mut self) -> bool {
-        let context = this_core::get().context();
-        // SAFETY: as for `instruction`.
-        cut::redirect(context, unsafe { &mut *context.registers() })
     }
 
     /// Has this core go on with `next` when the handler returns, and returns

@@ -14,7 +14,6 @@ pub mod clock;
 pub mod context;
 pub mod counted_time;
 pub mod cpu;
-pub mod cut;
 pub(crate) mod debug_port;
 pub(crate) mod descriptors;
 pub mod exit;

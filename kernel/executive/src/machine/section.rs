@@ -96,8 +96,6 @@ fn leave(own: &Context) {
     let Sections { depth, put_off_ns } = own.sections();
     if depth.fetch_sub(1, Ordering::Relaxed) == 1 && put_off_ns.swap(0, Ordering::Relaxed) != 0 {
         let were_enabled = interrupt_flag::disable();
-        // A cut may have been put off, too.
-        timer::set_no_later(this_core::get(), Alarm::Budget, own.budget_end_ns());
         local_apic::send(this_core::get().apic_id(), vector::WAKE);
         if were_enabled {
             interrupt_flag::enable();
@@ -125,11 +123,6 @@ pub fn puts_off(core: &Core, now_ns: u64) -> bool {
         timer::set_no_later(core, Alarm::Budget, end_ns);
     }
     now_ns < end_ns
-}
-
-/// Reports whether what runs on this core, `core`, is in a section. In an interrupt handler.
-pub fn is_in_one(core: &Core) -> bool {
-    core.context().sections().depth.load(Ordering::Relaxed) > 0
 }
 
 /// Reports whether a preemption on this core has been put off. In an interrupt handler.

@@ -26,7 +26,7 @@ use super::{contexts, execution};
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{cut, interrupt_flag, section, this_core};
+use crate::machine::{interrupt_flag, this_core};
 use crate::text::backtrace::Spot;
 use crate::text::excerpt::Excerpt;
 use crate::text::json;
@@ -109,8 +109,7 @@ pub fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupted) -> b
     true
 }
 
-/// Ends this core's instance if its budget is used up; if that is the one of its optional part,
-/// ends that part.
+/// Ends this core's instance if its budget is used up.
 pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
     let core = this_core::get();
     let context = core.context();
@@ -122,32 +121,13 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         timer::set(Alarm::Budget, context.budget_end_ns());
         return;
     }
-    let refines = cut::can_cut(context);
-    if refines {
-        // What is given up in a section would keep the section for good.
-        if section::puts_off(core, now_ns) {
-            return;
-        }
-        if !section::is_in_one(core) && interrupted.cut() {
-            return;
-        }
-    }
     let budget = Duration::from_nanos(execution::budget_ns(instance));
-    let over_budget = format_args!("executed for more than its budget of {budget:?}");
-    let (cause, message) = if refines {
-        (
-            "refinement",
-            format_args!("held a lock for too long to be cut"),
-        )
-    } else {
-        ("budget overrun", over_budget)
-    };
     let rip = interrupted.instruction();
     report(
         instance,
         &Fault {
-            cause,
-            message: &message,
+            cause: "budget overrun",
+            message: &format_args!("executed for more than its budget of {budget:?}"),
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: None,
             spot: Spot {

@@ -6,7 +6,7 @@ use core::time::Duration;
 
 use fass::edge::Begin;
 use fass::{
-    Channel, Clock, Clusters, Cutter, LaunchError, Occupation, Overheads, Plan, Platform, Policy,
+    Channel, Clock, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy,
     Preemption, Recorded,
 };
 use sched_dag::analysis::OverheadSource;
@@ -15,7 +15,7 @@ use sched_dag::{DagId, SchedulerOptions, TaskSet};
 use super::execution::{self, Division, Terms};
 use super::{edge, occupation, stacks};
 use crate::machine::once::Once;
-use crate::machine::{clock, cut, this_core};
+use crate::machine::{clock, this_core};
 use crate::text::graph;
 
 /// The one kernel, as `fass` sees it.
@@ -200,10 +200,6 @@ impl Platform for Kernel {
             Occupation::Spin => occupation::spin(ns),
             Occupation::Hold => occupation::hold(ns),
         }
-    }
-
-    fn cutter(&self) -> Option<Cutter> {
-        cut::MAY_CUT.then_some(cut::run as Cutter)
     }
 
     fn raise(&self, plan: u64, dag: DagId) {
