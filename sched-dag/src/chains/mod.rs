@@ -60,30 +60,23 @@ pub struct Sampling {
 
 /// The part of a chain that lies in one DAG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Segment {
-    /// The DAG.
-    pub dag: DagId,
+struct Segment {
+    dag: DagId,
     /// Where the chain enters: a sampling subtask, or where it begins.
-    pub entry: SubtaskId,
+    entry: SubtaskId,
     /// Where it leaves: the writer of what is sampled next, or of the outputs.
-    pub exit: SubtaskId,
+    exit: SubtaskId,
 }
 
 /// A path from a subtask to another one, along edges within DAGs and samplings between them. It
 /// passes no DAG twice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chain {
-    /// At least one.
+    /// One for each DAG, at least one.
     segments: Vec<Segment>,
 }
 
 impl Chain {
-    /// Returns its parts, one for each DAG.
-    #[must_use]
-    pub fn segments(&self) -> &[Segment] {
-        &self.segments
-    }
-
     /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
     #[must_use]
     pub fn place(task_set: &TaskSet, name: &str) -> Option<Place> {

@@ -73,14 +73,6 @@ fn some(vertex: Vertex) -> Option<Vertex> {
 }
 
 impl<Body, Parked> Placement<Body, Parked> {
-    /// Puts all bodies, those of each vertex in turn, to rest.
-    pub fn new(bodies: impl Iterator<Item = Body>, cores: usize) -> Self {
-        Self {
-            places: bodies.map(Place::Resting).collect(),
-            seats: alloc::vec![EMPTY_SEAT; cores].into_boxed_slice(),
-        }
-    }
-
     /// Makes the places of so many vertices, all without a body until one
     /// [is put there](Self::replace).
     #[must_use]

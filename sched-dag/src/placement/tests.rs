@@ -8,6 +8,14 @@ const X: Vertex = Vertex(0);
 const Y: Vertex = Vertex(1);
 
 impl Cores {
+    /// Two cores, which run nothing.
+    fn with_bodies() -> Cores {
+        let mut cores = Cores::empty(2, 2);
+        cores.replace(X, 'x');
+        cores.replace(Y, 'y');
+        cores
+    }
+
     /// Notes a decision to run, or to preempt if `target` is `None`.
     fn decide(&mut self, core: u32, target: Option<Vertex>) {
         self.set_target(CoreId(core), target);
@@ -16,7 +24,7 @@ impl Cores {
 
 /// Two cores; core 0 runs `X`, and the scheduler wants `Y` there instead.
 fn about_to_preempt() -> Cores {
-    let mut cores = Cores::new(['x', 'y'].into_iter(), 2);
+    let mut cores = Cores::with_bodies();
     cores.decide(0, Some(X));
     assert_eq!(cores.next(0), Next::Start(X, 'x'));
     assert!(!cores.must_suspend(0));
@@ -59,7 +67,7 @@ fn a_preempted_instance_continues_on_any_core() {
 
 #[test]
 fn a_core_exchanges_what_it_has_finished_for_what_it_should_have() {
-    let mut cores = Cores::new(['x', 'y'].into_iter(), 2);
+    let mut cores = Cores::with_bodies();
     cores.decide(0, Some(X));
     assert_eq!(cores.next(0), Next::Start(X, 'x'));
     assert_eq!(cores.exchange(CoreId(0), X, 'x', Y), Some('y'));

@@ -161,12 +161,6 @@ impl Dag {
         self.graph_hash
     }
 
-    /// Returns what releases the jobs.
-    #[must_use]
-    pub const fn activation(&self) -> Activation {
-        self.activation
-    }
-
     /// Reports whether signals release the jobs, rather than the clock.
     #[must_use]
     pub const fn is_sporadic(&self) -> bool {
@@ -311,13 +305,6 @@ impl Subtask {
     #[must_use]
     pub const fn wcet_ns(&self) -> Option<u64> {
         self.wcet_ns
-    }
-
-    /// Returns the execution time beyond which an instance is faulty, if the app
-    /// gave one.
-    #[must_use]
-    pub const fn budget_ns(&self) -> Option<u64> {
-        self.budget_ns
     }
 
     /// Returns the stack that it needs, in bytes, if the app stated one.
