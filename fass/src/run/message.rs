@@ -154,17 +154,6 @@ impl<T> DerefMut for Unique<T> {
 }
 
 /// What the commit must know of a message's type.
-///
-/// # Examples
-///
-/// ```
-/// use fass::MessageType;
-///
-/// let shared = MessageType::of::<i32>();
-/// assert_eq!(shared.name(), "i32");
-/// assert!(shared.can_fan_out());
-/// assert!(!MessageType::of::<fass::Unique<i32>>().can_fan_out());
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MessageType {
     id: TypeId,
@@ -174,12 +163,7 @@ pub struct MessageType {
 
 impl MessageType {
     /// Describes the type `M`.
-    ///
-    /// ```
-    /// assert_eq!(fass::MessageType::of::<u8>().name(), "u8");
-    /// ```
-    #[must_use]
-    pub fn of<M: Message>() -> Self {
+    pub(crate) fn of<M: Message>() -> Self {
         Self {
             id: TypeId::of::<M>(),
             name: type_name::<M>(),
@@ -198,33 +182,7 @@ impl MessageType {
     }
 
     /// Returns the identity of the type.
-    ///
-    /// ```
-    /// use std::any::TypeId;
-    /// assert_eq!(fass::MessageType::of::<u8>().id(), TypeId::of::<u8>());
-    /// ```
-    #[must_use]
-    pub const fn id(&self) -> TypeId {
+    pub(crate) const fn id(&self) -> TypeId {
         self.id
-    }
-
-    /// Returns the name of the type, for messages to people.
-    ///
-    /// ```
-    /// assert_eq!(fass::MessageType::of::<u8>().name(), "u8");
-    /// ```
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        self.name
-    }
-
-    /// Reports whether a topic of this type may have several readers.
-    ///
-    /// ```
-    /// assert!(fass::MessageType::of::<u8>().can_fan_out());
-    /// ```
-    #[must_use]
-    pub const fn can_fan_out(&self) -> bool {
-        self.can_fan_out
     }
 }
