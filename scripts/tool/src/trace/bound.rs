@@ -9,10 +9,6 @@ use crate::options::Parsed;
 use crate::protocol::MachineLine;
 use crate::qemu::Mode;
 
-/// For how long counted time lets a core wait for others' turns, and for what the kernel
-/// executes meanwhile (`docs/decisions/0021-turns.md`).
-pub const TURN_NS: u64 = 20_000;
-
 /// In counted time: for turns, and for the kernel's steps, which are the longer the more
 /// happens at once.
 pub const COUNTED_NS: u64 = 50_000;
