@@ -295,7 +295,7 @@ fn more_subtasks_than_memory_are_refused() {
 #[test]
 fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
     let page = system::workspace().join("docs/dag-file.md");
-    let blocks = tool::markdown::blocks(&fs::read_to_string(page).expect("the page"));
+    let blocks = harness::markdown::blocks(&fs::read_to_string(page).expect("the page"));
     let of_info = |info: &str| blocks.iter().find(|block| block.info == info);
     let commands = &of_info("console").expect("commands").text;
     let words = |line: &str| -> Vec<String> {

@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use harness::Guest;
-use tool::fault_page::{self, documented_faults};
+use harness::fault_page::{self, documented_faults};
 use tool::protocol::Status;
 use tool::{Mode, Outcome};
 

@@ -11,8 +11,8 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use harness::guide::{documented_output, without_numbers};
+use harness::markdown::blocks;
 use tool::golden::{Golden, excerpt};
-use tool::markdown::blocks;
 use tool::new_app::{self, Source};
 use tool::system::{self, workspace};
 

@@ -10,12 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use fass::finish_create_dags;
+use harness::fault_page::{self, documented_faults, function_bodies, is_said_by, table};
 use sched_dag::analysis::{Reason, TaskError};
 use sched_dag::{
     CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
 };
-use tool::fault_page::{self, documented_faults, function_bodies, is_said_by, table};
 use tool::golden::Golden;
 use tool::system::workspace;
 

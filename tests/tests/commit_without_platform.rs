@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use fass::{CommitError, SubtaskAttributes, create_dag, finish_create_dags};
-use tool::fault_page::{self, documented_faults};
+use harness::fault_page::{self, documented_faults};
 
 fn no_platform() -> Result<fass::Commit, CommitError> {
     // No `VirtualTime::new()` before this.

@@ -10,7 +10,7 @@
 
 use std::fs;
 
-use tool::markdown::blocks;
+use crate::markdown::blocks;
 use tool::system;
 
 /// The tutorials.

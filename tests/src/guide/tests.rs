@@ -5,9 +5,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use super::{PAGES, read, without_numbers};
-use tool::fault_page::{documented_faults, with_names_of};
+use crate::fault_page::{documented_faults, with_names_of};
+use crate::markdown::{Block, blocks};
 use tool::golden::Golden;
-use tool::markdown::{Block, blocks};
 use tool::new_app::NEW_APP;
 use tool::options::{Command, Request};
 use tool::run::RUN;

@@ -8,9 +8,10 @@
 use std::collections::BTreeMap;
 use std::fs;
 
-use crate::golden::Golden;
+use tool::golden::Golden;
+use tool::system;
+
 use crate::markdown::blocks;
-use crate::system;
 
 const PAGE: &str = "docs/errors.md";
 
