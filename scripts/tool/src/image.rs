@@ -37,8 +37,6 @@ pub fn most_stripped_bytes(app: &str) -> u64 {
 /// A built image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// The package it was built from.
-    pub package: String,
     /// Where it lies.
     pub path: PathBuf,
 }
@@ -221,10 +219,7 @@ fn build_target(package: &str, profile: &str, target: [&str; 2]) -> Result<Image
         return Err(failed("see cargo's errors above".into()));
     }
     match path {
-        Some(path) => Ok(Image {
-            package: package.into(),
-            path,
-        }),
+        Some(path) => Ok(Image { path }),
         None => Err(failed("cargo built no binary of that name".into())),
     }
 }
