@@ -19,10 +19,10 @@ mod recorder;
 mod set;
 
 use random::Random;
-use recorder::Recorder;
+use recorder::{lose, record};
 use set::Overruns;
+use tool::trace::check;
 use tool::trace::model::Run;
-use tool::trace::{check, read};
 
 fn number(variable: &str, default: u64) -> u64 {
     let given = std::env::var(variable).ok();
@@ -30,7 +30,7 @@ fn number(variable: &str, default: u64) -> u64 {
 }
 
 /// Draws a set from each seed, runs it, and hands its trace on.
-fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, &Recorder)) {
+fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, Run)) {
     let count = number("TRACES", count);
     let first_seed = number("TRACE_SEED", 1);
     println!("{count} sets from seed {first_seed} on");
@@ -47,36 +47,28 @@ fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, &Recorder))
                 *execution_ns *= u64::from(!random.chance(10));
             }
         }
-        let recorder = Recorder::run(&set);
-        with(seed, &mut random, &recorder);
+        let run = record(&set);
+        with(seed, &mut random, run);
     }
 }
 
-/// Reads a log of one run.
-fn read_one(log: &str) -> Run {
-    let mut runs = read(log).unwrap_or_else(|fault| panic!("{fault}\n{log}"));
-    assert_eq!(runs.len(), 1);
-    runs.remove(0)
-}
-
 /// Fails if a run has a breach.
-fn assert_right(seed: u64, run: &Run, log: &str) {
+fn assert_right(seed: u64, run: &Run) {
     let breaches = check(run, 0).breaches;
     let texts: Vec<String> = breaches.iter().map(ToString::to_string).collect();
     assert!(
         texts.is_empty(),
-        "seed {seed}:\n{}\n{log}",
-        texts.join("\n")
+        "seed {seed}:\n{}\n{:#?}",
+        texts.join("\n"),
+        run.events
     );
 }
 
 #[test]
 fn a_right_trace_has_no_breach() {
     let (mut preemptions, mut instances) = (0, 0);
-    for_each_trace(1000, |seed, _, recorder| {
-        let log = recorder.log();
-        let run = read_one(&log);
-        assert_right(seed, &run, &log);
+    for_each_trace(1000, |seed, _, run| {
+        assert_right(seed, &run);
         let figures = check(&run, 0).figures;
         assert_eq!(figures.finish_to_ready_max_ns, 0);
         assert_eq!(figures.preemption.max_ns, 0);
@@ -91,13 +83,10 @@ fn a_right_trace_has_no_breach() {
 
 #[test]
 fn a_right_trace_whose_oldest_events_are_lost_has_no_breach() {
-    for_each_trace(1000, |seed, random, recorder| {
-        let mut recorder = recorder.clone();
-        recorder.lose(random);
-        let log = recorder.log();
-        let run = read_one(&log);
+    for_each_trace(1000, |seed, random, mut run| {
+        lose(&mut run, random);
         if !run.events.is_empty() {
-            assert_right(seed, &run, &log);
+            assert_right(seed, &run);
         }
     });
 }
@@ -105,9 +94,7 @@ fn a_right_trace_whose_oldest_events_are_lost_has_no_breach() {
 #[test]
 fn a_trace_with_a_lie_has_a_breach() {
     let mut told = vec![0; lies::LIES.len()];
-    for_each_trace(500, |seed, random, recorder| {
-        let log = recorder.log();
-        let truth = read_one(&log);
+    for_each_trace(500, |seed, random, truth| {
         for (count, (name, lie)) in told.iter_mut().zip(lies::LIES) {
             let mut run = truth.clone();
             if !lie(&mut run, random) {
@@ -118,7 +105,7 @@ fn a_trace_with_a_lie_has_a_breach() {
             let findings = check(&run, 0);
             assert!(
                 !findings.breaches.is_empty(),
-                "seed {seed}: `{name}` is not found\n{:#?}\n{log}",
+                "seed {seed}: `{name}` is not found\n{:#?}",
                 run.events
             );
         }

@@ -2,142 +2,55 @@
 //!
 //! The requests that a kernel makes of cores are imitated.
 
-use std::fmt::Write;
 use std::sync::Arc;
 
 use sched_dag::Recorder as Journal;
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::What;
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Observer,
-    OverrunPolicy, Policy, Preemption, Scheduler, verify,
+    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Observer, Scheduler,
+    TaskSet, verify,
 };
+use tool::trace::commit::Committed;
+use tool::trace::model::Run;
 
 use crate::random::Random;
 use crate::set::Set;
 
-/// A run's trace.
-#[derive(Clone)]
-pub(crate) struct Recorder {
-    set: Set,
-    events: Vec<Event>,
-    lost: usize,
-}
-
-impl Recorder {
-    /// Runs a set to its end.
-    pub(crate) fn run(set: &Set) -> Recorder {
-        let options = CommitOptions::new(set.options.policy, set.options.cores)
-            .with_construction(ConstructionPolicy::any_graph());
-        let verified = verify(&set.specs(), &options).expect("sets are right");
-        let task_set = Arc::new(verified.task_set);
-        let mut driver = Driver {
-            set,
-            journal: Journal::new(Arc::clone(&task_set)),
-            preempted: None,
-        };
-        let mut run = VirtualTime::new(Scheduler::new(task_set, set.options));
-        assert_eq!(run.run(&mut driver), End::Finished);
-        Recorder {
-            set: set.clone(),
-            events: driver.journal.events,
-            lost: 0,
-        }
-    }
-
-    /// Loses the oldest events.
-    pub(crate) fn lose(&mut self, random: &mut Random) {
-        if !self.events.is_empty() {
-            self.lost = random.below(self.events.len());
-            self.events.drain(..self.lost);
-        }
-    }
-
-    /// Returns the trace as a kernel prints it.
-    pub(crate) fn log(&self) -> String {
-        let options = self.set.options;
-        let mut log = String::from("a line for people\n");
-        let policy = match options.policy {
-            Policy::StaticPriority => "static",
-            Policy::Edf => "edf",
-        };
-        let preemption = match options.preemption {
-            Preemption::Enabled => "on",
-            Preemption::Disabled => "off",
-        };
-        let mut say = |line: String| writeln!(log, "{line}").expect("a string takes it");
-        say(format!(
-            "{{\"kind\":\"trace_begin\",\"policy\":\"{policy}\",\"preemption\":\"{preemption}\",\
-             \"cores\":{},\"run\":0}}",
-            options.cores
-        ));
-        for number in 0..self.set.dags.len() {
-            say(self.dag_line(number));
-        }
-        for chunk in self.events.chunks(32) {
-            let chunk: Vec<String> = chunk.iter().map(as_json).collect();
-            let chunk = chunk.join(",");
-            say(format!("{{\"kind\":\"trace\",\"events\":[{chunk}]}}"));
-        }
-        say(format!(
-            "{{\"kind\":\"trace_end\",\"events\":{},\"lost\":{},\"complete\":{}}}",
-            self.events.len(),
-            self.lost,
-            self.lost == 0
-        ));
-        log
-    }
-
-    fn dag_line(&self, number: usize) -> String {
-        let dag = &self.set.dags[number];
-        let overrun = match dag.overrun {
-            OverrunPolicy::Queue => "queue",
-            OverrunPolicy::Skip => "skip",
-            OverrunPolicy::Abort => "abort",
-        };
-        let subtasks = dag.subtasks.iter().enumerate().map(|(number, subtask)| {
-            format!(
-                "[\"s{number}\",{},{},null]",
-                subtask.priority,
-                u8::from(subtask.non_preemptive)
-            )
-        });
-        let subtasks: Vec<String> = subtasks.collect();
-        let edges = dag.edges.iter().map(|(from, to)| format!("[{from},{to}]"));
-        let edges: Vec<String> = edges.collect();
-        let stated = dag.subtasks.iter().enumerate();
-        let sinks = stated
-            .filter_map(|(number, subtask)| Some(format!("[{number},{}]", subtask.deadline_ns?)));
-        let sinks: Vec<String> = sinks.collect();
-        format!(
-            "{{\"kind\":\"trace_dag\",\"dag\":{number},\"name\":\"d{number}\",\"period_ns\":{},\
-             \"relative_deadline_ns\":{},\"offset_ns\":{},\"in_flight\":{},\
-             \"overrun\":\"{overrun}\",\"subtasks\":[{}],\"edges\":[{}],\"sinks\":[{}]}}",
-            dag.period_ns,
-            dag.deadline_ns,
-            dag.offset_ns,
-            dag.in_flight,
-            subtasks.join(","),
-            edges.join(","),
-            sinks.join(",")
-        )
+/// Runs a set to its end, and returns what a trace tells of that.
+pub(crate) fn record(set: &Set) -> Run {
+    let options = CommitOptions::new(set.options.policy, set.options.cores)
+        .with_construction(ConstructionPolicy::any_graph());
+    let verified = verify(&set.specs(), &options).expect("sets are right");
+    let task_set = Arc::new(verified.task_set);
+    let mut driver = Driver {
+        set,
+        journal: Journal::new(Arc::clone(&task_set)),
+        preempted: None,
+    };
+    let mut run = VirtualTime::new(Scheduler::new(Arc::clone(&task_set), set.options));
+    assert_eq!(run.run(&mut driver), End::Finished);
+    Run {
+        number: 0,
+        line: 1,
+        options: set.options,
+        usual_bound_ns: 0,
+        task_set: TaskSet::clone(&task_set),
+        committed: Committed::default(),
+        events: driver.journal.events,
+        lost: 0,
+        complete: true,
     }
 }
 
-fn as_json(event: &Event) -> String {
-    let Event {
-        time_ns,
-        what,
-        core,
-        dag,
-        job,
-        subtask,
-    } = event;
-    let subtask = subtask.map_or(-1, |subtask| i64::from(subtask.0));
-    format!(
-        "[{time_ns},\"{what}\",{},{},{job},{subtask}]",
-        core.0, dag.0
-    )
+/// Loses the oldest events.
+pub(crate) fn lose(run: &mut Run, random: &mut Random) {
+    if !run.events.is_empty() {
+        let lost = random.below(run.events.len());
+        run.events.drain(..lost);
+        run.lost = u64::try_from(lost).expect("few events");
+        run.complete = lost == 0;
+    }
 }
 
 /// The run as the driver shows it.
