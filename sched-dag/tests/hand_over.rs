@@ -3,12 +3,11 @@
 
 mod support;
 
-use std::fmt::Write;
-
 use sched_dag::{
-    Activation, CoreId, DagId, DagSpec, Decision, HandOff, Instance, JobOutcome, Observer,
-    OverrunPolicy, Scheduler, SchedulerOptions, SubtaskSpec,
+    Activation, CoreId, DagId, DagSpec, Decision, HandOff, Instance, OverrunPolicy, Scheduler,
+    SchedulerOptions, SubtaskSpec,
 };
+use support::bench::Log;
 use support::{PREEMPTIVE, dag, instance, overrunning, scheduler};
 
 const FIRST: CoreId = CoreId(0);
@@ -17,39 +16,6 @@ const TWO_CORES: SchedulerOptions = SchedulerOptions {
     cores: 2,
     ..PREEMPTIVE
 };
-
-/// What was reported since it was last asked.
-#[derive(Default)]
-struct Log(String);
-
-impl Log {
-    fn note(&mut self, what: &str, of: impl std::fmt::Display) {
-        // Writing into a `String` cannot fail.
-        let _ = write!(self.0, "{what} {of}, ");
-    }
-
-    fn take(&mut self) -> String {
-        std::mem::take(&mut self.0).trim_end_matches(", ").into()
-    }
-}
-
-impl Observer for Log {
-    fn cancelled(&mut self, instance: Instance) {
-        self.note("cancelled", instance);
-    }
-
-    fn skipped(&mut self, _: DagId, job: u64, _: u64) {
-        self.note("skipped", job);
-    }
-
-    fn deadline_missed(&mut self, _: DagId, job: u64, _: u64) {
-        self.note("missed", job);
-    }
-
-    fn job_completed(&mut self, _: DagId, job: u64, outcome: JobOutcome) {
-        self.note(&format!("{outcome:?}"), job);
-    }
-}
 
 fn chain(period_ns: u64, deadline_ns: u64, jobs: u64) -> DagSpec {
     dag(period_ns, deadline_ns, jobs, &[0, 0], &[(0, 1)])
@@ -192,7 +158,10 @@ fn a_successor_that_is_first_in_line_is_cancelled_with_its_dag() {
     moment.stop(DagId(0), &mut log);
     let released = moment.release_due(&mut log);
     assert_eq!(released.dispatch(), [start(FIRST, instance(1, 0, 0))]);
-    assert_eq!(log.take(), "cancelled dag 0 job 0 subtask 1, DagEnded 0");
+    assert_eq!(
+        log.take(),
+        "ended 0, cancelled dag 0 job 0 subtask 1, DagEnded 0"
+    );
 }
 
 #[test]
