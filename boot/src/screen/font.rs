@@ -41,7 +41,6 @@ const fn letters() -> [[u8; WIDTH]; COUNT] {
     letters
 }
 
-#[rustfmt::skip]
 const DRAWING: [&[u8; ABREAST * (WIDTH + 1) - 1]; COUNT.div_ceil(ABREAST) * HEIGHT] = [
     b"        #    # #   # #    #   ##  #  ##     #      #   #               ",
     b"        #    # #   # #   #### ##  # #  #    #     #     #     #     #  ",

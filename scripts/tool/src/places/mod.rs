@@ -218,9 +218,10 @@ mod tests {
         format!("{:#x}", address - usize::from_str_radix(base, 16).unwrap())
     }
 
-    #[rustfmt::skip]
     #[inline(never)]
-    fn fuse() -> u32 { line!() }
+    fn fuse() -> u32 {
+        line!()
+    }
 
     fn own_places() -> Places {
         Places::new(&std::env::current_exe().unwrap())
@@ -230,13 +231,13 @@ mod tests {
     fn an_address_of_a_fault_is_named_with_the_apps_line() {
         let inside = in_file(fuse as *const () as usize);
         let explained = own_places().explain(&line("exception", &inside)).unwrap();
+        let (place, line) = explained.rsplit_once(':').unwrap();
         assert_eq!(
-            explained,
-            format!(
-                "{inside} is tool::places::tests::fuse, of scripts/tool/src/places/mod.rs:{}",
-                fuse()
-            )
+            place,
+            format!("{inside} is tool::places::tests::fuse, of scripts/tool/src/places/mod.rs")
         );
+        // Any of its three lines.
+        assert!(fuse().abs_diff(line.parse().unwrap()) <= 1, "{explained}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Checks: properties of the whole tree, each counted as one test.
 //!
 //! They hold the promises that no unit test can: the image's weight, no package from
-//! elsewhere, no file too long, layers in order, nothing for the formatter, the linter
+//! elsewhere, no file too long, layers in order, no crate beyond its budget of lines, nothing for the formatter, the linter
 //! and the documentation to complain of, a hand-off of no more instructions than its
 //! baseline, and a guest under KVM where KVM works. They judge the project's own packages.
 
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use super::libtest::Plan;
 use super::tally::Tally;
-use super::{layers, lint, own};
+use super::{budgets, layers, lint, own};
 use crate::bench::hand_off;
 use crate::image;
 use crate::probe;
@@ -21,24 +21,33 @@ use crate::system;
 /// The most lines of a source file.
 const MOST_LINES: usize = 400;
 
+/// A check: its name, and what runs it.
+type Check<'c> = (&'static str, &'c dyn Fn() -> Result<(), String>);
+
 /// Runs the checks that the plan wants.
 pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
-    let sources = own::sources();
-    let quick: [(&str, Result<(), String>); 4] = [
-        ("Cargo.lock names only our own packages", lock_is_ours()),
-        (
-            "no source file has more than 400 lines",
-            files_are_short(&sources),
-        ),
-        (
-            "every source file opens with an essay",
-            files_have_essays(&sources),
-        ),
-        ("layers name only layers below them", layers::check()),
+    let files = own::files();
+    let mut sources = files.clone();
+    sources.retain(|path| path.extension().is_some_and(|ending| ending == "rs"));
+    let quick: [Check<'_>; 6] = [
+        ("Cargo.lock names only our own packages", &lock_is_ours),
+        ("no source file has more than 400 lines", &|| {
+            files_are_short(&sources)
+        }),
+        ("every source file opens with an essay", &|| {
+            files_have_essays(&sources)
+        }),
+        ("layers name only layers below them", &layers::check),
+        ("no crate has more lines than its budget", &|| {
+            budgets::check(&files, plan.blessed.as_deref())
+        }),
+        ("no line escapes the budgets", &|| {
+            complain(&files, budgets::escape)
+        }),
     ];
-    for (name, result) in quick {
+    for (name, check) in quick {
         if plan.wants(name) {
-            tally.add(name, result);
+            tally.add(name, check());
         }
     }
     for (name, check) in lint::CHECKS {
@@ -104,14 +113,14 @@ fn foreign(lock: &str) -> Result<(), String> {
 }
 
 fn files_are_short(sources: &[PathBuf]) -> Result<(), String> {
-    complain(sources, |text| {
+    complain(sources, |_, text| {
         let lines = text.lines().count();
         (lines > MOST_LINES).then(|| format!("has {lines} lines, split it"))
     })
 }
 
 fn files_have_essays(sources: &[PathBuf]) -> Result<(), String> {
-    complain(sources, |text| {
+    complain(sources, |_, text| {
         let code = text
             .lines()
             .find(|line| !line.trim().is_empty() && !line.starts_with("#!"));
@@ -120,16 +129,19 @@ fn files_have_essays(sources: &[PathBuf]) -> Result<(), String> {
     })
 }
 
-/// Asks for a fault of each file and gathers them on one line.
-fn complain(sources: &[PathBuf], fault: impl Fn(&str) -> Option<String>) -> Result<(), String> {
+/// Asks for a fault of each file, by its name and its text, and gathers them on one line.
+fn complain(
+    sources: &[PathBuf],
+    fault: impl Fn(&str, &str) -> Option<String>,
+) -> Result<(), String> {
     let mut faults = Vec::new();
     for path in sources {
-        let shown = path
-            .strip_prefix(system::workspace())
-            .unwrap_or(path)
-            .display();
-        match fs::read_to_string(path) {
-            Ok(text) => faults.extend(fault(&text).map(|fault| format!("{shown} {fault}"))),
+        let shown = own::shown(path);
+        match fs::read(path) {
+            Ok(text) => {
+                let fault = fault(&shown, &String::from_utf8_lossy(&text));
+                faults.extend(fault.map(|fault| format!("{shown} {fault}")));
+            }
             Err(error) => faults.push(format!("{shown}: {error}")),
         }
     }

@@ -9,6 +9,7 @@
 //! Nothing passes by not running: a test binary that does not compile, dies
 //! without its result line, or does not end within its time is a failure.
 
+mod budgets;
 mod checks;
 mod code;
 mod crates;

@@ -16,16 +16,22 @@ pub(super) fn packages() -> Vec<String> {
     names
 }
 
-/// Returns all Rust files of the workspace but the generated ones, and but those of
-/// packages that are not the project's own; sorted.
-pub(super) fn sources() -> Vec<PathBuf> {
-    let (_, mut sources) = read(system::workspace());
-    sources.sort();
-    sources
+/// Returns all files of the workspace but the generated ones, and but those of packages that
+/// are not the project's own; sorted.
+pub(super) fn files() -> Vec<PathBuf> {
+    let (_, mut files) = read(system::workspace());
+    files.sort();
+    files
+}
+
+/// Names a file from the workspace's root.
+pub(super) fn shown(path: &Path) -> String {
+    let path = path.strip_prefix(system::workspace()).unwrap_or(path);
+    path.display().to_string()
 }
 
 fn read(root: &Path) -> (Vec<String>, Vec<PathBuf>) {
-    let (mut names, mut sources) = (Vec::new(), Vec::new());
+    let (mut names, mut files) = (Vec::new(), Vec::new());
     let mut folders = vec![root.to_path_buf()];
     while let Some(folder) = folders.pop() {
         if let Ok(manifest) = fs::read_to_string(folder.join("Cargo.toml"))
@@ -40,14 +46,14 @@ fn read(root: &Path) -> (Vec<String>, Vec<PathBuf>) {
             let path = entry.path();
             let name = entry.file_name();
             let name = name.to_string_lossy();
-            if path.is_dir() && !name.starts_with('.') && name != "target" {
+            if !path.is_dir() {
+                files.push(path);
+            } else if !name.starts_with('.') && name != "target" {
                 folders.push(path);
-            } else if name.ends_with(".rs") {
-                sources.push(path);
             }
         }
     }
-    (names, sources)
+    (names, files)
 }
 
 /// Reads the name of a package; a manifest may be of a workspace alone.
@@ -80,9 +86,11 @@ mod tests {
             fs::write(folder.join("Cargo.toml"), manifest).unwrap();
             fs::write(folder.join("src/lib.rs"), "").unwrap();
         }
-        let (names, sources) = read(&root);
+        let (names, mut files) = read(&root);
+        files.sort();
         assert_eq!(names, ["ours"]);
-        assert_eq!(sources, [root.join("apps/ours/src/lib.rs")]);
+        let ours = root.join("apps/ours");
+        assert_eq!(files, [ours.join("Cargo.toml"), ours.join("src/lib.rs")]);
         fs::remove_dir_all(root).unwrap();
     }
 

@@ -1,0 +1,291 @@
+//! A budget of lines for each crate: what is added beyond it, something else gives way to.
+//!
+//! A *row* of the table is a folder with a `Cargo.toml`, less the folders in it that have
+//! one; what lies in no package is of its first folder, `scripts`. Its lines are those of
+//! Rust, assembly, C, Python and shell that are neither blank nor a comment alone. Tests are
+//! counted apart: what lies in a folder `tests` or in `tests.rs`, and modules below
+//! `#[cfg(test)]`. `--bless` makes each budget what is there, lower or higher. It guarantees,
+//! by [`escape`], that what is counted has the default format, that Rust and assembly lie
+//! only in files that are counted, and that nothing is called a test that a product contains.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::mem;
+use std::path::{Path, PathBuf};
+
+use super::code::code_only;
+use super::own;
+use crate::golden::Golden;
+use crate::system::workspace;
+
+/// The table, from the workspace's root.
+const TABLE: &str = "tests/baselines/lines.txt";
+
+/// How the names of counted files end. Timelines as data are tests: their ending goes here.
+const ENDINGS: [&str; 5] = [".rs", ".s", ".c", ".py", ".sh"];
+
+/// Lines of code and of tests, by the row's name.
+type Rows = BTreeMap<String, [usize; 2]>;
+
+/// Holds these files to the table; rewrites it if there is a `list` of rewritten files.
+pub(super) fn check(files: &[PathBuf], list: Option<&Path>) -> Result<(), String> {
+    let table = fs::read_to_string(workspace().join(TABLE));
+    let table = table.map_err(|error| format!("{TABLE}: {error}"))?;
+    let there = count(files);
+    let (file, below, text) = (TABLE, "", &*table);
+    match (list, complaints(&read(&table), &there).join("; ")) {
+        (Some(_), _) => Golden { file, below, text }.compare(&write(&there), list),
+        (None, complaints) if complaints.is_empty() => Ok(()),
+        (None, complaints) => Err(complaints),
+    }
+}
+
+fn read(table: &str) -> Rows {
+    let row = |line: &str| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let [name, code, tests] = words[..] else {
+            return None;
+        };
+        Some((name.into(), [code.parse().ok()?, tests.parse().ok()?]))
+    };
+    table.lines().filter_map(row).collect()
+}
+
+fn write(rows: &Rows) -> String {
+    let rows = rows.iter();
+    let rows = rows.map(|(row, [code, tests])| format!("{row:20} {code:>7} {tests:>7}\n"));
+    format!("{:20} {:>7} {:>7}\n", "crate", "code", "tests") + &rows.collect::<String>()
+}
+
+fn complaints(budgets: &Rows, there: &Rows) -> Vec<String> {
+    let mut complaints = Vec::new();
+    for row in budgets.keys().chain(there.keys()).collect::<BTreeSet<_>>() {
+        let (Some(budget), Some(lines)) = (budgets.get(row), there.get(row)) else {
+            complaints.push(format!(
+                "`{row}` is not both in {TABLE} and in the tree; bless it"
+            ));
+            continue;
+        };
+        for (what, index) in [("code", 0), ("tests", 1)] {
+            if let Some(more @ 1..) = lines[index].checked_sub(budget[index]) {
+                complaints.push(format!(
+                    "{row} has {more} lines of {what} more than its budget; remove as much, or raise \
+                     the number in {TABLE} and say in the commit what went instead"
+                ));
+            }
+        }
+    }
+    complaints
+}
+
+fn count(files: &[PathBuf]) -> Rows {
+    let mut rows = Rows::new();
+    for path in files {
+        let name = own::shown(path);
+        let is_script = name.starts_with("scripts/") && path.extension().is_none();
+        if !is_script && !ENDINGS.iter().any(|ending| name.ends_with(ending)) {
+            continue;
+        }
+        let mut folders = path.ancestors().skip(1);
+        let package = folders.find(|folder| folder.join("Cargo.toml").is_file());
+        let package = package.map(own::shown).filter(|row| !row.is_empty());
+        let row = package.or_else(|| Some(name.split_once('/')?.0.into()));
+        let [code, tests] = lines(&name, &fs::read_to_string(path).unwrap_or_default());
+        let sum = rows.entry(row.unwrap_or_default()).or_default();
+        *sum = [sum[0] + code, sum[1] + tests];
+    }
+    rows
+}
+
+/// Counts the lines of code and of tests in a file.
+fn lines(name: &str, text: &str) -> [usize; 2] {
+    let comment = match name.rsplit_once('.') {
+        Some((_, "rs" | "c")) => "//",
+        Some((_, "py" | "sh")) => "#",
+        // Comments of other files are counted, for no line begins so.
+        _ => "\n",
+    };
+    let mut counts = [0, 0];
+    // How the module ends that is below `#[cfg(test)]`.
+    let mut end: Option<String> = None;
+    let mut lines = text.lines().peekable();
+    while let Some(line) = lines.next() {
+        let trimmed = line.trim();
+        let next = lines.peek().map_or("", |next| next.trim());
+        let is_module = next.trim_start_matches("pub ").starts_with("mod ") && next.ends_with('{');
+        if trimmed.starts_with("#[cfg(test)]") && is_module {
+            end = Some(line.replace(trimmed, "}"));
+        }
+        if !trimmed.is_empty() && !trimmed.starts_with(comment) {
+            counts[usize::from(is_test(name) || end.is_some())] += 1;
+        }
+        end = end.filter(|end| !line.starts_with(end));
+    }
+    counts
+}
+
+fn is_test(name: &str) -> bool {
+    name.starts_with("tests/") || name.contains("/tests/") || name.ends_with("tests.rs")
+}
+
+/// Says by what a source file or one of settings has lines that are not counted as what they
+/// are.
+pub(super) fn escape(name: &str, text: &str) -> Option<String> {
+    if !name.ends_with(".rs") && !name.ends_with(".toml") {
+        return None;
+    }
+    let code = code_only(text);
+    let words = ["rustfmt::skip", "rustfmt_skip", "include!"];
+    let word = words.into_iter().find(|word| code.contains(word));
+    let format = name.ends_with("rustfmt.toml").then_some("a format");
+    let mut texts = text.split("include_str!(\"").skip(1);
+    let is_odd = |text: &str| !text.split('"').take(1).all(|file| file.ends_with(".s"));
+    let assembly = (code.contains("asm!(") && texts.any(is_odd)).then_some("assembly");
+    let mut above = "";
+    let line = text.lines().map(str::trim).find(|line| {
+        let is_test_only = mem::replace(&mut above, line) == "#[cfg(test)]";
+        let is_module = line.ends_with("tests;") && line.contains("mod ");
+        let starts = ["#[path = \"", "path = \"", "build = \""];
+        let file = starts
+            .iter()
+            .find_map(|start| line.strip_prefix(start)?.split('"').next());
+        file.is_some_and(|file| !file.ends_with(".rs") || is_test(file) && !is_test(name))
+            || is_module && !is_test_only && !is_test(name)
+    });
+    let what = word.or(format).or(assembly).or(line)?;
+    Some(format!("has `{what}`, by which lines escape the budgets"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Rows, complaints, escape, lines, read, write};
+
+    #[test]
+    fn code_is_told_from_tests_comments_and_blanks() {
+        // As it stands here, it must not end this module where they are counted.
+        let source = "
+            //! Essay.
+            use a::b; // code
+
+            // A comment alone.
+            @
+            use a::c;
+            mod inner {
+                @
+                pub mod tests {
+                    //! Essay.
+                    fn test() {}
+                }
+                fn code() {}
+            }
+            @
+            mod tests {
+                const TEXT: &str = \"
+                    }
+            \";
+            }
+            fn code_again() {}
+        ";
+        let source = source
+            .replace('@', "#[cfg(test)]")
+            .replace("\n            ", "\n");
+        let source = source.as_str();
+        assert_eq!(lines("a/src/lib.rs", source), [7, 10]);
+        for name in [
+            "a/tests/b.rs",
+            "tests/b.rs",
+            "a/src/tests.rs",
+            "a/src/b_tests.rs",
+        ] {
+            assert_eq!(lines(name, source), [0, 17], "{name}");
+        }
+        let script = "#!/bin/sh\n# Says\n\necho \\\n    // # hello\n";
+        assert_eq!(lines("scripts/a.sh", script), [2, 0]);
+        // Files without ending, and assembly, are counted with their comments.
+        assert_eq!(lines("scripts/a", script), [4, 0]);
+        assert_eq!(lines("a/src/b.s", script), [4, 0]);
+        assert_eq!(lines("a/src/b.c", script), [3, 0]);
+    }
+
+    fn rows(rows: &[(&str, [usize; 2])]) -> Rows {
+        let rows = rows.iter().map(|(row, lines)| (row.to_string(), *lines));
+        rows.collect()
+    }
+
+    #[test]
+    fn what_is_beyond_a_budget_is_named_with_the_remedy() {
+        let budgets = rows(&[("fass", [10, 20]), ("gone", [1, 1]), ("kernel", [5, 5])]);
+        let there = rows(&[("fass", [13, 20]), ("kernel", [5, 4]), ("new", [1, 0])]);
+        let complaints = complaints(&budgets, &there);
+        let table = "tests/baselines/lines.txt";
+        let stray = |row| format!("`{row}` is not both in {table} and in the tree; bless it");
+        let more = format!(
+            "fass has 3 lines of code more than its budget; remove as much, or raise the number in \
+             {table} and say in the commit what went instead"
+        );
+        assert_eq!(complaints, [more, stray("gone"), stray("new")]);
+    }
+
+    #[test]
+    fn a_table_is_read_back() {
+        let rows = rows(&[("fass", [13, 99]), ("fass/native", [5, 25])]);
+        let table = write(&rows);
+        assert_eq!(read(&table), rows);
+        assert!(
+            table.starts_with("crate                   code   tests\nfass "),
+            "{table}"
+        );
+    }
+
+    #[test]
+    fn what_would_escape_the_count_is_named() {
+        for (name, text, what) in [
+            ("rustfmt.toml", "", "a format"),
+            ("a/src/b.rs", "#[rustfmt::skip]\nfn f() {}", "rustfmt::skip"),
+            ("a/src/b.rs", "include!(\"c.txt\");", "include!"),
+            (
+                "a/src/b.rs",
+                "global_asm!(include_str!(\"c.txt\"));",
+                "assembly",
+            ),
+            (
+                "a/src/b.rs",
+                "#[path = \"c.txt\"]\nmod c;",
+                "#[path = \"c.txt\"]",
+            ),
+            (
+                "a/src/b.rs",
+                "  #[path = \"tests/c.rs\"]\n  mod c;",
+                "#[path = \"tests/c.rs\"]",
+            ),
+            (
+                "a/Cargo.toml",
+                "[lib]\npath = \"tests/c.rs\"",
+                "path = \"tests/c.rs\"",
+            ),
+            (
+                "a/src/b.rs",
+                "pub(crate) mod latests;",
+                "pub(crate) mod latests;",
+            ),
+        ] {
+            let expected = format!("has `{what}`, by which lines escape the budgets");
+            assert_eq!(escape(name, text), Some(expected));
+        }
+        for (name, text) in [
+            (
+                "a/src/b.rs",
+                "// rustfmt::skip\nconst A: &str = \"include!\";",
+            ),
+            (
+                "a/src/b.rs",
+                "global_asm!(include_str!(\"c.s\"));\n#[cfg(test)]\nmod tests;",
+            ),
+            ("a/tests/b.rs", "#[path = \"../../c/tests/c.rs\"]\nmod c;"),
+            ("a/Cargo.toml", "c = { path = \"../tests\" }"),
+            ("docs/a.md", "include!(\"c.txt\");"),
+        ] {
+            assert_eq!(escape(name, text), None, "{text}");
+        }
+    }
+}
