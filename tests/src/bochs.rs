@@ -49,8 +49,9 @@ pub fn succeed_after(
     model: &str,
     cores: u64,
 ) -> Transcript {
-    let run = || -> Result<String, String> {
+    let run = || -> Result<(String, String), String> {
         install::ensure(&install::BOCHS)?;
+        let program = find_program("bochs").ok_or("there is no program `bochs`")?;
         let words = format!("{words} end=off");
         let iso = Medium::new(Loader::Bios, &built(package)?.path, &words, None)?;
         if !command.is_empty() {
@@ -61,17 +62,19 @@ pub fn succeed_after(
         let text = settings_text(model, cores, iso.path(), &log, &said);
         let written = fs::write(&settings, text);
         written.map_err(|why| format!("cannot write `{}`: {why}", settings.display()))?;
-        let serial = boot(&settings, &log);
+        let booted = boot(&program, &settings, &said);
+        let serial = fs::read(&log).unwrap_or_default();
         for file in [&settings, &said, &log] {
             // They are ours, and in the way of no one if they cannot be removed.
             let _ = fs::remove_file(file);
         }
-        serial
+        Ok((String::from_utf8_lossy(&serial).into_owned(), booted?))
     };
-    let serial = run().unwrap_or_else(|why| panic!("`{package}` did not boot in Bochs: {why}"));
+    let booted = run().unwrap_or_else(|why| panic!("`{package}` did not boot in Bochs: {why}"));
+    let (serial, end) = booted;
     let transcript = Transcript::read(&serial);
     if let Err(fault) = judge_lines(&transcript) {
-        panic!("{}\n{serial}", fault.reason);
+        panic!("{}\n{serial}\n{end}", fault.reason);
     }
     transcript
 }
@@ -103,33 +106,50 @@ fn put_before(command: &str, iso: &Path) -> Result<(), String> {
     fs::write(iso, bytes).map_err(|why| format!("`{}`: {why}", iso.display()))
 }
 
-/// Runs Bochs until it ends, at most for the limit, and returns the serial log.
-fn boot(settings: &Path, log: &Path) -> Result<String, String> {
-    let program = find_program("bochs").ok_or("there is no program `bochs`")?;
-    let mut command = bound_to_us(&program);
+/// Runs Bochs until it ends, at most for the limit, and returns how it ended and its last words,
+/// which are in the file `said` and in its standard error.
+fn boot(program: &Path, settings: &Path, said: &Path) -> Result<String, String> {
+    let mut command = bound_to_us(program);
     // Debian's Bochs has a debugger, which has to be told to begin; its commands are a file.
     let commands = settings.with_extension("commands");
-    fs::write(&commands, "c\n").map_err(|why| format!("`{}`: {why}", commands.display()))?;
+    let cannot = |why| format!("cannot write next to `{}`: {why}", settings.display());
+    fs::write(&commands, "c\n").map_err(cannot)?;
     command.arg("-q").arg("-f").arg(settings);
     command.arg("-rc").arg(&commands);
     command.env("SDL_VIDEODRIVER", "dummy");
+    let errors = settings.with_extension("errors");
+    let file = fs::File::create(&errors).map_err(cannot)?;
     command
         .stdin(Stdio::null())
         .stdout(Stdio::null())
-        .stderr(Stdio::null());
+        .stderr(file);
     let started = Child::start(&mut command);
     let mut child = started.map_err(|why| format!("cannot start Bochs: {why}"))?;
     let waited = child.wait(LIMIT, || true);
-    let _ = fs::remove_file(&commands);
-    let serial = fs::read(log).unwrap_or_default();
-    let serial = String::from_utf8_lossy(&serial).into_owned();
+    let words = [last_words(said), last_words(&errors)].concat();
+    for file in [&commands, &errors] {
+        let _ = fs::remove_file(file);
+    }
     match waited {
-        Waited::Ended(_) => Ok(serial),
-        _ => Err(format!("it was not powered off; {}\n{serial}", host_load())),
+        Waited::Ended(status) => Ok(format!("Bochs ended with {status} and said:\n{words}")),
+        _ => Err(format!("it was not powered off; {}\n{words}", host_load())),
     }
 }
 
-/// Returns the settings of the PC.
+/// Returns the last lines of a file of another program's.
+fn last_words(file: &Path) -> String {
+    const LINES: usize = 20;
+    let text = fs::read(file).unwrap_or_default();
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let first = text.lines().count().saturating_sub(LINES);
+    text.lines()
+        .skip(first)
+        .map(|line| format!("{line}\n"))
+        .collect()
+}
+
+/// Returns the settings of the PC. It has no sound: Bochs would end itself where the host has no
+/// sound card.
 fn settings_text(model: &str, cores: u64, iso: &Path, log: &Path, said: &Path) -> String {
     let (iso, log, said) = (iso.display(), log.display(), said.display());
     format!(
@@ -145,7 +165,31 @@ ata0-master: type=cdrom, path={iso}, status=inserted
 boot: cdrom
 com1: enabled=1, mode=file, dev={log}
 clock: sync=none
+sound: waveoutdrv=dummy, waveindrv=dummy, midioutdrv=dummy
 log: {said}
 "
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::boot;
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn a_bochs_that_dies_is_quoted() {
+        let folder = std::env::temp_dir().join(format!("bochs-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder");
+        let program = folder.join("bochs");
+        let script = "#!/bin/sh\necho no mixer > said\necho buffer overflow >&2\nexit 134\n";
+        let script = script.replace("> said", &format!("> {}", folder.join("said").display()));
+        fs::write(&program, script).expect("a script");
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
+        let end = boot(&program, &folder.join("settings"), &folder.join("said"));
+        let end = end.expect("it has ended");
+        assert!(end.contains("134") && end.contains("no mixer"), "{end}");
+        assert!(end.contains("buffer overflow"), "{end}");
+        fs::remove_dir_all(&folder).expect("it was made");
+    }
 }
