@@ -36,13 +36,9 @@ fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> A
 
 /// Runs a set, of which DAG k is that of the original with the number `originals[k]`.
 fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[usize]) -> Vec<String> {
-    let subtask = |of: Instance| {
-        let dag = &set.dags[originals[of.dag.index()]];
-        (&dag.subtasks[of.subtask.index()], of.job)
-    };
     let mut log = Log::new(|of| {
-        let (subtask, job) = subtask(of);
-        subtask.executions_ns[usize::try_from(job).expect("few jobs")]
+        let dag = DagId(u32::try_from(originals[of.dag.index()]).expect("few DAGs"));
+        set.execution_ns(Instance { dag, ..of })
     });
     for (dag, &original) in (0..).zip(originals) {
         let subtasks = (0..).zip(&set.dags[original].subtasks);

@@ -4,11 +4,9 @@ mod support;
 
 use sched_dag::journal::What;
 use sched_dag::law::{self, Terms};
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
-use sched_dag::{
-    CoreId, DagId, DagSpec, FaultLimit, Instance, Observer, OnFault, OverrunPolicy, Recorder,
-    Scheduler, SchedulerOptions,
-};
+use sched_dag::virtual_time::{End, VirtualTime};
+use sched_dag::{DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, SchedulerOptions};
+use support::written::Written;
 use support::{
     Log, PREEMPTIVE, assert_events, commit, dag, instance, overrunning, run, run_failing, scheduler,
 };
@@ -246,69 +244,14 @@ fn d7_other_dags_do_not_notice() {
     assert_eq!((statistics[0].failed, statistics[0].completed), (3, 3));
 }
 
-/// Fails in every third job, and writes all down.
-struct Written(Recorder);
-
-impl Workload for Written {
-    fn execute(&mut self, _: Instance, _: u64) -> u64 {
-        3
-    }
-
-    fn fails(&mut self, instance: Instance) -> bool {
-        instance.job % 3 == 2 && instance.subtask.0 == 1
-    }
-
-    fn is_replaceable(&mut self, _: Instance) -> bool {
-        true
-    }
-
-    fn instant(&mut self, now_ns: u64) {
-        self.0.now_ns = now_ns;
-    }
-
-    fn started(&mut self, instance: Instance, core: CoreId, _: u64) {
-        self.0.on_core(What::Start, instance, core);
-    }
-
-    fn finished(&mut self, instance: Instance, core: CoreId, _: u64) {
-        self.0.on_core(What::Finish, instance, core);
-    }
-
-    fn failed(&mut self, instance: Instance, core: CoreId, _: u64) {
-        self.0.on_core(What::Ended, instance, core);
-    }
-}
-
-impl Observer for Written {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.0.released(dag, job, release_ns);
-    }
-
-    fn ready(&mut self, instance: Instance) {
-        self.0.ready(instance);
-    }
-
-    fn cancelled(&mut self, instance: Instance) {
-        self.0.cancelled(instance);
-    }
-
-    fn restarted(&mut self, instance: Instance) {
-        self.0.restarted(instance);
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: sched_dag::JobOutcome) {
-        self.0.job_completed(dag, job, outcome);
-    }
-}
-
 #[test]
 fn the_law_accepts_what_is_survived_and_nothing_else() {
     let chain = dag(10, 10, 9, &[0, 0, 0], &[(0, 1), (1, 2)]);
     let task_set = commit(&[surviving(1, 3, 3, chain.clone())], PREEMPTIVE);
-    let mut written = Written(Recorder::new(task_set.clone()));
-    let mut run = VirtualTime::new(Scheduler::new(task_set.clone(), PREEMPTIVE));
-    assert_eq!(run.run(&mut written), End::Finished);
-    let events = || written.0.events.iter().copied();
+    let mut written = Written::new(&task_set, |_| 3);
+    written.fails = |instance| instance.job % 3 == 2 && instance.subtask.0 == 1;
+    let _ = written.run(PREEMPTIVE);
+    let events = || written.journal.events.iter().copied();
     assert_eq!(law::violations(&task_set, Terms::EXACT, events()), []);
     let record = law::Record::of_events(&task_set, true, events()).expect("it is short");
     let failed = |job: &law::JobRecord| job.has_failed;

@@ -4,92 +4,27 @@
 //! More or other sets: `JOURNALS=100000 JOURNAL_SEED=7 cargo test -p sched-dag --test
 //! journal`.
 
-#[path = "support/random.rs"]
-mod random;
 #[allow(dead_code, reason = "its own test uses all of it")]
 #[path = "properties/set.rs"]
 mod set;
+mod support;
+
+pub(crate) use support::random;
 
 use std::sync::Arc;
 
 use random::Random;
-use sched_dag::Recorder;
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{Record, Tally, Terms, Violation, dispatch_violations, violations};
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
-use sched_dag::{
-    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Observer, Scheduler,
-    TaskSet, verify,
-};
+use sched_dag::{DagId, Instance, JobOutcome, TaskSet};
 use set::{Overruns, Set};
+use support::commit;
+use support::written::Written;
 
 /// A run of a set: its model, and its journal.
 struct Run {
     task_set: Arc<TaskSet>,
     events: Vec<Event>,
-}
-
-struct Driver<'s>(&'s Set, Recorder);
-
-impl Observer for Driver<'_> {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.1.released(dag, job, release_ns);
-    }
-
-    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.1.queued(dag, job, release_ns);
-    }
-
-    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.1.skipped(dag, job, release_ns);
-    }
-
-    fn ready(&mut self, instance: Instance) {
-        self.1.ready(instance);
-    }
-
-    fn cancelled(&mut self, instance: Instance) {
-        self.1.cancelled(instance);
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        self.1.aborted(dag, job);
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        self.1.deadline_missed(dag, job, deadline_ns);
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.1.job_completed(dag, job, outcome);
-    }
-}
-
-impl Workload for Driver<'_> {
-    fn instant(&mut self, now_ns: u64) {
-        self.1.now_ns = now_ns;
-    }
-
-    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
-        let subtask = &self.0.dags[instance.dag.index()].subtasks[instance.subtask.index()];
-        subtask.executions_ns[usize::try_from(instance.job).expect("few jobs")]
-    }
-
-    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.1.on_core(What::Start, instance, core);
-    }
-
-    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.1.on_core(What::Suspend, instance, core);
-    }
-
-    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.1.on_core(What::Resume, instance, core);
-    }
-
-    fn finished(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.1.on_core(What::Finish, instance, core);
-    }
 }
 
 fn number(variable: &str, default: u64) -> u64 {
@@ -107,14 +42,10 @@ fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
             false => Overruns::Never,
         };
         let set = set::draw(&mut random, overruns);
-        let options = CommitOptions::new(set.options.policy, set.options.cores)
-            .with_construction(ConstructionPolicy::any_graph());
-        let verified = verify(&set.specs(), &options).expect("sets are right");
-        let task_set = Arc::new(verified.task_set);
-        let mut driver = Driver(&set, Recorder::new(Arc::clone(&task_set)));
-        let scheduler = Scheduler::new(Arc::clone(&task_set), set.options);
-        assert_eq!(VirtualTime::new(scheduler).run(&mut driver), End::Finished);
-        let events = driver.1.events;
+        let task_set = commit(&set.specs(), set.options);
+        let mut written = Written::new(&task_set, |instance| set.execution_ns(instance));
+        let _ = written.run(set.options);
+        let events = written.journal.events;
         with(seed, &mut random, &set, &Run { task_set, events });
     }
 }

@@ -2,138 +2,47 @@
 
 mod support;
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use sched_dag::analysis::{Overheads, Settings, answer};
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::Event;
 use sched_dag::law::{Record, Terms, Violation, violations};
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
-    Activation, CoreId, DagId, DagSpec, DagStatistics, Instance, JobOutcome, Observer,
-    OverrunPolicy, Policy, Recorder, Scheduler, SchedulerOptions, TaskSet,
+    Activation, DagId, DagSpec, DagStatistics, Instance, Observer, OverrunPolicy, Policy, Recorder,
+    Scheduler, SchedulerOptions, TaskSet,
 };
 use support::random::Random;
+use support::written::Written;
 use support::{PREEMPTIVE, commit, dag, overrunning};
 
-/// Executes every instance for its WCET or 1 ns, sends signals, records all.
-struct Run {
-    task_set: Arc<TaskSet>,
-    journal: Recorder,
-    /// Signals by time.
-    signals: VecDeque<(u64, DagId)>,
-    /// At which instance's completion which DAG gets a signal.
-    chained: Option<(DagId, DagId)>,
-    /// What became of each signal.
-    arrivals: Vec<(u64, Option<u64>)>,
+/// Executes every instance for its WCET or 1 ns.
+type Run = Written<Box<dyn Fn(Instance) -> u64>>;
+
+fn new_run(task_set: &Arc<TaskSet>, signals: impl Iterator<Item = (u64, DagId)>) -> Run {
+    let of_set = Arc::clone(task_set);
+    let wcet_ns = move |instance: Instance| {
+        let subtask = of_set.dag(instance.dag).subtask(instance.subtask);
+        subtask.wcet_ns().unwrap_or(1)
+    };
+    let mut run: Run = Written::new(task_set, Box::new(wcet_ns));
+    run.signals = signals.collect();
+    run
 }
 
-impl Observer for Run {
-    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
-        self.arrivals.push((self.journal.now_ns, release_ns));
-        self.journal.signalled(dag, job, release_ns);
-    }
-
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.journal.released(dag, job, release_ns);
-    }
-
-    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.journal.queued(dag, job, release_ns);
-    }
-
-    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.journal.skipped(dag, job, release_ns);
-    }
-
-    fn ready(&mut self, instance: Instance) {
-        self.journal.ready(instance);
-    }
-
-    fn cancelled(&mut self, instance: Instance) {
-        self.journal.cancelled(instance);
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        self.journal.aborted(dag, job);
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        self.journal.deadline_missed(dag, job, deadline_ns);
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.journal.job_completed(dag, job, outcome);
-    }
+fn record(run: &Run) -> Record {
+    let events = run.journal.events.iter().copied();
+    Record::of_events(&run.task_set, true, events).expect("it fits")
 }
 
-impl Workload for Run {
-    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
-        let dag = self.task_set.dag(instance.dag);
-        dag.subtask(instance.subtask).wcet_ns().unwrap_or(1)
-    }
-
-    fn instant(&mut self, now_ns: u64) {
-        self.journal.now_ns = now_ns;
-    }
-
-    fn next_signal_ns(&self) -> Option<u64> {
-        self.signals.front().map(|&(at_ns, _)| at_ns)
-    }
-
-    fn take_signal(&mut self, now_ns: u64) -> Option<DagId> {
-        let (_, dag) = self.signals.pop_front_if(|(at_ns, _)| *at_ns <= now_ns)?;
-        Some(dag)
-    }
-
-    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.journal.on_core(What::Start, instance, core);
-    }
-
-    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.journal.on_core(What::Suspend, instance, core);
-    }
-
-    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.journal.on_core(What::Resume, instance, core);
-    }
-
-    fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        self.journal.on_core(What::Finish, instance, core);
-        if let Some((from, to)) = self.chained
-            && instance.dag == from
-        {
-            self.signals.push_front((now_ns, to));
-        }
-    }
+fn releases(run: &Run, dag: u32) -> Vec<u64> {
+    let record = record(run);
+    let jobs = record.jobs(DagId(dag)).iter();
+    jobs.filter_map(|job| job.release_ns).collect()
 }
 
-impl Run {
-    fn new(task_set: &Arc<TaskSet>, signals: impl Iterator<Item = (u64, DagId)>) -> Self {
-        Self {
-            task_set: Arc::clone(task_set),
-            journal: Recorder::new(Arc::clone(task_set)),
-            signals: signals.collect(),
-            chained: None,
-            arrivals: Vec::new(),
-        }
-    }
-
-    fn record(&self) -> Record {
-        let events = self.journal.events.iter().copied();
-        Record::of_events(&self.task_set, true, events).expect("it fits")
-    }
-
-    fn releases(&self, dag: u32) -> Vec<u64> {
-        let record = self.record();
-        let jobs = record.jobs(DagId(dag)).iter();
-        jobs.filter_map(|job| job.release_ns).collect()
-    }
-
-    fn violations(&self) -> Vec<Violation> {
-        let events = self.journal.events.iter().copied();
-        violations(&self.task_set, Terms::EXACT, events)
-    }
+fn breaches(run: &Run) -> Vec<Violation> {
+    let events = run.journal.events.iter().copied();
+    violations(&run.task_set, Terms::EXACT, events)
 }
 
 fn sporadic(spec: DagSpec) -> DagSpec {
@@ -152,11 +61,10 @@ fn run(
 ) -> (Run, Vec<DagStatistics>) {
     let task_set = commit(specs, options);
     let last = DagId(u32::try_from(specs.len() - 1).expect("few DAGs"));
-    let mut run = Run::new(&task_set, signals.iter().map(|&at_ns| (at_ns, last)));
+    let mut run = new_run(&task_set, signals.iter().map(|&at_ns| (at_ns, last)));
     run.chained = chained;
-    let mut driver = VirtualTime::new(Scheduler::new(Arc::clone(&task_set), options));
-    assert_eq!(driver.run(&mut run), End::Finished);
-    assert_eq!(run.violations(), []);
+    let driver = run.run(options);
+    assert_eq!(breaches(&run), []);
     let ids = (0..=last.0).map(DagId);
     let statistics = ids
         .map(|dag| *driver.scheduler_of(dag).statistics(dag))
@@ -168,7 +76,7 @@ fn run(
 fn s1_an_early_signal_is_delayed_to_the_minimum_inter_arrival_time() {
     let spec = sporadic(dag(10, 10, 4, &[0], &[]));
     let (run, _) = run(&[spec], PREEMPTIVE, &[3, 5, 40, 50], None);
-    assert_eq!(run.releases(0), [3, 13, 40, 50]);
+    assert_eq!(releases(&run, 0), [3, 13, 40, 50]);
     assert_eq!(run.arrivals[1], (5, Some(13)));
 }
 
@@ -179,7 +87,7 @@ fn s1_nothing_is_released_before_the_offset_or_without_a_signal() {
         ..sporadic(dag(10, 10, 4, &[0], &[]))
     };
     let (run, statistics) = run(&[late], PREEMPTIVE, &[7, 205], None);
-    assert_eq!(run.releases(0), [100, 205]);
+    assert_eq!(releases(&run, 0), [100, 205]);
     assert_eq!(statistics[0].released, 2);
 }
 
@@ -187,7 +95,7 @@ fn s1_nothing_is_released_before_the_offset_or_without_a_signal() {
 fn s2_one_early_signal_is_kept_and_more_are_dropped_and_counted() {
     let spec = sporadic(dag(10, 10, 9, &[0], &[]));
     let (run, statistics) = run(&[spec], PREEMPTIVE, &[0, 1, 2, 3, 11], None);
-    assert_eq!(run.releases(0), [0, 10, 20]);
+    assert_eq!(releases(&run, 0), [0, 10, 20]);
     assert_eq!(statistics[0].signals, 5);
     assert_eq!(statistics[0].dropped_signals, 2);
 }
@@ -202,8 +110,8 @@ fn s2_a_job_that_waits_for_room_counts_as_the_one_that_is_kept() {
     });
     let (run, statistics) = run(&[spec], PREEMPTIVE, &[0, 10, 12, 20, 30], None);
     // Job 1 is due at 10 and waits till 25; its nominal release stays.
-    assert_eq!(run.releases(0), [0, 10, 30]);
-    assert_eq!(run.record().jobs(DagId(0))[1].released_ns, Some(25));
+    assert_eq!(releases(&run, 0), [0, 10, 30]);
+    assert_eq!(record(&run).jobs(DagId(0))[1].released_ns, Some(25));
     assert_eq!(statistics[0].dropped_signals, 2);
     assert_eq!(statistics[0].queued, 2);
 }
@@ -225,7 +133,7 @@ fn s3_a_completion_may_signal_at_its_own_instant() {
     let receiver = sporadic(dag(5, 5, 3, &[1], &[]));
     let chained = Some((DagId(0), DagId(1)));
     let (run, _) = run(&[sender, receiver], PREEMPTIVE, &[], chained);
-    assert_eq!(run.releases(1), [4, 24, 44]);
+    assert_eq!(releases(&run, 1), [4, 24, 44]);
 }
 
 #[test]
@@ -240,7 +148,7 @@ fn s3_the_deadline_counts_from_the_nominal_release() {
     long.subtasks[0].wcet_ns = Some(50);
     let (run, statistics) = run(&[long, sporadic(spec)], edf, &[1, 2], None);
     // Its deadlines are the earlier ones, so it preempts.
-    assert_eq!(run.releases(1), [1, 11]);
+    assert_eq!(releases(&run, 1), [1, 11]);
     assert_eq!((statistics[1].completed, statistics[1].misses), (2, 0));
 }
 
@@ -248,7 +156,7 @@ fn s3_the_deadline_counts_from_the_nominal_release() {
 fn s4_signals_beyond_the_limit_are_dropped() {
     let spec = sporadic(dag(10, 10, 1, &[0], &[]));
     let (run, statistics) = run(&[spec], PREEMPTIVE, &[0, 30, 60], None);
-    assert_eq!(run.releases(0), [0]);
+    assert_eq!(releases(&run, 0), [0]);
     assert_eq!(statistics[0].dropped_signals, 2);
 }
 
@@ -344,11 +252,11 @@ fn bounds_hold_for_random_signals() {
             at_ns += random.between(0, 40);
             (at_ns, DagId(u32::try_from(sporadic_at).expect("small")))
         });
-        let mut run = Run::new(&task_set, signals);
-        let mut driver = VirtualTime::new(Scheduler::new(Arc::clone(&task_set), options));
-        assert_eq!(driver.run(&mut run), End::Finished, "seed {seed}");
-        assert_eq!(run.violations(), [], "seed {seed}");
-        let record = run.record();
+        let mut run = new_run(&task_set, signals);
+        println!("seed {seed}");
+        let _ = run.run(options);
+        assert_eq!(breaches(&run), [], "seed {seed}");
+        let record = record(&run);
         let period_ns = task_set.dags()[sporadic_at].period_ns();
         let mut earliest_ns = 0;
         for &(at_ns, release_ns) in &run.arrivals {

@@ -181,8 +181,7 @@ impl Observer for Record<'_> {
 
 impl Workload for Record<'_> {
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
-        let subtask = &self.set.dags[instance.dag.index()].subtasks[instance.subtask.index()];
-        subtask.executions_ns[usize::try_from(instance.job).expect("few jobs")]
+        self.set.execution_ns(instance)
     }
 
     fn fails(&mut self, instance: Instance) -> bool {

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use sched_dag::{
-    Activation, DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority,
-    SchedulerOptions, SubtaskSpec,
+    Activation, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
+    Priority, SchedulerOptions, SubtaskSpec,
 };
 
 use crate::random::Random;
@@ -233,6 +233,11 @@ fn draw_edges(random: &mut Random, count: usize) -> Vec<(usize, usize)> {
 impl Set {
     pub(crate) fn specs(&self) -> Vec<DagSpec> {
         self.dags.iter().map(Dag::spec).collect()
+    }
+
+    pub(crate) fn execution_ns(&self, instance: Instance) -> u64 {
+        let subtask = &self.dags[instance.dag.index()].subtasks[instance.subtask.index()];
+        subtask.executions_ns[usize::try_from(instance.job).expect("few jobs")]
     }
 }
 

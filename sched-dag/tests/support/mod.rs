@@ -4,6 +4,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod random;
+pub(crate) mod written;
 
 use std::fmt::Write;
 use std::sync::Arc;

@@ -11,12 +11,14 @@
 //! trace_of_virtual_time`.
 
 mod lies;
-#[path = "../../../../sched-dag/tests/support/random.rs"]
-mod random;
 mod recorder;
 #[allow(dead_code, reason = "its own test uses all of it")]
 #[path = "../../../../sched-dag/tests/properties/set.rs"]
 mod set;
+#[path = "../../../../sched-dag/tests/support/mod.rs"]
+mod support;
+
+pub(crate) use support::random;
 
 use random::Random;
 use recorder::{lose, record};
