@@ -13,7 +13,7 @@ use std::time::Duration;
 use fass::{
     Dag, Latest, Policy, Raiser, Sample, Signal, SubtaskAttributes, create_dag, finish_create_dags,
 };
-use graphs::{chain, checking, commit_divided, fork_join, layered, spec};
+use graphs::{chain, checking, commit_divided, fork_join, layered, runs_all, spec};
 use native::{Closure, Native, Report, Setting};
 use sched_dag::{ClusterId, DagSpec};
 
@@ -54,44 +54,8 @@ fn each_cluster_obeys_r1_to_r5() {
             let specs = dealt(specs(), sizes);
             let workers = sizes.iter().sum();
             let setting = Setting { policy, workers };
-            let task_set = commit_divided(&specs, setting, sizes);
-            let (bodies, counts) = checking(&task_set);
-            let recorded = native::run_recorded(task_set, bodies, setting);
-            assert_eq!(recorded.violations, [], "{policy:?}, {sizes:?}");
-            for (statistics, spec) in recorded.report.statistics.iter().zip(&specs) {
-                assert_eq!(Some(statistics.completed), spec.jobs);
-            }
-            let all: u64 = specs.iter().map(DagSpecExt::instances).sum();
-            assert_eq!(recorded.instances, all);
-            assert!(
-                counts
-                    .iter()
-                    .flat_map(|done| done.iter())
-                    .all(|count| count.load(Relaxed) > 0)
-            );
-
-            // And once more at full speed, where nobody looks on.
-            let task_set = commit_divided(&specs, setting, sizes);
-            let (bodies, counts) = checking(&task_set);
-            native::run(task_set, bodies, setting);
-            for (done, spec) in counts.iter().zip(&specs) {
-                assert!(
-                    done.iter()
-                        .all(|count| Some(count.load(Relaxed)) == spec.jobs)
-                );
-            }
+            runs_all(&specs, setting, sizes);
         }
-    }
-}
-
-/// How many instances a DAG has in all.
-trait DagSpecExt {
-    fn instances(&self) -> u64;
-}
-
-impl DagSpecExt for DagSpec {
-    fn instances(&self) -> u64 {
-        self.subtasks.len() as u64 * self.jobs.expect("stated")
     }
 }
 
@@ -271,26 +235,4 @@ fn fewer_workers_than_the_clusters_have_are_refused() {
     let task_set = commit_divided(&specs, setting(3), &sizes.1);
     let (bodies, _) = checking(&task_set);
     native::run(task_set, bodies, setting(2));
-}
-
-#[test]
-fn the_commit_checks_clusters_as_everywhere() {
-    let machine = Native::new().workers(2).clusters(&[1, 1]);
-    let dags = [("astray", Some(2)), ("nowhere", None)].map(|(name, cluster)| {
-        let dag = create_dag();
-        dag.name(name)
-            .jobs(1)
-            .period(PERIOD)
-            .relative_deadline(PERIOD);
-        if let Some(cluster) = cluster {
-            dag.cluster(cluster);
-        }
-        dag.register_untyped_subtask(|_job| (), named("tick"));
-        dag
-    });
-    let error = finish_create_dags(&dags).expect_err("two faults");
-    drop(machine);
-    let text = error.to_string();
-    assert!(text.contains("dag `astray` is in cluster 2"), "{text}");
-    assert!(text.contains("dag `nowhere` is in no cluster"), "{text}");
 }

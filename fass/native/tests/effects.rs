@@ -125,31 +125,6 @@ fn a_signal_too_soon_is_dropped_and_an_instance_that_raises_none_has_none() {
     });
 }
 
-#[test]
-fn a_chain_of_signals_reaches_its_end() {
-    in_all_settings(|| {
-        let dags: Vec<Dag> = (0..4).map(|_| create_dag()).collect();
-        let signals: Vec<Signal> = dags[1..].iter().map(|dag| dag.sporadic(SHORTER)).collect();
-        dags[0].period(PERIOD);
-        for (stage, dag) in dags.iter().enumerate() {
-            dag.name(&format!("stage {stage}")).jobs(JOBS);
-            dag.relative_deadline(SHORTER);
-            if let Some(next) = signals.get(stage) {
-                dag.using(next.raising()).register_untyped_subtask(
-                    |mut next: Raiser<'_>, _job| next.raise(),
-                    named("stage"),
-                );
-            } else {
-                let _ = dag.register_untyped_subtask(|_job| (), named("stage"));
-            }
-        }
-        finish_create_dags(&dags).expect("the DAGs are right");
-        Box::new(|report| {
-            assert!(report.statistics.iter().all(|of| of.completed == JOBS));
-        })
-    });
-}
-
 /// A sporadic DAG without a limit, whose jobs are more urgent than what raises them.
 fn without_a_limit() -> Native {
     let machine = Native::new().policy(Policy::Edf);

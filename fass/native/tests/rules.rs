@@ -7,10 +7,9 @@
 #[path = "support/graphs.rs"]
 mod graphs;
 
-use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Barrier};
 
-use graphs::{chain, checking, commit, fork_join, layered, spec};
+use graphs::{chain, commit, fork_join, layered, runs_all, spec};
 use native::{Closure, Setting};
 use sched_dag::{DagSpec, Policy};
 
@@ -18,32 +17,7 @@ fn holds(specs: &[DagSpec]) {
     for policy in [Policy::StaticPriority, Policy::Edf] {
         for workers in 1..=3 {
             let setting = Setting { policy, workers };
-            let task_set = commit(specs, setting);
-            let (bodies, counts) = checking(&task_set);
-            let recorded = native::run_recorded(task_set, bodies, setting);
-            assert_eq!(recorded.violations, [], "{policy:?}, {workers} workers");
-            for ((spec, done), statistics) in
-                specs.iter().zip(&counts).zip(&recorded.report.statistics)
-            {
-                let jobs = spec.jobs.expect("stated");
-                assert_eq!(statistics.completed, jobs);
-                assert!(done.iter().all(|count| count.load(Relaxed) == jobs));
-            }
-            let expected: u64 = specs
-                .iter()
-                .map(|spec| spec.subtasks.len() as u64 * spec.jobs.expect("stated"))
-                .sum();
-            assert_eq!(recorded.instances, expected);
-
-            // And once more at full speed, where nobody looks on.
-            let task_set = commit(specs, setting);
-            let (bodies, counts) = checking(&task_set);
-            native::run(task_set, bodies, setting);
-            let ends = counts.iter().zip(specs);
-            for (done, spec) in ends {
-                let jobs = spec.jobs.expect("stated");
-                assert!(done.iter().all(|count| count.load(Relaxed) == jobs));
-            }
+            runs_all(specs, setting, &[]);
         }
     }
 }

@@ -69,6 +69,35 @@ pub(crate) fn checking(task_set: &TaskSet) -> (Vec<Vec<Closure>>, Vec<Arc<[Atomi
     (bodies.collect(), counts)
 }
 
+/// Runs DAGs to the end, written down and at full speed: all jobs of all subtasks run, as the
+/// rules say.
+pub(crate) fn runs_all(specs: &[DagSpec], setting: Setting, sizes: &[u32]) {
+    let jobs = |spec: &DagSpec| spec.jobs.expect("stated");
+    let ran_all = |counts: &[Arc<[AtomicU64]>]| {
+        for (done, spec) in counts.iter().zip(specs) {
+            assert!(done.iter().all(|count| count.load(Relaxed) == jobs(spec)));
+        }
+    };
+    let task_set = commit_divided(specs, setting, sizes);
+    let (bodies, counts) = checking(&task_set);
+    let recorded = native::run_recorded(task_set, bodies, setting);
+    assert_eq!(recorded.violations, [], "{setting:?}, {sizes:?}");
+    ran_all(&counts);
+    for (statistics, spec) in recorded.report.statistics.iter().zip(specs) {
+        assert_eq!(statistics.completed, jobs(spec));
+    }
+    let instances = specs
+        .iter()
+        .map(|spec| spec.subtasks.len() as u64 * jobs(spec));
+    assert_eq!(recorded.instances, instances.sum::<u64>());
+
+    // And once more at full speed, where nobody looks on.
+    let task_set = commit_divided(specs, setting, sizes);
+    let (bodies, counts) = checking(&task_set);
+    native::run(task_set, bodies, setting);
+    ran_all(&counts);
+}
+
 /// The edges of subtasks one after the other.
 pub(crate) fn chain(length: usize) -> Vec<(usize, usize)> {
     (1..length).map(|later| (later - 1, later)).collect()
