@@ -3,38 +3,17 @@
 
 mod support;
 
-use sched_dag::{CoreId, Decision, Instance, Scheduler, SchedulerOptions};
-use support::{PREEMPTIVE, dag, instance, scheduler};
+use sched_dag::{CoreId, Decision, Instance, Scheduler};
+use support::{PREEMPTIVE, cores, dag, instance, scheduler, start, step};
 
 /// DAG 0, which DAG 1 preempts at 2.
-fn preempted_at_2(cores: u32) -> Scheduler {
+fn preempted_at_2(count: u32) -> Scheduler {
     let mut urgent = dag(100, 100, 1, &[0], &[]);
     urgent.offset_ns = 2;
     let specs = [dag(100, 100, 1, &[5, 5], &[(0, 1)]), urgent];
-    let mut scheduler = scheduler(
-        &specs,
-        SchedulerOptions {
-            cores,
-            ..PREEMPTIVE
-        },
-    );
+    let mut scheduler = scheduler(&specs, cores(count));
     assert_eq!(step(&mut scheduler, 0, &[]), [start(0, instance(0, 0, 0))]);
     scheduler
-}
-
-fn step(scheduler: &mut Scheduler, now_ns: u64, completed: &[Instance]) -> Vec<Decision> {
-    let mut moment = scheduler.at(now_ns);
-    for &instance in completed {
-        moment.complete(instance, &mut ());
-    }
-    moment.release_due(&mut ()).dispatch().to_vec()
-}
-
-fn start(core: u32, instance: Instance) -> Decision {
-    Decision::Start {
-        core: CoreId(core),
-        instance,
-    }
 }
 
 fn resume(core: u32, instance: Instance) -> Decision {
@@ -97,13 +76,7 @@ fn of_several_preempted_instances_each_may_complete() {
     let mut urgent = dag(100, 100, 1, &[0, 1], &[]);
     urgent.offset_ns = 2;
     let low = dag(100, 100, 1, &[7, 8], &[]);
-    let mut scheduler = scheduler(
-        &[low, urgent],
-        SchedulerOptions {
-            cores: 2,
-            ..PREEMPTIVE
-        },
-    );
+    let mut scheduler = scheduler(&[low, urgent], cores(2));
     let _ = step(&mut scheduler, 0, &[]);
     // The largest key gives way first.
     assert_eq!(
@@ -172,13 +145,7 @@ fn completing_another_job_is_refused() {
 #[test]
 fn hundreds_of_cores_are_served() {
     let priorities: Vec<u32> = (0..500).collect();
-    let mut scheduler = scheduler(
-        &[dag(1000, 1000, 1, &priorities, &[])],
-        SchedulerOptions {
-            cores: 300,
-            ..PREEMPTIVE
-        },
-    );
+    let mut scheduler = scheduler(&[dag(1000, 1000, 1, &priorities, &[])], cores(300));
     let decisions = step(&mut scheduler, 0, &[]);
     assert_eq!(decisions.len(), 300);
     for core in 0..300 {

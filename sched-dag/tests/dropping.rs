@@ -5,15 +5,11 @@ mod support;
 use sched_dag::journal::What;
 use sched_dag::law::{self, Terms};
 use sched_dag::virtual_time::{End, VirtualTime};
-use sched_dag::{DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, SchedulerOptions};
+use sched_dag::{DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy};
 use support::written::Written;
 use support::{
-    Log, PREEMPTIVE, assert_events, commit, dag, instance, overrunning, run, run_failing, scheduler,
-};
-
-const TWO_CORES: SchedulerOptions = SchedulerOptions {
-    cores: 2,
-    ..PREEMPTIVE
+    Log, PREEMPTIVE, TWO_CORES, assert_events, commit, dag, instance, overrunning, run,
+    run_failing, scheduler,
 };
 
 /// Lets a DAG survive `faults` within `window` jobs, `in_all` in all.

@@ -3,14 +3,10 @@
 
 mod support;
 
-use sched_dag::{
-    CoreId, DagId, DagSpec, Decision, Instance, OverrunPolicy, Scheduler, SchedulerOptions,
-};
-use support::{PREEMPTIVE, assert_events, dag, instance, overrunning, run, run_failing, scheduler};
-
-const TWO_CORES: SchedulerOptions = SchedulerOptions {
-    cores: 2,
-    ..PREEMPTIVE
+use sched_dag::{CoreId, DagId, DagSpec, Decision, Instance, OverrunPolicy, Scheduler};
+use support::{
+    PREEMPTIVE, TWO_CORES, assert_events, dag, instance, overrunning, run, run_failing, scheduler,
+    start, step,
 };
 
 /// 0 -> (1, 2) -> 3, every 10; the middle subtasks run in parallel.
@@ -24,20 +20,10 @@ fn diamond(jobs: u64) -> DagSpec {
     )
 }
 
-/// Completes and fails instances at one instant, and returns the decisions.
-fn step(
-    scheduler: &mut Scheduler,
-    now_ns: u64,
-    completed: &[Instance],
-    failed: &[Instance],
-) -> Vec<Decision> {
+/// Fails an instance, and returns the decisions.
+fn fail(scheduler: &mut Scheduler, now_ns: u64, failed: Instance) -> Vec<Decision> {
     let mut moment = scheduler.at(now_ns);
-    for &instance in completed {
-        moment.complete(instance, &mut ());
-    }
-    for &instance in failed {
-        moment.fail(instance, &mut ());
-    }
+    moment.fail(failed, &mut ());
     moment.release_due(&mut ()).dispatch().to_vec()
 }
 
@@ -45,13 +31,6 @@ fn stop(scheduler: &mut Scheduler, now_ns: u64, dag: u32) -> Vec<Decision> {
     let mut moment = scheduler.at(now_ns);
     moment.stop(DagId(dag), &mut ());
     moment.release_due(&mut ()).dispatch().to_vec()
-}
-
-fn start(core: u32, instance: Instance) -> Decision {
-    Decision::Start {
-        core: CoreId(core),
-        instance,
-    }
 }
 
 #[test]
@@ -81,12 +60,12 @@ fn e1_an_instance_may_fail_while_its_preemption_is_under_way() {
     let mut urgent = dag(100, 100, 1, &[0], &[]);
     urgent.offset_ns = 2;
     let mut scheduler = scheduler(&[dag(100, 100, 1, &[5, 5], &[(0, 1)]), urgent], PREEMPTIVE);
-    let _ = step(&mut scheduler, 0, &[], &[]);
-    assert_eq!(step(&mut scheduler, 2, &[], &[]).len(), 2);
-    assert_eq!(step(&mut scheduler, 3, &[], &[instance(0, 0, 0)]), []);
+    let _ = step(&mut scheduler, 0, &[]);
+    assert_eq!(step(&mut scheduler, 2, &[]).len(), 2);
+    assert_eq!(fail(&mut scheduler, 3, instance(0, 0, 0)), []);
     assert_eq!(scheduler.running(CoreId(0)), Some(instance(1, 0, 0)));
     assert!(scheduler.is_over(DagId(0)) && !scheduler.is_finished());
-    assert_eq!(step(&mut scheduler, 4, &[instance(1, 0, 0)], &[]), []);
+    assert_eq!(step(&mut scheduler, 4, &[instance(1, 0, 0)]), []);
     assert!(scheduler.is_finished());
 }
 
@@ -283,13 +262,13 @@ fn e6_deadlines_count_up_to_the_end_and_no_further() {
     // The driver is not called between 0 and the failure.
     for (now_ns, misses) in [(10, 0), (11, 1), (25, 1)] {
         let mut scheduler = scheduler(&[diamond(9)], TWO_CORES);
-        let _ = step(&mut scheduler, 0, &[], &[]);
-        let _ = step(&mut scheduler, now_ns, &[], &[instance(0, 0, 0)]);
+        let _ = step(&mut scheduler, 0, &[]);
+        let _ = fail(&mut scheduler, now_ns, instance(0, 0, 0));
         let counted = *scheduler.statistics(DagId(0));
         assert_eq!((counted.misses, counted.released), (misses, 1), "{now_ns}");
         assert_eq!(scheduler.next_event_ns(), None);
         assert!(scheduler.is_finished());
-        let _ = step(&mut scheduler, 1_000, &[], &[]);
+        let _ = step(&mut scheduler, 1_000, &[]);
         assert_eq!(*scheduler.statistics(DagId(0)), counted);
     }
 }
@@ -320,10 +299,7 @@ fn e8_an_ended_dag_stays_ended() {
     let mut endless = diamond(1);
     endless.jobs = None;
     let mut scheduler = scheduler(&[endless, dag(30, 30, 2, &[5], &[])], PREEMPTIVE);
-    assert_eq!(
-        step(&mut scheduler, 0, &[], &[]),
-        [start(0, instance(0, 0, 0))]
-    );
+    assert_eq!(step(&mut scheduler, 0, &[]), [start(0, instance(0, 0, 0))]);
     assert!(!scheduler.is_ended(DagId(0)));
     // The instance that has started keeps its core to its end.
     assert_eq!(stop(&mut scheduler, 3, 0), []);
@@ -331,17 +307,14 @@ fn e8_an_ended_dag_stays_ended() {
     assert_eq!(scheduler.running(CoreId(0)), Some(instance(0, 0, 0)));
     assert_eq!(stop(&mut scheduler, 4, 0), []);
     assert_eq!(
-        step(&mut scheduler, 5, &[instance(0, 0, 0)], &[]),
+        step(&mut scheduler, 5, &[instance(0, 0, 0)]),
         [start(0, instance(1, 0, 0))]
     );
     assert!(scheduler.is_over(DagId(0)) && !scheduler.is_finished());
-    let _ = step(&mut scheduler, 6, &[instance(1, 0, 0)], &[]);
+    let _ = step(&mut scheduler, 6, &[instance(1, 0, 0)]);
     assert_eq!(scheduler.next_event_ns(), Some(30));
-    assert_eq!(
-        step(&mut scheduler, 30, &[], &[]),
-        [start(0, instance(1, 1, 0))]
-    );
-    let _ = step(&mut scheduler, 31, &[instance(1, 1, 0)], &[]);
+    assert_eq!(step(&mut scheduler, 30, &[]), [start(0, instance(1, 1, 0))]);
+    let _ = step(&mut scheduler, 31, &[instance(1, 1, 0)]);
     assert!(scheduler.is_finished());
     let counted = scheduler.statistics(DagId(0));
     assert_eq!(
@@ -363,6 +336,6 @@ fn a_stop_before_the_first_release_leaves_nothing_to_do() {
 #[should_panic(expected = "dag 0 job 0 subtask 1 fails and has not started")]
 fn failing_what_has_not_started_is_refused() {
     let mut scheduler = scheduler(&[diamond(1)], PREEMPTIVE);
-    let _ = step(&mut scheduler, 0, &[], &[]);
-    let _ = step(&mut scheduler, 1, &[], &[instance(0, 0, 1)]);
+    let _ = step(&mut scheduler, 0, &[]);
+    let _ = fail(&mut scheduler, 1, instance(0, 0, 1));
 }

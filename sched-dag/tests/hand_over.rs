@@ -5,17 +5,13 @@ mod support;
 
 use sched_dag::{
     Activation, CoreId, DagId, DagSpec, Decision, HandOff, Instance, OverrunPolicy, Scheduler,
-    SchedulerOptions, SubtaskSpec,
+    SubtaskSpec,
 };
 use support::bench::Log;
-use support::{PREEMPTIVE, dag, instance, overrunning, scheduler};
+use support::{PREEMPTIVE, TWO_CORES, cores, dag, instance, overrunning, scheduler};
 
 const FIRST: CoreId = CoreId(0);
 const SECOND: CoreId = CoreId(1);
-const TWO_CORES: SchedulerOptions = SchedulerOptions {
-    cores: 2,
-    ..PREEMPTIVE
-};
 
 fn chain(period_ns: u64, deadline_ns: u64, jobs: u64) -> DagSpec {
     dag(period_ns, deadline_ns, jobs, &[0, 0], &[(0, 1)])
@@ -217,11 +213,7 @@ fn a_paused_dags_job_in_flight_goes_on_by_hand() {
 #[test]
 fn the_core_that_was_to_go_on_stays_the_first_to_be_given_something() {
     let specs = [dag(100, 100, 1, &[0], &[]), dag(50, 50, 2, &[1], &[])];
-    let options = SchedulerOptions {
-        cores: 3,
-        ..PREEMPTIVE
-    };
-    let mut scheduler = scheduler(&specs, options);
+    let mut scheduler = scheduler(&specs, cores(3));
     let _ = dispatch(&mut scheduler, 0);
     for (at_ns, core, finished) in [
         (1, FIRST, instance(0, 0, 0)),
@@ -237,23 +229,19 @@ fn the_core_that_was_to_go_on_stays_the_first_to_be_given_something() {
 
 #[test]
 fn cores_beyond_a_word_of_bits_take_over() {
-    let cores = 130;
-    let options = SchedulerOptions {
-        cores,
-        ..PREEMPTIVE
-    };
+    let count = 130;
     // A fork of as many branches as there are cores, and a join.
-    let branches = 1..=cores as usize;
-    let edges = branches.flat_map(|branch| [(0, branch), (branch, cores as usize + 1)]);
+    let branches = 1..=count as usize;
+    let edges = branches.flat_map(|branch| [(0, branch), (branch, count as usize + 1)]);
     let spec = DagSpec {
         period_ns: Some(1_000),
         relative_deadline_ns: Some(1_000),
         jobs: Some(1),
-        subtasks: vec![SubtaskSpec::default(); cores as usize + 2],
+        subtasks: vec![SubtaskSpec::default(); count as usize + 2],
         edges: edges.collect(),
         ..DagSpec::default()
     };
-    let mut scheduler = scheduler(&[spec], options);
+    let mut scheduler = scheduler(&[spec], cores(count));
     let _ = dispatch(&mut scheduler, 0);
     let source = scheduler.vertex(instance(0, 0, 0));
     let open = scheduler.hand_over(1, FIRST, source, CoreId(129), &mut ());
@@ -261,7 +249,7 @@ fn cores_beyond_a_word_of_bits_take_over() {
     assert_eq!(dispatch(&mut scheduler, 1).len(), 130);
     // All finish; the last to do so, on core 63, hands the join to core 64.
     let last = CoreId(63);
-    for core in (0..cores).map(CoreId).filter(|&core| core != last) {
+    for core in (0..count).map(CoreId).filter(|&core| core != last) {
         let branch = scheduler.running(core).expect("each core has a branch");
         let vertex = scheduler.vertex(branch);
         let done = scheduler.hand_off(2, core, vertex, &mut ());

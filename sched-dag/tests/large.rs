@@ -2,8 +2,8 @@
 
 mod support;
 
-use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SchedulerOptions, SubtaskSpec, verify};
-use support::{PREEMPTIVE, run};
+use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SubtaskSpec, verify};
+use support::{PREEMPTIVE, cores, run};
 
 const LARGE: usize = 200_000;
 
@@ -31,11 +31,7 @@ fn a_long_chain_is_committed_and_run() {
 #[test]
 fn a_wide_fork_is_committed_and_run() {
     let fork = (1..LARGE - 1).flat_map(|branch| [(0, branch), (branch, LARGE - 1)]);
-    let options = SchedulerOptions {
-        cores: 64,
-        ..PREEMPTIVE
-    };
-    let (events, _) = run(&[large(fork.collect())], options, |_| 1);
+    let (events, _) = run(&[large(fork.collect())], cores(64), |_| 1);
     // 199,998 branches on 64 cores take 3125 rounds.
     assert_eq!(
         events.last().map(String::as_str),

@@ -5,9 +5,9 @@ mod support;
 use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
 use sched_dag::{
     Activation, CoreId, DagId, DagSpec, Instance, JobOutcome, Observer, OverrunPolicy, Policy,
-    Priority, Scheduler, SchedulerOptions, SubtaskSpec,
+    Priority, Scheduler, SubtaskSpec,
 };
-use support::{PREEMPTIVE, dag, instance, overrunning, scheduler};
+use support::{PREEMPTIVE, dag, instance, overrunning, scheduler, under};
 
 const DAG: DagId = DagId(0);
 
@@ -54,11 +54,7 @@ fn releases_go_on_as_long_as_there_is_an_instant_after_the_deadline() {
             jobs: None,
             ..dag(3, 2, 3, &[0, 0], &[(0, 1)])
         };
-        let options = SchedulerOptions {
-            policy,
-            ..PREEMPTIVE
-        };
-        let mut run = VirtualTime::new(scheduler(&[spec], options));
+        let mut run = VirtualTime::new(scheduler(&[spec], under(policy)));
         assert_eq!(run.run(&mut ExecutionTimes(|_| 1)), End::Finished);
         assert_eq!(run.now_ns(), u64::MAX - 3);
         let statistics = run.scheduler_of(DAG).statistics(DAG);
@@ -261,12 +257,8 @@ fn as_many_ready_subtasks_as_there_are_bits_in_words_start_in_order() {
                 subtasks: (0..count).map(subtask).collect(),
                 ..dag(1_000_000, 1_000_000, 1, &[0], &[])
             };
-            let options = SchedulerOptions {
-                policy,
-                ..PREEMPTIVE
-            };
             let mut started = Vec::new();
-            let mut run = VirtualTime::new(scheduler(&[spec], options));
+            let mut run = VirtualTime::new(scheduler(&[spec], under(policy)));
             let end = run.run(&mut ExecutionTimes(|instance: Instance| {
                 started.push(instance.subtask.0);
                 1

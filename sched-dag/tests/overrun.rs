@@ -4,8 +4,8 @@
 
 mod support;
 
-use sched_dag::{DagSpec, Instance, OverrunPolicy, SchedulerOptions};
-use support::{PREEMPTIVE, assert_events, dag, overrunning, run};
+use sched_dag::{DagSpec, Instance, OverrunPolicy};
+use support::{PREEMPTIVE, TWO_CORES, assert_events, cores, dag, overrunning, run};
 
 /// A chain of two subtasks.
 const CHAIN: &[(usize, usize)] = &[(0, 1)];
@@ -77,11 +77,7 @@ fn queue_releases_late_and_keeps_the_nominal_times() {
 
 #[test]
 fn queue_lets_the_given_number_of_jobs_overlap() {
-    let options = SchedulerOptions {
-        cores: 4,
-        ..PREEMPTIVE
-    };
-    let (events, _) = run(&chain(4, 2, OverrunPolicy::Queue), options, |instance| {
+    let (events, _) = run(&chain(4, 2, OverrunPolicy::Queue), cores(4), |instance| {
         [9, 18][instance.subtask.index()]
     });
     assert_events(
@@ -269,11 +265,7 @@ fn abort_lets_a_preempted_instance_end_at_its_key() {
 #[test]
 fn abort_with_several_in_flight_takes_the_oldest_first() {
     // Two in flight; the first subtask is quick, the second takes 35.
-    let options = SchedulerOptions {
-        cores: 2,
-        ..PREEMPTIVE
-    };
-    let (events, _) = run(&chain(5, 2, OverrunPolicy::Abort), options, |instance| {
+    let (events, _) = run(&chain(5, 2, OverrunPolicy::Abort), TWO_CORES, |instance| {
         [1, 35][instance.subtask.index()]
     });
     assert_events(

@@ -3,23 +3,9 @@
 mod support;
 
 use sched_dag::{DagStatistics, Policy, Preemption, SchedulerOptions};
-use support::{PREEMPTIVE, assert_events, dag, run, scheduler};
+use support::{PREEMPTIVE, assert_events, cores, dag, run, scheduler, under};
 
 const DIAMOND: &[(usize, usize)] = &[(0, 1), (0, 2), (1, 3), (2, 3)];
-
-fn cores(cores: u32) -> SchedulerOptions {
-    SchedulerOptions {
-        cores,
-        ..PREEMPTIVE
-    }
-}
-
-fn edf() -> SchedulerOptions {
-    SchedulerOptions {
-        policy: Policy::Edf,
-        ..PREEMPTIVE
-    }
-}
 
 fn non_preemptive() -> SchedulerOptions {
     SchedulerOptions {
@@ -189,7 +175,9 @@ fn r5_between_jobs_of_one_dag_with_one_deadline_the_older_one_goes_first() {
     // Job 0's subtask 1 and job 1's subtask 0 are due at 14.
     let mut spec = dag(10, 14, 2, &[0, 0], &[]);
     spec.subtasks[0].relative_deadline_ns = Some(4);
-    let (events, _) = run(&[spec], edf(), |instance| [1, 12][instance.subtask.index()]);
+    let (events, _) = run(&[spec], under(Policy::Edf), |instance| {
+        [1, 12][instance.subtask.index()]
+    });
     assert_events(
         &events,
         "0 start 0.0.0 on 0
@@ -250,7 +238,7 @@ fn r5_edf_orders_by_absolute_deadline() {
     let mut late = dag(100, 10, 1, &[0], &[]);
     late.offset_ns = 3;
     let specs = [late, dag(100, 12, 1, &[9], &[])];
-    let (events, _) = run(&specs, edf(), |_| 5);
+    let (events, _) = run(&specs, under(Policy::Edf), |_| 5);
     assert_events(
         &events,
         "0 start 1.0.0 on 0

@@ -13,7 +13,7 @@ use sched_dag::{
 };
 use support::random::Random;
 use support::written::Written;
-use support::{PREEMPTIVE, commit, dag, overrunning};
+use support::{PREEMPTIVE, TWO_CORES, commit, dag, overrunning, under};
 
 /// Executes every instance for its WCET or 1 ns.
 type Run = Written<Box<dyn Fn(Instance) -> u64>>;
@@ -138,15 +138,11 @@ fn s3_a_completion_may_signal_at_its_own_instant() {
 
 #[test]
 fn s3_the_deadline_counts_from_the_nominal_release() {
-    let edf = SchedulerOptions {
-        policy: Policy::Edf,
-        ..PREEMPTIVE
-    };
     let mut spec = dag(10, 3, 4, &[0], &[]);
     spec.subtasks[0].wcet_ns = Some(3);
     let mut long = dag(100, 100, 1, &[0], &[]);
     long.subtasks[0].wcet_ns = Some(50);
-    let (run, statistics) = run(&[long, sporadic(spec)], edf, &[1, 2], None);
+    let (run, statistics) = run(&[long, sporadic(spec)], under(Policy::Edf), &[1, 2], None);
     // Its deadlines are the earlier ones, so it preempts.
     assert_eq!(releases(&run, 1), [1, 11]);
     assert_eq!((statistics[1].completed, statistics[1].misses), (2, 0));
@@ -242,10 +238,7 @@ fn bounds_hold_for_random_signals() {
             specs.rotate_left(1);
         }
         let sporadic_at = usize::from(seed % 2 == 0) * 2;
-        let options = SchedulerOptions {
-            cores: 2,
-            ..PREEMPTIVE
-        };
+        let options = TWO_CORES;
         let task_set = commit(&specs, options);
         let mut at_ns = 0;
         let signals = (0..60).map(|_| {

@@ -3,11 +3,11 @@
 mod support;
 
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, LatestSpec, Policy, SchedulerOptions,
-    StateSpec, StateUser, SubtaskId, SubtaskSpec, TopicPort, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, LatestSpec, Policy, StateSpec, StateUser,
+    SubtaskId, SubtaskSpec, TopicPort, verify,
 };
 use support::random::Random;
-use support::{PREEMPTIVE, commit, dag, run};
+use support::{PREEMPTIVE, commit, cores, dag, run};
 
 fn state(name: &str, users: &[(usize, bool)]) -> StateSpec {
     let user = |&(subtask, updates)| StateUser { subtask, updates };
@@ -105,11 +105,7 @@ fn several_states_never_close_a_cycle() {
             ..dag(1000, 1000, 3, &vec![0; count], &edges)
         };
         let states = spec.states.clone();
-        let options = SchedulerOptions {
-            cores: 4,
-            ..PREEMPTIVE
-        };
-        let task_set = commit(std::slice::from_ref(&spec), options);
+        let task_set = commit(std::slice::from_ref(&spec), cores(4));
         let model = task_set.dag(DagId(0));
         assert_eq!(model.topological_order().len(), count, "seed {seed}");
         // Any two conflicting users are ordered by a path.
@@ -141,12 +137,8 @@ fn several_states_never_close_a_cycle() {
 fn users_take_turns_within_a_job_and_from_job_to_job() {
     let mut spec = with_state(&FORK, 5, &[(1, true), (2, false), (3, true)]);
     spec.relative_deadline_ns = Some(30);
-    let options = SchedulerOptions {
-        cores: 4,
-        ..PREEMPTIVE
-    };
     // 4 ns each: 1, 2 and 3 one after the other, and job 1 after job 0.
-    let (lines, statistics) = run(&[spec], options, |_| 4);
+    let (lines, statistics) = run(&[spec], cores(4), |_| 4);
     let starts: Vec<&str> = (lines.iter().map(String::as_str))
         .filter(|line| line.contains("start"))
         .collect();

@@ -8,8 +8,8 @@ use std::collections::VecDeque;
 
 use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
-use sched_dag::{DagId, DagSpec, Instance, JobOutcome, ModeId, Observer, SchedulerOptions};
-use support::{PREEMPTIVE, dag, scheduler};
+use sched_dag::{DagId, DagSpec, Instance, JobOutcome, ModeId, Observer};
+use support::{TWO_CORES, dag, scheduler};
 
 /// What is reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,11 +54,7 @@ impl Script {
 
     /// Runs all jobs of DAGs on two cores.
     fn run(&mut self, specs: &[DagSpec], lifecycle: Changes) {
-        let options = SchedulerOptions {
-            cores: 2,
-            ..PREEMPTIVE
-        };
-        let driver = VirtualTime::new(scheduler(specs, options));
+        let driver = VirtualTime::new(scheduler(specs, TWO_CORES));
         let mut driver = driver.with_lifecycle(Some(Box::new(lifecycle)));
         assert_eq!(driver.run(self), End::Finished);
         assert!(driver.is_finished());

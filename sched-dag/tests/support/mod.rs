@@ -11,9 +11,9 @@ use std::sync::Arc;
 
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, DagStatistics, Instance, JobOutcome,
-    Observer, OverrunPolicy, Policy, Preemption, Priority, Scheduler, SchedulerOptions, SubtaskId,
-    SubtaskSpec, TaskSet, verify,
+    CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, DagStatistics, Decision, Instance,
+    JobOutcome, Observer, OverrunPolicy, Policy, Preemption, Priority, Scheduler, SchedulerOptions,
+    SubtaskId, SubtaskSpec, TaskSet, verify,
 };
 
 /// Options for static priority with preemption.
@@ -22,6 +22,24 @@ pub(crate) const PREEMPTIVE: SchedulerOptions = SchedulerOptions {
     preemption: Preemption::Enabled,
     cores: 1,
 };
+
+pub(crate) const TWO_CORES: SchedulerOptions = cores(2);
+
+/// Likewise, on so many cores.
+pub(crate) const fn cores(cores: u32) -> SchedulerOptions {
+    SchedulerOptions {
+        cores,
+        ..PREEMPTIVE
+    }
+}
+
+/// Likewise, on one core by another policy.
+pub(crate) const fn under(policy: Policy) -> SchedulerOptions {
+    SchedulerOptions {
+        policy,
+        ..PREEMPTIVE
+    }
+}
 
 /// Returns a DAG with period, deadline, jobs, priorities of its subtasks, and edges.
 pub(crate) fn dag(
@@ -69,6 +87,26 @@ pub(crate) fn commit(specs: &[DagSpec], options: SchedulerOptions) -> Arc<TaskSe
 /// Makes a scheduler for DAGs of any shape.
 pub(crate) fn scheduler(specs: &[DagSpec], options: SchedulerOptions) -> Scheduler {
     Scheduler::new(commit(specs, options), options)
+}
+
+/// Completes instances at one instant, and returns the decisions.
+pub(crate) fn step(
+    scheduler: &mut Scheduler,
+    now_ns: u64,
+    completed: &[Instance],
+) -> Vec<Decision> {
+    let mut moment = scheduler.at(now_ns);
+    for &instance in completed {
+        moment.complete(instance, &mut ());
+    }
+    moment.release_due(&mut ()).dispatch().to_vec()
+}
+
+pub(crate) fn start(core: u32, instance: Instance) -> Decision {
+    Decision::Start {
+        core: CoreId(core),
+        instance,
+    }
 }
 
 pub(crate) fn instance(dag: u32, job: u64, subtask: u32) -> Instance {
