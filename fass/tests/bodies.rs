@@ -2,20 +2,12 @@
 
 mod support;
 
-use core::time::Duration;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 
-use fass::{Dag, Plan, SubtaskAttributes, Unique, create_dag};
-use support::{commit, run_job};
-
-const PERIOD: Duration = Duration::from_millis(10);
-
-fn named(name: &str) -> SubtaskAttributes {
-    SubtaskAttributes::named(name)
-}
+use fass::{Dag, Plan, Unique, create_dag};
+use support::{PERIOD, commit, named, panic_message, run_job};
 
 /// A source that counts, a middle that doubles, a sink that sends what it sees.
 fn chain(in_flight: u32) -> (Dag, mpsc::Receiver<(u64, u64)>) {
@@ -41,13 +33,6 @@ fn chain(in_flight: u32) -> (Dag, mpsc::Receiver<(u64, u64)>) {
         named("sink"),
     );
     (dag, sees)
-}
-
-fn panic_message(action: impl FnOnce()) -> String {
-    let payload = catch_unwind(AssertUnwindSafe(action)).expect_err("it panics");
-    let text = payload.downcast_ref::<String>().cloned();
-    text.or_else(|| payload.downcast_ref::<&str>().map(ToString::to_string))
-        .expect("a message")
 }
 
 #[test]

@@ -6,28 +6,14 @@
 mod random;
 mod support;
 
-use core::time::Duration;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use fass::{Body, Dag, SubtaskAttributes, create_dag};
+use fass::{Body, Dag, create_dag};
 use random::Random;
-use support::commit;
-
-const PERIOD: Duration = Duration::from_millis(10);
-
-fn named(name: &str) -> SubtaskAttributes {
-    SubtaskAttributes::named(name)
-}
-
-fn panic_message(action: impl FnOnce()) -> String {
-    let payload = catch_unwind(AssertUnwindSafe(action)).expect_err("it panics");
-    let text = payload.downcast_ref::<String>().cloned();
-    text.or_else(|| payload.downcast_ref::<&str>().map(ToString::to_string))
-        .expect("a message")
-}
+use support::{PERIOD, commit, named, panic_message};
 
 /// A value that knows its job and is counted while it lives.
 struct Counted {

@@ -5,31 +5,17 @@
 mod support;
 
 use core::time::Duration;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Instant;
 
-use fass::{Plan, Raiser, Request, Sample, SubtaskAttributes, create_dag};
+use fass::{Plan, Raiser, Request, Sample, create_dag};
 use sched_dag::DagId;
-use support::commit;
-
-const PERIOD: Duration = Duration::from_millis(10);
+use support::{PERIOD, commit, named, panic_message};
 
 /// How long a test waits for what has to come, on however busy a host.
 const PATIENCE: Duration = Duration::from_secs(300);
-
-fn named(name: &str) -> SubtaskAttributes {
-    SubtaskAttributes::named(name)
-}
-
-fn panic_message(action: impl FnOnce()) -> String {
-    let payload = catch_unwind(AssertUnwindSafe(action)).expect_err("it panics");
-    let text = payload.downcast_ref::<String>().cloned();
-    text.or_else(|| payload.downcast_ref::<&str>().map(ToString::to_string))
-        .expect("a message")
-}
 
 /// Where a subtask and the test wait for each other; to wait in vain is a panic.
 #[derive(Default)]

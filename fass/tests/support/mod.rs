@@ -1,10 +1,15 @@
 //! A platform that keeps each thread's plan for the test to drive by hand.
 
+#![allow(dead_code, reason = "not every test program uses every helper")]
+
 use core::time::Duration;
 use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
 
-use fass::{Dag, LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+use fass::{Dag, LaunchError, Occupation, Plan, Platform, Policy, Preemption, SubtaskAttributes};
+
+pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 
 thread_local! {
     static PLAN: RefCell<Option<Plan>> = const { RefCell::new(None) };
@@ -43,8 +48,19 @@ pub(crate) fn install() {
     assert!(IS_OURS.get_or_init(|| fass::install(&Keeper).is_ok()));
 }
 
+pub(crate) fn named(name: &str) -> SubtaskAttributes {
+    SubtaskAttributes::named(name)
+}
+
+/// Returns what an action says that must panic.
+pub(crate) fn panic_message(action: impl FnOnce()) -> String {
+    let payload = catch_unwind(AssertUnwindSafe(action)).expect_err("it panics");
+    let text = payload.downcast_ref::<String>().cloned();
+    text.or_else(|| payload.downcast_ref::<&str>().map(ToString::to_string))
+        .expect("a message")
+}
+
 /// Commits DAGs that must be faultless, and returns their plan.
-#[allow(dead_code, reason = "not every test program uses every helper")]
 pub(crate) fn commit(dags: &[Dag]) -> Plan {
     install();
     if let Err(error) = fass::finish_create_dags(dags) {
@@ -59,7 +75,6 @@ pub(crate) fn take() -> Plan {
 }
 
 /// Runs job `job` of DAG 0, predecessors first.
-#[allow(dead_code, reason = "not every test program uses every helper")]
 pub(crate) fn run_job(plan: &mut Plan, job: u64) {
     let Plan {
         task_set, bodies, ..
