@@ -11,11 +11,13 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{
-    ConstructionPolicy, Dag, Occupation, OverrunPolicy, Raiser, Sample, Signal, SubtaskAttributes,
-    create_dag, execute_for, finish_create_dags, finish_create_dags_with,
+    ConstructionPolicy, Dag, OverrunPolicy, Raiser, Sample, Signal, SubtaskAttributes, create_dag,
+    finish_create_dags, finish_create_dags_with,
 };
 use kernel::{Ending, Machine, Run, json};
 use sched_dag::DagId;
+
+use crate::times::hold;
 
 const JOBS: u64 = 40;
 
@@ -79,10 +81,6 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let run = machine.run()?;
     report(&run, seen.load(Ordering::Relaxed));
     Ok(())
-}
-
-fn hold(us: u64) {
-    execute_for(Duration::from_micros(us), Occupation::Hold);
 }
 
 fn priority(priority: u32) -> SubtaskAttributes {

@@ -5,12 +5,12 @@
 //! long. `ends` shuts the run down in job 10, at 200 ms. None of them has a last job.
 
 use alloc::vec;
-use core::time::Duration;
 
-use fass::{Dag, Occupation, Shutdown, SubtaskAttributes, Switch};
-use fass::{create_dag, execute_for, finish_create_dags, shutting_down};
+use fass::{Dag, Shutdown, Switch, create_dag, finish_create_dags, shutting_down};
 use kernel::{Ending, Machine, json};
 use sched_dag::DagId;
+
+use crate::times::{hold, ms, taking};
 
 /// Runs them, and prints what became of their jobs.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
@@ -47,18 +47,6 @@ fn report(machine: &Machine, place: impl FnOnce(&[Dag; 3])) -> Result<(), Ending
             .number("allocations", run.allocations());
     });
     Ok(())
-}
-
-fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
-}
-
-fn hold(us: u64) {
-    execute_for(Duration::from_micros(us), Occupation::Hold);
-}
-
-fn taking(name: &str, us: u64) -> SubtaskAttributes {
-    SubtaskAttributes::named(name).wcet(Duration::from_micros(us))
 }
 
 fn ticks() -> Dag {

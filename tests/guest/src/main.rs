@@ -28,6 +28,7 @@ mod sharing;
 mod stacks;
 mod stalled;
 mod storm;
+mod times;
 mod tuned;
 mod unnoticed;
 #[allow(unsafe_code, reason = "registers that the compiler would spill")]

@@ -5,11 +5,11 @@
 //! turns of three jobs. At last it shuts the run down.
 
 use alloc::vec;
-use core::time::Duration;
 
-use fass::{Dag, Entrance, Modes, Occupation, Shutdown, SubtaskAttributes, create_dag};
-use fass::{execute_for, finish_create_dags, shutting_down};
+use fass::{Dag, Entrance, Modes, Shutdown, create_dag, finish_create_dags, shutting_down};
 use kernel::{Ending, Machine, json};
+
+use crate::times::{hold, ms, taking};
 
 /// What the pilot changes.
 type Uses<'a> = (Entrance<'a>, Entrance<'a>, Shutdown<'a>);
@@ -61,18 +61,6 @@ fn report(machine: &Machine, place: impl FnOnce(&[Dag; 3])) -> Result<(), Ending
             .number("allocations", run.allocations());
     });
     Ok(())
-}
-
-fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
-}
-
-fn hold(us: u64) {
-    execute_for(Duration::from_micros(us), Occupation::Hold);
-}
-
-fn taking(name: &str, us: u64) -> SubtaskAttributes {
-    SubtaskAttributes::named(name).wcet(Duration::from_micros(us))
 }
 
 /// A fork-join that keeps its cores busy for most of the time.

@@ -13,12 +13,11 @@ use alloc::vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{
-    Dag, Latest, Occupation, Raiser, Sample, Signal, SubtaskAttributes, create_dag, execute_for,
-    finish_create_dags,
-};
+use fass::{Dag, Latest, Raiser, Sample, Signal, create_dag, finish_create_dags};
 use kernel::{Ending, Machine, json};
 use sched_dag::DagId;
+
+use crate::times::{hold, ms, taking};
 
 const ANSWERS_APART: Duration = Duration::from_millis(20);
 
@@ -83,18 +82,6 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
             .number("answers_to_bytes", of_input.unwrap_or(0));
     });
     Ok(())
-}
-
-fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
-}
-
-fn taking(name: &str, us: u64) -> SubtaskAttributes {
-    SubtaskAttributes::named(name).wcet(Duration::from_micros(us))
-}
-
-fn hold(us: u64) {
-    execute_for(Duration::from_micros(us), Occupation::Hold);
 }
 
 /// source -> (first, second) -> join, where `second` sees what `first` has counted.
