@@ -4,11 +4,11 @@
 //! carry is kept here, as it was stated.
 
 use alloc::boxed::Box;
-use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::ids::{SubtaskId, to_u32};
+use crate::order::sorted;
 use crate::spec::DagSpec;
 
 /// A named, typed bundle of edges from one subtask to others of its DAG.
@@ -29,23 +29,26 @@ pub struct Topic {
 /// Collects the topics of a DAG without fault, in the order of their writers and,
 /// within a writer, of its outputs.
 pub(crate) fn topics_of(spec: &DagSpec) -> Box<[Topic]> {
-    let mut readers: BTreeMap<&str, Vec<SubtaskId>> = BTreeMap::new();
-    for (subtask, reader) in spec.subtasks.iter().enumerate() {
-        for port in &reader.inputs {
-            let of_topic = readers.entry(&port.topic).or_default();
-            of_topic.push(SubtaskId(to_u32(subtask)));
-        }
-    }
+    let subtasks = spec.subtasks.iter().enumerate();
+    let inputs = subtasks.flat_map(|(subtask, reader)| {
+        let ports = reader.inputs.iter();
+        ports.map(move |port| (&*port.topic, SubtaskId(to_u32(subtask))))
+    });
+    // By topic, then by reader.
+    let inputs = sorted(&inputs.collect::<Vec<_>>());
     let is_sampled = |name: &str| spec.latest.iter().any(|latest| latest.port.topic == name);
     let mut topics = Vec::new();
     for (writer, of) in spec.subtasks.iter().enumerate() {
         for port in &of.outputs {
-            let readers = readers.remove(port.topic.as_str()).unwrap_or_default();
+            let first = inputs.partition_point(|&(topic, _)| topic < &*port.topic);
+            let of_topic = inputs[first..]
+                .iter()
+                .take_while(|&&(topic, _)| topic == port.topic);
             topics.push(Topic {
                 name: port.topic.clone(),
                 type_name: port.type_name,
                 writer: SubtaskId(to_u32(writer)),
-                readers: readers.into_boxed_slice(),
+                readers: of_topic.map(|&(_, reader)| reader).collect(),
                 is_sampled: is_sampled(&port.topic),
             });
         }

@@ -150,7 +150,10 @@ impl<T: StateValue> State<T> {
         let dag = Dag {
             draft: Rc::clone(&self.draft),
         };
-        dag.open().resets.insert(self.position, Box::new(provide));
+        let mut draft = dag.open();
+        draft.resets.retain(|(state, _)| *state != self.position);
+        draft.resets.push((self.position, Box::new(provide)));
+        drop(draft);
         self
     }
 

@@ -24,13 +24,13 @@ mod replaceable;
 mod staleness;
 mod tie;
 
-use alloc::collections::BTreeSet;
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
-use sched_dag::{Policy, TaskSet, Verified, Warning, wcets};
+use sched_dag::{Policy, TaskSet, Verified, Warning, sorted_by_key, wcets};
 
 use crate::api::dag::Dag;
 use crate::platform;
@@ -309,6 +309,16 @@ fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
     lacking.collect()
 }
 
+/// Reports for each DAG whether it stands in the list before, too.
+fn repeated(dags: &[Dag]) -> Vec<bool> {
+    let address = |number: usize| Rc::as_ptr(&dags[number].draft);
+    let mut is_repeated = vec![false; dags.len()];
+    for pair in sorted_by_key(dags.len(), address).windows(2) {
+        is_repeated[pair[1]] = address(pair[0]) == address(pair[1]);
+    }
+    is_repeated
+}
+
 /// Verifies all DAGs, and collects the faults of both crates.
 fn verify(
     dags: &[Dag],
@@ -317,14 +327,14 @@ fn verify(
 ) -> Result<Verified, CommitError> {
     let mut faults = Vec::new();
     let mut specs = Vec::with_capacity(dags.len());
-    let mut drafts = BTreeSet::new();
+    let is_repeated = repeated(dags);
     for (number, dag) in dags.iter().enumerate() {
         let draft = dag.draft.borrow();
         let label = DagLabel {
             id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
             name: draft.spec.name.clone(),
         };
-        if !drafts.insert(Rc::as_ptr(&dag.draft)) {
+        if is_repeated[number] {
             faults.push(Fault::GivenTwice { dag: label });
             continue;
         }

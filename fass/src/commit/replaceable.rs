@@ -23,7 +23,7 @@ pub(super) fn check(draft: &Draft, label: &DagLabel) -> Vec<Fault> {
     for (position, state) in draft.spec.states.iter().enumerate() {
         let mut users = state.users.iter().map(|user| user.subtask);
         if let Some(subtask) = users.find(|user| draft.replaceable.contains(user))
-            && !draft.resets.contains_key(&position)
+            && draft.resets.iter().all(|(state, _)| *state != position)
         {
             faults.push(Fault::StateWithoutReset {
                 dag: label.clone(),

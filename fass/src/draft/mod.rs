@@ -12,7 +12,6 @@ pub(crate) mod flaw;
 pub(crate) mod modes;
 
 use alloc::boxed::Box;
-use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -81,7 +80,7 @@ pub(crate) struct Draft {
     /// The subtasks whose functions can be replaced.
     pub(crate) replaceable: Vec<usize>,
     /// What provides so many values of a state for after faults.
-    pub(crate) resets: BTreeMap<usize, Box<dyn FnOnce(u32)>>,
+    pub(crate) resets: Vec<(usize, Box<dyn FnOnce(u32)>)>,
     /// Which DAG it is, for others that send it signals, or pause it.
     pub(crate) target: Option<Arc<Target>>,
     /// The signal that is raised when a fault ends the DAG.

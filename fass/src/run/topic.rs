@@ -12,13 +12,12 @@
 //! in [`Wiring`] relies on it.
 
 use alloc::boxed::Box;
-use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::Any;
 
-use sched_dag::DagSpec;
+use sched_dag::{DagSpec, sorted_by_key};
 
 use super::cell::{Reader, Writer, ring};
 use super::latest::{AnyLatest, Stage};
@@ -177,8 +176,8 @@ pub(crate) struct Wiring {
     in_flight: usize,
     /// For each edge the end that was made but not yet asked for.
     ends: Vec<Option<Box<dyn Any>>>,
-    /// For each topic its edges, in the order of the reading ports.
-    edges_of_topic: BTreeMap<String, Vec<usize>>,
+    /// The edges with their topics, by topic and in the order of the reading ports.
+    edges_by_topic: Vec<(String, usize)>,
     /// For each subtask the edges of its input ports.
     edges_of_inputs: Vec<Vec<usize>>,
     /// For each subtask the topics of its output ports.
@@ -205,18 +204,15 @@ impl Wiring {
         in_flight: usize,
         faults: u32,
     ) -> Self {
-        let mut edges_of_topic = BTreeMap::<String, Vec<usize>>::new();
-        let mut edges = 0;
+        let mut topics = Vec::new();
         let mut edges_of_inputs = Vec::with_capacity(spec.subtasks.len());
         for subtask in &spec.subtasks {
-            let first = edges;
-            for port in &subtask.inputs {
-                let readers = edges_of_topic.entry(port.topic.clone()).or_default();
-                readers.push(edges);
-                edges += 1;
-            }
-            edges_of_inputs.push((first..edges).collect());
+            let first = topics.len();
+            topics.extend(subtask.inputs.iter().map(|port| &port.topic));
+            edges_of_inputs.push((first..topics.len()).collect());
         }
+        let by_topic = sorted_by_key(topics.len(), |edge| topics[edge]).into_iter();
+        let edges_by_topic = by_topic.map(|edge| (topics[edge].clone(), edge)).collect();
         let outputs = spec
             .subtasks
             .iter()
@@ -225,15 +221,15 @@ impl Wiring {
             .collect();
         let none = || alloc::vec![Vec::new(); spec.subtasks.len()];
         let (mut tokens_to, mut tokens_from) = (none(), none());
-        for (edge, &(earlier, later)) in (edges..).zip(&spec.edges) {
+        for (edge, &(earlier, later)) in (topics.len()..).zip(&spec.edges) {
             tokens_to[later].push(edge);
             tokens_from[earlier].push(edge);
         }
-        edges += spec.edges.len();
+        let edges = topics.len() + spec.edges.len();
         Self {
             in_flight,
             ends: (0..edges).map(|_| None).collect(),
-            edges_of_topic,
+            edges_by_topic,
             edges_of_inputs,
             outputs,
             tokens_to,
@@ -335,8 +331,10 @@ impl Ports<'_> {
     pub(crate) fn publisher<T: Message>(&mut self) -> Publisher<T> {
         let topic = &self.wiring.outputs[self.subtask][self.next].clone();
         self.next += 1;
-        let edges = self.wiring.edges_of_topic.get(topic).cloned();
-        let edges = edges.unwrap_or_default();
+        let all = &self.wiring.edges_by_topic;
+        let first = all.partition_point(|(other, _)| other < topic);
+        let of_topic = all[first..].iter().take_while(|(other, _)| other == topic);
+        let edges: Vec<usize> = of_topic.map(|(_, edge)| *edge).collect();
         let writers = edges.iter().map(|&e| self.wiring.writer(e)).collect();
         self.wiring.publisher(topic, writers)
     }

@@ -157,7 +157,7 @@ pub trait VecToSubs: Sized + Send + 'static {
     ///
     /// ```
     /// use fass::VecToSubs;
-    /// assert_eq!(<(u8,)>::input_types()[0].name(), "u8");
+    /// assert_eq!(<(u8, i32)>::input_types().len(), 2);
     /// ```
     fn input_types() -> Vec<MessageType>;
 
@@ -212,7 +212,7 @@ pub trait VecToPubs: Sized + Send + 'static {
     ///
     /// ```
     /// use fass::VecToPubs;
-    /// assert_eq!(<(u8,)>::output_types()[0].name(), "u8");
+    /// assert_eq!(<(u8, i32)>::output_types().len(), 2);
     /// ```
     fn output_types() -> Vec<MessageType>;
 

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use sched_dag::law::Histogram;
+use sched_dag::sorted_by_key;
 
 use executive::text::json::Object;
 
@@ -38,12 +39,12 @@ impl Distribution {
         Self::of(samples_ns.into_iter().collect())
     }
 
-    /// Orders them. Apart, so that an image has one sort and not one for each use.
-    #[inline(never)]
-    fn of(mut samples_ns: Vec<u64>) -> Self {
-        samples_ns.sort_unstable();
+    /// Orders them, by the sort that an image has.
+    fn of(samples_ns: Vec<u64>) -> Self {
+        let order = sorted_by_key(samples_ns.len(), |sample| samples_ns[sample]);
+        let samples_ns = order.into_iter().map(|sample| samples_ns[sample]);
         Self {
-            samples: Samples::Sorted(samples_ns),
+            samples: Samples::Sorted(samples_ns.collect()),
         }
     }
 

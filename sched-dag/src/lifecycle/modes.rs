@@ -29,6 +29,7 @@ use alloc::vec::Vec;
 
 use super::{Change, Entry};
 use crate::ids::{DagId, ModeId};
+use crate::order::sorted;
 
 /// The modes of a run.
 #[derive(Clone, Debug, Default)]
@@ -48,8 +49,7 @@ struct Mode {
 
 impl Modes {
     pub(super) fn new(modes: Vec<Vec<DagId>>) -> Self {
-        let mut all = modes.concat();
-        all.sort_unstable();
+        let mut all = sorted(&modes.concat());
         all.dedup();
         let of_dags = |joining: Vec<DagId>| Mode {
             leaving: (all.iter().copied())

@@ -35,7 +35,7 @@ impl Replay<'_> {
         let model = self.task_set.dag(dag);
         let due = |sink: &SubtaskId| Due {
             deadline_ns: release_ns.saturating_add(model.subtask(*sink).relative_deadline_ns()),
-            finish_ns: (known.lives.get(sink))
+            finish_ns: (known.life(*sink))
                 .and_then(|life| life.finish)
                 .map(|finish| finish.time_ns),
         };

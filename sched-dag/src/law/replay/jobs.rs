@@ -10,12 +10,13 @@
 //! was aborted, or cut short by its DAG's end. Whether it is late is the affair of
 //! `deadlines`.
 
-use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
 use super::lives::Life;
 use super::{Moment, OfDag, Replay};
 use crate::ids::{DagId, Instance, SubtaskId};
 use crate::journal::{Event, What};
+use crate::law::sweep::Stage;
 use crate::law::{Violation, latest};
 
 /// What is known of a job.
@@ -32,7 +33,8 @@ pub(super) struct Job {
     pub(super) cut: Option<Moment>,
     pub(super) missed: Option<Moment>,
     pub(super) completed: Option<Moment>,
-    pub(super) lives: BTreeMap<SubtaskId, Life>,
+    /// By subtask, as far as there is one.
+    lives: Vec<Option<Life>>,
 }
 
 impl Job {
@@ -42,6 +44,19 @@ impl Job {
             is_partial: true,
             ..Self::default()
         }
+    }
+
+    /// Returns what is known of an instance.
+    pub(super) fn life(&self, subtask: SubtaskId) -> Option<&Life> {
+        self.lives.get(subtask.index())?.as_ref()
+    }
+
+    /// Returns what is known of an instance, whose life begins at a stage if nothing is.
+    pub(super) fn life_from(&mut self, subtask: SubtaskId, first: Stage) -> &mut Life {
+        if self.lives.len() <= subtask.index() {
+            self.lives.resize_with(subtask.index() + 1, || None);
+        }
+        self.lives[subtask.index()].get_or_insert_with(|| Life::new(first))
     }
 
     /// Takes note of an event; that it happens twice is a breach.
@@ -253,7 +268,7 @@ impl Replay<'_> {
         let is_same_step = |moment: Moment| moment.is_same_step(completed);
         let mut has_cause = known.cut.is_some_and(is_same_step);
         for subtask in (0..self.subtasks(dag)).map(SubtaskId) {
-            let life = known.lives.get(&subtask);
+            let life = known.life(subtask);
             match life.and_then(Life::over) {
                 Some(over) if over.time_ns <= completed.time_ns => {
                     if over.time_ns >= last_ns {
@@ -297,7 +312,7 @@ impl Replay<'_> {
             return None;
         }
         let over_ns = |subtask| {
-            let life = known.lives.get(&SubtaskId(subtask))?;
+            let life = known.life(SubtaskId(subtask))?;
             Some(life.over()?.time_ns)
         };
         let over_ns = latest((0..self.subtasks(dag)).map(over_ns))

@@ -71,7 +71,7 @@ impl Replay<'_> {
         let known = of_dag.jobs.get(&job);
         let is_partial = known.is_none_or(|known| known.is_partial);
         let of_predecessors = predecessors.iter().map(move |&subtask| {
-            let life = known.and_then(|known| known.lives.get(&subtask));
+            let life = known.and_then(|known| known.life(subtask));
             Condition {
                 awaited: Some(Instance { dag, job, subtask }),
                 held: life.and_then(|life| life.finish),
@@ -80,7 +80,7 @@ impl Replay<'_> {
         });
         let precursor = of_dag.jobs.range(..job).next_back();
         let of_precursor = precursor.map(|(&job, known)| {
-            let life = known.lives.get(&subtask);
+            let life = known.life(subtask);
             Condition {
                 awaited: Some(Instance { dag, job, subtask }),
                 held: life.and_then(super::lives::Life::over),
@@ -149,7 +149,7 @@ impl Replay<'_> {
         let of_dag = &self.dags[instance.dag.index()];
         let job = of_dag.jobs.get(&instance.job)?;
         let is_cut = job.cut.is_some() || of_dag.is_stopped;
-        if is_cut || job.lives.contains_key(&instance.subtask) {
+        if is_cut || job.life(instance.subtask).is_some() {
             return None;
         }
         let held = self.last_condition(instance)?.held?;

@@ -29,7 +29,7 @@ pub(super) struct Life {
 }
 
 impl Life {
-    const fn new(stage: Stage) -> Self {
+    pub(super) const fn new(stage: Stage) -> Self {
         Self {
             stage,
             last: None,
@@ -129,10 +129,7 @@ impl Replay<'_> {
             job.cut.get_or_insert(moment);
         }
         let is_uncut = job.cut.is_none() && !is_stopped && !job.is_partial;
-        let lives = &mut job.lives;
-        let life = lives
-            .entry(instance.subtask)
-            .or_insert_with(|| Life::new(first));
+        let life = job.life_from(instance.subtask, first);
         let ready_ns = life.ready.map(|ready| ready.time_ns);
         let out_of_turn = life.note(event, moment);
         self.found.extend(out_of_turn);
