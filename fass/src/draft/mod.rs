@@ -39,6 +39,9 @@ use flaw::Flaw;
 /// Makes of all drafts of a commit what serves their requests.
 pub(crate) type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
 
+/// Provides so many values of a state for after faults.
+pub(crate) type Reset = Box<dyn FnOnce(u32)>;
+
 /// A DAG as registered so far.
 #[derive(Default)]
 pub(crate) struct Draft {
@@ -79,8 +82,8 @@ pub(crate) struct Draft {
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// The subtasks whose functions can be replaced.
     pub(crate) replaceable: Vec<usize>,
-    /// What provides so many values of a state for after faults.
-    pub(crate) resets: Vec<(usize, Box<dyn FnOnce(u32)>)>,
+    /// The states that are made anew after faults, and by what.
+    pub(crate) resets: Vec<(usize, Reset)>,
     /// Which DAG it is, for others that send it signals, or pause it.
     pub(crate) target: Option<Arc<Target>>,
     /// The signal that is raised when a fault ends the DAG.
