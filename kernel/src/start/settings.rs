@@ -35,6 +35,13 @@ use executive::run::platform::KERNEL;
 use executive::run::{edge, stacks, worker};
 use executive::text::graph;
 
+/// The values of `times`: whether statistics are printed, and whether bounds are judged.
+const TIMES: [(&str, (bool, bool)); 3] = [
+    ("keep", (false, true)),
+    ("dump", (true, true)),
+    ("observe", (true, false)),
+];
+
 /// What the words say about tracing and the background; all else is set where it
 /// belongs.
 #[derive(Clone, Copy, Debug)]
@@ -134,6 +141,7 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
             "`record` and `replay` exclude each other; give one",
         ));
     }
+    let (dumps_times, judges_bounds) = options.choice("times", &TIMES)?;
     Ok(Settings {
         events,
         replay_bytes: usize::try_from(replay_bytes).unwrap_or(0),
@@ -141,12 +149,12 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
         latest_jobs: u32::try_from(latest_jobs).unwrap_or(0),
         wcet_bytes: usize::try_from(wcet_bytes).unwrap_or(0),
         dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
-        dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,
+        dumps_times,
         wishes: Wishes {
             input: None,
             console: options.choice("console", &consoles)?,
             status_ns: status_s * 1_000_000_000,
         },
-        judges_bounds: options.text("mode") != Some("threads"),
+        judges_bounds: judges_bounds && options.text("mode") != Some("threads"),
     })
 }

@@ -38,6 +38,24 @@ fn prove(words: &[&str], place: &Path) -> Output {
 const CHAIN: &str =
     "dag chain period 20ms\nsubtask a wcet 1ms\nsubtask b wcet 2ms\nedge a -> b\nend\n";
 
+/// Twenty DAGs released together take longer than the overheads that the app knows by itself.
+#[test]
+fn the_run_that_observes_judges_no_bound() {
+    let folder = Folder::new("observed");
+    let file = folder.0.join("twenty.dag");
+    let dag = |number| format!("dag x{number} period 100ms\nsubtask a wcet 100us\n");
+    let dags: String = (0..20).map(dag).collect();
+    fs::write(&file, dags + "end\n").expect("there is room");
+    let output = prove(&["--cores", "2", "--mode", "deterministic"], &file);
+    let said = String::from_utf8_lossy(&output.stdout);
+    let complaints = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}{complaints}");
+    let proofs = said
+        .lines()
+        .filter(|line| line.contains("\"kind\":\"proof\""));
+    assert_eq!(proofs.count(), 20, "{said}");
+}
+
 #[test]
 fn overheads_that_are_stated_are_charged_and_none_are_measured() {
     let folder = Folder::new("stated");

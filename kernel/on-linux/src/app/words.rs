@@ -79,7 +79,10 @@ pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending
         terms,
         module: None,
         dumps_trace: options.choice("trace", &[("keep", false), ("dump", true)])?,
-        dumps_times: options.choice("times", &[("keep", false), ("dump", true)])?,
+        dumps_times: options.choice(
+            "times",
+            &[("keep", false), ("dump", true), ("observe", true)],
+        )?,
     };
     let mut module = options.text("module").map(read).transpose()?;
     let mut wcets = None;

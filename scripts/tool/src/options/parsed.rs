@@ -103,6 +103,14 @@ impl Parsed {
         other
     }
 
+    /// Returns the same as if a flag had not been given.
+    #[must_use]
+    pub fn without(&self, name: &str) -> Parsed {
+        let mut other = self.clone();
+        other.given.retain(|given| *given != name);
+        other
+    }
+
     /// Returns the first positional word, if one was given.
     #[must_use]
     pub fn positional(&self) -> Option<&str> {
