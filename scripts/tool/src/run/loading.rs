@@ -64,7 +64,8 @@ pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result
     };
     // A replay has a table of its values besides.
     let module_mib = (bytes("module") + 3 * bytes("replay")).div_ceil(1 << 20);
-    let mut least = loader.least_memory_mib().max((cores * 5).div_ceil(8)) + module_mib;
+    // Each processor has stacks and tables; a quarter of the memory is for them, the rest is heap.
+    let mut least = loader.least_memory_mib().max(8 + cores) + module_mib;
     if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
         least = least.max(dags.memory_mib);
     }
