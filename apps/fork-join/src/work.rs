@@ -55,11 +55,12 @@ fn sort(random: &mut u64) -> u64 {
     let mut numbers: [u32; NUMBERS] = core::array::from_fn(|_| next(random));
     // By insertion: the library's sort would take 3 KB of the image.
     for end in 1..black_box(&mut numbers).len() {
-        for place in (1..=end).rev() {
-            if numbers[place - 1] > numbers[place] {
-                numbers.swap(place - 1, place);
-            }
+        let (number, mut place) = (numbers[end], end);
+        while place > 0 && numbers[place - 1] > number {
+            numbers[place] = numbers[place - 1];
+            place -= 1;
         }
+        numbers[place] = number;
     }
     numbers.iter().fold(0, |mix: u64, number| {
         mix.rotate_left(7).wrapping_add(u64::from(*number))
