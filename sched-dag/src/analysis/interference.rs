@@ -9,6 +9,7 @@
 use alloc::vec::Vec;
 
 use super::cover::covers_and_parts;
+use super::non_preemptive::{Blocking, largest};
 use super::task::Task;
 use super::width::parallelism;
 use super::workload::{Piece, Workload};
@@ -33,6 +34,9 @@ pub(super) struct Shape {
     pub(super) covers: Vec<u64>,
     /// The work of some disjoint chains.
     chains: Vec<u64>,
+    /// What of it may block others, where subtasks keep their cores.
+    pub(super) largest_ns: Vec<u64>,
+    pub(super) unblocked: Blocking,
 }
 
 impl Shape {
@@ -44,8 +48,17 @@ impl Shape {
             parallelism,
             covers,
             chains,
+            largest_ns: largest(task.wcets_ns(), cores),
+            unblocked: Blocking::none(task),
         }
     }
+}
+
+/// What may delay a DAG's work that is due at some time, for as long as it waits.
+pub(super) struct Delays {
+    /// The workloads of DAGs that may outrank it.
+    pub(super) others: Vec<Other>,
+    pub(super) blocking: Blocking,
 }
 
 /// Adds what DAGs may execute on `m - j` cores, as [`Other::add_to`] does.

@@ -25,8 +25,7 @@
 use alloc::vec;
 
 use super::cover::covers;
-use super::interference::{Clip, Other, add_to};
-use super::non_preemptive::Blocking;
+use super::interference::{Clip, Delays, add_to};
 use super::pipelined::Unsolved;
 use super::task::Task;
 use super::workload::Piece;
@@ -52,7 +51,6 @@ pub(super) struct Equations<'a> {
     pub(super) task: &'a Task,
     pub(super) covers: &'a [u64],
     pub(super) cores: usize,
-    pub(super) blocking: &'a Blocking,
     pub(super) clip: Clip,
     /// The longest response time that is of use, at most a period.
     pub(super) limit_ns: u64,
@@ -71,7 +69,7 @@ impl Equations<'_> {
     /// Returns the least response time that some form proves, if it is at least `start_ns`.
     pub(super) fn solve(
         &self,
-        others: &[Other],
+        delays: &Delays,
         start_ns: u64,
         steps: &mut u64,
     ) -> Result<u64, Unsolved> {
@@ -80,7 +78,7 @@ impl Equations<'_> {
         let mut window = start_ns.max(start.unwrap_or(0)).max(length);
         while window <= self.limit_ns {
             *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
-            let lacks = self.forms(others, window).map(|form| {
+            let lacks = self.forms(delays, window).map(|form| {
                 let lack = form.busy.lacks(form.cores, u128::from(window - length));
                 lack.unwrap_or(0)
             });
@@ -98,7 +96,8 @@ impl Equations<'_> {
     }
 
     /// Returns the forms at a window of at least the length.
-    pub(super) fn forms(&self, others: &[Other], window_ns: u64) -> impl Iterator<Item = Form> {
+    pub(super) fn forms(&self, delays: &Delays, window_ns: u64) -> impl Iterator<Item = Form> {
+        let Delays { others, blocking } = delays;
         let times = (window_ns, window_ns - self.task.length_ns());
         let mut plain = vec![Piece::NONE; self.covers.len()];
         let mut clipped = plain.clone();
@@ -109,7 +108,7 @@ impl Equations<'_> {
         sums.flat_map(move |(j, (plain, clipped))| {
             let left = u128::from(self.task.volume_ns() - self.covers[j]);
             let form = |is_clipped: bool, own: u128, sum: Piece| {
-                let blocked = self.blocking.during(self.cores, j, is_clipped);
+                let blocked = blocking.during(self.cores, j, is_clipped);
                 let value = sum.value.saturating_add(own).saturating_add(blocked);
                 Form {
                     cores: (self.cores - j) as u128,

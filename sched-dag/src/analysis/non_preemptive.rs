@@ -22,7 +22,9 @@
 //! being preempted: in the unit test below that gives 10 and 11 is observed.
 //!
 //! Under EDF any other DAG's job may have the later deadline, whatever the relative
-//! deadlines: it may be released during this job. So `Delta` is over all other DAGs.
+//! deadlines: it may be released during this job. So `Delta` is over all other DAGs. What
+//! starts while a subtask waits is due no later than that subtask, so it is among the
+//! interference, be it up to the job's deadline or up to a sink's.
 //!
 //! Assumes: *no* subtask of any DAG is ever preempted; work-conserving.
 
@@ -31,8 +33,8 @@ use alloc::vec::Vec;
 use super::task::Task;
 use crate::order::sorted;
 
-/// Lower-ranked work that a job may find on the cores and must wait for; none by default.
-#[derive(Clone, Debug, Default)]
+/// Lower-ranked work that a job may find on the cores and must wait for.
+#[derive(Clone, Debug)]
 pub(super) struct Blocking {
     /// The sums of the 1, 2, .. largest subtasks, for as many as there are cores.
     largest: Vec<u128>,
@@ -43,20 +45,26 @@ pub(super) struct Blocking {
 }
 
 impl Blocking {
-    /// Returns what subtasks of these WCETs can block of `task`.
-    pub(super) fn by(wcets_ns: &[u64], cores: u32, task: &Task) -> Self {
-        let cores = usize::try_from(cores).unwrap_or(usize::MAX);
-        let ascending = sorted(wcets_ns);
-        let largest = ascending.iter().rev().take(cores).scan(0, |sum, &wcet| {
-            *sum += u128::from(wcet);
-            Some(*sum)
-        });
+    /// Returns that of a DAG which nothing blocks.
+    pub(super) fn none(task: &Task) -> Self {
         let is_source = task.sources();
         let later = is_source.iter().filter(|&&is_source| !is_source);
         Self {
-            largest: largest.collect(),
+            largest: Vec::new(),
             path: task.most_subtasks_on_a_path().into(),
             later: later.count() as u128,
+        }
+    }
+
+    /// Returns that of the same DAG by subtasks of these WCETs.
+    pub(super) fn by(&self, wcets_ns: &[u64], cores: u32) -> Self {
+        let sums = largest(wcets_ns, cores).into_iter().scan(0, |sum, wcet| {
+            *sum += u128::from(wcet);
+            Some(*sum)
+        });
+        Self {
+            largest: sums.collect(),
+            ..*self
         }
     }
 
@@ -81,4 +89,11 @@ impl Blocking {
         let again = again.saturating_mul(self.sum(cores - 1));
         self.sum(cores).saturating_add(again)
     }
+}
+
+/// Returns the largest WCETs, as many as there are cores at most, the largest first.
+pub(super) fn largest(wcets_ns: &[u64], cores: u32) -> Vec<u64> {
+    let cores = usize::try_from(cores).unwrap_or(usize::MAX);
+    let ascending = sorted(wcets_ns);
+    ascending.into_iter().rev().take(cores).collect()
 }

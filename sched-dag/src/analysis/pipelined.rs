@@ -42,8 +42,7 @@
 
 use alloc::vec::Vec;
 
-use super::interference::{Other, Shape, on_all_cores};
-use super::non_preemptive::Blocking;
+use super::interference::{Delays, Shape, on_all_cores};
 use super::task::Task;
 use super::workload::Piece;
 
@@ -75,8 +74,6 @@ pub(super) struct Figures {
     whole: Option<u128>,
     /// Whether a younger job's subtask may win over an older job's.
     pub(super) younger_may_win: bool,
-    /// Non-preemptible work of lower rank.
-    pub(super) blocking: Blocking,
 }
 
 /// Why an equation has no usable solution.
@@ -102,7 +99,6 @@ impl Figures {
             parallelism: shape.parallelism.into(),
             whole: None,
             younger_may_win: false,
-            blocking: Blocking::default(),
         }
     }
 
@@ -139,14 +135,14 @@ impl Figures {
     /// must not exceed the least solution (0 always is right).
     pub(super) fn solve(
         &self,
-        others: &[Other],
+        delays: &Delays,
         start_ns: u64,
         steps: &mut u64,
     ) -> Result<u64, Unsolved> {
         let mut response = u128::from(start_ns);
         let mut windows: Vec<u128> = Vec::new();
         loop {
-            self.extend(&mut windows, response, others, steps)?;
+            self.extend(&mut windows, response, delays, steps)?;
             let back = windows.iter().zip(0..);
             let responses = back.map(|(window, back)| window.saturating_sub(back * self.period));
             let largest = responses.max().unwrap_or(0).max(response);
@@ -161,13 +157,14 @@ impl Figures {
     /// jobs before the chain's first can run.
     pub(super) fn windows(
         &self,
-        others: &[Other],
+        delays: &Delays,
         response_ns: u64,
     ) -> Result<(Vec<u128>, u128), Unsolved> {
         let (mut windows, mut steps) = (Vec::new(), STEP_LIMIT);
         let response = u128::from(response_ns);
-        self.extend(&mut windows, response, others, &mut steps)?;
-        Ok((windows, self.other_jobs(response)?))
+        self.extend(&mut windows, response, delays, &mut steps)?;
+        let own = self.other_jobs(self.whole.unwrap_or(response))?;
+        Ok((windows, own))
     }
 
     /// Raises the windows to those of a response time.
@@ -175,7 +172,7 @@ impl Figures {
         &self,
         windows: &mut Vec<u128>,
         response: u128,
-        others: &[Other],
+        delays: &Delays,
         steps: &mut u64,
     ) -> Result<(), Unsolved> {
         let own = self.other_jobs(self.whole.unwrap_or(response))?;
@@ -184,7 +181,7 @@ impl Figures {
             if index == windows.len() {
                 windows.push(0);
             }
-            windows[index] = self.window(back, own, others, windows[index], steps)?;
+            windows[index] = self.window(back, own, delays, windows[index], steps)?;
             if windows[index] <= u128::from(back + 1) * self.period {
                 return Ok(());
             }
@@ -217,7 +214,7 @@ impl Figures {
         &self,
         back: u64,
         own: u128,
-        others: &[Other],
+        delays: &Delays,
         start: u128,
         steps: &mut u64,
     ) -> Result<u128, Unsolved> {
@@ -228,7 +225,7 @@ impl Figures {
         while window <= limit {
             *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
             let length = u64::try_from(window).map_err(|_| Unsolved::Limit)?;
-            let busy = self.busy(back, own, others, length);
+            let busy = self.busy(back, own, delays, length);
             match busy.lacks(cores, window - self.chain(back)) {
                 None => return Ok(window),
                 Some(lack) => window = window.checked_add(lack).ok_or(Unsolved::Limit)?,
@@ -243,11 +240,11 @@ impl Figures {
     }
 
     /// Returns what the cores execute at most while a chain over `back` releases waits.
-    pub(super) fn busy(&self, back: u128, own: u128, others: &[Other], window_ns: u64) -> Piece {
+    pub(super) fn busy(&self, back: u128, own: u128, delays: &Delays, window_ns: u64) -> Piece {
         let constant = (back * self.volume + self.last_volume - self.chain(back))
             .saturating_add(own)
-            .saturating_add(self.blocking.along_a_chain(self.cores, back));
-        let sum = on_all_cores(others, window_ns);
+            .saturating_add(delays.blocking.along_a_chain(self.cores, back));
+        let sum = on_all_cores(&delays.others, window_ns);
         let value = sum.value.saturating_add(constant);
         Piece { value, ..sum }
     }

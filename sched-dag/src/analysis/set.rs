@@ -18,7 +18,7 @@
 
 use alloc::vec::Vec;
 
-use super::interference::{Clip, Other, Shape};
+use super::interference::{Clip, Delays, Other, Shape};
 use super::multi_path::{Equations, alone};
 use super::pipelined::{Figures, OWN_STEPS, STEP_LIMIT, Unsolved};
 use super::refusal::Refusal;
@@ -33,6 +33,8 @@ pub(super) struct Set<'a> {
     pub(super) figures: Vec<Figures>,
     /// Whether only jobs with deadlines no later count (EDF with `D <= T`).
     pub(super) deadlines_limit: bool,
+    /// Whether each subtask keeps its core, so that lower-ranked ones may block.
+    pub(super) keep_cores: bool,
     /// Which interference counts.
     pub(super) clip: Clip,
     /// Bounds that are known already, by DAG.
@@ -82,6 +84,7 @@ impl<'a> Set<'a> {
                 .collect(),
             shapes,
             deadlines_limit: false,
+            keep_cores: false,
             clip: Clip::Chains,
             known: alloc::vec![None; tasks.len()],
         }
@@ -106,8 +109,8 @@ impl<'a> Set<'a> {
             for &dag in order {
                 let before = solution.responses[dag];
                 if self.known[dag].is_none() && before.is_some() {
-                    let others = self.interference(dag, &solution.responses, &may_outrank);
-                    self.visit(dag, others, &mut solution, &mut steps);
+                    let delays = self.delays_of_job(dag, &solution.responses, &may_outrank);
+                    self.visit(dag, delays, &mut solution, &mut steps);
                 }
                 is_done &= solution.responses[dag] == before;
             }
@@ -127,14 +130,14 @@ impl<'a> Set<'a> {
     fn visit(
         &self,
         dag: usize,
-        others: Result<Vec<Other>, usize>,
+        delays: Result<Delays, usize>,
         solution: &mut Solution,
         steps: &mut Steps,
     ) {
         let start_ns = solution.responses[dag].unwrap_or(0);
-        let after = match others {
+        let after = match delays {
             Err(other) => Err(Failure::Other(other)),
-            Ok(others) => (self.respond(dag, &others, start_ns, steps)).map_err(|why| {
+            Ok(delays) => (self.respond(dag, &delays, start_ns, steps)).map_err(|why| {
                 solution.first_failing.get_or_insert((dag, why));
                 Failure::Own(why)
             }),
@@ -143,25 +146,19 @@ impl<'a> Set<'a> {
         solution.responses[dag] = after.ok();
     }
 
-    /// Returns the deadline up to which others' jobs count for a DAG's, if there is one.
-    fn limit_ns(&self, dag: usize) -> Option<u64> {
-        let deadline_ns = self.tasks[dag].relative_deadline_ns();
-        self.deadlines_limit.then_some(deadline_ns)
-    }
-
     /// Returns the least response time of a DAG among others, if it is at least `start_ns`.
     fn respond(
         &self,
         dag: usize,
-        others: &[Other],
+        delays: &Delays,
         start_ns: u64,
         steps: &mut Steps,
     ) -> Result<u64, Unsolved> {
         let (equations, figures) = (self.equations(dag), &self.figures[dag]);
         steps.spend(dag, |steps| {
-            match equations.solve(others, start_ns, steps) {
+            match equations.solve(delays, start_ns, steps) {
                 Err(Unsolved::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
-                    figures.solve(others, start_ns, steps)
+                    figures.solve(delays, start_ns, steps)
                 }
                 solved => solved,
             }
@@ -175,7 +172,6 @@ impl<'a> Set<'a> {
             task: self.tasks[dag],
             covers: &self.shapes[dag].covers,
             cores: self.cores as usize,
-            blocking: &figures.blocking,
             clip: self.clip,
             limit_ns: figures.limit_ns().min(self.tasks[dag].period_ns()),
         }
@@ -206,9 +202,9 @@ impl<'a> Set<'a> {
                 if let Some(known) = self.known[dag] {
                     return Ok(known);
                 }
-                let others = self.interference(dag, &responses, &may_outrank);
-                let others = others.map_err(|_| (dag, Unsolved::Limit))?;
-                let response = self.respond(dag, &others, 0, &mut steps);
+                let delays = self.delays_of_job(dag, &responses, &may_outrank);
+                let delays = delays.map_err(|_| (dag, Unsolved::Limit))?;
+                let response = self.respond(dag, &delays, 0, &mut steps);
                 response.map_err(|why| (dag, why))
             });
             match lower.collect::<Result<Vec<u64>, _>>() {
@@ -221,31 +217,43 @@ impl<'a> Set<'a> {
         }
     }
 
-    /// Returns the workloads of the DAGs that may outrank `dag`, or the first of
-    /// these that has no bound.
-    pub(super) fn interference(
+    /// Returns what may delay the jobs of a DAG, as [`delays`](Self::delays) does.
+    pub(super) fn delays_of_job(
         &self,
         dag: usize,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<Vec<Other>, usize> {
-        self.interference_up_to(dag, self.limit_ns(dag), responses, may_outrank)
+    ) -> Result<Delays, usize> {
+        let deadline_ns = self.tasks[dag].relative_deadline_ns();
+        self.delays(dag, deadline_ns, responses, may_outrank)
     }
 
-    /// Does the same; with a limit only jobs that are due no later than that count.
-    pub(super) fn interference_up_to(
+    /// Returns what may delay work of a DAG that is due at a relative deadline, its job or
+    /// one sink of it; or the first DAG that may outrank it and has no bound.
+    ///
+    /// A DAG that may outrank this one counts with its jobs that are due by then, where that
+    /// is a limit, and else in full. What does not count in full may block.
+    pub(super) fn delays(
         &self,
         dag: usize,
-        limit_ns: Option<u64>,
+        deadline_ns: u64,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<Vec<Other>, usize> {
-        let others = (0..self.tasks.len()).filter(|&other| other != dag && may_outrank(other, dag));
-        let others = others.map(|other| {
-            let response = responses[other].ok_or(other)?;
-            Ok(self.other(other, response, limit_ns))
-        });
-        others.collect()
+    ) -> Result<Delays, usize> {
+        let limit_ns = self.deadlines_limit.then_some(deadline_ns);
+        let (mut others, mut blocking_ns) = (Vec::new(), Vec::new());
+        for other in (0..self.tasks.len()).filter(|&other| other != dag) {
+            let outranks = may_outrank(other, dag);
+            if outranks {
+                let response = responses[other].ok_or(other)?;
+                others.push(self.other(other, response, limit_ns));
+            }
+            if self.keep_cores && (limit_ns.is_some() || !outranks) {
+                blocking_ns.extend_from_slice(&self.shapes[other].largest_ns);
+            }
+        }
+        let blocking = (self.shapes[dag].unblocked).by(&blocking_ns, self.cores);
+        Ok(Delays { others, blocking })
     }
 
     /// Describes what a DAG with a response-time bound may execute next to another one.

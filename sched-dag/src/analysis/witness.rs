@@ -6,11 +6,12 @@
 //! whose text says what it requires of each line, computes each term again from the others.
 //!
 //! ```text
-//! machine CORES POLICY OVERHEAD_NS            static, edf, or edf-sinks: jobs of several deadlines
+//! machine CORES POLICY OVERHEAD_NS            static or edf
 //! cluster CLUSTER CLUSTERS                    only of divided cores: which it is, of how many
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
 //! edge FROM TO
+//! due SUBTASK DEADLINE                        of a sink that is due before its job
 //! hash FNV_1A                                 of all above
 //!
 //! graph DAG LENGTH VOLUME
@@ -25,6 +26,8 @@
 //! bound DAG R overlap OWN
 //! window X BUSY                               and `other` lines with W in that window
 //!
+//! sink DAG SUBTASK R OWN                      that is complete before its job; as `overlap`
+//!
 //! bound DAG R priorities CORES
 //! path SUBTASK..                              each path of the DAG
 //!
@@ -38,13 +41,14 @@
 
 use alloc::string::String;
 use alloc::vec::Vec;
-use core::fmt::Write;
+use core::fmt::{self, Write};
 
 use super::answer::{DagBound, Settings, Test};
 use super::cover::{Chain, covering, heaviest, peel};
-use super::interference::Other;
+use super::interference::{Delays, Other};
 use super::intra_task::each_path;
-use super::judge::{Case, with_case};
+use super::judge::{Case, sinks, with_case};
+use super::pipelined::{Figures, STEP_LIMIT};
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::to_u32;
 use crate::policy::{Policy, Preemption};
@@ -75,9 +79,14 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> Stri
         for dag in 0..case.members.len() {
             text.graph(case, dag);
         }
+        let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
+        let responses: Vec<Option<u64>> = responses.collect();
         for (dag, bound) in bounds.iter().enumerate() {
             match bound {
-                Some(bound) => text.bound(case, &bounds, dag, *bound),
+                Some(bound) => {
+                    text.bound(case, &responses, dag, *bound);
+                    text.sinks(case, &responses, dag, bound.bound_ns);
+                }
                 None => text.line(format_args!("unproven {}", case.members[dag])),
             }
         }
@@ -101,7 +110,7 @@ impl Text {
         self.line(format_args!("{word} {hash}"));
     }
 
-    fn line(&mut self, words: core::fmt::Arguments<'_>) {
+    fn line(&mut self, words: fmt::Arguments<'_>) {
         // Writing into a `String` cannot fail.
         let _ = writeln!(self.0, "{words}");
     }
@@ -115,12 +124,8 @@ impl Text {
     }
 
     fn statement(&mut self, dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) {
-        let has_sink_deadlines = dags
-            .iter()
-            .any(|dag| dag.least_deadline_ns() != dag.relative_deadline_ns());
         let policy = match settings.policy {
             Policy::StaticPriority => "static",
-            Policy::Edf if has_sink_deadlines => "edf-sinks",
             Policy::Edf => "edf",
         };
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
@@ -154,6 +159,12 @@ impl Text {
                     self.line(format_args!("edge {} {}", from.0, to.0));
                 }
             }
+            for &sink in dag.sinks() {
+                let deadline_ns = dag.subtask(sink).relative_deadline_ns();
+                if deadline_ns < dag.relative_deadline_ns() {
+                    self.line(format_args!("due {} {deadline_ns}", sink.0));
+                }
+            }
         }
     }
 
@@ -184,7 +195,7 @@ impl Text {
     fn bound(
         &mut self,
         case: &Case<'_>,
-        bounds: &[Option<DagBound>],
+        responses: &[Option<u64>],
         dag: usize,
         DagBound { bound_ns, test }: DagBound,
     ) {
@@ -196,23 +207,31 @@ impl Text {
             Test::IntraTask => self.priorities(case, dag, bound_ns),
             _ => {
                 let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
-                let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
-                let responses: Vec<Option<u64>> = responses.collect();
-                let others = case.set.interference(dag, &responses, may_outrank);
-                let others = others.unwrap_or_default();
-                let ids = (0..bounds.len()).filter(|&other| case.relation.may_outrank(other, dag));
-                let listed: Vec<Listed<'_>> = (ids.zip(&others))
-                    .map(|(other, workloads)| Listed {
-                        id: case.members[other],
-                        response_ns: responses[other].unwrap_or(u64::MAX),
-                        workloads,
-                    })
-                    .collect();
+                let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) else {
+                    return;
+                };
+                let listed = listed(case, dag, responses, &delays);
                 if bound_ns > task.period_ns() {
-                    self.overlap(case, dag, bound_ns, &others, &listed);
+                    let figures = &case.set.figures[dag];
+                    let begin = format_args!("bound {id} {bound_ns} overlap");
+                    self.overlap(begin, figures, bound_ns, &delays, &listed);
                 } else {
-                    self.paths(case, dag, bound_ns, &others, &listed);
+                    self.paths(case, dag, bound_ns, &delays, &listed);
                 }
+            }
+        }
+    }
+
+    /// Writes the bounds of sinks that are below their job's.
+    fn sinks(&mut self, case: &Case<'_>, responses: &[Option<u64>], dag: usize, whole_ns: u64) {
+        for (sink, equation) in sinks::equations(case, dag, responses) {
+            if let Some((figures, delays)) = equation
+                && let Ok(bound_ns) = figures.solve(&delays, 0, &mut { STEP_LIMIT })
+                && bound_ns < whole_ns
+            {
+                let listed = listed(case, dag, responses, &delays);
+                let begin = format_args!("sink {} {} {bound_ns}", case.members[dag], sink.0);
+                self.overlap(begin, &figures, bound_ns, &delays, &listed);
             }
         }
     }
@@ -222,14 +241,14 @@ impl Text {
         case: &Case<'_>,
         dag: usize,
         bound_ns: u64,
-        others: &[Other],
+        delays: &Delays,
         listed: &[Listed<'_>],
     ) {
         let (id, task) = (case.members[dag], case.tasks[dag]);
         let equations = case.set.equations(dag);
         let waiting = bound_ns - task.length_ns();
         let enough = |cores: u128| cores * u128::from(waiting);
-        let mut forms = equations.forms(others, bound_ns);
+        let mut forms = equations.forms(delays, bound_ns);
         let Some(form) = forms.find(|form| form.busy.value <= enough(form.cores)) else {
             return;
         };
@@ -238,7 +257,7 @@ impl Text {
         let word = if form.is_clipped { "waiting" } else { "paths" };
         let left = task.volume_ns() - equations.covers[chains - 1];
         let left = if form.is_clipped { left.max(1) } else { left };
-        let blocked = equations
+        let blocked = delays
             .blocking
             .during(equations.cores, chains - 1, form.is_clipped);
         self.line(format_args!(
@@ -261,23 +280,19 @@ impl Text {
 
     fn overlap(
         &mut self,
-        case: &Case<'_>,
-        dag: usize,
+        begin: fmt::Arguments<'_>,
+        figures: &Figures,
         bound_ns: u64,
-        others: &[Other],
+        delays: &Delays,
         listed: &[Listed<'_>],
     ) {
-        let figures = &case.set.figures[dag];
-        let Ok((windows, own)) = figures.windows(others, bound_ns) else {
+        let Ok((windows, own)) = figures.windows(delays, bound_ns) else {
             return;
         };
-        self.line(format_args!(
-            "bound {} {bound_ns} overlap {own}",
-            case.members[dag]
-        ));
+        self.line(format_args!("{begin} {own}"));
         for (back, window) in windows.iter().enumerate() {
             let window_ns = u64::try_from(*window).unwrap_or(u64::MAX);
-            let busy = figures.busy(back as u128, own, others, window_ns).value;
+            let busy = figures.busy(back as u128, own, delays, window_ns).value;
             self.line(format_args!("window {window} {busy}"));
             for other in listed {
                 let (count, [all, _]) = other.workloads.on((window_ns, 0), usize::MAX);
@@ -305,6 +320,22 @@ struct Listed<'a> {
     id: usize,
     response_ns: u64,
     workloads: &'a Other,
+}
+
+/// Names the DAGs that may outrank one, in the order of their workloads.
+fn listed<'a>(
+    case: &Case<'_>,
+    dag: usize,
+    responses: &[Option<u64>],
+    delays: &'a Delays,
+) -> Vec<Listed<'a>> {
+    let ids = (0..responses.len()).filter(|&other| case.relation.may_outrank(other, dag));
+    let listed = ids.zip(&delays.others).map(|(other, workloads)| Listed {
+        id: case.members[other],
+        response_ns: responses[other].unwrap_or(u64::MAX),
+        workloads,
+    });
+    listed.collect()
 }
 
 fn most(parallelism: u64) -> usize {

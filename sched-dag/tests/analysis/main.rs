@@ -1,23 +1,19 @@
 //! The analysis against the scheduler: no observed response exceeds a bound.
 //!
-//! [`accepted_sets_keep_their_bounds`] draws thousands of task sets of every
-//! kind the scheduler knows; whatever DAG has a bound must keep it, with full
-//! and with shortened execution times, to which the platform's overheads add. A failure prints its seed; run that one
-//! alone with `ANALYSIS_SEED=n ANALYSIS_SETS=1`.
-//!
-//! The other tests are worked examples, and the counterexamples to forms that
-//! look like bounds and are not.
+//! [`kinds`] holds bounds of random sets of every kind against virtual time. The other tests
+//! are worked examples, and the counterexamples to forms that look like bounds and are not.
 
+mod kinds;
 mod random;
 mod simulate;
 mod witnesses;
 mod worked;
 
-use sched_dag::analysis::{Answer, Overheads, Reason, Settings, TaskError, Test, answer};
-use sched_dag::{DagId, Order, Policy, Preemption, SubtaskId, TaskSet};
+use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer};
+use sched_dag::{DagId, Order, Policy, Preemption, SubtaskId};
 
-use random::{Random, Sample, sample};
-use simulate::{Observed, commit, observe, responses, spec};
+use random::{Random, sample};
+use simulate::{commit, responses, spec};
 
 const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
 const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
@@ -38,115 +34,6 @@ fn number_from(variable: &str, default: u64) -> u64 {
     }
 }
 
-#[test]
-fn accepted_sets_keep_their_bounds() {
-    let first = number_from("ANALYSIS_SEED", 1);
-    let sets = number_from("ANALYSIS_SETS", 12_000);
-    let mut proven_sets = 0_u64;
-    let mut by_test = std::collections::BTreeMap::new();
-    let mut tighter_sinks = 0_u64;
-    for seed in first..first + sets {
-        let mut random = Random::new(seed);
-        let Sample {
-            specs,
-            policy,
-            preemption,
-            cores,
-        } = sample(&mut random);
-        let dispatch_ns = random.within(0, 5).saturating_sub(3);
-        let options = sched_dag::CommitOptions::new(policy, cores)
-            .with_construction(sched_dag::ConstructionPolicy::any_graph());
-        let Ok(verified) = sched_dag::verify(&specs, &options) else {
-            // A WCET or path beyond the deadline: the commit refuses it.
-            continue;
-        };
-        let task_set = verified.task_set;
-        let mut settings = settings((policy, preemption), cores);
-        settings.overheads.dispatch_ns = dispatch_ns;
-        let answer = answer(&task_set, &settings);
-        assert_eq!(
-            answer.is_proven(),
-            answer.bounds.iter().all(Option::is_some),
-            "seed {seed}"
-        );
-        if answer.bounds.iter().all(Option::is_none) {
-            continue;
-        }
-        proven_sets += u64::from(answer.is_proven());
-        for bound in answer.bounds.iter().flatten() {
-            *by_test.entry(bound.test.to_string()).or_insert(0_u64) += 1;
-        }
-        let longest = task_set.dags().iter().map(|dag| dag.period_ns()).max();
-        let until = 12 * longest.expect("there is a DAG");
-        let wcet = |instance: sched_dag::Instance| {
-            let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
-            subtask.wcet_ns().expect("every subtask has one")
-        };
-        for shorten in [false, true] {
-            let platform = (policy, preemption, cores);
-            let observed = observe(&task_set, platform, until, |instance| {
-                let full = wcet(instance) + dispatch_ns;
-                if shorten {
-                    random.within(0, full)
-                } else {
-                    full
-                }
-            });
-            tighter_sinks += check_sinks(&task_set, &answer, &observed, seed);
-            for (dag, (bound, observed)) in answer.bounds.iter().zip(observed.dags).enumerate() {
-                if let Some(bound) = bound {
-                    let deadline = task_set.dags()[dag].relative_deadline_ns();
-                    assert!(
-                        observed <= bound.bound_ns && bound.bound_ns <= deadline,
-                        "seed {seed}, dag {dag}: observed {observed}, {bound:?}, deadline \
-                         {deadline}, {policy:?} {preemption:?} on {cores} cores: {specs:#?}"
-                    );
-                }
-            }
-        }
-    }
-    println!(
-        "seeds {first}..{}: {proven_sets} sets proven whole; bounds: {by_test:?}; \
-         {tighter_sinks} times a sink with a smaller one than its job",
-        first + sets
-    );
-    if sets >= 10_000 {
-        assert!(
-            proven_sets > 1000,
-            "too few proven sets say little: {proven_sets}"
-        );
-        assert!(by_test.len() >= 7, "some test was never used: {by_test:?}");
-        assert!(tighter_sinks > 1000, "too few sinks: {tighter_sinks}");
-    }
-}
-
-/// Holds what was observed against the bounds of sinks, and returns how many have a smaller
-/// one than their DAG.
-fn check_sinks(task_set: &TaskSet, answer: &Answer, observed: &Observed, seed: u64) -> u64 {
-    let mut tighter = 0;
-    for (dag, model) in task_set.dags().iter().enumerate() {
-        for (&sink, bound_ns) in model.sinks().iter().zip(&answer.sinks_ns[dag]) {
-            assert_eq!(
-                bound_ns.is_some(),
-                answer.bounds[dag].is_some(),
-                "seed {seed}"
-            );
-            let (Some(bound_ns), Some(whole)) = (*bound_ns, answer.bounds[dag]) else {
-                continue;
-            };
-            let seen_ns = observed.subtasks[dag][sink.index()];
-            let deadline_ns = model.subtask(sink).relative_deadline_ns();
-            assert!(
-                seen_ns <= bound_ns && bound_ns <= deadline_ns && bound_ns <= whole.bound_ns,
-                "seed {seed}, dag {dag}, {sink:?}: observed {seen_ns}, bound {bound_ns}, deadline \
-                 {deadline_ns}, {whole:?}: {task_set:#?}"
-            );
-            tighter += u64::from(bound_ns < whole.bound_ns);
-        }
-    }
-    tighter
-}
-
 /// A DAG with a WCET of 0 gets no bound, and neither does what it may delay; where
 /// others have one, they keep it.
 #[test]
@@ -159,19 +46,15 @@ fn no_bound_rests_on_a_wcet_of_zero() {
         let subtasks = &mut sample.specs[dag].subtasks;
         let subtask = random.within(0, subtasks.len() as u64 - 1);
         subtasks[usize::try_from(subtask).unwrap()].wcet_ns = Some(0);
-        let (policy, preemption, cores) = (sample.policy, sample.preemption, sample.cores);
-        let options = sched_dag::CommitOptions::new(policy, cores)
-            .with_construction(sched_dag::ConstructionPolicy::any_graph());
-        let Ok(verified) = sched_dag::verify(&sample.specs, &options) else {
+        let Some(task_set) = sample.task_set() else {
             continue;
         };
-        let task_set = verified.task_set;
-        let answer = answer(&task_set, &settings((policy, preemption), cores));
+        let answer = answer(&task_set, &sample.settings());
         let subtask = SubtaskId(u32::try_from(subtask).unwrap());
         let missing = Reason::Unknown(TaskError::MissingWcet { subtask });
         assert_eq!(answer.reasons[dag], Some(missing), "seed {seed}");
         let longest = task_set.dags().iter().map(|dag| dag.period_ns()).max();
-        let platform = (policy, preemption, cores);
+        let platform = (sample.policy, sample.preemption, sample.cores);
         let observed = responses(&task_set, platform, 12 * longest.unwrap(), |instance| {
             let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
             subtask.wcet_ns().unwrap()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, JobOutcome, Observer, Policy,
-    Preemption, Priority, Scheduler, SchedulerOptions, SubtaskSpec, TaskSet, verify,
+    Preemption, Priority, SchedulerOptions, SubtaskSpec, TaskSet, verify,
 };
 
 /// Returns the spec of a DAG whose subtasks all have one priority.
@@ -77,8 +77,7 @@ pub(crate) fn observe(
         preemption,
         cores,
     };
-    let scheduler = Scheduler::new(Arc::new(task_set.clone()), options);
-    let mut driver = VirtualTime::new(scheduler);
+    let mut driver = VirtualTime::of_clusters(&Arc::new(task_set.clone()), options);
     let mut watch = Watch {
         execution_ns,
         now_ns: 0,

@@ -6,7 +6,7 @@ use sched_dag::analysis::{
 };
 use sched_dag::{DagSpec, Policy, Preemption, Priority};
 
-use crate::simulate::{commit, responses, spec};
+use crate::simulate::{commit, observe, responses, spec};
 use crate::{DIAMOND, FP, settings};
 
 fn fork_join() -> Task {
@@ -158,4 +158,51 @@ fn a_dag_near_its_bound_slowly_leaves_a_more_urgent_one_its_own() {
     let answer = answer(&task_set, &settings(FP, 2));
     assert_eq!(answer.bounds[0].map(|bound| bound.bound_ns), Some(40_000));
     assert_eq!(answer.reasons, [None, Some(Reason::Limit)]);
+}
+
+/// Returns the bounds without preemption under EDF, of jobs and of their sinks.
+fn non_preemptive_edf(specs: &[DagSpec], cores: u32) -> (Vec<Option<u64>>, Vec<Vec<Option<u64>>>) {
+    let kind = (Policy::Edf, Preemption::Disabled);
+    let answer = answer(&commit(specs, kind.0, cores), &settings(kind, cores));
+    let jobs = answer.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
+    (jobs.collect(), answer.sinks_ns)
+}
+
+#[test]
+fn under_edf_what_has_a_shorter_deadline_may_block_too() {
+    // The second DAG may be released during the chain and be due after it, and keep its core
+    // when the chain goes on: 6 at either subtask of the chain, besides the jobs that are due
+    // before it.
+    let chain = spec(40, 40, &[2, 3], &[(0, 1)], 0);
+    let short = spec(20, 20, &[6], &[], 1);
+    let (jobs, _) = non_preemptive_edf(&[chain, short], 2);
+    assert_eq!(jobs, [Some(14), Some(9)]);
+}
+
+#[test]
+fn a_sink_waits_for_what_is_due_later_and_keeps_its_core() {
+    let mut quick = spec(100, 100, &[1, 1], &[], 0);
+    quick.subtasks[0].relative_deadline_ns = Some(10);
+    quick.offset_ns = 1;
+    let slow = spec(1000, 1000, &[50], &[], 0);
+    let specs = [quick.clone(), slow.clone()];
+    assert_eq!(non_preemptive_edf(&specs, 1).0[0], None);
+    // With time to wait for it, that is what the bounds count.
+    quick.subtasks[0].relative_deadline_ns = Some(60);
+    let specs = [quick, slow];
+    let (jobs, sinks) = non_preemptive_edf(&specs, 1);
+    assert_eq!(
+        (jobs[0], &sinks[0][..]),
+        (Some(52), &[Some(52), Some(52)][..])
+    );
+    let platform = (Policy::Edf, Preemption::Disabled, 1);
+    let observed = observe(
+        &commit(&specs, Policy::Edf, 1),
+        platform,
+        1000,
+        |instance| {
+            if instance.dag.0 == 0 { 1 } else { 50 }
+        },
+    );
+    assert_eq!(observed.subtasks[0], [50, 51]);
 }

@@ -15,8 +15,9 @@
 //!   subtask of `k` waits, whatever runs on the cores belongs to `k` or wins
 //!   over that subtask, so its DAG is among those counted.
 //! - *EDF.* Every DAG may outrank every other. If `D <= T` for all DAGs, only
-//!   jobs with a deadline no later are counted; but all where sinks have deadlines of
-//!   their own, as then a job has more than one.
+//!   jobs with a deadline no later are counted: a subtask that waits is due no later than
+//!   its job, so what wins over it is, too. Where sinks have deadlines of their own, a job
+//!   counts as soon as the first of its deadlines is no later.
 //! - *No preemption at all.* Lower-ranked subtasks block besides; those of
 //!   DAGs that count in full are counted already.
 //! - *Preemption for some subtasks and not for others.* A subtask preempted
@@ -36,7 +37,7 @@
 //! is analysed without it: whatever it does, it cannot delay these.
 
 mod analysable;
-mod sinks;
+pub(super) mod sinks;
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -49,7 +50,6 @@ use super::capacity::{gedf_capacity, grm_capacity};
 use super::closure::SUBTASK_LIMIT;
 use super::intra_task::intra_task;
 use super::multi_path;
-use super::non_preemptive::Blocking;
 use super::pipelined::Unsolved;
 use super::ratio::Ratio;
 use super::relation::{Mixture, Relation};
@@ -249,25 +249,13 @@ impl<'a> Case<'a> {
     fn complete(&mut self) {
         let known = (0..self.members.len()).map(|dag| self.by_priorities(dag));
         self.set.known = known.collect();
+        self.set.keep_cores = self.relation.preemption == Mixture::None;
         self.set.deadlines_limit = self.settings.policy == Policy::Edf
             && self.relation.preemption != Mixture::Some
-            && !self.relation.ranks_sinks
             && constrained(self.tasks, self.settings.cores);
-        let counts_in_full =
-            |other, dag| self.relation.may_outrank(other, dag) && !self.set.deadlines_limit;
         for (dag, figures) in self.set.figures.iter_mut().enumerate() {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
-            if self.relation.preemption == Mixture::None {
-                let others = (0..self.tasks.len()).filter(|&other| other != dag);
-                let blocking = others.filter(|&other| !counts_in_full(other, dag));
-                let wcets = blocking.flat_map(|other| self.tasks[other].wcets_ns().iter().copied());
-                figures.blocking = Blocking::by(
-                    &wcets.collect::<Vec<u64>>(),
-                    self.settings.cores,
-                    self.tasks[dag],
-                );
-            }
         }
     }
 

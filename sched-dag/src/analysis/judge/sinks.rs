@@ -9,7 +9,8 @@
 //!   (all ancestors have deadlines no later than the sink's); under static priority,
 //!   those that are not less urgent than the least urgent ancestor. If not all can be
 //!   preempted, all count.
-//! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline.
+//! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline. What is
+//!   due later and keeps its core may block.
 //!
 //! So the sink's bound is the solution of the job's equation with these figures (see
 //! `pipelined`). Older and younger jobs of the DAG count as there, with the job's bound,
@@ -21,10 +22,9 @@ use alloc::vec::Vec;
 
 use super::Case;
 use crate::analysis::answer::{Answer, DagBound, NotProven, Reason};
-use crate::analysis::interference::Other;
-use crate::analysis::pipelined::STEP_LIMIT;
+use crate::analysis::interference::Delays;
+use crate::analysis::pipelined::{Figures, STEP_LIMIT};
 use crate::analysis::relation::Mixture;
-use crate::analysis::set::constrained;
 use crate::analysis::task::Task;
 use crate::ids::SubtaskId;
 use crate::order::sorted_by_key;
@@ -42,18 +42,12 @@ struct Reach {
 pub(super) fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
-    let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
-    let deadlines_limit = case.settings.policy == Policy::Edf
-        && case.relation.preemption != Mixture::Some
-        && constrained(case.tasks, case.settings.cores);
-    for &dag in &case.order {
-        if let Some(whole_ns) = responses[dag] {
-            let others = |deadline_ns| {
-                let limit_ns = deadlines_limit.then_some(deadline_ns);
-                (case.set).interference_up_to(dag, limit_ns, &responses, may_outrank)
-            };
-            bounds[case.members[dag]] = of_dag(case, dag, whole_ns, others);
-        }
+    for (dag, &number) in case.members.iter().enumerate() {
+        let solved = equations(case, dag, &responses).map(|(_, equation)| {
+            let (figures, delays) = equation?;
+            figures.solve(&delays, 0, &mut { STEP_LIMIT }).ok()
+        });
+        bounds[number] = solved.collect();
     }
     for (dag, &number) in case.members.iter().enumerate() {
         let model = case.dag(dag);
@@ -80,33 +74,29 @@ fn is_certain(reason: Option<Reason>) -> bool {
     reason.is_some_and(|reason| reason.is_certain())
 }
 
-/// Returns the bounds of a DAG's sinks that their own equations give, among others that
-/// depend on the sink's deadline.
-fn of_dag(
-    case: &Case<'_>,
+/// Returns the equation of each sink of a DAG and what may delay it, where the response times
+/// of jobs are known that it rests on.
+pub(in crate::analysis) fn equations<'a>(
+    case: &'a Case<'_>,
     dag: usize,
-    whole_ns: u64,
-    others: impl Fn(u64) -> Result<Vec<Other>, usize>,
-) -> Vec<Option<u64>> {
+    responses: &'a [Option<u64>],
+) -> impl Iterator<Item = (SubtaskId, Option<(Figures, Delays)>)> {
     let (set, model) = (&case.set, case.dag(dag));
     let (policy, preemption) = (case.settings.policy, case.relation.preemption);
     let reaches = reaches(set.tasks[dag], model, policy, preemption);
     let sinks = model.sinks().iter().zip(reaches);
-    let bound = sinks.map(
-        |(
-            &sink,
-            Reach {
-                length_ns,
-                volume_ns,
-            },
-        )| {
+    sinks.map(move |(&sink, reach)| {
+        let equation = || {
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
-            let others = others(deadline_ns).ok()?;
-            let figures = set.figures[dag].of_sink(length_ns, volume_ns, deadline_ns, whole_ns);
-            figures.solve(&others, 0, &mut { STEP_LIMIT }).ok()
-        },
-    );
-    bound.collect()
+            let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+            let delays = set.delays(dag, deadline_ns, responses, may_outrank).ok()?;
+            let (length_ns, volume_ns) = (reach.length_ns, reach.volume_ns);
+            let figures = &set.figures[dag];
+            let figures = figures.of_sink(length_ns, volume_ns, deadline_ns, responses[dag]?);
+            Some((figures, delays))
+        };
+        (sink, equation())
+    })
 }
 
 /// Returns the longest path to each sink, in their order.
