@@ -3,6 +3,7 @@
 //! [`kinds`] holds bounds of random sets of every kind against virtual time. The other tests
 //! are worked examples, and the counterexamples to forms that look like bounds and are not.
 
+mod forged;
 mod kinds;
 mod random;
 mod simulate;

@@ -113,6 +113,7 @@ pub(crate) fn sample_of(kind: Kind, random: &mut Random) -> Sample {
         let own = cores_of(dag);
         specs.push(draw_dag(random, own, count * load, pipelined));
         let spec = specs.last_mut().expect("just pushed");
+        spec.name = format!("{dag} of {count}");
         let levels = random.within(1, 6);
         for (position, subtask) in spec.subtasks.iter_mut().enumerate() {
             let number = if by_subtask {
