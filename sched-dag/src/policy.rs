@@ -103,8 +103,9 @@ pub enum Order {
     /// It may not: the policy decides at every instant.
     #[default]
     Free,
-    /// It adds precedence edges, those of a schedule of the WCETs on all cores, if these prove a
-    /// shorter response time. All subtasks need a WCET.
+    /// It may: [`fix_orders`](crate::analysis::fix_orders) adds precedence edges, those of a
+    /// schedule of the WCETs on the DAG's cores, if these prove a shorter response time and none
+    /// of another DAG a longer one. All subtasks need a WCET, and no sink a deadline of its own.
     Fixed,
 }
 

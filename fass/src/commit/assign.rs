@@ -24,15 +24,19 @@ use crate::platform::{LaunchError, Platform};
 /// }
 /// ```
 pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-    let settings = Settings {
-        policy: platform.policy(),
-        preemption: platform.preemption(),
-        cores: platform.cores(),
-        overheads: platform.overheads(),
-    };
-    analysis::assign(task_set, &settings).map_err(|NotAssigned { dag: id, reason }| {
+    analysis::assign(task_set, &settings(platform)).map_err(|NotAssigned { dag: id, reason }| {
         let name = task_set.dag(id).name().into();
         let dag = DagLabel { id, name };
         LaunchError::new(format!("{dag} gets no cores: {reason}"))
     })
+}
+
+/// Returns what the analysis is to know of a platform.
+pub(super) fn settings(platform: &dyn Platform) -> Settings {
+    Settings {
+        policy: platform.policy(),
+        preemption: platform.preemption(),
+        cores: platform.cores(),
+        overheads: platform.overheads(),
+    }
 }

@@ -5,7 +5,7 @@
 //! 1. *Verify.* Every fault of every DAG is collected, ours and the model's. If
 //!    there is one, nothing has happened; the handles are as they were.
 //! 2. *Assign.* Where the platform leaves that to the commit, the cores are divided among the
-//!    DAGs.
+//!    DAGs. The order of subtasks is fixed in DAGs that allow it, where that proves more.
 //! 3. *Answer.* The response times are bounded where that can be done, for the
 //!    model that the platform will run. A lacking proof that was demanded ends
 //!    the commit as a fault does.
@@ -30,7 +30,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
-use sched_dag::{Policy, TaskSet, Verified, Warning, sorted_by_key, wcets};
+use sched_dag::{Policy, TaskSet, Verified, Warning, analysis, sorted_by_key, wcets};
 
 use crate::api::dag::Dag;
 use crate::platform;
@@ -147,6 +147,7 @@ pub fn finish_create_dags_with(
         let faults = Vec::from([Fault::NotAssigned(error)]);
         return Err(CommitError { faults, warnings });
     }
+    analysis::fix_orders(&mut task_set, &assign::settings(platform));
     let answers = Answers::new(&task_set, platform);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));

@@ -3,7 +3,8 @@
 //!
 //! This is federated scheduling (see `federated` for the papers). A DAG is *heavy* if a job of
 //! it is more work than one core does by its deadline, or by the next release if that comes
-//! first; it gets a cluster of as many cores as its multi-path bound needs. The others are
+//! first; it gets a cluster of as many cores as its multi-path bound needs, or the order that may
+//! be fixed for it. The others are
 //! *light*: clusters of one core each take them, the densest first, each where the sum of
 //! densities is least (worst fit), so that what room there is, is left on every core. A core
 //! takes light DAGs up to a sum of 1, which is enough for EDF and no proof for static
@@ -15,6 +16,7 @@ use core::fmt;
 use core::time::Duration;
 
 use super::answer::Settings;
+use super::fixed_order;
 use super::multi_path::multi_path;
 use super::ratio::Ratio;
 use super::task::{Task, TaskError};
@@ -97,7 +99,12 @@ pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssi
             let dag = DagId(to_u32(dag));
             return Err(NotAssigned { dag, reason });
         }
-        let is_enough = |count: &u32| multi_path(task, *count).is_some_and(|ns| ns <= within_ns);
+        let allows = fixed_order::allows(&task_set.dags()[dag]);
+        let is_enough = |&count: &u32| {
+            let fixed = || fixed_order::shorter(task, count).filter(|_| allows);
+            multi_path(task, count).is_some_and(|ns| ns <= within_ns)
+                || fixed().is_some_and(|(_, length_ns)| length_ns <= within_ns)
+        };
         let Some(count) = (1..=left).find(is_enough) else {
             let (dag, reason) = (DagId(to_u32(dag)), Unassigned::TooHeavy { left });
             return Err(NotAssigned { dag, reason });
@@ -237,6 +244,7 @@ mod tests {
         };
         let mut divided = verified.task_set;
         assign(&mut divided, &settings)?;
+        crate::analysis::fix_orders(&mut divided, &settings);
         let answer = crate::analysis::answer(&divided, &settings);
         assert!(answer.is_proven(), "{:?}", answer.first_failing);
         Ok(divided)
@@ -278,6 +286,14 @@ mod tests {
     fn a_core_more_than_there_are_light_dags_stays_idle() {
         let found = assigned(&[parallel(&[8], 10)], 4).unwrap();
         assert_eq!(sizes(&found), [1]);
+    }
+
+    #[test]
+    fn an_order_that_may_be_fixed_needs_fewer_cores() {
+        let mut dag = parallel(&[3, 3, 2, 2, 2], 7);
+        assert_eq!(sizes(&assigned(&[dag.clone()], 4).unwrap()), [3]);
+        dag.order = crate::Order::Fixed;
+        assert_eq!(sizes(&assigned(&[dag], 4).unwrap()), [2]);
     }
 
     #[test]

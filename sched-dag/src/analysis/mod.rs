@@ -24,6 +24,7 @@
 //! | `sinks` | sinks with deadlines of their own | derived here |
 //! | `judge`, `relation`, `answer`, `overheads` | the verdict at commit | |
 //! | `assign` | the commit's own clusters | Li 2014 |
+//! | `fixed_order` | orders that the commit fixes | Graham 1969 |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -70,6 +71,7 @@ mod capacity;
 mod closure;
 mod cover;
 mod federated;
+mod fixed_order;
 mod graph;
 mod interference;
 mod intra_task;
@@ -95,6 +97,7 @@ pub use capacity::{gedf_capacity, grm_capacity};
 pub use closure::SUBTASK_LIMIT;
 pub use cover::covers;
 pub use federated::{Federation, federated, federated_multi_path};
+pub use fixed_order::fix_orders;
 pub use interference::Clip;
 pub use intra_task::{PATH_LIMIT, assign_intra_task, intra_task};
 pub use judge::answer;

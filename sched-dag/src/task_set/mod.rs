@@ -11,14 +11,14 @@ use alloc::string::String;
 
 use crate::clusters::Why;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
-use crate::policy::{Activation, OnFault, OverrunPolicy, Priority};
+use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
 /// All DAG tasks of one commit; by default none.
 #[derive(Clone, Debug, Default)]
 pub struct TaskSet {
-    dags: Box<[Dag]>,
+    pub(crate) dags: Box<[Dag]>,
     /// The cores of each cluster; none if they are not divided.
     clusters: Box<[u32]>,
     /// Each DAG's first vertex.
@@ -41,6 +41,7 @@ pub struct Dag {
     pub(crate) on_fault: OnFault,
     pub(crate) cluster: Option<ClusterId>,
     pub(crate) why_there: Option<Why>,
+    pub(crate) order: Order,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
     pub(crate) sources: Box<[SubtaskId]>,

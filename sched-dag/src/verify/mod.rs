@@ -14,7 +14,6 @@ mod cycles;
 mod fault;
 mod fault_text;
 mod findings;
-mod fixed_order;
 mod graph;
 mod interner;
 mod label;

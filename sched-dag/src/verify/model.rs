@@ -6,10 +6,11 @@ use alloc::vec::Vec;
 use super::attributes::in_flight;
 use super::fault::Fault;
 use super::findings::Findings;
+use super::graph::Graph;
 use super::label::DagLabel;
 use super::options::CommitOptions;
 use super::shape::Shape;
-use crate::ids::{SubtaskId, to_u32};
+use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sort_by_key;
 use crate::policy::Priority;
 use crate::priorities::ranks;
@@ -36,6 +37,22 @@ pub(super) fn build(
     let dags = specs.iter().zip(shapes).zip(bases);
     let dags = dags.map(|((spec, shape), base)| build_dag(spec, shape, base));
     Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
+}
+
+impl TaskSet {
+    /// Adds edges to a DAG of which no sink has a deadline of its own. They close no cycle.
+    pub(crate) fn precede(&mut self, dag: DagId, edges: &[(u32, u32)]) {
+        let dag = &mut self.dags[dag.index()];
+        let stated = (0..).map(SubtaskId).take(dag.subtasks.len());
+        let stated =
+            stated.flat_map(|from| dag.successors(from).iter().map(move |to| (from.0, to.0)));
+        let edges: Vec<(u32, u32)> = stated.chain(edges.iter().copied()).collect();
+        let graph = Graph::new(dag.subtasks.len(), &edges);
+        dag.topological_order = graph.topological_order().into_boxed_slice();
+        dag.sources = without_neighbours(&graph.predecessors);
+        dag.sinks = without_neighbours(&graph.successors);
+        (dag.predecessors, dag.successors) = (graph.predecessors, graph.successors);
+    }
 }
 
 /// Returns for each DAG without priorities the number of its first one:
@@ -136,6 +153,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         overrun: spec.overrun,
         on_fault: spec.on_fault,
         cluster: spec.cluster,
+        order: spec.order,
         why_there: None,
         jobs: spec.jobs,
         subtasks: subtasks.collect(),

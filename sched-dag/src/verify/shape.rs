@@ -6,7 +6,6 @@ use alloc::vec::Vec;
 use super::cycles;
 use super::fault::Fault;
 use super::findings::Findings;
-use super::fixed_order;
 use super::graph::Graph;
 use super::label::{DagLabel, SubtaskLabel};
 use super::options::{CommitOptions, ConstructionPolicy};
@@ -14,7 +13,6 @@ use super::states;
 use super::topics::Topology;
 use super::warning::Warning;
 use crate::ids::{SubtaskId, to_u32};
-use crate::policy::Order;
 use crate::spec::DagSpec;
 use crate::task_set::StatePrecedence;
 
@@ -83,10 +81,6 @@ pub(super) fn check(
         let precedences = shape.state_precedences.iter();
         let precedences = precedences.map(|added| (added.earlier.0, added.later.0));
         shape.add(edges, precedences.collect());
-        if spec.order == Order::Fixed {
-            let fixed = fixed_order::edges(spec, &shape.graph, options.cores);
-            shape.add(edges, fixed);
-        }
     }
     shape
 }

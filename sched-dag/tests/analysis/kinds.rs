@@ -12,7 +12,7 @@
 use std::collections::BTreeMap;
 
 use sched_dag::TaskSet;
-use sched_dag::analysis::{Answer, Settings, answer};
+use sched_dag::analysis::{Answer, Settings, answer, fix_orders};
 
 use crate::number_from;
 use crate::random::{Kind, Random, sample_of};
@@ -28,7 +28,7 @@ fn accepted_sets_keep_their_bounds() {
     let most = if wanted == 0 { 60_000 } else { wanted };
     let mut whole = [0; Kind::COUNT];
     let mut by_test: BTreeMap<String, u64> = BTreeMap::new();
-    let mut tighter_sinks = 0_u64;
+    let (mut tighter_sinks, mut fixed) = (0_u64, 0_u64);
     let mut breaches = Vec::new();
     for seed in first..first + most {
         let number = usize::try_from(seed % Kind::COUNT as u64).expect("below the count");
@@ -37,12 +37,17 @@ fn accepted_sets_keep_their_bounds() {
         }
         let mut random = Random::new(seed);
         let sample = sample_of(Kind::number(number), &mut random);
-        let Some(task_set) = sample.task_set() else {
+        let Some(mut task_set) = sample.task_set() else {
             continue;
         };
         let mut settings = sample.settings();
         settings.overheads.dispatch_ns = random.within(0, 5).saturating_sub(3);
+        let free = answer(&task_set, &settings);
+        fix_orders(&mut task_set, &settings);
         let answer = answer(&task_set, &settings);
+        let order = is_no_longer(&answer, &free);
+        assert!(order.is_some(), "seed {seed}: {free:?} {answer:?}");
+        fixed += u64::from(order == Some(true));
         assert_eq!(
             answer.is_proven(),
             answer.bounds.iter().all(Option::is_some),
@@ -61,7 +66,8 @@ fn accepted_sets_keep_their_bounds() {
     }
     println!(
         "seeds {first}..{}: sets proven whole by kind: {whole:?}; bounds: {by_test:?}; \
-         {tighter_sinks} times a sink with a smaller one than its job",
+         {tighter_sinks} times a sink with a smaller one than its job, {fixed} sets that a fixed \
+         order shortens",
         first + most
     );
     assert!(
@@ -76,6 +82,7 @@ fn accepted_sets_keep_their_bounds() {
         assert_eq!(lacking.collect::<Vec<_>>(), [], "too few are proven");
         assert!(by_test.len() >= 7, "some test was never used: {by_test:?}");
         assert!(tighter_sinks > 1000, "too few sinks: {tighter_sinks}");
+        assert!(fixed > 100, "too few orders: {fixed}");
     }
 }
 
@@ -130,4 +137,20 @@ pub(crate) fn tighter(answer: &Answer) -> u64 {
         sinks_ns.iter().filter(|&&ns| ns < whole_ns).count() as u64
     });
     counts.sum()
+}
+
+/// Reports whether bounds are shorter than others; `None`: one is longer.
+fn is_no_longer(fixed: &Answer, free: &Answer) -> Option<bool> {
+    // None is longer than all.
+    let [fixed, free] = [fixed, free].map(|answer| {
+        let bounds = answer
+            .bounds
+            .iter()
+            .map(|bound| bound.map(|bound| bound.bound_ns));
+        bounds
+            .map(|bound| bound.unwrap_or(u64::MAX))
+            .collect::<Vec<_>>()
+    });
+    let is_longer = fixed.iter().zip(&free).any(|(fixed, free)| fixed > free);
+    (!is_longer).then_some(fixed != free)
 }

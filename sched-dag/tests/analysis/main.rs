@@ -10,8 +10,11 @@ mod simulate;
 mod witnesses;
 mod worked;
 
-use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer};
-use sched_dag::{DagId, Order, Policy, Preemption, SubtaskId};
+use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer, fix_orders};
+use sched_dag::{
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, Order, Policy, Preemption,
+    SubtaskId, verify,
+};
 
 use random::{Random, sample};
 use simulate::{commit, responses, spec};
@@ -249,27 +252,32 @@ fn overheads_are_charged_to_every_subtask() {
 
 #[test]
 fn a_fixed_order_is_taken_where_it_proves_more() {
-    let bound = |order: Order, wcets: &[u64]| {
+    let on = |cores, clusters: &[u32], order: Order, wcets: &[u64]| {
         let mut spec = spec(100, 100, wcets, &[], 0);
         spec.order = order;
+        spec.cluster = (!clusters.is_empty()).then_some(ClusterId(0));
         // Under EDF, so that no priorities within the DAG help.
-        let task_set = commit(&[spec], Policy::Edf, 2);
+        let options = CommitOptions::new(Policy::Edf, cores)
+            .with_construction(ConstructionPolicy::any_graph())
+            .with_clusters(Clusters::Of(clusters.to_vec()));
+        let mut task_set = verify(&[spec], &options).unwrap().task_set;
+        let settings = settings((Policy::Edf, Preemption::Enabled), cores);
+        fix_orders(&mut task_set, &settings);
         let added: usize = (0..)
             .map(SubtaskId)
             .take(wcets.len())
             .map(|subtask| task_set.dags()[0].successors(subtask).len())
             .sum();
-        (
-            answer(&task_set, &settings((Policy::Edf, Preemption::Enabled), 2)).bounds[0]
-                .unwrap()
-                .bound_ns,
-            added,
-        )
+        let bound = answer(&task_set, &settings).bounds[0].unwrap();
+        (bound.bound_ns, added)
     };
+    let bound = |order, wcets: &[u64]| on(2, &[], order, wcets);
     // Three of 2 after two of 3, on two cores: 3 + 2 + 2, in whatever order they are taken.
     let wcets = [3, 3, 2, 2, 2];
     assert_eq!(bound(Order::Free, &wcets), (8, 0));
     assert_eq!(bound(Order::Fixed, &wcets), (7, 3));
+    // Made for the cores of its cluster, be there more on the machine.
+    assert_eq!(on(8, &[2, 6], Order::Fixed, &wcets), (7, 3));
     // Here one job alone takes no longer anyway.
     assert_eq!(bound(Order::Fixed, &[5, 5]), (5, 0));
 }

@@ -32,6 +32,7 @@ use sched_dag::analysis::{self, OverheadSource, Reason, Settings, TaskError, Tes
 use sched_dag::wcets::WcetSource;
 use sched_dag::{ClusterId, DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet, Why};
 
+use super::assign::settings;
 use crate::platform::Platform;
 
 /// What is known at commit about the deadlines of one DAG.
@@ -281,12 +282,7 @@ pub(crate) struct Answers {
 impl Answers {
     /// Analyses what a platform will run.
     pub(crate) fn new(task_set: &TaskSet, platform: &dyn Platform) -> Self {
-        let settings = Settings {
-            policy: platform.policy(),
-            preemption: platform.preemption(),
-            cores: platform.cores(),
-            overheads: platform.overheads(),
-        };
+        let settings = settings(platform);
         let answer = analysis::answer(task_set, &settings);
         let found = answer.bounds.iter().zip(&answer.reasons);
         let of_dags = (0..).map(DagId).zip(found).map(|(dag, (bound, reason))| {

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use sched_dag::analysis::{Task, multi_path};
-use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Order, Policy, verify};
+use sched_dag::analysis::{Overheads, Settings, Task, fix_orders, multi_path};
+use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Order, Policy, Preemption, verify};
 
 use crate::dag_file::stg;
 use crate::oracle::bounds::older::{graham, long_paths};
@@ -68,7 +68,15 @@ fn task(spec: &DagSpec, order: Order, cores: u32) -> Result<Task, String> {
     let options =
         CommitOptions::new(Policy::Edf, cores).with_construction(ConstructionPolicy::any_graph());
     let verified = verify(&[spec], &options).map_err(|rejected| rejected.to_string())?;
-    Task::from_dag(&verified.task_set.dags()[0], 0).map_err(|error| error.to_string())
+    let mut task_set = verified.task_set;
+    let settings = Settings {
+        policy: options.policy,
+        preemption: Preemption::Enabled,
+        cores,
+        overheads: Overheads::default(),
+    };
+    fix_orders(&mut task_set, &settings);
+    Task::from_dag(&task_set.dags()[0], 0).map_err(|error| error.to_string())
 }
 
 /// Writes a row a number of cores.

@@ -12,7 +12,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use sched_dag::analysis::{Settings, answer};
+use sched_dag::analysis::{Settings, answer, fix_orders};
 use sched_dag::{CommitOptions, ConstructionPolicy, verify};
 
 use crate::options::{Command, Opt, Takes as Value};
@@ -104,18 +104,20 @@ impl Seen {
             // A WCET or a path beyond the deadline.
             return Vec::new();
         };
-        let task_set = Arc::new(verified.task_set);
+        let mut task_set = verified.task_set;
         let settings = Settings {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,
             overheads: costs.overheads(),
         };
+        fix_orders(&mut task_set, &settings);
         let answer = answer(&task_set, &settings);
         if !answer.is_proven() {
             return Vec::new();
         }
         self.accepted += 1;
+        let task_set = Arc::new(task_set);
         let bounds: Vec<_> = answer.bounds.into_iter().flatten().collect();
         for bound in &bounds {
             *self.by_test.entry(bound.test.to_string()).or_default() += 1;

@@ -1,0 +1,135 @@
+//! Precedence that fixes an order of a DAG's subtasks, where that proves a shorter bound.
+//!
+//! Take a schedule of the WCETs on the cores of the DAG's cluster: always the ready subtask with
+//! the longest remaining path first, and none preempted. Add an edge from each subtask to the
+//! next one on its core. Each core's subtasks are then a chain, so the DAG is no wider than the
+//! cores; alone, no ready subtask ever waits, and the response time is at most the length of the
+//! new graph: that of the schedule. Shorter execution times make no difference to that, as
+//! they would to the schedule (R. L. Graham's anomalies, 1969).
+//!
+//! Among others that can be worse: the path is longer, and what interferes with it may come
+//! on one core. So the edges are added where the answer with them is better for the DAG and no
+//! worse for any other, which takes an answer more for each DAG whose schedule is shorter than
+//! the bound of one job alone. A DAG of which sinks have deadlines of their own stays as it is,
+//! as the schedule knows none, and an edge would hand an early one on.
+//!
+//! An edge goes from an earlier finish to a later start of the schedule, so none closes a cycle.
+
+use alloc::collections::BinaryHeap;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cmp::Reverse;
+
+use super::answer::{Answer, Settings};
+use super::judge::answer;
+use super::multi_path::multi_path;
+use super::task::Task;
+use crate::ids::{DagId, to_u32};
+use crate::policy::Order;
+use crate::task_set::{Dag, TaskSet};
+
+/// Fixes the order of each DAG that allows it, where that proves more: a shorter bound of it,
+/// and of no other job or sink a longer one.
+pub fn fix_orders(task_set: &mut TaskSet, settings: &Settings) {
+    let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
+    let Some(overhead_ns) = overhead_ns else {
+        return;
+    };
+    let mut free = None;
+    for dag in (0..).map(DagId).take(task_set.dags().len()) {
+        let model = task_set.dag(dag);
+        let cores = to_u32(task_set.cores_of(model.cluster(), settings.cores).len());
+        let edges = match Task::from_dag(model, overhead_ns) {
+            Ok(task) if allows(model) => shorter(&task, cores),
+            _ => None,
+        };
+        let Some((edges, _)) = edges else {
+            continue;
+        };
+        let mut with_edges = task_set.clone();
+        with_edges.precede(dag, &edges);
+        let before = free.take().unwrap_or_else(|| answer(task_set, settings));
+        let after = answer(&with_edges, settings);
+        if is_better(dag, &after, &before) {
+            *task_set = with_edges;
+            free = Some(after);
+        } else {
+            free = Some(before);
+        }
+    }
+}
+
+/// Reports whether an order of a DAG's subtasks may be fixed.
+pub(super) fn allows(dag: &Dag) -> bool {
+    dag.order == Order::Fixed && dag.least_deadline_ns() == dag.relative_deadline_ns()
+}
+
+/// Returns the edges of a schedule and its length, if that is below the bound of one job alone.
+pub(super) fn shorter(task: &Task, cores: u32) -> Option<(Vec<(u32, u32)>, u64)> {
+    let bound_ns = multi_path(task, cores)?;
+    Some(schedule(task, cores)).filter(|&(_, length_ns)| length_ns < bound_ns)
+}
+
+/// Compares answers: one DAG is to have a shorter bound, and no other a longer one, nor a sink
+/// of these.
+fn is_better(dag: DagId, after: &Answer, before: &Answer) -> bool {
+    // What is not proven is longer than all that is.
+    let bounds = |answer: &Answer| -> Vec<u64> {
+        let jobs = answer.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
+        let (earlier, own_on) = answer.sinks_ns.split_at(dag.index());
+        let sinks = earlier.iter().chain(&own_on[1..]).flatten().copied();
+        jobs.chain(sinks).map(|ns| ns.unwrap_or(u64::MAX)).collect()
+    };
+    let (after, before) = (bounds(after), bounds(before));
+    after[dag.index()] < before[dag.index()] && after.iter().zip(&before).all(|(a, b)| a <= b)
+}
+
+/// Schedules the WCETs; returns an edge for each two neighbours on a core, and the length.
+fn schedule(task: &Task, cores: u32) -> (Vec<(u32, u32)>, u64) {
+    let (levels, wcets) = (task.bottom_levels(), task.wcets_ns());
+    let mut missing = vec![0; task.subtask_count()];
+    for &subtask in task.topological_order() {
+        for &next in task.successors(subtask) {
+            missing[next] += 1;
+        }
+    }
+    let urgency = |subtask: usize| (levels[subtask], Reverse(subtask));
+    let sources = (0..missing.len()).filter(|&subtask| missing[subtask] == 0);
+    let mut ready: BinaryHeap<_> = sources.map(urgency).collect();
+    let cores = usize::try_from(cores)
+        .unwrap_or(usize::MAX)
+        .min(missing.len());
+    let mut last: Vec<Option<usize>> = vec![None; cores];
+    let mut idle: Vec<usize> = (0..cores).rev().collect();
+    // By their finish.
+    let mut running: BinaryHeap<Reverse<(u64, usize, usize)>> = BinaryHeap::new();
+    let mut edges = Vec::new();
+    let mut now = 0;
+    loop {
+        while let Some(core) = idle.last().copied()
+            && let Some((_, Reverse(subtask))) = ready.pop()
+        {
+            idle.pop();
+            if let Some(before) = last[core].replace(subtask) {
+                edges.push((to_u32(before), to_u32(subtask)));
+            }
+            running.push(Reverse((now + wcets[subtask], subtask, core)));
+        }
+        let Some(Reverse((finish, ..))) = running.peek().copied() else {
+            return (edges, now);
+        };
+        now = finish;
+        while let Some(Reverse((finish, subtask, core))) = running.peek().copied()
+            && finish == now
+        {
+            running.pop();
+            idle.push(core);
+            for &next in task.successors(subtask) {
+                missing[next] -= 1;
+                if missing[next] == 0 {
+                    ready.push(urgency(next));
+                }
+            }
+        }
+    }
+}
