@@ -27,7 +27,6 @@ mod tie;
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
-use alloc::vec;
 use alloc::vec::Vec;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
 use sched_dag::{Policy, TaskSet, Verified, Warning, analysis, sorted_by_key, wcets};
@@ -313,7 +312,7 @@ fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
 /// Reports for each DAG whether it stands in the list before, too.
 fn repeated(dags: &[Dag]) -> Vec<bool> {
     let address = |number: usize| Rc::as_ptr(&dags[number].draft);
-    let mut is_repeated = vec![false; dags.len()];
+    let mut is_repeated: Vec<bool> = dags.iter().map(|_| false).collect();
     for pair in sorted_by_key(dags.len(), address).windows(2) {
         is_repeated[pair[1]] = address(pair[0]) == address(pair[1]);
     }
@@ -328,14 +327,13 @@ fn verify(
 ) -> Result<Verified, CommitError> {
     let mut faults = Vec::new();
     let mut specs = Vec::with_capacity(dags.len());
-    let is_repeated = repeated(dags);
-    for (number, dag) in dags.iter().enumerate() {
+    for ((number, dag), is_repeated) in dags.iter().enumerate().zip(repeated(dags)) {
         let draft = dag.draft.borrow();
         let label = DagLabel {
             id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
             name: draft.spec.name.clone(),
         };
-        if is_repeated[number] {
+        if is_repeated {
             faults.push(Fault::GivenTwice { dag: label });
             continue;
         }
