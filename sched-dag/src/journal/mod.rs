@@ -7,7 +7,7 @@
 //! viewer draws.
 //!
 //! [`What`] is the only list of words. Here they are printed and read, and here an
-//! event is packed into three [words](Event::pack) of 64 bits and unpacked.
+//! event is packed into three [words](Event::words) of 64 bits and unpacked.
 //!
 //! # Order
 //!
