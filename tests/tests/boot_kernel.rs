@@ -92,6 +92,44 @@ fn faults_of_a_subtask_end_its_dag_alone() {
     faults_are_contained(4);
 }
 
+/// Has one DAG survive thousands of faults, next to one that must not notice.
+fn faults_cost_nothing_that_lasts(preemption: &str) {
+    const FAULTS: u64 = 10_000;
+    for cores in [1, 2, 4, 8] {
+        let guest = Guest::new("faults").cores(cores).word("trace_events=1000");
+        let guest = guest.word(&format!("preemption={preemption}"));
+        let outcome = guest.word(&format!("faults={FAULTS}")).succeed();
+        let lines: Vec<_> = outcome.transcript.of_kind("endurance").collect();
+        let [few, many] = lines[..] else {
+            panic!("not two lines of kind `endurance`\n{}", outcome.tail());
+        };
+        for (line, faults) in [(few, 100), (many, FAULTS)] {
+            for member in ["faults", "restarts", "completed"] {
+                assert_eq!(line.number_at(member), Some(faults), "{}", line.text);
+            }
+            assert_eq!(line.number_at("healthy_jobs"), Some(2 * faults));
+            assert_eq!(line.number_at("misses"), Some(0), "{}", line.text);
+            assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+        }
+        // While the run is held, and after it.
+        let held = [few, many].map(|line| line.number_at("held_bytes").unwrap_or(0));
+        assert!(held[0] > 0 && held[1] <= held[0] + 64, "{held:?}");
+        for member in ["heap_bytes", "contexts"] {
+            assert_eq!(few.number_at(member), many.number_at(member), "{member}");
+        }
+    }
+}
+
+#[test]
+fn ten_thousand_faults_cost_no_more_than_a_hundred() {
+    faults_cost_nothing_that_lasts("on");
+}
+
+#[test]
+fn ten_thousand_faults_cost_no_more_than_a_hundred_without_preemption() {
+    faults_cost_nothing_that_lasts("off");
+}
+
 #[test]
 fn a_fault_that_the_app_does_not_look_at_is_a_failure() {
     let outcome = guest("unnoticed").end_in(Status::Failure);

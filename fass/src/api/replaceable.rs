@@ -1,9 +1,8 @@
 //! Registering a subtask whose function another one replaces after a fault.
 //!
 //! Where a DAG drops a job at a fault and goes on ([`Dag::survive_faults`]), the function that
-//! failed cannot: what it had is abandoned as it is. So its next jobs are another
-//! function's, which the commit has made: one *made anew* by the same factory, or one to
-//! *fall back* on, which does the work in a simpler way.
+//! failed cannot: what it had is given up as it is. So its next jobs are another
+//! function's: one *made anew* by the same factory, or one to *fall back* on, which does the work in a simpler way.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -18,7 +17,8 @@ use super::signal::Signal;
 use super::uses::{ResettableUses, Uses};
 use super::using::Using;
 use crate::draft::attributes::SubtaskAttributes;
-use crate::run::replaceable::{Function, Functions};
+use crate::run::replaceable::{Call, Function, Functions};
+use crate::run::reset::Reset;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 /// A DAG whose next subtask has a function that can be replaced after a fault. Made by
@@ -71,6 +71,7 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 pub struct Replaceable<'d, Args, Ret> {
     dag: &'d Dag,
     functions: Functions<Args, Ret>,
+    states: Arc<[Arc<dyn Reset>]>,
 }
 
 impl Dag {
@@ -86,25 +87,21 @@ impl Dag {
 
     /// Begins the registration of a subtask whose function is made anew after a fault.
     ///
-    /// The commit calls `make` for the function, and once more for each fault that the
-    /// DAG survives in all.
+    /// The commit calls `make` for the function. The first instance after a fault calls it again,
+    /// in its own time; a fault of `make` then ends the DAG.
     ///
     /// See [`Replaceable`].
     pub fn restarting<M, F, Args, Ret>(&self, mut make: M) -> Replaceable<'_, Args, Ret>
     where
-        M: FnMut() -> F + 'static,
+        M: FnMut() -> F + Send + 'static,
         F: FnMut(Args) -> Ret + Send + 'static,
         Args: VecToSubs,
         Ret: VecToPubs,
     {
         Replaceable {
             dag: self,
-            functions: Functions {
-                make: Box::new(move || Box::new(make())),
-                fallback: None,
-                restarts: true,
-                states: Arc::new([]),
-            },
+            functions: Functions::Anew(Box::new(move || Box::new(make()))),
+            states: Arc::new([]),
         }
     }
 
@@ -130,25 +127,10 @@ impl Dag {
     {
         Replaceable {
             dag: self,
-            functions: Functions {
-                make: once(first),
-                fallback: Some(Box::new(second)),
-                restarts: false,
-                states: Arc::new([]),
-            },
+            functions: Functions::Two(Box::new(first), Box::new(second)),
+            states: Arc::new([]),
         }
     }
-}
-
-/// Returns what makes one function, once.
-fn once<Args: VecToSubs, Ret: VecToPubs>(
-    f: impl FnMut(Args) -> Ret + Send + 'static,
-) -> Box<dyn FnMut() -> Function<Args, Ret>> {
-    let mut f: Option<Function<Args, Ret>> = Some(Box::new(f));
-    Box::new(move || {
-        f.take()
-            .expect("a function that is not made anew is asked for once")
-    })
 }
 
 // The bound is each method's own, so that the compiler says our sentence where it is not met.
@@ -161,7 +143,8 @@ impl<'d, U: Uses + 'static> Using<'d, U> {
     pub fn restarting<M, F, Args, Ret>(self, mut make: M) -> Replaceable<'d, Args, Ret>
     where
         U: ResettableUses,
-        M: FnMut() -> F + 'static,
+        U::Held: Send,
+        M: FnMut() -> F + Send + 'static,
         F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
         Args: VecToSubs,
         Ret: VecToPubs,
@@ -171,12 +154,8 @@ impl<'d, U: Uses + 'static> Using<'d, U> {
         let make = move || wrap::<U, _, _, _>(U::another(&held), make());
         Replaceable {
             dag,
-            functions: Functions {
-                make: Box::new(make),
-                fallback: None,
-                restarts: true,
-                states,
-            },
+            functions: Functions::Anew(Box::new(make)),
+            states,
         }
     }
 
@@ -207,30 +186,42 @@ impl<'d, U: Uses + 'static> Using<'d, U> {
     {
         let (dag, held) = self.hold();
         let states = U::states(&held).into();
-        let fallback = wrap::<U, _, _, _>(U::another(&held), second);
+        let second = wrap::<U, _, _, _>(U::another(&held), second);
         Replaceable {
             dag,
-            functions: Functions {
-                make: once(wrap::<U, _, _, _>(held, first)),
-                fallback: Some(fallback),
-                restarts: false,
-                states,
-            },
+            functions: Functions::Two(wrap::<U, _, _, _>(held, first), second),
+            states,
         }
     }
 }
 
+/// A function with what it uses.
+struct Wrapped<U: Uses, F> {
+    held: U::Held,
+    f: F,
+}
+
 /// Makes a function that begins the uses, lends them for one call, and ends them.
-fn wrap<U: ResettableUses + 'static, F, Args, Ret>(
-    mut held: U::Held,
-    mut f: F,
-) -> Function<Args, Ret>
+fn wrap<U: ResettableUses + 'static, F, Args, Ret>(held: U::Held, f: F) -> Function<Args, Ret>
 where
     F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
     Args: VecToSubs,
     Ret: VecToPubs,
 {
-    Box::new(move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args))
+    Box::new(Wrapped::<U, F> { held, f })
+}
+
+impl<U: Uses, F, Args, Ret> Call<Args, Ret> for Wrapped<U, F>
+where
+    F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send,
+{
+    fn call(&mut self, args: Args) -> Ret {
+        (self.f)(U::borrow(&mut U::enter(&mut self.held)), args)
+    }
+
+    fn forget(self: Box<Self>) {
+        core::mem::forget(self.f);
+    }
 }
 
 impl<Args: VecToSubs, Ret: VecToPubs> Replaceable<'_, Args, Ret> {
@@ -245,7 +236,12 @@ impl<Args: VecToSubs, Ret: VecToPubs> Replaceable<'_, Args, Ret> {
         attributes: SubtaskAttributes,
     ) {
         let mut draft = self.dag.open();
-        draft.register_replaceable(self.functions, &input_topics, &output_topics, attributes);
+        draft.register_replaceable(
+            (self.functions, self.states),
+            &input_topics,
+            &output_topics,
+            attributes,
+        );
     }
 }
 
@@ -275,7 +271,12 @@ impl<Ret: VecToPubs> Replaceable<'_, (), Ret> {
         attributes: SubtaskAttributes,
     ) {
         let mut draft = self.dag.open();
-        let subtask = draft.register_replaceable(self.functions, &[], &output_topics, attributes);
+        let subtask = draft.register_replaceable(
+            (self.functions, self.states),
+            &[],
+            &output_topics,
+            attributes,
+        );
         draft.set_period(Activation::Periodic, period, subtask);
     }
 
@@ -298,7 +299,12 @@ impl<Ret: VecToPubs> Replaceable<'_, (), Ret> {
         attributes: SubtaskAttributes,
     ) -> Signal {
         let mut draft = self.dag.open();
-        let subtask = draft.register_replaceable(self.functions, &[], &output_topics, attributes);
+        let subtask = draft.register_replaceable(
+            (self.functions, self.states),
+            &[],
+            &output_topics,
+            attributes,
+        );
         draft.set_period(Activation::Sporadic, min_inter_arrival, subtask);
         drop(draft);
         self.dag.signal()
@@ -325,7 +331,12 @@ impl<Args: VecToSubs> Replaceable<'_, Args, ()> {
         attributes: SubtaskAttributes,
     ) {
         let mut draft = self.dag.open();
-        let subtask = draft.register_replaceable(self.functions, &input_topics, &[], attributes);
+        let subtask = draft.register_replaceable(
+            (self.functions, self.states),
+            &input_topics,
+            &[],
+            attributes,
+        );
         draft.set_sink_deadline(relative_deadline, &subtask);
     }
 }

@@ -29,6 +29,7 @@ use crate::run::latest::AnyLatest;
 use crate::run::message::MessageType;
 use crate::run::record::AnyRecorded;
 use crate::run::replaceable::{self, Functions};
+use crate::run::reset::Reset;
 use crate::run::signal::Target;
 use crate::run::subtask::{MakeBody, defer};
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -117,7 +118,7 @@ impl Draft {
     /// Adds a subtask whose function can be replaced, and returns its label.
     pub(crate) fn register_replaceable<Args: VecToSubs, Ret: VecToPubs>(
         &mut self,
-        functions: Functions<Args, Ret>,
+        (functions, states): (Functions<Args, Ret>, Arc<[Arc<dyn Reset>]>),
         inputs: &[&str],
         outputs: &[&str],
         attributes: SubtaskAttributes,
@@ -125,7 +126,7 @@ impl Draft {
         let inputs = (inputs, Args::input_types());
         let outputs = (outputs, Ret::output_types());
         self.replaceable.push(self.make_bodies.len());
-        self.make_bodies.push(replaceable::defer(functions));
+        self.make_bodies.push(replaceable::defer(functions, states));
         self.enter(inputs, outputs, attributes)
     }
 

@@ -291,4 +291,7 @@ impl Subtask for ReplayedSource {
     }
 
     fn discard(&mut self, _job: u64) {}
+
+    // It has no function.
+    fn forget(self: Box<Self>) {}
 }

@@ -7,6 +7,7 @@
 
 mod distribution;
 pub(crate) mod latest;
+pub(crate) mod left;
 pub(crate) mod run;
 pub(crate) mod stacks;
 mod time;

@@ -67,7 +67,7 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::cell::UnsafeCell;
-use core::mem::MaybeUninit;
+use core::mem::{ManuallyDrop, MaybeUninit};
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
@@ -254,7 +254,7 @@ const CHANGING: u32 = u32::MAX;
 /// A value that one may change or several look at.
 pub(crate) struct Shared<T> {
     claims: AtomicU32,
-    value: UnsafeCell<T>,
+    value: UnsafeCell<ManuallyDrop<T>>,
 }
 
 // SAFETY: by the claim invariant threads have either one `&mut T` or several `&T`
@@ -272,7 +272,7 @@ impl<T> Shared<T> {
     pub(crate) const fn new(value: T) -> Self {
         Self {
             claims: AtomicU32::new(0),
-            value: UnsafeCell::new(value),
+            value: UnsafeCell::new(ManuallyDrop::new(value)),
         }
     }
 
@@ -291,6 +291,16 @@ impl<T> Shared<T> {
             .claims
             .fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more);
         claim.ok().map(|_| Looking(self))
+    }
+}
+
+impl<T> Drop for Shared<T> {
+    fn drop(&mut self) {
+        // One that a fault has left half changed stays as it is.
+        if *self.claims.get_mut() != CHANGING {
+            // SAFETY: `&mut self` shows that no claim is in use, and it is done once.
+            unsafe { ManuallyDrop::drop(self.value.get_mut()) };
+        }
     }
 }
 

@@ -14,7 +14,9 @@ use super::runner::Runner;
 use super::status::note_running;
 use super::step::Ended;
 use super::time::{instance_time_ns, seat, since_epoch};
+use super::watcher::Watcher;
 use super::{Occasion, Work, cluster};
+use crate::machine::context::Abandoned;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::{clock, section, this_core, turns};
@@ -83,16 +85,16 @@ pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     take_turns(core, work)
 }
 
-/// Ends this core's instance because of a fault, and with it its DAG or its job. The
-/// context that ran it must not be resumed. Interrupts are disabled.
-pub fn fail() {
+/// Ends this core's instance because of a fault, and with it its DAG or its job. Its context was
+/// `left` here. Interrupts are disabled.
+pub fn fail(left: &Abandoned) {
     let core = this_core::get();
     let mut place = cluster::of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;
     };
     let here = seat(core);
-    let Some(vertex) = execution.watcher.placement.lose(here.index()) else {
+    let Some(vertex) = execution.watcher.take_ended(here, left) else {
         return;
     };
     let instance = execution.scheduler.instance_of(vertex);
@@ -108,6 +110,8 @@ pub fn fail() {
     edge::failed(instance, ended_ns, clock_ns);
     let mut woken = CoreSet::default();
     execution.step(clock_ns, Occasion::Failed(instance), &mut woken);
+    let Watcher { ended, lost, .. } = &mut execution.watcher;
+    lost.extend(ended.take());
     drop(place);
     woken.wake();
 }

@@ -17,6 +17,11 @@ mod divided;
 mod ended;
 mod events;
 mod letters;
+#[allow(
+    unsafe_code,
+    reason = "a box that a fault has left on a stack is taken back"
+)]
+mod loans;
 mod runner;
 mod signals;
 mod stacks;
@@ -40,7 +45,7 @@ use crate::machine::context::Parked;
 pub use cluster::{count as clusters, first_core};
 pub use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
 pub use divided::{Division, division, is_finished, set_division};
-pub use ended::Ended;
+pub use ended::{Ended, look_at_clearing};
 pub use events::{complete, fail, find_work, interrupt};
 pub use runner::Runner;
 use signals::Signals;
@@ -162,13 +167,7 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
     let number_of = |runner: &Runner| task_set.dag(runner.instance.dag).cluster().index();
     for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
         let watcher = &mut executions[number_of(&runner)].watcher;
-        watcher.placement.replace(runner.vertex, runner);
-    }
-    for others in runner::others(task_set, plan.others, terms.budget_factor) {
-        if let Some(any) = others.first() {
-            let (number, vertex) = (number_of(any), any.vertex.index());
-            executions[number].watcher.others[vertex] = others;
-        }
+        watcher.begin(runner);
     }
     for (number, execution) in executions.into_iter().enumerate() {
         *cluster::nth(number).execution.lock() = Some(execution);
@@ -192,10 +191,12 @@ pub fn begin(epoch_ns: u64) -> Option<u64> {
     Some(jobs.sum())
 }
 
-/// Takes the run out when it has ended.
+/// Takes the run out when it has ended, and drops what it has left behind.
 pub fn end() -> Option<Ended> {
     let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
-    Ended::of(parts.collect())
+    let mut ended = Ended::of(parts.collect())?;
+    ended.clear();
+    Some(ended)
 }
 
 impl Execution {

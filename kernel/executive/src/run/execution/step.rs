@@ -101,7 +101,7 @@ impl Execution {
         watcher.instant_ns = instant_ns.max(scheduler.now_ns());
         let is_survived = match occasion {
             Occasion::Failed(failed) if scheduler.survives(failed.dag, failed.job) => {
-                watcher.other(watcher.task_set.vertex(failed)).is_some()
+                watcher.next(watcher.task_set.vertex(failed)).is_some()
             }
             _ => false,
         };

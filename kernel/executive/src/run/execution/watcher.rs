@@ -4,8 +4,10 @@ use core::sync::atomic::Ordering;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 
+use fass::Replacement;
 use fass::edge::Happened;
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Placement;
@@ -14,9 +16,9 @@ use sched_dag::{TaskSet, Vertex};
 
 use super::Runner;
 use super::cluster::{self, Cluster};
-use super::runner::Others;
+use super::loans::Loans;
 use super::time::here;
-use crate::machine::context::Parked;
+use crate::machine::context::{Abandoned, Parked};
 use crate::machine::this_core;
 use crate::run::edge;
 
@@ -28,7 +30,17 @@ pub(super) struct Watcher {
     pub(super) journal: Journal,
     /// The bodies, and which core has which.
     pub(super) placement: Placement<Box<Runner>, Parked>,
-    pub(super) others: Others,
+    /// What would replace the functions of these, by vertex.
+    next: Box<[Option<Replacement>]>,
+    loans: Loans,
+    /// The runner of the instance that a fault has just ended here.
+    pub(super) ended: Option<Box<Runner>>,
+    /// Those of which nothing runs any more, because of a fault. There is room for all.
+    #[allow(
+        clippy::vec_box,
+        reason = "at the fault nothing may be boxed or unboxed"
+    )]
+    pub(super) lost: Vec<Box<Runner>>,
     pub(super) task_set: Arc<TaskSet>,
     /// The instant, on the run's time.
     pub(super) instant_ns: u64,
@@ -48,7 +60,10 @@ impl Watcher {
             cluster: cluster::nth(id.index()),
             journal,
             placement: Placement::empty(task_set.vertices(), cores.len()),
-            others: (0..task_set.vertices()).map(|_| Vec::new()).collect(),
+            next: vec![None; task_set.vertices()].into(),
+            loans: Loans::new(task_set.vertices()),
+            ended: None,
+            lost: Vec::with_capacity(task_set.vertices()),
             task_set: Arc::clone(task_set),
             instant_ns: 0,
             has_job_news: false,
@@ -82,10 +97,22 @@ impl Watcher {
         self.finish_ns = finish_ns;
     }
 
-    /// Returns what would take the place of a body if a fault lost it now.
-    pub(super) fn other(&self, vertex: Vertex) -> Option<&Runner> {
-        let next = self.others[vertex.index()].last()?;
-        next.body.can_take_over().then_some(&**next)
+    /// Puts the runner of a vertex into its place, at the commit.
+    pub(super) fn begin(&mut self, runner: Box<Runner>) {
+        self.next[runner.vertex.index()] = runner.body.replacement();
+        self.loans.begin(&mut self.placement, runner);
+    }
+
+    /// Returns what would take the place of a function if a fault ended it now.
+    pub(super) fn next(&self, vertex: Vertex) -> Option<&Replacement> {
+        let next = self.next[vertex.index()].as_ref()?;
+        next.is_there().then_some(next)
+    }
+
+    /// Takes back what this core had with it as a fault ended that, and returns its vertex.
+    pub(super) fn take_ended(&mut self, here: CoreId, left: &Abandoned) -> Option<Vertex> {
+        self.ended = self.loans.end(&mut self.placement, here.index(), left);
+        self.ended.as_ref().map(|runner| runner.vertex)
     }
 
     /// Writes down what has happened to a whole job.
@@ -152,10 +179,9 @@ impl Observer for Watcher {
         self.note(What::Restarted, self.instant_ns, Subject::of(instance));
         let Instance { dag, subtask, job } = instance;
         self.tell(What::Restarted, (dag, subtask.0, job), None);
-        let vertex = self.task_set.vertex(instance);
-        if let Some(mut next) = self.others[vertex.index()].pop() {
-            next.body.take_over();
-            self.placement.replace(vertex, next);
+        if let Some(mut runner) = self.ended.take() {
+            runner.body.replace();
+            self.loans.begin(&mut self.placement, runner);
         }
     }
 
