@@ -2,7 +2,7 @@
 //!
 //! Root pointer (RSDP) -> RSDT or XSDT -> MADT (processors, I/O APICs) and
 //! FADT (power management timer, [`power`]), HPET. Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every
-//! table's checksum is verified; what is malformed is as good as absent.
+//! table's checksum is verified; one with a wrong checksum is not used, and named.
 
 use crate::physical::PhysicalMemory;
 use crate::power::{self, Power, Register};
@@ -26,6 +26,8 @@ pub struct Platform {
     pub io_apics: List<u64, MAX_IO_APICS>,
     /// How it is powered off and reset.
     pub power: Power,
+    /// What is wrong with a table that could be done without, if anything is.
+    pub warning: Option<AcpiError>,
 }
 
 impl Platform {
@@ -47,24 +49,39 @@ pub struct PmTimer {
     pub bits: u32,
 }
 
-/// Why the processors could not be found.
+/// Why the processors, or a table, could not be found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AcpiError {
     /// No root pointer where the loader said, nor in the BIOS area.
     NoRootPointer,
     /// The root pointer leads to no valid table of tables.
     NoRootTable,
-    /// The table of interrupt controllers (MADT) is missing or malformed.
-    NoProcessorTable,
+    /// No table has this signature.
+    Absent(Signature),
+    /// The one with this signature has a wrong length or checksum.
+    Damaged(Signature),
+    /// The table of interrupt controllers (MADT) is malformed, or names no processor.
+    NoProcessors,
 }
+
+/// How a table begins.
+type Signature = [u8; 4];
 
 impl core::fmt::Display for AcpiError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::NoRootPointer => "the machine has no ACPI root pointer; boot it with ACPI on",
-            Self::NoRootTable => "the ACPI root table is malformed; update the firmware",
-            Self::NoProcessorTable => "ACPI names no processors (MADT); update the firmware",
-        })
+        let (signature, what) = match self {
+            Self::NoRootPointer => {
+                return f.write_str("the machine has no ACPI root pointer; boot it with ACPI on");
+            }
+            Self::NoRootTable => {
+                return f.write_str("the ACPI root table is malformed; update the firmware");
+            }
+            Self::Absent(signature) => (signature, "is missing"),
+            Self::Damaged(signature) => (signature, "has a wrong length or checksum"),
+            Self::NoProcessors => (b"APIC", "is malformed, or names no processor"),
+        };
+        let name = signature.escape_ascii();
+        write!(f, "the ACPI table `{name}` {what}; update the firmware")
     }
 }
 
@@ -89,19 +106,27 @@ pub fn read(memory: &dyn PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, 
         })
         .ok_or(AcpiError::NoRootPointer)?;
     let tables = RootTable::at(memory, root).ok_or(AcpiError::NoRootTable)?;
-    let madt = tables
-        .find(memory, *b"APIC")
-        .ok_or(AcpiError::NoProcessorTable)?;
-    let fadt = tables.find(memory, *b"FACP");
+    let madt = tables.find(memory, *b"APIC")?;
+    let mut warning = None;
+    let mut find = |signature| {
+        let found = tables.find(memory, signature);
+        warning = warning.or(found
+            .err()
+            .filter(|why| *why == AcpiError::Damaged(signature)));
+        found.ok()
+    };
+    let fadt = find(*b"FACP");
+    let hpet = find(*b"HPET").and_then(|hpet| hpet_registers(memory, hpet));
     let mut platform = Platform {
         apic_ids: List::new(0),
         local_apic: 0,
         pm_timer: fadt.and_then(|fadt| pm_timer(memory, fadt)),
-        hpet: (tables.find(memory, *b"HPET")).and_then(|hpet| hpet_registers(memory, hpet)),
+        hpet,
         io_apics: List::new(0),
         power: fadt.map_or(Power::default(), |fadt| power::read(memory, fadt)),
+        warning,
     };
-    read_madt(memory, madt, &mut platform).ok_or(AcpiError::NoProcessorTable)?;
+    read_madt(memory, madt, &mut platform).ok_or(AcpiError::NoProcessors)?;
     Ok(platform)
 }
 
@@ -116,7 +141,7 @@ fn sums_to_0(bytes: &[u8]) -> bool {
 }
 
 /// Returns the table's length if it is whole and starts with `signature`.
-fn table_length(memory: &dyn PhysicalMemory, table: u64, signature: [u8; 4]) -> Option<u64> {
+fn table_length(memory: &dyn PhysicalMemory, table: u64, signature: Signature) -> Option<u64> {
     let length = memory.u32(table + 4)?;
     let bytes = memory.bytes(table, usize::try_from(length).ok()?)?;
     (bytes.starts_with(&signature) && sums_to_0(bytes)).then_some(u64::from(length))
@@ -126,7 +151,7 @@ fn table_length(memory: &dyn PhysicalMemory, table: u64, signature: [u8; 4]) -> 
 struct RootTable {
     address: u64,
     length: u64,
-    entry_size: u64,
+    entry_size: usize,
 }
 
 impl RootTable {
@@ -150,14 +175,24 @@ impl RootTable {
         })
     }
 
-    fn find(&self, memory: &dyn PhysicalMemory, signature: [u8; 4]) -> Option<u64> {
-        (HEADER..self.length)
-            .step_by(usize::try_from(self.entry_size).ok()?)
-            .filter_map(|offset| match self.entry_size {
-                4 => memory.u32(self.address + offset).map(u64::from),
-                _ => memory.u64(self.address + offset),
-            })
-            .find(|table| table_length(memory, *table, signature).is_some())
+    /// Finds the first whole table with a signature.
+    fn find(&self, memory: &dyn PhysicalMemory, signature: Signature) -> Result<u64, AcpiError> {
+        let mut why = AcpiError::Absent(signature);
+        for offset in (HEADER..self.length).step_by(self.entry_size) {
+            let entry = self.address + offset;
+            let table = match self.entry_size {
+                4 => memory.u32(entry).map(u64::from),
+                _ => memory.u64(entry),
+            };
+            let is_named = |at: &u64| memory.bytes(*at, 4) == Some(&signature);
+            if let Some(table) = table.filter(is_named) {
+                if table_length(memory, table, signature).is_some() {
+                    return Ok(table);
+                }
+                why = AcpiError::Damaged(signature);
+            }
+        }
+        Err(why)
     }
 }
 
@@ -327,7 +362,28 @@ mod tests {
 
         let mut machine = Machine::new(0);
         machine.0[0x5010] ^= 1; // spoils the MADT's
-        assert_eq!(fault(&machine), AcpiError::NoProcessorTable);
+        let damaged = fault(&machine);
+        assert_eq!(damaged, AcpiError::Damaged(*b"APIC"));
+        assert_eq!(
+            damaged.to_string(),
+            "the ACPI table `APIC` has a wrong length or checksum; update the firmware"
+        );
+        machine.0[0x5000] = b'X';
+        assert_eq!(fault(&machine), AcpiError::Absent(*b"APIC"));
+    }
+
+    #[test]
+    fn names_a_damaged_table_that_it_does_without() {
+        let mut machine = Machine::new(2);
+        let whole = read(&machine, Some(RSDP)).unwrap();
+        assert_eq!(whole.warning, None);
+        machine.0[0x6010] ^= 1;
+        let platform = read(&machine, Some(RSDP)).unwrap();
+        assert_eq!(platform.pm_timer, None);
+        assert_eq!(platform.hpet, whole.hpet);
+        assert_eq!(platform.warning, Some(AcpiError::Damaged(*b"FACP")));
+        machine.0[0x6000] = b'X'; // absent
+        assert_eq!(read(&machine, Some(RSDP)).unwrap().warning, None);
     }
 
     #[test]
@@ -350,7 +406,7 @@ mod tests {
         machine.put_table(0x5000, *b"APIC", &[0; 16]);
         assert_eq!(
             read(&machine, Some(RSDP)).unwrap_err(),
-            AcpiError::NoProcessorTable
+            AcpiError::NoProcessors
         );
     }
 }

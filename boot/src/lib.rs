@@ -22,6 +22,7 @@ pub mod acpi;
 mod list;
 #[allow(unsafe_code, reason = "C's memory functions take pointers")]
 pub mod memory_functions;
+mod memory_map;
 pub mod multiboot2;
 #[allow(
     unsafe_code,
@@ -36,6 +37,7 @@ pub mod screen;
 use physical::PhysicalMemory;
 
 pub use list::{Full, List};
+pub use memory_map::{MAX_REGIONS, MEMORY_END, MemoryMap, MemoryRegion};
 
 /// The most processors that are told apart.
 pub const MAX_PROCESSORS: usize = 255;
@@ -53,8 +55,8 @@ pub struct BootInfo {
     pub command_line: List<u8, MOST_COMMAND_LINE_BYTES>,
     /// Whether the loader passed more than that.
     pub is_command_line_cut: bool,
-    /// The physical memory map; what no longer fits is left out.
-    pub memory: List<MemoryRegion, 64>,
+    /// The physical memory map, as the loader told it until it is put in order.
+    pub memory: MemoryMap,
     /// The files that the loader left in memory, in its order. Where they lie is the
     /// loader's word, which the kernel compares with the memory map.
     pub modules: List<Module, MAX_MODULES>,
@@ -64,17 +66,6 @@ pub struct BootInfo {
     pub rsdp: Option<u64>,
     /// The time stamp counter when Rust code began to run, in ticks.
     pub entry_tsc: u64,
-}
-
-/// A range of physical memory of one kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MemoryRegion {
-    /// The address of its first byte.
-    pub start: u64,
-    /// The address after its last byte.
-    pub end: u64,
-    /// Whether it is ordinary memory that nobody uses.
-    pub usable: bool,
 }
 
 /// A screen of coloured pixels in memory.
@@ -120,11 +111,7 @@ impl BootInfo {
         Self {
             command_line: List::new(0),
             is_command_line_cut: false,
-            memory: List::new(MemoryRegion {
-                start: 0,
-                end: 0,
-                usable: false,
-            }),
+            memory: MemoryMap::new(),
             modules: List::new(Module { start: 0, end: 0 }),
             screen: None,
             rsdp: None,
@@ -146,27 +133,15 @@ impl BootInfo {
         }
     }
 
-    /// Adds a range of the memory map, of the given kind by E820's numbers. Firmware splits
-    /// memory into many ranges, so one that continues the last of its kind becomes one with it.
-    fn add_memory(&mut self, start: u64, size: u64, kind: u32) -> Result<(), Full> {
+    /// Takes an entry of a memory map: PVH and Multiboot2 have the same beginning of one, start,
+    /// size and kind by E820's numbers. Returns nothing if it is not there or does not fit.
+    fn take_region(&mut self, memory: &impl PhysicalMemory, entry: u64) -> Option<()> {
         /// The kind of ordinary memory.
         const USABLE: u32 = 1;
-        let (end, usable) = (start.saturating_add(size), kind == USABLE);
-        if let Some(last) = self.memory.as_mut_slice().last_mut()
-            && (last.end, last.usable) == (start, usable)
-        {
-            last.end = end;
-            return Ok(());
-        }
-        self.memory.push(MemoryRegion { start, end, usable })
-    }
-
-    /// Takes an entry of a memory map: PVH and Multiboot2 have the same beginning of one, start,
-    /// size and kind. Returns nothing if it is not there or does not fit.
-    fn take_region(&mut self, memory: &impl PhysicalMemory, entry: u64) -> Option<()> {
         let (start, size) = (memory.u64(entry)?, memory.u64(entry + 8)?);
         let kind = memory.u32(entry + 16)?;
-        self.add_memory(start, size, kind).ok()
+        self.memory.add(start, size, kind == USABLE);
+        (!self.memory.is_cut).then_some(())
     }
 
     /// Adds a module, unless it has no bytes.

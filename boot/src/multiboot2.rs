@@ -204,7 +204,8 @@ mod tests {
         assert_eq!(ends, [60, 100]);
         let split = (0..200).map(|page| (page << 13, 4096, 1));
         let info = self::info(&list(&[map(24, &split.collect::<Vec<_>>())]));
-        assert_eq!(info.memory.as_slice().len(), 64, "what fits");
+        assert_eq!(info.memory.as_slice().len(), 128, "what fits");
+        assert!(info.memory.is_cut);
     }
 
     #[test]

@@ -51,6 +51,7 @@ extern "C" fn rust_entry(told: u32) -> ! {
     if !pvh::read(&memory, u64::from(told), &mut info) {
         multiboot2::read(&memory, u64::from(told), &mut info);
     }
+    info.memory.put_in_order();
     // SAFETY: this frame is never left (`kernel_main` does not return), and the
     // boot stack is part of the image: `info` lives as long as the machine runs.
     let info: &'static BootInfo = unsafe { &*core::ptr::from_ref(&info) };

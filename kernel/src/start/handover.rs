@@ -7,7 +7,7 @@ use core::ops::Range;
 
 use boot::acpi::{self, MAX_IO_APICS, Platform};
 use boot::physical::LowMemory;
-use boot::{BootInfo, Framebuffer, List, Module};
+use boot::{BootInfo, Framebuffer, List, MAX_REGIONS, Module};
 
 use super::{probe, settings};
 use crate::app::bound_verdict::BoundVerdict;
@@ -88,6 +88,12 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         unsafe { avx::turn_on() };
     }
     let platform = read_platform(info);
+    if let Some(warning) = platform.warning {
+        println!("warning: {warning}");
+    }
+    if info.memory.is_cut {
+        println!("warning: the memory map has more than {MAX_REGIONS} ranges; some are not used");
+    }
     let module = module(info);
     // SAFETY: 1. `boot` handed over with its table in use and the machine's
     // map. 2. This is the boot processor's only way, and nothing was allocated.
@@ -100,7 +106,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
             screen.clone(),
         )
     };
-    let layout = layout.expect("the machine has too little memory: give it 16 MiB or more");
+    let layout = layout.unwrap_or_else(|error| panic!("{error}"));
     if !is_early {
         show_text(info, &screen);
     }

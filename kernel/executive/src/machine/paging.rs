@@ -38,11 +38,23 @@ impl Access {
 
 /// Something that a page cannot be mapped for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum MapError {
+pub enum MapError {
     /// No frame is left for the table itself.
     OutOfFrames,
     /// The page is mapped already.
     AlreadyMapped,
+}
+
+/// Says what is wrong with the machine, where its own memory and devices are mapped.
+impl core::fmt::Display for MapError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::OutOfFrames => "the machine has too little memory: give it 16 MiB or more",
+            Self::AlreadyMapped => {
+                "the firmware has two of image, memory, registers and screen in one place; update it"
+            }
+        })
+    }
 }
 
 const PRESENT: u64 = 1;

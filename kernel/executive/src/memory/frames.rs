@@ -5,7 +5,7 @@
 
 use core::ops::Range;
 
-use boot::{List, MemoryRegion};
+use boot::{List, MAX_REGIONS, MemoryRegion};
 
 /// The size of a frame, in bytes.
 pub(crate) const FRAME: u64 = 4096;
@@ -16,13 +16,15 @@ const LOWEST: u64 = 1 << 20;
 /// The frames that nobody has taken.
 #[derive(Debug)]
 pub(crate) struct Frames {
-    free: List<(u64, u64), 64>,
+    /// Image and module cut two ranges of a map in two.
+    free: List<(u64, u64), { MAX_REGIONS + 2 }>,
     /// The bytes of all usable memory, taken or not.
     total: u64,
 }
 
 impl Frames {
-    /// Creates the stock from the memory map, less the `taken` ranges.
+    /// Creates the stock from the memory map, which ascends, less the `taken` ranges. So does
+    /// the stock: what lies below 4 GiB, where page tables have to be at first, goes first.
     pub(crate) fn new(map: &[MemoryRegion], taken: &[Range<u64>]) -> Self {
         let mut frames = Self {
             free: List::new((0, 0)),
@@ -38,8 +40,7 @@ impl Frames {
         frames
     }
 
-    /// Adds the whole frames of `start..end`, if there are any. What no longer
-    /// fits in the list stays unused.
+    /// Adds the whole frames of `start..end`, if there are any.
     fn add(&mut self, start: u64, end: u64) {
         let (start, end) = (start.next_multiple_of(FRAME), end / FRAME * FRAME);
         if start < end {

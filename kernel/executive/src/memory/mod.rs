@@ -10,14 +10,14 @@ mod tlsf;
 
 use core::ops::Range;
 
-use boot::{MemoryRegion, Module};
+use boot::{MEMORY_END, MemoryRegion, Module};
 
 use crate::machine::paging::{Access, MapError, PAGE, PageTable};
 use crate::machine::spinlock::SpinLock;
 use frames::{FRAME, Frames, less};
 
-/// Where stacks live: 512 GiB, beyond any physical address of ordinary PCs.
-const STACK_WINDOW: u64 = 1 << 39;
+/// Where stacks live: beyond the memory that is used.
+const STACK_WINDOW: u64 = MEMORY_END;
 
 /// Where the module is: its physical address beyond this one.
 pub const MODULE_WINDOW: u64 = 1 << 40;
@@ -55,7 +55,7 @@ pub struct Layout {
 ///
 /// # Safety
 ///
-/// 1. The boot page table is in use, and `map` is the machine's memory map.
+/// 1. The boot page table is in use, and `map` is the machine's memory map, in order.
 /// 2. It is called once, by the boot processor, before anything is allocated.
 /// 3. `module`, if any, [lies in memory](lies_in_memory) by that map.
 /// 4. At `devices` there are registers, and `screen`, whole pages, is a screen.
@@ -64,10 +64,10 @@ pub unsafe fn initialize(
     module: Option<Module>,
     devices: &[u64],
     screen: Range<u64>,
-) -> Result<Layout, OutOfMemory> {
+) -> Result<Layout, MapError> {
     let mut frames = Frames::new(map, &[boot_entry::image::whole(), pages_of(module)]);
     let total_bytes = frames.total_bytes();
-    let heap = frames.take_heap().ok_or(OutOfMemory)?;
+    let heap = frames.take_heap().ok_or(MapError::OutOfFrames)?;
     let mut new_frame = || take_zeroed(&mut frames);
     // SAFETY: frames are unused and zeroed (`take_zeroed`), in memory that the
     // boot table maps (condition 1) and `map_all` maps too.
@@ -138,7 +138,7 @@ fn map_all(
     map: &[MemoryRegion],
     module: Range<u64>,
     new_frame: &mut dyn FnMut() -> Option<u64>,
-) -> Result<(), OutOfMemory> {
+) -> Result<(), MapError> {
     let image = boot_entry::image::whole();
     let sections = [
         (boot_entry::image::rodata(), Access::Constant),
@@ -167,7 +167,7 @@ fn map_devices(
     map: &[MemoryRegion],
     devices: &[u64],
     new_frame: &mut dyn FnMut() -> Option<u64>,
-) -> Result<(), OutOfMemory> {
+) -> Result<(), MapError> {
     let page = |address: &u64| address / PAGE * PAGE;
     for (index, start) in devices.iter().map(page).enumerate() {
         let is_memory = |region: &MemoryRegion| {
