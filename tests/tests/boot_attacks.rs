@@ -163,7 +163,6 @@ fn the_kinds_of_the_kernel_are_refused() {
 
 #[test]
 fn a_lock_misused_is_its_holders_fault() {
-    attacked("lock_panic", 1, says("panic", "a panic in a section"));
     attacked("lock_twice", 1, says("panic", "taken by its holder"));
     attacked("lock_loop", 1, says("budget overrun", "budget of 6ms"));
 }

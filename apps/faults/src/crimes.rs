@@ -5,6 +5,10 @@
 
 use core::arch::asm;
 use core::hint::black_box;
+use core::time::Duration;
+
+use fass::Occupation::{self, Hold as HOLD, Spin as SPIN};
+use kernel::{Event, Lock};
 
 /// The crime had no consequence, which is the failure of a protection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,7 +18,7 @@ pub struct Unpunished;
 pub type Crime = fn() -> Unpunished;
 
 /// Every crime, by name.
-pub const CRIMES: [(&str, Crime); 13] = [
+pub const CRIMES: [(&str, Crime); 18] = [
     ("panic", panic),
     ("panic_in_message", panic_twice),
     ("null_write", write_to_null),
@@ -26,6 +30,11 @@ pub const CRIMES: [(&str, Crime); 13] = [
     ("division", divide_by_zero),
     ("undefined_instruction", execute_undefined),
     ("stack_overflow", overflow_the_stack),
+    ("overflow_in_hold", || overflow_in(&|| execute(HOLD))),
+    ("overflow_in_spin", || overflow_in(&|| execute(SPIN))),
+    ("overflow_in_wait", || overflow_in(&wait)),
+    ("overflow_in_lock", || overflow_in(&lock)),
+    ("panic_in_section", panic_in_section),
     ("endless_loop", loop_for_ever),
     ("endless_wait", wait_for_ever),
 ];
@@ -117,6 +126,43 @@ fn sum_down(number: u64) -> u64 {
     frame[0].wrapping_add(sum_down(number.wrapping_sub(1)))
 }
 
+/// Recurses, with a call of the kernel's on each level: sooner or later it is that which hits
+/// the guard page.
+fn overflow_in(call: &dyn Fn()) -> Unpunished {
+    descend(call, black_box(u64::MAX));
+    Unpunished
+}
+
+#[expect(unconditional_recursion, reason = "that is the crime")]
+fn descend(call: &dyn Fn(), levels: u64) {
+    // Less than any section of the kernel takes.
+    let frame = black_box([levels; 2]);
+    call();
+    descend(call, levels.wrapping_sub(1));
+    black_box(frame);
+}
+
+fn execute(how: Occupation) {
+    fass::execute_for(Duration::from_micros(1), how);
+}
+
+fn wait() {
+    static EVENT: Event = Event::new();
+    EVENT.wait(EVENT.version(), fass::now_ns() + 1_000);
+}
+
+static SHARED: Lock<u32> = Lock::new(0);
+
+fn lock() {
+    static FREE: Lock<u32> = Lock::new(0);
+    FREE.with(|free| *free = free.wrapping_add(1));
+}
+
+/// Panics while it holds a lock, which is lost with that, or because the lock is lost.
+fn panic_in_section() -> Unpunished {
+    SHARED.with(|_| panic!("a panic in a section"))
+}
+
 /// Computes without end.
 fn loop_for_ever() -> Unpunished {
     while black_box(true) {
@@ -127,6 +173,6 @@ fn loop_for_ever() -> Unpunished {
 
 /// Never returns, and hardly computes.
 fn wait_for_ever() -> Unpunished {
-    fass::execute_for(core::time::Duration::MAX, fass::Occupation::Hold);
+    fass::execute_for(Duration::MAX, HOLD);
     Unpunished
 }

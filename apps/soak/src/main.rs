@@ -241,15 +241,14 @@ impl Soak<'_> {
     }
 }
 
-/// Returns what is to be in use after a round with so many faults: each has lost its stack, and
-/// kept some of the heap, how much to the byte depends on the heap's holes.
+/// Returns what is to be in use after a round with so many faults: each has kept some of the heap,
+/// how much to the byte depends on the heap's holes.
 fn after_faults(before: Resources, now: Resources, faults: u64) -> Resources {
     let faults = usize::try_from(faults).unwrap_or(usize::MAX);
     let most = before.heap_bytes + faults.saturating_mul(KEPT_BYTES);
     Resources {
         heap_bytes: now.heap_bytes.clamp(before.heap_bytes, most),
-        contexts: before.contexts.saturating_sub(faults),
-        contexts_free: before.contexts_free.saturating_sub(faults),
+        ..before
     }
 }
 

@@ -77,8 +77,7 @@ impl Dag {
     /// Lets the DAG go on after faults, within a limit: a fault costs the job only, where
     /// the subtask has another function. Without it a fault ends the DAG.
     ///
-    /// See [`Replaceable`], and [`FaultLimit`] for the memory that it
-    /// takes: each fault keeps a stack and what is on it until the end of the run.
+    /// See [`Replaceable`], and [`FaultLimit`] for the memory that it takes.
     #[track_caller]
     pub fn survive_faults(&self, limit: FaultLimit) -> &Self {
         self.open().spec.on_fault = OnFault::DropJob(limit);

@@ -14,8 +14,7 @@ use super::machine_handle::Machine;
 pub struct Resources {
     /// The bytes of the heap that are in use.
     pub heap_bytes: usize,
-    /// The contexts, each with a stack, that there are for instances. (Those in
-    /// which faults have ended instances are lost and no longer count.)
+    /// The contexts, each with a stack, that there are for instances.
     pub contexts: usize,
     /// How many of these can be taken: while nothing runs, all.
     pub contexts_free: usize,

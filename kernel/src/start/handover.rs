@@ -28,7 +28,7 @@ use executive::machine::{
 };
 use executive::memory::{self, OutOfMemory};
 use executive::run::platform::KERNEL;
-use executive::run::{contexts, edge, heartbeat, worker};
+use executive::run::{containment, contexts, edge, heartbeat, worker};
 use executive::text::{console, json};
 
 /// An app: sets up its DAGs, runs them and reports.
@@ -76,6 +76,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         interrupt::Handlers {
             timer: interrupts::timer_interrupt,
             wake: interrupts::wake_interrupt,
+            end: containment::end_at_fault,
             beat: watch::beat,
             exception: panic::exception,
             work: worker::work,

@@ -27,6 +27,7 @@ use executive::text::json;
 pub(crate) const HANDLERS: Handlers = Handlers {
     timer: pass_token_on,
     wake: take_token,
+    end: |_| {},
     beat: |_, _| {},
     exception: panic::exception,
     work: rest,

@@ -12,7 +12,7 @@
 use core::cell::UnsafeCell;
 use core::fmt;
 use core::ops::Range;
-use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
 
@@ -102,6 +102,13 @@ impl fmt::Display for Registers {
 /// of 64 that says which parts are there, and the upper halves (Intel SDM 1, 13.4).
 pub(super) const VECTOR_BYTES: usize = 832;
 
+/// The control and status words of x87 after FNINIT, and MXCSR after reset (Intel SDM 1, 8.1.5,
+/// 10.2.3 and 10.5.1): every exception masked and none pending, full precision.
+const CONTROL: [(usize, [u8; 8]); 2] = [
+    (0, [0x7f, 0x03, 0, 0, 0, 0, 0, 0]),
+    (24, [0x80, 0x1f, 0, 0, 0, 0, 0, 0]),
+];
+
 /// Vector state, then registers.
 #[derive(Debug)]
 #[repr(C, align(64))]
@@ -137,11 +144,19 @@ pub struct Context {
     sections: Sections,
 }
 
-/// What a context notes of the sections that it is in; see [`section`](super::section).
+/// A section that a context is in, or is about to be in; see [`section`](super::section).
+#[derive(Debug)]
+pub(super) struct Section {
+    pub(super) holder: *const AtomicPtr<Context>,
+    /// The one that it is in.
+    pub(super) outer: *mut Section,
+}
+
+/// What a context notes of its sections.
 #[derive(Debug)]
 pub(super) struct Sections {
-    /// How many there are, one in the other.
-    pub(super) depth: AtomicU32,
+    /// The innermost one; null if there is none.
+    pub(super) innermost: AtomicPtr<Section>,
     /// When a preemption was put off first; 0 if none was.
     pub(super) put_off_ns: AtomicU64,
 }
@@ -149,7 +164,7 @@ pub(super) struct Sections {
 impl Sections {
     const fn new() -> Self {
         Self {
-            depth: AtomicU32::new(0),
+            innermost: AtomicPtr::new(core::ptr::null_mut()),
             put_off_ns: AtomicU64::new(0),
         }
     }
@@ -219,7 +234,7 @@ impl Context {
     }
 
     /// Reports whether what the context runs has been found at fault.
-    pub(super) fn is_at_fault(&self) -> bool {
+    pub fn is_at_fault(&self) -> bool {
         self.is_at_fault.load(Ordering::Relaxed)
     }
 
@@ -248,15 +263,8 @@ impl Parked {
     /// Makes a context with the stack of `stack_bytes` that grows down from `stack_top`,
     /// which must be a multiple of 16. It has nothing to do yet.
     pub fn new(stack_top: u64, stack_bytes: u64, is_background: bool) -> Self {
-        /// The state after FNINIT, and MXCSR's state after reset (Intel SDM 1,
-        /// 8.1.5 and 10.2.3): every exception masked, full precision.
-        const CONTROL: [(usize, [u8; 2]); 2] = [(0, [0x7f, 0x03]), (24, [0x80, 0x1f])];
-        let mut vector_state = [0; VECTOR_BYTES];
-        for (offset, value) in CONTROL {
-            vector_state[offset..offset + 2].copy_from_slice(&value);
-        }
         let save_area = SaveArea {
-            vector_state,
+            vector_state: [0; VECTOR_BYTES],
             // The segments stay these: all code has them.
             registers: Registers {
                 cs: u64::from(super::descriptors::CODE),
@@ -264,7 +272,7 @@ impl Parked {
                 ..Registers::default()
             },
         };
-        Self(Box::leak(Box::new(Context {
+        let context = Box::leak(Box::new(Context {
             save_area: UnsafeCell::new(save_area),
             stack_top,
             stack_bytes: AtomicU64::new(stack_bytes),
@@ -274,7 +282,26 @@ impl Parked {
             budget_end_ns: AtomicU64::new(u64::MAX),
             is_at_fault: AtomicBool::new(false),
             sections: Sections::new(),
-        })))
+        }));
+        let mut parked = Self(context);
+        parked.reset();
+        parked
+    }
+
+    /// Sets back what one function would hand on to the next: the vector state's control words,
+    /// and whether it was found at fault.
+    pub(super) fn reset(&mut self) {
+        self.0.is_at_fault.store(false, Ordering::Relaxed);
+        let area: *mut u8 = self.0.save_area.get().cast();
+        for (offset, value) in CONTROL {
+            // SAFETY: `&mut self` is the one holder of a context that does not run (context
+            // invariant), and the words lie within the vector state.
+            unsafe {
+                area.wrapping_byte_add(offset)
+                    .cast::<[u8; 8]>()
+                    .write(value)
+            };
+        }
     }
 
     /// Has the context begin anew with `entry`, on an empty stack, when it next runs.
@@ -315,6 +342,11 @@ impl Parked {
     /// Returns where `interrupt.s` keeps the context's registers.
     pub(super) fn registers(&self) -> *mut Registers {
         self.0.registers()
+    }
+
+    /// Returns the context itself.
+    pub(super) const fn context(&self) -> &Context {
+        self.0
     }
 
     /// Reports whether this is what its core does when nothing is assigned to it.

@@ -6,19 +6,17 @@
 use core::arch::asm;
 use core::arch::x86_64::__cpuid;
 
-/// Clears the interrupt flag and reports whether it was set. Where the time for which
-/// interrupts stay disabled is to be measured, [`interrupt_flag`](super::interrupt_flag)
-/// does so.
-pub(super) fn clear_interrupt_flag() -> bool {
+/// Reports whether the interrupt flag is set.
+pub(super) fn is_interrupt_flag_set() -> bool {
     let flags: u64;
-    // SAFETY: reads the flags through the stack and clears the interrupt flag,
-    // which delays interrupts and changes no memory that Rust knows of.
-    unsafe { asm!("pushfq", "pop {}", "cli", out(reg) flags) };
+    // SAFETY: reads the flags through the stack, which changes no memory that Rust knows of.
+    unsafe { asm!("pushfq", "pop {}", out(reg) flags) };
     flags & (1 << 9) != 0
 }
 
-/// Clears the interrupt flag where it is known to be set.
-pub(super) fn clear_set_interrupt_flag() {
+/// Clears the interrupt flag. Where the time for which interrupts stay disabled is to be
+/// measured, [`interrupt_flag`](super::interrupt_flag) does so.
+pub(super) fn clear_interrupt_flag() {
     // SAFETY: clearing the interrupt flag delays interrupts and changes no memory.
     unsafe { asm!("cli") };
 }
@@ -39,13 +37,19 @@ pub(super) fn set_interrupt_flag_and_halt() {
 
 /// Touches the stack where what comes next will not reach beyond: if it is too short for
 /// that, it overflows here and not there.
-pub fn probe_stack() {
+pub(super) fn probe_stack() {
     // SAFETY: reads a byte below the stack, which is the stack's own or its guard page's.
     unsafe { asm!("test byte ptr [rsp - {}], 0", const STACK_FOR_A_SECTION, options(nostack)) };
 }
 
-/// More than any section under a lock takes, in bytes; less than a page.
+/// More than any section with interrupts disabled takes, in bytes; less than a page.
 const STACK_FOR_A_SECTION: usize = 2048;
+
+/// Interrupts what runs here, which asks for its own end.
+pub fn ask_for_end() {
+    // SAFETY: as for any interrupt: its handler keeps all registers, or never returns.
+    unsafe { asm!("int {}", const super::vector::END) };
+}
 
 /// Continues on another stack, for good.
 ///

@@ -7,6 +7,7 @@
 use core::arch::global_asm;
 use core::panic::Location;
 
+use super::abandoned::Abandoned;
 use super::context::{Parked, Registers, VECTOR_BYTES};
 use super::fault::{self, Exception};
 use super::once::Once;
@@ -35,6 +36,8 @@ pub struct Handlers {
     pub timer: fn(&mut Interrupted),
     /// Another core asked for attention.
     pub wake: fn(&mut Interrupted),
+    /// What was running asks for its own end.
+    pub end: fn(&mut Interrupted),
     /// The core's heartbeat, with the time: looks in on the run.
     pub beat: fn(&Core, u64),
     /// The code that was running cannot go on. If the handler returns, it has
@@ -73,6 +76,12 @@ impl Interrupted {
         // SAFETY: an `Interrupted` exists in handlers only.
         unsafe { this_core::exchange_context(next) }
     }
+
+    /// Has this core go on with `next` when the handler returns, and nothing ever with the
+    /// context that was interrupted.
+    pub fn abandon(&mut self, next: Parked) -> Abandoned {
+        Abandoned::new(self.exchange(next))
+    }
 }
 
 static HANDLERS: Once<Handlers> = Once::new();
@@ -105,6 +114,7 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
             local_apic::acknowledge();
             (handlers.wake)(&mut Interrupted(()));
         }
+        (Ok(vector::END), Some(handlers)) => (handlers.end)(&mut Interrupted(())),
         (Ok(vector::SPURIOUS), _) => {}
         _ => local_apic::acknowledge(),
     }

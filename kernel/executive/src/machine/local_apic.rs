@@ -223,7 +223,8 @@ fn command(apic_id: u32, low: u32) {
     if base == 0 {
         return command_at_once(apic_id, low);
     }
-    let was_set = cpu::clear_interrupt_flag();
+    let was_set = cpu::is_interrupt_flag_set();
+    cpu::clear_interrupt_flag();
     // Delivery takes microseconds at most; the hardware bounds the wait.
     while read_mapped(base, Register::CommandLow) & PENDING != 0 {
         cpu::relax();

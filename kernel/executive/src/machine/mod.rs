@@ -5,6 +5,7 @@
 //! functions that it is to call. Each module states the invariant that its
 //! SAFETY comments cite.
 
+pub mod abandoned;
 mod accusation;
 pub mod agreement;
 pub mod avx;

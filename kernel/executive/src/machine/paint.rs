@@ -34,6 +34,12 @@ pub fn take_used_bytes() -> Option<u64> {
     was_painted.then(|| stack.end - lowest)
 }
 
+/// Makes the next measurement on a stack that nothing runs on begin anew.
+pub(super) fn spoil(stack: &core::ops::Range<u64>) {
+    // SAFETY: the word is the lowest of a stack, and nothing runs there (context invariant).
+    unsafe { (stack.start as *mut u64).write_volatile(0) };
+}
+
 fn is_painted(word: u64) -> bool {
     // SAFETY: the caller passes a word of its own stack, which can be read as a number.
     unsafe { (word as *const u64).read_volatile() == PAINT }

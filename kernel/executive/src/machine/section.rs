@@ -7,16 +7,23 @@
 //! lock. It is put off for [`LONGEST_NS`] at most: the section of a holder that never
 //! returns delays other instances for that time, and no longer.
 //!
-//! **Holder invariant**: `holder` is null, or the context that alone touches `data`. It
-//! remains so for good if that context is ended in its section.
+//! **Holder invariant**: `holder` is null, or the context that alone touches `data`, or for good
+//! [`LOST`] once a fault has ended a holder.
+//!
+//! **Section invariant**: from a context's innermost [`Section`] on, each lies in a frame of
+//! [`Guarded::with`] on that context's stack that has not returned, and names a lock that this
+//! frame borrows.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicPtr, Ordering};
 
-use super::context::{Context, Sections};
+use super::context::{Context, Section, Sections};
 use super::this_core::{self, Core};
 use super::timer::{self, Alarm};
 use super::{cpu, interrupt_flag, local_apic, vector};
+
+/// Stands where the holder does, once a fault has ended one.
+const LOST: *mut Context = core::ptr::without_provenance_mut(align_of::<Context>());
 
 /// For how long a section may put off its core's preemption.
 const LONGEST_NS: u64 = 1_000_000;
@@ -52,21 +59,23 @@ impl<T> Guarded<T> {
 
     /// Waits for the data and lends it to `section`.
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> Result<R, Refusal> {
+        let mut own_section = Section {
+            holder: &raw const self.holder,
+            outer: core::ptr::null_mut(),
+        };
         let own = loop {
-            let own = enter();
+            let own = enter(&mut own_section);
             let place = core::ptr::from_ref(own).cast_mut();
             let free = core::ptr::null_mut();
             let (acquire, relaxed) = (Ordering::Acquire, Ordering::Relaxed);
             let Err(holder) = (self.holder).compare_exchange(free, place, acquire, relaxed) else {
                 break own;
             };
-            leave(own);
+            leave(own, &own_section);
             if holder == place {
                 return Err(Refusal::HeldByCaller);
             }
-            // SAFETY: contexts are never freed, and all that changes in one outside its
-            // save area is atomic.
-            if unsafe { &*holder }.is_at_fault() {
+            if holder == LOST {
                 return Err(Refusal::HolderEnded);
             }
             cpu::relax();
@@ -75,16 +84,18 @@ impl<T> Guarded<T> {
         // refused), so this is the only reference (holder invariant).
         let result = section(unsafe { &mut *self.data.get() });
         self.holder.store(core::ptr::null_mut(), Ordering::Release);
-        leave(own);
+        leave(own, &own_section);
         Ok(result)
     }
 }
 
 /// Keeps the caller from being preempted, for [`LONGEST_NS`] at most.
-fn enter() -> &'static Context {
+fn enter(section: &mut Section) -> &'static Context {
     let were_enabled = interrupt_flag::disable();
     let own = this_core::get().context();
-    own.sections().depth.fetch_add(1, Ordering::Relaxed);
+    let innermost = &own.sections().innermost;
+    section.outer = innermost.load(Ordering::Relaxed);
+    innermost.store(section, Ordering::Release);
     if were_enabled {
         interrupt_flag::enable();
     }
@@ -92,9 +103,13 @@ fn enter() -> &'static Context {
 }
 
 /// Ends what `enter` has begun, and does what was put off.
-fn leave(own: &Context) {
-    let Sections { depth, put_off_ns } = own.sections();
-    if depth.fetch_sub(1, Ordering::Relaxed) == 1 && put_off_ns.swap(0, Ordering::Relaxed) != 0 {
+fn leave(own: &Context, section: &Section) {
+    let Sections {
+        innermost,
+        put_off_ns,
+    } = own.sections();
+    innermost.store(section.outer, Ordering::Release);
+    if section.outer.is_null() && put_off_ns.swap(0, Ordering::Relaxed) != 0 {
         let were_enabled = interrupt_flag::disable();
         local_apic::send(this_core::get().apic_id(), vector::WAKE);
         if were_enabled {
@@ -103,11 +118,34 @@ fn leave(own: &Context) {
     }
 }
 
+/// Ends the sections of a context that was abandoned in them: what they guard is lost.
+pub(super) fn lose_all(context: &Context) {
+    let Sections {
+        innermost,
+        put_off_ns,
+    } = context.sections();
+    let mut next = innermost.swap(core::ptr::null_mut(), Ordering::Acquire);
+    // SAFETY: by the section invariant it lies in a frame, which nothing has used since.
+    while let Some(section) = unsafe { next.as_ref() } {
+        let own = core::ptr::from_ref(context).cast_mut();
+        // SAFETY: by the section invariant the frame borrows the lock.
+        let holder = unsafe { &*section.holder };
+        let (release, relaxed) = (Ordering::Release, Ordering::Relaxed);
+        // A context that was about to enter waits for another one's.
+        let _ = holder.compare_exchange(own, LOST, release, relaxed);
+        next = section.outer;
+    }
+    put_off_ns.store(0, Ordering::Relaxed);
+}
+
 /// Puts off the preemption of what runs on this core, `core`, if it is in a section.
 /// Reports whether it is put off. In an interrupt handler.
 pub fn puts_off(core: &Core, now_ns: u64) -> bool {
-    let Sections { depth, put_off_ns } = core.context().sections();
-    if depth.load(Ordering::Relaxed) == 0 {
+    let Sections {
+        innermost,
+        put_off_ns,
+    } = core.context().sections();
+    if innermost.load(Ordering::Relaxed).is_null() {
         return false;
     }
     let first_ns = match put_off_ns.load(Ordering::Relaxed) {

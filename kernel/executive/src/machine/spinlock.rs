@@ -51,8 +51,6 @@ impl<T> SpinLock<T> {
     /// Must not be called by its holder: that waits forever.
     #[track_caller]
     pub fn lock(&self) -> SpinLockGuard<'_, T> {
-        // An app that has used up its stack falls here, where it still can fall alone.
-        cpu::probe_stack();
         let interrupts_were_enabled = interrupt_flag::disable();
         let mut guard = self.lock_uninterrupted();
         guard.interrupts_were_enabled = interrupts_were_enabled;

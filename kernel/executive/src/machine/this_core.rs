@@ -217,17 +217,6 @@ pub(super) unsafe fn exchange_context(next: Parked) -> Parked {
     unsafe { Parked::from_context(last) }
 }
 
-/// Leaves the context that runs where it is, for good, for `next`. Its stack is
-/// never used again, so all that lies on it stays valid.
-pub fn abandon_context(next: Parked) -> ! {
-    cpu::clear_interrupt_flag();
-    let registers = next.registers();
-    get().run_next(next);
-    // SAFETY: the registers are those of a context that does not run and that
-    // this core has made its own; interrupts are disabled.
-    unsafe { resume(registers) }
-}
-
 /// Leaves the context that runs, for good, for `next`. What was left becomes
 /// this core's spare context.
 ///

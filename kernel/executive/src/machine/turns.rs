@@ -183,7 +183,7 @@ pub fn enter_by_interrupt(core: &Core) {
 /// Like [`leave`], for an instance that watches the clock. Interrupts are enabled.
 pub fn stand_back() {
     if is_enabled() {
-        interrupt_flag::disable_enabled();
+        interrupt_flag::disable();
         leave(this_core::get());
         interrupt_flag::enable();
     }
@@ -192,7 +192,7 @@ pub fn stand_back() {
 /// Like [`enter`], for that instance afterwards.
 pub fn come_back() {
     if is_enabled() {
-        interrupt_flag::disable_enabled();
+        interrupt_flag::disable();
         enter();
         interrupt_flag::enable();
     }

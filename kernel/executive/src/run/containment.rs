@@ -3,12 +3,11 @@
 //! A subtask that panics, causes an exception or exceeds its budget ends its DAG:
 //! what it may have left half done can belong to that DAG alone. If that DAG survives
 //! the fault, it costs the job only. The fault is reported with DAG, subtask, job,
-//! core, cause and place, the context that it happened in is never used again, and all
-//! other DAGs go on.
+//! core, cause and place, and all other DAGs go on.
 //!
-//! What a fault pins, until the machine is reset: the context's stack, the body that was
-//! on it with the function and what that owns, and locks and states that it held. For
-//! each fault that is survived the commit has taken another stack and another body.
+//! The core leaves the context that it happened in for another one, within an interrupt, and
+//! the context goes back into the stock. What a fault takes until the machine is reset is what
+//! the function owned on the heap, and the app's locks that it held.
 //!
 //! That is possible because code that may be at fault is told apart by the
 //! interrupt flag: apps run with interrupts enabled, while code that holds a
@@ -26,7 +25,7 @@ use super::{contexts, execution};
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{interrupt_flag, this_core};
+use crate::machine::{cpu, interrupt_flag, this_core};
 use crate::text::backtrace::Spot;
 use crate::text::excerpt::Excerpt;
 use crate::text::json;
@@ -75,10 +74,15 @@ pub fn end_panicked(info: &PanicInfo<'_>) {
             spot: Spot::here(),
         },
     );
-    interrupt_flag::disable();
-    execution::fail();
-    contexts::lose();
-    this_core::abandon_context(contexts::begin())
+    cpu::ask_for_end();
+}
+
+/// Ends this core's instance, which has asked for that after it was found at fault.
+pub fn end_at_fault(interrupted: &mut Interrupted) {
+    let core = this_core::get();
+    if core.context().is_at_fault() && execution::running(core).is_some() {
+        end_interrupted(interrupted);
+    }
 }
 
 /// Ends the instance that caused an exception, if it is a subtask's, and reports
@@ -141,12 +145,9 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
 
 /// Ends this core's instance, whose context a handler has interrupted.
 fn end_interrupted(interrupted: &mut Interrupted) {
-    // From here on the locks that it holds are lost.
-    this_core::get().context().note_fault();
+    let abandoned = interrupted.abandon(contexts::begin());
     execution::fail();
-    contexts::lose();
-    // The context is leaked: what lies on its stack stays valid forever.
-    let _ = interrupted.exchange(contexts::begin());
+    contexts::give_back(abandoned.recover());
 }
 
 /// Returns where a panic was raised, as `file:line:column`.

@@ -2,10 +2,9 @@
 //!
 //! A preempted instance keeps its context, stack and all. At any time a core
 //! runs one context and keeps at most one to spare, and each subtask has at most
-//! one suspended instance: so twice the cores and once the subtasks are enough. A
-//! fault abandons one, after which the subtask needs none, unless the fault is survived:
-//! so there is one more for each such fault that there may be. That many are made at
-//! a commit, never later. Contexts are never freed;
+//! one suspended instance: so twice the cores and once the subtasks are enough. That many are
+//! made at a commit, never later. A core that ends what it runs, because of a fault, takes
+//! another one for that moment, and gives the first one back. Contexts are never freed;
 //! the next commit uses them again.
 //!
 //! All stacks are as large as the largest that the first commit states: any context may run any
@@ -120,7 +119,7 @@ fn take() -> Parked {
         .expect("contexts are provided at commit")
 }
 
-/// Makes a context that works, in place of one that is suspended or lost.
+/// Makes a context that works, in place of one that is suspended or abandoned.
 /// Interrupts are disabled.
 pub fn begin() -> Parked {
     let mut context = this_core::take_spare_context().unwrap_or_else(take);
@@ -138,9 +137,4 @@ pub fn give_back(context: Parked) {
 pub fn count() -> (usize, usize) {
     let stock = STOCK.lock();
     (stock.total, stock.free.len())
-}
-
-/// Counts a context as lost: it was abandoned with what it ran.
-pub fn lose() {
-    STOCK.lock().total -= 1;
 }

@@ -7,11 +7,6 @@ use kernel::Lock;
 
 static SHARED: Lock<u32> = Lock::new(0);
 
-/// Panics while it holds the lock.
-pub(super) fn panic_in_section() -> Unpunished {
-    SHARED.with(|_| panic!("a panic in a section"))
-}
-
 /// Takes the lock that it holds.
 pub(super) fn lock_twice() -> Unpunished {
     SHARED.with(|_| SHARED.with(|shared| *shared += 1));

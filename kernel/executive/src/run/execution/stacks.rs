@@ -3,7 +3,7 @@
 use alloc::format;
 
 use fass::LaunchError;
-use sched_dag::{Dag, OnFault, Preemption, SchedulerOptions, TaskSet};
+use sched_dag::{Preemption, SchedulerOptions, TaskSet};
 
 use crate::run::contexts;
 
@@ -11,14 +11,11 @@ use crate::run::contexts;
 pub(super) fn provide(task_set: &TaskSet, options: SchedulerOptions) -> Result<(), LaunchError> {
     let subtasks = task_set.vertices();
     let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
-    let faults = task_set.dags().iter().map(survived_faults);
-    let faults = faults.fold(0, usize::saturating_add);
     let suspended = match options.preemption {
         Preemption::Enabled => task_set.most_suspended(),
         Preemption::Disabled => 0,
     };
     let total = cores.saturating_mul(2).saturating_add(suspended);
-    let total = total.saturating_add(faults);
     let needed = contexts::stack_bytes(task_set);
     let kib = needed / 1024;
     let settled = contexts::settle(needed).and_then(|settled| {
@@ -27,9 +24,8 @@ pub(super) fn provide(task_set: &TaskSet, options: SchedulerOptions) -> Result<(
     });
     let settled = settled.map_err(|_| {
         LaunchError::new(format!(
-            "{subtasks} subtasks, {cores} cores and {faults} survived faults need {total} stacks \
-             of {kib} KiB, more than there is memory for; register fewer subtasks, survive fewer \
-             faults, or give the machine more memory"
+            "{subtasks} subtasks and {cores} cores need {total} stacks of {kib} KiB, more than \
+             there is memory for; register fewer subtasks, or give the machine more memory"
         ))
     })?;
     if settled < needed {
@@ -40,12 +36,4 @@ pub(super) fn provide(task_set: &TaskSet, options: SchedulerOptions) -> Result<(
         )));
     }
     Ok(())
-}
-
-/// Returns how many faults a DAG survives, each of which keeps a context for good.
-fn survived_faults(dag: &Dag) -> usize {
-    match dag.on_fault() {
-        OnFault::EndDag => 0,
-        OnFault::DropJob(of) => of.in_all as usize,
-    }
 }
