@@ -66,6 +66,11 @@ pub enum Test {
     Pipelined,
     /// The multi-path bound in any work-conserving order: all other DAGs count in full.
     AnyOrder,
+    /// Response-time analysis of one core under static priorities (Joseph and Pandya 1986).
+    OneCore,
+    /// Processor demand of one core under EDF (Baruah, Rosier and Howell 1990); the bound is
+    /// the deadline itself.
+    Demand,
     /// Capacity augmentation for EDF or RM (Li et al. 2014); the bound is the
     /// deadline itself.
     Capacity,
@@ -166,6 +171,8 @@ impl fmt::Display for Test {
             Self::NonPreemptive => "multiple paths of non-preemptive subtasks",
             Self::Pipelined => "overlapping jobs",
             Self::AnyOrder => "multiple paths in any work-conserving order",
+            Self::OneCore => "response times on one core (Joseph and Pandya 1986)",
+            Self::Demand => "processor demand of one core (Baruah et al. 1990)",
             Self::Capacity => "capacity augmentation (Li et al. 2014)",
             Self::SpeedUp => "speed-up (Bonifaci et al. 2013)",
         })

@@ -18,6 +18,7 @@
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
 //! | `set` | the equations of all DAGs, solved exactly | |
 //! | `non_preemptive` | subtasks that keep their core | derived here |
+//! | `one_core` | response times and demand on one core | Joseph and Pandya 1986; Baruah 1990 |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
 //! | `federated` | dedicated cores | Li 2014; Baruah 2015 |
@@ -79,6 +80,7 @@ mod judge;
 mod multi_path;
 mod multi_path_sets;
 mod non_preemptive;
+mod one_core;
 mod overheads;
 mod pipelined;
 mod ratio;

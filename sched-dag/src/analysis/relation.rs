@@ -56,9 +56,7 @@ impl Relation {
         other != dag
             && match (self.policy, self.preemption) {
                 (Policy::Edf, _) | (_, Mixture::Some) => true,
-                (Policy::StaticPriority, _) => {
-                    (self.priorities[other].0, other) < (self.priorities[dag].1, dag)
-                }
+                (Policy::StaticPriority, _) => self.ranks(other)[0] < self.ranks(dag)[1],
             }
     }
 
@@ -68,9 +66,10 @@ impl Relation {
         other != dag && (self.preemption != Mixture::All || self.may_outrank(other, dag))
     }
 
-    /// Returns the number of the most urgent priority in a DAG.
-    pub(super) fn most_urgent(&self, dag: usize) -> u32 {
-        self.priorities[dag].0
+    /// Returns the most and the least urgent priority of a DAG among all; the smaller wins.
+    pub(super) fn ranks(&self, dag: usize) -> [(u32, usize); 2] {
+        let (most, least) = self.priorities[dag];
+        [(most, dag), (least, dag)]
     }
 
     /// Reports whether a younger job of a DAG may win over an older one.

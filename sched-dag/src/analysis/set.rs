@@ -269,14 +269,14 @@ impl<'a> Set<'a> {
 
 /// How often equations may be evaluated yet. A DAG takes the shared steps first and then its
 /// own, so that one which comes near its solution slowly takes no other's bound away.
-struct Steps {
+pub(super) struct Steps {
     shared: u64,
     /// By DAG.
     own: Vec<u64>,
 }
 
 impl Steps {
-    fn of(dags: usize) -> Self {
+    pub(super) fn of(dags: usize) -> Self {
         Self {
             shared: STEP_LIMIT,
             own: alloc::vec![OWN_STEPS; dags],
@@ -284,7 +284,7 @@ impl Steps {
     }
 
     /// Lets a DAG take steps from those that it may.
-    fn spend<T>(&mut self, dag: usize, work: impl FnOnce(&mut u64) -> T) -> T {
+    pub(super) fn spend<T>(&mut self, dag: usize, work: impl FnOnce(&mut u64) -> T) -> T {
         let own = self.own[dag];
         let mut left = self.shared + own;
         let result = work(&mut left);

@@ -28,6 +28,12 @@
 //!
 //! sink DAG SUBTASK R OWN                      that is complete before its job; as `overlap`
 //!
+//! bound DAG R response BLOCKED                on one core
+//! window X OWN
+//!
+//! demand BUSY TIME..                          before all bounds, if it proves some
+//! bound DAG R demand
+//!
 //! bound DAG R priorities CORES
 //! path SUBTASK..                              each path of the DAG
 //!
@@ -47,7 +53,8 @@ use super::answer::{DagBound, Settings, Test};
 use super::cover::{Chain, covering, heaviest, peel};
 use super::interference::{Delays, Other};
 use super::intra_task::each_path;
-use super::judge::{Case, sinks, with_case};
+use super::judge::{self, Case, sinks, with_case};
+use super::one_core::{Response, demand};
 use super::pipelined::{Figures, STEP_LIMIT};
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::to_u32;
@@ -81,6 +88,14 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> Stri
         }
         let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
         let responses: Vec<Option<u64>> = responses.collect();
+        let by_demand = |bound: &DagBound| bound.test == Test::Demand;
+        let is_asked = case.relation.ranks_sinks && judge::one_core::are_in_time(case);
+        if (is_asked || bounds.iter().flatten().any(by_demand))
+            && let Some((busy, times)) = demand(&judge::one_core::all_dues(case))
+        {
+            let numbers = core::iter::once(busy).chain(times);
+            text.list("demand", numbers.map(u128::cast_signed));
+        }
         for (dag, bound) in bounds.iter().enumerate() {
             match bound {
                 Some(bound) => {
@@ -204,6 +219,8 @@ impl Text {
             Test::Capacity | Test::SpeedUp => {
                 self.line(format_args!("bound {id} {bound_ns} utilisation"));
             }
+            Test::Demand => self.line(format_args!("bound {id} {bound_ns} demand")),
+            Test::OneCore => self.response(case, dag, bound_ns),
             Test::IntraTask => self.priorities(case, dag, bound_ns),
             _ => {
                 let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
@@ -299,6 +316,18 @@ impl Text {
                 let (id, response) = (other.id, other.response_ns);
                 self.line(format_args!("other {id} {response} {count} {all}"));
             }
+        }
+    }
+
+    fn response(&mut self, case: &Case<'_>, dag: usize, bound_ns: u64) {
+        let (id, loads) = (case.members[dag], judge::one_core::loads(case));
+        let response = Response::of(&loads, dag);
+        let blocked = response.blocking;
+        self.line(format_args!("bound {id} {bound_ns} response {blocked}"));
+        let windows = response.windows(&mut { u64::MAX }).unwrap_or_default();
+        for (back, window) in (0..).zip(windows) {
+            let own = response.own_work(back, window);
+            self.line(format_args!("window {window} {own}"));
         }
     }
 

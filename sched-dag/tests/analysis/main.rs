@@ -5,6 +5,7 @@
 
 mod forged;
 mod kinds;
+mod one_core;
 mod random;
 mod simulate;
 mod witnesses;

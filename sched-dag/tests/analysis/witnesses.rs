@@ -62,7 +62,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
         for test in tests.chain(sinks) {
             let count = by_test.entry(test).or_default();
             *count += 1;
-            is_new |= *count <= 2;
+            is_new |= *count <= 3;
         }
         // What is altered is one witness.
         if seed == 1 || is_new && !is_divided {
@@ -89,7 +89,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     // More of the same are numbers that the checker no longer computes.
     assert!(refused > 2_000 && same <= 23, "{refused}, {same}");
     assert!(sound > 100, "no statement was altered: {sound}");
-    assert!(by_test.len() >= 9, "some test was never used: {by_test:?}");
+    assert!(by_test.len() >= 11, "some test was never used: {by_test:?}");
     fs::remove_dir_all(&folder).unwrap();
 }
 

@@ -24,6 +24,8 @@
 //!   again and again may find other non-preemptible ones each time, which the
 //!   blocking term does not cover. Then every other DAG counts in full, in
 //!   whatever order: true of any work-conserving scheduler.
+//! - *One core.* There are exact tests, with what keeps the core as blocking (see `one_core`).
+//!   Under static priorities they come first, under EDF last, as they give only the deadline.
 //! - *Alone.* A DAG that nothing may outrank or block, and whose bound is
 //!   within its period, may have a shorter one by its subtasks' priorities.
 //!
@@ -37,6 +39,7 @@
 //! is analysed without it: whatever it does, it cannot delay these.
 
 mod analysable;
+pub(super) mod one_core;
 pub(super) mod sinks;
 
 use alloc::vec;
@@ -150,7 +153,7 @@ impl<'a> Case<'a> {
         settings: &'a Settings,
     ) -> Self {
         let order = sorted_by_key(members.len(), |dag| match settings.policy {
-            Policy::StaticPriority => u64::from(relation.most_urgent(dag)),
+            Policy::StaticPriority => u64::from(relation.ranks(dag)[0].0),
             Policy::Edf => tasks[dag].relative_deadline_ns(),
         });
         let mut case = Self {
@@ -183,7 +186,10 @@ impl<'a> Case<'a> {
         let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
             .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
             .collect();
-        if let Some(test) = self.vouching_test() {
+        let demand = || one_core::are_in_time(self).then_some(Test::Demand);
+        if bounds.iter().any(Option::is_none)
+            && let Some(test) = self.vouching_test().or_else(demand)
+        {
             for (bound, task) in bounds.iter_mut().zip(self.tasks) {
                 bound.get_or_insert(DagBound {
                     bound_ns: task.relative_deadline_ns(),
@@ -247,8 +253,6 @@ impl<'a> Case<'a> {
 
     /// Tells the equations what follows from the attributes.
     fn complete(&mut self) {
-        let known = (0..self.members.len()).map(|dag| self.by_priorities(dag));
-        self.set.known = known.collect();
         self.set.keep_cores = self.relation.preemption == Mixture::None;
         self.set.deadlines_limit = self.settings.policy == Policy::Edf
             && self.relation.preemption != Mixture::Some
@@ -257,12 +261,22 @@ impl<'a> Case<'a> {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
+        self.set.known = match (self.settings.cores, self.settings.policy) {
+            (1, Policy::StaticPriority) => one_core::responses(self),
+            _ => {
+                let dags = 0..self.members.len();
+                dags.map(|dag| self.by_priorities(dag)).collect()
+            }
+        };
     }
 
     /// Names the test behind a response time of the set's equations.
     fn bound(&self, dag: usize, bound_ns: u64) -> DagBound {
         let test = if self.set.known[dag].is_some() {
-            Test::IntraTask
+            match self.settings.cores {
+                1 => Test::OneCore,
+                _ => Test::IntraTask,
+            }
         } else if bound_ns > self.tasks[dag].period_ns() {
             Test::Pipelined
         } else if self.is_alone(dag) {

@@ -12,6 +12,8 @@
 //! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline. What is
 //!   due later and keeps its core may block.
 //!
+//! On one core under EDF the demand test proves each sink its deadline, if it accepts the set.
+//!
 //! So the sink's bound is the solution of the job's equation with these figures (see
 //! `pipelined`). Older and younger jobs of the DAG count as there, with the job's bound,
 //! which holds for all of them. The sink finishes no later than its job: the smaller of
@@ -20,7 +22,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::Case;
+use super::{Case, one_core};
 use crate::analysis::answer::{Answer, DagBound, NotProven, Reason};
 use crate::analysis::interference::Delays;
 use crate::analysis::pipelined::{Figures, STEP_LIMIT};
@@ -42,10 +44,13 @@ struct Reach {
 pub(super) fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
+    let is_met = case.relation.ranks_sinks && one_core::are_in_time(case);
     for (dag, &number) in case.members.iter().enumerate() {
-        let solved = equations(case, dag, &responses).map(|(_, equation)| {
-            let (figures, delays) = equation?;
-            figures.solve(&delays, 0, &mut { STEP_LIMIT }).ok()
+        let solved = equations(case, dag, &responses).map(|(sink, equation)| {
+            let solved = equation
+                .and_then(|(figures, delays)| figures.solve(&delays, 0, &mut { STEP_LIMIT }).ok());
+            let deadline_ns = case.dag(dag).subtask(sink).relative_deadline_ns();
+            solved.or(is_met.then_some(deadline_ns))
         });
         bounds[number] = solved.collect();
     }
