@@ -127,7 +127,7 @@ pub use commit::error::CommitError;
 pub use commit::fault::Fault;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
-pub use draft::modes::ModeFault;
+pub use draft::flaw::WordedFault;
 pub use platform::{
     AlreadyInstalled, Clock, LaunchError, Occupation, Platform, execute_for, install, now_ns,
     set_clock,

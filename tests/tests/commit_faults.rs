@@ -229,9 +229,9 @@ fn every_kind_of_fault_has_an_entry() {
         assert!(found.len() >= 12, "{file}: {found:?}");
         codes.extend(found.into_iter().map(String::from));
     }
-    // Those of modes are named where they are found.
-    let modes = fs::read_to_string(workspace().join("fass/src/draft/modes.rs")).expect("it");
-    let found = modes.split("add(\"").skip(1);
+    // Others are named where they are found.
+    let others = sources(&["fass/src/draft/modes.rs", "fass/src/commit/inputs.rs"]);
+    let found = others.split("add(\"").skip(1);
     codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
     assert_eq!(documented, codes);
     let page = fs::read_to_string(workspace().join("docs/errors.md")).expect("the page");
@@ -294,7 +294,6 @@ fn every_panic_of_a_wrong_program_is_one() {
         "fass/src/api/signal.rs",
         "fass/src/api/using.rs",
         "fass/src/api/wire/mod.rs",
-        "fass/src/api/wire/uses.rs",
         "fass/virtual-time/src/platform.rs",
     ]);
     all_are_in(&documented, &sources);

@@ -338,25 +338,10 @@ impl<T: ParameterValue> Uses for Reading<T> {
         true
     }
 
-    fn hold(self, dag: &Dag, _subtask: usize) -> Self::Held {
-        let mut draft = dag.draft.borrow_mut();
-        let name = self.0.0.name.as_str();
-        assert!(
-            !draft.parameters.iter().any(|read| read == name),
-            "another source of the DAG reads parameter `{name}`, and a job has one value; let one \
-             source read it, and send it along edges"
-        );
-        draft.parameters.push(name.into());
-        drop(draft);
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        let takes = format!("reads parameter `{}`", self.0.0.name);
+        dag.draft.borrow_mut().outside.push((subtask, takes));
         self.0
-    }
-
-    fn follows(held: &Self::Held) {
-        panic!(
-            "a subtask with inputs reads parameter `{}`; let a source read it, and send it along \
-             an edge",
-            held.0.name
-        );
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {

@@ -78,13 +78,6 @@ pub trait Uses: sealed::Sealed {
         let _ = (held, dag);
     }
 
-    /// Notes that the subtask has inputs. Panics if the use is a source's.
-    #[doc(hidden)]
-    #[track_caller]
-    fn follows(held: &Self::Held) {
-        let _ = held;
-    }
-
     /// Begins the use at the start of an instance.
     #[doc(hidden)]
     fn enter(held: &mut Self::Held) -> Self::Guard<'_>;
@@ -144,12 +137,6 @@ macro_rules! implement_tuple {
             fn begins(held: &Self::Held, dag: &Dag) {
                 let ($($use_,)*) = held;
                 $($Use::begins($use_, dag);)*
-            }
-
-            #[track_caller]
-            fn follows(held: &Self::Held) {
-                let ($($use_,)*) = held;
-                $($Use::follows($use_);)*
             }
 
             fn enter(held: &mut Self::Held) -> Self::Guard<'_> {

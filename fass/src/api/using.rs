@@ -128,7 +128,6 @@ impl<'d, U: Uses> Using<'d, U> {
         Ret: VecToPubs,
     {
         let (dag, mut held) = self.hold();
-        U::follows(&held);
         let f = move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args);
         dag.register_subtask(f, input_topics, output_topics, attributes);
     }
@@ -146,7 +145,6 @@ impl<'d, U: Uses> Using<'d, U> {
         Args: VecToSubs,
     {
         let (dag, mut held) = self.hold();
-        U::follows(&held);
         let f = move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args);
         dag.register_sink_subtask(f, input_topics, relative_deadline, attributes);
     }

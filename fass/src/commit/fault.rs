@@ -13,8 +13,7 @@ use sched_dag::{DagLabel, SubtaskLabel};
 
 use super::answer::Unproven;
 use super::count::Count;
-use crate::draft::flaw::Flaw;
-use crate::draft::modes::ModeFault;
+use crate::draft::flaw::{Flaw, WordedFault};
 use crate::platform::LaunchError;
 
 /// One reason why a commit was refused.
@@ -138,8 +137,8 @@ pub enum Fault {
         /// The subtask.
         subtask: SubtaskLabel,
     },
-    /// Something is wrong with the modes.
-    Modes(ModeFault),
+    /// Something is wrong with the modes, or with what enters from outside.
+    Worded(WordedFault),
     /// A subtask has a function for after a fault, and a fault ends its DAG.
     ReplacedInVain {
         /// The DAG.
@@ -199,7 +198,7 @@ impl Fault {
             Self::LatestNotCommitted { .. } => "latest_not_committed",
             Self::SignalNotCommitted { .. } => "signal_not_committed",
             Self::SwitchedNotCommitted { .. } => "switched_not_committed",
-            Self::Modes(fault) => fault.code(),
+            Self::Worded(fault) => fault.code,
             Self::ReplacedInVain { .. } => "replaced_in_vain",
             Self::NothingReplaceable { .. } => "nothing_replaceable",
             Self::StateWithoutReset { .. } => "state_without_reset",
@@ -331,7 +330,7 @@ impl fmt::Display for Fault {
                 "{subtask} of {dag} may pause a dag that is not in the commit; commit both dags in \
                  one call"
             ),
-            Self::Modes(fault) => fault.fmt(f),
+            Self::Worded(fault) => fault.fmt(f),
             Self::ReplacedInVain { dag, subtask } => write!(
                 f,
                 "{subtask} of {dag} has another function for after a fault, and a fault ends the \

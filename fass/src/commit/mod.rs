@@ -18,6 +18,7 @@ pub(crate) mod chains;
 mod count;
 pub(crate) mod error;
 pub(crate) mod fault;
+mod inputs;
 mod missing;
 mod modes;
 mod replaceable;
@@ -357,15 +358,14 @@ fn verify(
         }
         faults.extend(missing::others(dags, dag, &label));
         faults.extend(replaceable::check(&draft, &label));
+        faults.extend(inputs::check(&draft, &label));
         specs.push(spec);
     }
     modes::check(dags, &mut faults);
     // A commit of nothing but repeated DAGs has been told what is wrong.
     if specs.is_empty() && !faults.is_empty() {
-        return Err(CommitError {
-            faults,
-            warnings: Vec::new(),
-        });
+        let warnings = Vec::new();
+        return Err(CommitError { faults, warnings });
     }
     match sched_dag::verify(&specs, &options) {
         Ok(verified) if faults.is_empty() => Ok(verified),

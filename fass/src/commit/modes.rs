@@ -10,6 +10,8 @@ use crate::api::dag::Dag;
 #[inline(never)]
 pub(super) fn check(dags: &[Dag], faults: &mut Vec<Fault>) {
     if let Some(check) = dags.iter().find_map(|dag| dag.draft.borrow().check_modes) {
-        check(&drafts(dags), &mut |fault| faults.push(Fault::Modes(fault)));
+        check(&drafts(dags), &mut |fault| {
+            faults.push(Fault::Worded(fault))
+        });
     }
 }

@@ -62,8 +62,8 @@ pub(crate) struct Draft {
     /// The latest values that subtasks sample, of whatever DAG, and the number that the subtask
     /// has there.
     pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>, usize)>,
-    /// The names of the parameters that sources read.
-    pub(crate) parameters: Vec<String>,
+    /// What subtasks take from outside: "reads parameter `gain`".
+    pub(crate) outside: Vec<(usize, String)>,
     /// The signals that subtasks may raise, of whatever DAG.
     pub(crate) raises: Vec<(usize, Arc<Target>)>,
     /// The DAGs that subtasks may pause.

@@ -6,11 +6,11 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
-use core::fmt;
 
 use sched_dag::{DagId, DagLabel};
 
 use super::Draft;
+use super::flaw::WordedFault;
 
 /// A mode as stated so far.
 pub(crate) struct ModeDraft {
@@ -27,42 +27,7 @@ pub(crate) type Modes = Rc<RefCell<Vec<ModeDraft>>>;
 pub(crate) type Drafts = [Rc<RefCell<Draft>>];
 
 /// Reports all that is wrong with the modes of a commit.
-pub(crate) type Check = fn(&Drafts, &mut dyn FnMut(ModeFault));
-
-/// Something that is wrong with [modes](crate::Modes).
-///
-/// ```
-/// use fass::{Modes, SubtaskAttributes, create_dag, finish_create_dags};
-///
-/// # let machine = virtual_time::VirtualTime::new();
-/// # let period = core::time::Duration::from_millis(10);
-/// let lander = create_dag();
-/// lander.name("lander").period(period).relative_deadline(period);
-/// lander.register_untyped_subtask(|_job| (), SubtaskAttributes::named("descend"));
-/// let modes = Modes::new();
-/// modes.mode("landing", &[]);
-/// modes.mode("landing", &[&lander]);
-/// let error = finish_create_dags(&[lander]).unwrap_err();
-/// assert_eq!(error.to_string(), "two modes are called `landing`; give each a name of its own");
-/// assert_eq!(error.faults()[0].code(), "duplicate_mode");
-/// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ModeFault {
-    code: &'static str,
-    text: String,
-}
-
-impl ModeFault {
-    pub(crate) const fn code(&self) -> &'static str {
-        self.code
-    }
-}
-
-impl fmt::Display for ModeFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)
-    }
-}
+pub(crate) type Check = fn(&Drafts, &mut dyn FnMut(WordedFault));
 
 /// Returns the DAGs of each mode of a commit.
 pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
@@ -74,9 +39,9 @@ pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
 }
 
 /// Reports all that is wrong with the modes of a commit.
-pub(crate) fn check(drafts: &Drafts, report: &mut dyn FnMut(ModeFault)) {
+pub(crate) fn check(drafts: &Drafts, report: &mut dyn FnMut(WordedFault)) {
     let found = of_commit(drafts);
-    let mut add = |code, text| report(ModeFault { code, text });
+    let mut add = |code, text| report(WordedFault { code, text });
     if found.len() > 1 {
         let text = "the commit has modes of more than one `Modes`; make all of them by one";
         add("several_sets_of_modes", text.into());

@@ -2,9 +2,8 @@
 
 mod support;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use fass::{Parameter, SubtaskAttributes, Tunable, create_dag, finish_create_dags};
+use fass::finish_create_dags_with;
+use fass::{ConstructionPolicy, Fault, Parameter, Tunable, create_dag, finish_create_dags};
 use support::sharing::{Seen, ms, named, taking, work};
 use virtual_time::VirtualTime;
 
@@ -100,34 +99,34 @@ fn a_value_beyond_the_range_or_of_another_type_changes_nothing() {
 }
 
 #[test]
-fn what_would_give_a_job_two_values_is_refused_where_it_is_registered() {
+fn what_would_give_a_job_two_values_is_refused_by_the_commit() {
     let _machine = VirtualTime::new();
     let gain = gain();
-    let message = |register: &dyn Fn()| {
-        let payload = catch_unwind(AssertUnwindSafe(register)).expect_err("a refusal");
-        let text = payload.downcast_ref::<String>().expect("a text");
-        text.clone()
-    };
     let dag = create_dag();
-    let register = |name: &'static str| {
+    for name in ["one", "other"] {
         let source = |gain: f64| (gain,);
         let using = dag.using(gain.reading());
-        using.register_periodic_subtask(source, vec![name], ms(10), SubtaskAttributes::named(name));
-    };
-    register("one");
-    assert_eq!(
-        message(&|| register("other")),
-        "another source of the DAG reads parameter `gain`, and a job has one value; let one source \
-         read it, and send it along edges"
+        using.register_periodic_subtask(source, vec![name], ms(10), named(name));
+    }
+    let sink = |_: f64, _: (f64, f64)| ();
+    let using = dag.using(gain.reading());
+    using.register_sink_subtask(sink, vec!["one", "other"], ms(10), named("sink"));
+    // It has no topics, but follows the sink.
+    let using = dag.using(gain.reading());
+    let untyped = using.register_untyped_subtask(|_: f64, _job| (), named("untyped"));
+    dag.precede(
+        &dag.register_untyped_subtask(|_job| (), named("before")),
+        &untyped,
     );
-    let dag = create_dag();
-    let later = || {
-        let sink = |_: f64, _: (u8,)| ();
-        let using = dag.using(gain.reading());
-        using.register_sink_subtask(sink, vec!["x"], ms(10), named("sink"));
-    };
+    let error = finish_create_dags_with(&[dag], ConstructionPolicy::any_graph());
+    let faults: Vec<_> = error
+        .unwrap_err()
+        .faults()
+        .iter()
+        .map(Fault::code)
+        .collect();
     assert_eq!(
-        message(&later),
-        "a subtask with inputs reads parameter `gain`; let a source read it, and send it along an edge"
+        faults,
+        ["taken_twice", "taken_by_no_source", "taken_by_no_source"]
     );
 }

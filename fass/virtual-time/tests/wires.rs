@@ -309,20 +309,19 @@ fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
         "another subtask receives on wire `radio`; let that one do it, or make another wire"
     );
     assert!(message(&|| _ = wire.sending()).starts_with("another subtask sends on wire"));
-    let sink = || {
-        let (dag, wire) = (create_dag(), Wire::new("radio"));
-        let attributes = SubtaskAttributes::named("late");
-        let receive = |_: Received<'_, u32>, _: (u32,)| ();
-        (dag.using(wire.receiving(number))).register_sink_subtask(
-            receive,
-            vec!["x"],
-            ms(10),
-            attributes,
-        );
-    };
-    assert_eq!(
-        *message(&sink),
-        "a subtask with inputs receives on wire `radio`; let a source receive, and send along an \
-         edge"
+    let dag = create_dag();
+    dag.name("far");
+    let receive = |_: Received<'_, u32>, _: (u32,)| ();
+    let attributes = SubtaskAttributes::named("late");
+    (dag.using(Wire::new("radio").receiving(number))).register_sink_subtask(
+        receive,
+        vec!["x"],
+        ms(10),
+        attributes,
+    );
+    let _machine = VirtualTime::new();
+    let refused = finish_create_dags(&[dag]).unwrap_err().to_string();
+    assert!(
+        refused.contains("subtask `late` of dag `far` is no source and receives on wire `radio`; ")
     );
 }

@@ -1,6 +1,7 @@
 //! What the functions at both ends of a wire get: the packets that have come, and a way to send.
 
 use alloc::boxed::Box;
+use alloc::format;
 use alloc::sync::Arc;
 use core::fmt;
 
@@ -102,7 +103,9 @@ impl<T: 'static> Uses for Receiving<T> {
         true
     }
 
-    fn hold(self, _dag: &Dag, _subtask: usize) -> Self::Held {
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        let takes = format!("receives on wire `{}`", self.wire.name());
+        dag.draft.borrow_mut().outside.push((subtask, takes));
         Receiver {
             room: self.wire.shared.incoming.buffer(),
             wire: self.wire,
@@ -112,13 +115,6 @@ impl<T: 'static> Uses for Receiving<T> {
 
     fn begins(held: &Self::Held, dag: &Dag) {
         held.wire.shared.signal.set(dag.signal());
-    }
-
-    fn follows(held: &Self::Held) {
-        panic!(
-            "a subtask with inputs receives on wire `{}`; let a source receive, and send along an edge",
-            held.wire.name()
-        );
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {

@@ -80,6 +80,8 @@ pub const CASES: &[Case] = &[
     ("latest_not_committed", shared::latest_not_committed),
     ("signal_not_committed", shared::signal_not_committed),
     ("switched_not_committed", shared::switched_not_committed),
+    ("taken_by_no_source", shared::taken_by_no_source),
+    ("taken_twice", shared::taken_twice),
     ("duplicate_mode", modes::duplicate_mode),
     ("several_sets_of_modes", modes::several_sets_of_modes),
     ("mode_not_committed", modes::mode_not_committed),

@@ -3,9 +3,9 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fass::{Dag, Latest, Raiser, Sample, SubtaskAttributes, Switch, Unique, create_dag};
+use fass::{Dag, Latest, Parameter, Raiser, Sample, SubtaskAttributes, Switch, Unique, create_dag};
 
-use super::{FAULT_LIMIT, PERIOD, named, sound, source};
+use super::{FAULT_LIMIT, PERIOD, joining_sink, named, sound, source};
 
 pub(super) fn activations_differ() -> Vec<Dag> {
     let dag = named("lidar");
@@ -173,6 +173,34 @@ pub(super) fn switched_not_committed() -> Vec<Dag> {
     dag.using(camera.switching())
         .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
     vec![dag] // without `camera`
+}
+
+pub(super) fn taken_by_no_source() -> Vec<Dag> {
+    let dag = named("lidar");
+    source(&dag, "read", "points");
+    let nearest = Parameter::new("nearest", 0.5, 0.0..=2.0);
+    let attributes = SubtaskAttributes::named("store");
+    let store = |_nearest: f64, (_,): (u32,)| ();
+    dag.using(nearest.reading())
+        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+    vec![dag]
+}
+
+pub(super) fn taken_twice() -> Vec<Dag> {
+    let dag = named("lidar");
+    let nearest = Parameter::new("nearest", 0.5, 0.0..=2.0);
+    for (name, topic) in [("left", "left points"), ("right", "right points")] {
+        let attributes = SubtaskAttributes::named(name);
+        let read = |_nearest: f64| (1_u32,);
+        dag.using(nearest.reading()).register_periodic_subtask(
+            read,
+            vec![topic],
+            PERIOD,
+            attributes,
+        );
+    }
+    joining_sink(&dag, "store", ["left points", "right points"]);
+    vec![dag]
 }
 
 /// A DAG of one subtask, which samples.
