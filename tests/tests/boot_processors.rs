@@ -106,6 +106,40 @@ fn nine_models_of_processors() {
 }
 
 #[test]
+fn a_processor_without_64_bits_is_refused() {
+    let program = qemu_with("#max", "qemu32");
+    let outcome = Guest::new("fork-join").program(&program).boot();
+    fs::remove_file(&program).expect("it is ours");
+    let line = "this processor has no 64-bit mode, which the image needs\r\n";
+    assert_eq!(outcome.serial, line, "{}", outcome.ending);
+    assert_eq!(outcome.ending, Ending::Guest(Status::Failure));
+}
+
+/// The hardware of one core fails, by the word of QEMU's monitor, which Ctrl-A and `c` lead to.
+#[test]
+fn a_machine_check_is_reported() {
+    let monitor = [("id=console", "id=console,mux=on")];
+    let program = qemu_and(&monitor, "-mon chardev=console");
+    for core in [0, 1] {
+        let guest = Guest::new("fork-join").in_real_time().cores(2);
+        let guest = guest.program(&program).word("jobs=100000");
+        // Bank 4 has an error that is valid, uncorrected and enabled, and says where.
+        let command = format!("\u{1}cmce {core} 4 0xb400000000000135 5 0x12340 0");
+        let guest = guest.typing(&[("\"boot\"", &command)]);
+        let outcome = guest.end_in(Status::Failure);
+        let exceptions: Vec<_> = outcome.transcript.of_kind("exception").collect();
+        let [exception] = exceptions[..] else {
+            panic!("not one exception\n{}", outcome.tail());
+        };
+        assert_eq!(exception.number_at("cpu"), Some(core), "{}", exception.text);
+        let message = exception.text_at("message").unwrap_or_default();
+        let says = "machine check, bank 4: 0xb400000000000135 at 0x12340";
+        assert!(message.starts_with(says), "{message}");
+    }
+    fs::remove_file(&program).expect("it is ours");
+}
+
+#[test]
 fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
     let endless = qemu_with("iobase=0xf4", "iobase=0xf8");
     for machine in [Machine::Microvm, Machine::Q35] {

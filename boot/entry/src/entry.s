@@ -48,6 +48,16 @@ pvh_entry:
     cld
     mov ebp, ebx                    # nothing below touches ebp
 
+    # A processor that has no 64-bit mode can only say so (Intel SDM volume 2, CPUID).
+    mov eax, 0x80000000
+    cpuid
+    cmp eax, 0x80000001
+    jb refuse
+    mov eax, 0x80000001
+    cpuid
+    test edx, 1 << 29
+    jz refuse
+
     # Identity-map the first 4 GiB with 2 MiB pages: 4 directories in a row.
     mov edi, offset boot_page_directories
     mov eax, 0x83                   # present, writable, large
@@ -79,6 +89,23 @@ pvh_entry:
     lgdt [boot_gdt_pointer]
     mov esi, offset boot_long_mode_pointer
     jmp enable_long_mode
+
+# Sends a line to the first serial port as the loader has left that, tells QEMU of a failure by
+# its debug exit device, which is nobody's port elsewhere, and stops.
+refuse:
+    mov esi, offset refusal
+4:  mov edx, 0x3f8 + 5
+5:  in al, dx
+    test al, 1 << 5                 # there is room; so it is, too, where there is no port
+    jz 5b
+    mov edx, 0x3f8
+    outsb
+    cmp esi, offset refusal_end
+    jb 4b
+    mov eax, 0x11
+    out 0xf4, eax
+6:  hlt
+    jmp 6b
 
 # Turns on long mode with the tables that cr3 holds, and SSE, which compiled
 # code uses from its first instruction on. Continues in 64-bit mode at the far
@@ -190,6 +217,11 @@ host_message:
     .ascii "this is an image for the bare machine, and no program of this system; "
     .ascii "boot it by `./scripts/boot FILE`, or by `fass-tool boot FILE`\n"
 host_message_end:
+
+.section .rodata.refusal, "a"
+refusal:
+    .ascii "this processor has no 64-bit mode, which the image needs\r\n"
+refusal_end:
 
 .section .rodata.boot_gdt, "a"
     .balign 16

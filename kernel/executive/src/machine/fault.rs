@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::context::Registers;
-use super::{cpu, this_core};
+use super::{cpu, machine_check, this_core};
 
 /// The vector of the non-maskable interrupt: another core's message
 /// ([`non_maskable`](super::non_maskable)), or a failure of the board.
@@ -62,6 +62,9 @@ impl fmt::Display for Exception<'_> {
                 let kib = (stack.end - stack.start) / 1024;
                 write!(f, " (the stack has {kib} KiB)")?;
             }
+        }
+        if self.registers.vector == MACHINE_CHECK {
+            machine_check::write_errors(f)?;
         }
         let Registers {
             error_code, rsp, ..

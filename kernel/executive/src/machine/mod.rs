@@ -26,6 +26,7 @@ pub mod io_apic;
 pub mod known_clock;
 pub mod legacy;
 pub mod local_apic;
+mod machine_check;
 mod meter;
 pub mod non_maskable;
 pub mod once;

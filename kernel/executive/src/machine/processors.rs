@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::this_core::{self, Core};
-use super::{agreement, avx, clock, cpu, interrupt, local_apic};
+use super::{agreement, avx, clock, cpu, interrupt, local_apic, machine_check};
 
 /// Cores that have arrived in their entry function, the boot processor not
 /// counted.
@@ -19,6 +19,7 @@ pub fn become_core(apic_id: u32) -> &'static Core {
     let core = this_core::load(apic_id);
     avx::begin();
     interrupt::load_table();
+    machine_check::begin();
     local_apic::enable();
     core
 }
