@@ -13,7 +13,7 @@ fn built(app: &str) -> PathBuf {
 fn run(image: &Path, words: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
     command.args(["run", "--mode=deterministic", "--image"]);
-    command.arg(image).args(words.split_whitespace());
+    command.arg(image).args(words.split(' '));
     command.output().expect("the tool can be started")
 }
 
@@ -22,7 +22,11 @@ fn an_image_of_another_app_is_2_before_it_boots() {
     let fork_join = built("fork-join");
     let demo = system::workspace().join("apps/dag-file/examples/demo.dag");
     let dag = format!("--dag {}", demo.display());
-    for (words, wanted) in [(&*dag, "dag-file"), ("--app replay", "replay")] {
+    for (words, wanted) in [
+        (&*dag, "dag-file"),
+        ("--app replay", "replay"),
+        ("--app re\nplay", "re\\nplay"),
+    ] {
         let output = run(&fork_join, words);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{said}");

@@ -100,6 +100,25 @@ fn the_nearest_option_or_word_is_suggested() {
 }
 
 #[test]
+fn a_newline_in_a_value_breaks_no_message() {
+    for words in [
+        "run --set gain\n=",
+        "run --set gain=1\n2",
+        "run --app fork\njoin",
+        "run --dag apps/dag-file/examples/demo.dag --graph a\nb",
+        "run --dag apps/dag-file/examples/demo.dag --clusters 1\n1",
+        "bench join-latency --policies fass\nexact",
+    ] {
+        let output = tool(words).current_dir(workspace()).output();
+        let output = output.expect("the tool can be started");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{words}: {said}");
+        assert_eq!(said.lines().count(), 1, "{words}: {said}");
+        assert!(said.contains("\\n"), "{words}: {said}");
+    }
+}
+
+#[test]
 fn what_is_no_image_is_2_before_anything_boots() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let text = folder.join("image.txt");

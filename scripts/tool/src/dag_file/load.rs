@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dag_file::{DagFile, Length, Malformed, check, is_name, parse};
-use replay::shown::is_seen;
+use replay::shown::{is_seen, shown};
 use sched_dag::{Clusters, CommitOptions, Policy};
 
 use super::{rd_gen, stg};
@@ -99,7 +99,8 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
         && let Some(graph) = &import.graph
     {
         return Err(vec![format!(
-            "{place}: `--graph {graph}` is for a set of task graphs in JSON; leave it out"
+            "{place}: `--graph {}` is for a set of task graphs in JSON; leave it out",
+            shown(graph)
         )]);
     }
     // Static priorities ask for all that EDF does, and more.

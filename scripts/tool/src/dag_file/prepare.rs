@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use dag_file::time::parse_ns;
 use dag_file::{DagFile, Execution, FileDag, Length, Set};
+use replay::shown::shown;
 
 use sched_dag::Clusters;
 
@@ -181,6 +182,7 @@ fn clusters(text: Option<&str>) -> Result<Clusters, String> {
     };
     let sizes: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
     sizes.map(Clusters::Of).map_err(|_| {
+        let text = shown(text);
         format!("`--clusters {text}`: give the number of cores of each cluster, as in 2,2, or auto")
     })
 }

@@ -31,6 +31,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use replay::shown::quoted;
+
 use crate::dag_file::{self, Prepared};
 use crate::files;
 use crate::image;
@@ -254,8 +256,9 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
     let wanted = (is_dag_file || options.is_given("app")).then_some(app);
     match (of_image, wanted) {
         (Some(own), Some(wanted)) if own != wanted => Err(Refusal::Usage(format!(
-            "`--image {place}`: the image is of app `{own}`, and `{wanted}` is wanted; name an \
-             image of that one, or leave `--image` out to have it built"
+            "`--image {place}`: the image is of app `{own}`, and {} is wanted; name an image of \
+             that one, or leave `--image` out to have it built",
+            quoted(wanted)
         ))),
         (Some(own), _) => Ok(own),
         (None, Some(wanted)) => Ok(wanted.into()),

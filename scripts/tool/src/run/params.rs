@@ -3,6 +3,8 @@
 //! The guest knows the types and ranges; here only that a word can be made of it all. What
 //! `--set` says comes after the file, and so prevails.
 
+use replay::shown::{quoted, shown};
+
 use super::Refusal;
 use crate::files;
 use crate::options::Parsed;
@@ -20,7 +22,8 @@ pub(super) fn guest_word(options: &Parsed) -> Result<String, Refusal> {
     }
     if let Some(text) = options.text("set") {
         for part in text.split(',') {
-            let why = format!("`--set {part}`: give it as NAME=VALUE, without blanks");
+            let shown = shown(part);
+            let why = format!("`--set {shown}`: give it as NAME=VALUE, without blanks");
             parts.push(pair(part).ok_or(Refusal::Usage(why))?);
         }
     }
@@ -38,7 +41,7 @@ fn of_file(text: &str) -> Result<Vec<String>, String> {
     });
     let said = lines.filter(|(_, said)| !said.is_empty());
     said.map(|(number, said)| {
-        pair(said).ok_or_else(|| format!("{number}: `{said}` is not NAME=VALUE; write it so"))
+        pair(said).ok_or_else(|| format!("{number}: {} is not NAME=VALUE; write it so", quoted(said)))
     })
     .collect()
 }
@@ -47,7 +50,7 @@ fn of_file(text: &str) -> Result<Vec<String>, String> {
 fn pair(text: &str) -> Option<String> {
     let (name, value) = text.split_once('=')?;
     let parts = [name.trim(), value.trim()];
-    let is_word = |part: &str| !part.is_empty() && !part.contains([' ', '\t', ',']);
+    let is_word = |part: &str| !part.is_empty() && !part.contains(|c: char| c.is_whitespace() || c == ',');
     let is_pair = parts.into_iter().all(is_word);
     is_pair.then(|| parts.join("="))
 }
@@ -67,7 +70,7 @@ mod tests {
 
     #[test]
     fn what_cannot_stand_in_a_word_is_no_pair() {
-        for text in ["gain", "=1", "gain=", "gain=1 2", "ga in=1", "gain=1,2"] {
+        for text in ["gain", "=1", "gain=", "gain=1 2", "ga in=1", "gain=1,2", "gain=1\n2"] {
             assert_eq!(pair(text), None, "{text}");
         }
         // The value may have what the name has not.

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use replay::shown::shown;
+
 /// What makes the joins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Policy {
@@ -18,14 +20,15 @@ impl Policy {
     pub(super) fn list(text: &str) -> Result<Vec<Policy>, String> {
         let mut policies = Vec::new();
         for name in text.split(',') {
+            let (text, shown_name) = (shown(text), shown(name));
             let policy = Policy::from_name(name).ok_or_else(|| {
                 format!(
-                    "`--policies {text}`: `{name}` is none; there are fass, exact, and \
+                    "`--policies {text}`: `{shown_name}` is none; there are fass, exact, and \
                      approximate-MS with 1 to 1000000 ms"
                 )
             })?;
             if policies.contains(&policy) {
-                return Err(format!("`--policies {text}`: `{name}` stands twice"));
+                return Err(format!("`--policies {text}`: `{shown_name}` stands twice"));
             }
             policies.push(policy);
         }
