@@ -145,19 +145,21 @@ fn what_is_no_image_is_2_before_anything_boots() {
 }
 
 #[test]
-fn that_another_command_builds_is_said() {
+fn that_another_command_builds_is_said_and_help_does_not_wait_for_it() {
     let target = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("locked");
     let folder = target.join("tool");
+    let _ = fs::remove_dir_all(&target);
     fs::create_dir_all(&folder).expect("the test's folder takes one");
     let lock = fs::File::create(folder.join(".cargo-lock")).expect("a file in it");
     lock.lock().expect("nobody else has it");
-    let mut command = Command::new(workspace().join("scripts/run"));
-    command.arg("--help").env("CARGO_TARGET_DIR", &target);
-    command
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped());
-    let mut child = command.spawn().expect("the script can be started");
+    let run_help = || {
+        let mut command = Command::new(workspace().join("scripts/run"));
+        command.arg("--help").env("CARGO_TARGET_DIR", &target);
+        command.stdin(Stdio::null()).stderr(Stdio::piped());
+        command
+    };
+    let mut child = run_help().stdout(Stdio::null()).spawn();
+    let child = child.as_mut().expect("the script can be started");
     let said = child.stderr.take().map(io::BufReader::new);
     let line = said
         .and_then(|said| said.lines().next())
@@ -170,6 +172,14 @@ fn that_another_command_builds_is_said() {
         folder.display()
     );
     assert_eq!(line.expect("UTF-8"), expected);
+
+    // A tool that is built, and newer than its sources, answers while the lock is held.
+    let built = env!("CARGO_BIN_EXE_fass-tool");
+    fs::copy(built, folder.join("fass-tool")).expect("the folder takes a program");
+    let output = run_help().output().expect("the script can be started");
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert_eq!(output.stderr, b"");
+    assert!(output.stdout.starts_with(b"Builds an app, "), "{output:?}");
 }
 
 #[test]
