@@ -113,6 +113,39 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
 }
 
 #[test]
+fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
+    let app = repository("replayed", NAME);
+    let file = app.join("run.rec").display().to_string();
+    cargo(&app, &format!("run -- --mode deterministic --record {file}"));
+    let replay = format!("run --example replay -- {file}");
+    let said = cargo(&app, &replay);
+    assert_eq!(said, "0 values are compared: nothing differs\n");
+    let said = cargo(&app, &format!("{replay} --until {NAME}/17"));
+    assert!(said.contains("    gives `distance`: 82\n"), "{said}");
+
+    let library = app.join("src/lib.rs");
+    let text = fs::read_to_string(&library).expect("the new app's");
+    let careless = text.replace("force > 80", "force > 81");
+    assert_ne!(careless, text);
+    fs::write(&library, careless).expect("it is ours");
+    for (words, code, says) in [
+        ("", 1, "`cargo run --profile host --example replay -- "),
+        (
+            " --on linux",
+            2,
+            "`cargo run --profile linux --example first-steps-linux`",
+        ),
+        (" --prove --seeds 2", 1, "leave `--seeds` out"),
+    ] {
+        let output = try_cargo(&app, &format!("run -- --mode deterministic{words}"));
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8_lossy(&said);
+        assert_eq!(output.status.code(), Some(code), "{words}: {said}");
+        assert!(said.contains(says), "{words}: {said}");
+    }
+}
+
+#[test]
 fn what_its_repository_lacks_is_named_with_the_remedy() {
     let app = repository("lacking", "brake-assist");
     let put = |file: &str, text: &str| fs::write(app.join(file), text).expect("it is ours");

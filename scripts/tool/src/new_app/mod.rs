@@ -47,6 +47,10 @@ const FILES: &[AppFile] = &[
         include_str!("../../template/examples/app-template-linux.rs"),
     ),
     (
+        "examples/replay.rs",
+        include_str!("../../template/examples/replay.rs"),
+    ),
+    (
         "tests/virtual_time.rs",
         include_str!("../../template/tests/virtual_time.rs"),
     ),
@@ -197,7 +201,7 @@ mod tests {
             named += usize::from(*template != text);
         }
         assert_eq!(
-            named, 4,
+            named, 5,
             "all but build.rs and the program for Linux have the app's name"
         );
         let again = create(&workspace, "brake-assist").unwrap_err();

@@ -10,10 +10,10 @@ use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{self, ExitCode};
 
-use super::run;
+use super::{RUN, on_linux, run};
 use crate::files;
 use crate::image;
-use crate::options::{Command, Takes};
+use crate::options::{Command, Request, Takes};
 
 /// The table of `boot`, for its help.
 static BOOT: Command = Command {
@@ -45,7 +45,16 @@ pub fn boot(words: &[OsString]) -> ExitCode {
             Err(code) => code,
         };
     };
-    if image::check_file(Path::new(file)).is_ok() {
+    if let Ok(app) = image::check_file(Path::new(file)) {
+        if let Ok(Request::Work(options)) = RUN.parse(rest)
+            && on_linux::is_asked_for(&options)
+        {
+            return BOOT.refuse(&format!(
+                "`--on`: an image is for the bare machine; on Linux the app is another program: \
+                 `cargo run --profile linux --example {}-linux`",
+                app.as_deref().unwrap_or("NAME")
+            ));
+        }
         return run(&[&["--image".into(), file.clone()], rest].concat());
     }
     let error = process::Command::new(file).args(rest).exec();

@@ -357,8 +357,13 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         };
         let lines = of_file
             .unwrap_or_else(|| format!("the {who} refused its command line: {}", fault.reason));
+        let draws_nothing = options.is_given("seeds") && fault.reason.starts_with("`seed`");
+        let remedy = match draws_nothing {
+            true => "; this app draws nothing by a seed: leave `--seeds` out",
+            false => "",
+        };
         log.restore();
-        return RUN.refuse(&lines);
+        return RUN.refuse(&(lines + remedy));
     }
     match outcome.transcript.verdict() {
         // The screen has shown all that it said.

@@ -94,19 +94,26 @@ impl Recorded {
         let path = raw.with_extension("rec");
         let file = files::place(&path);
         fs::write(&path, &bytes).map_err(|error| format!("{file}: cannot be written: {error}"))?;
-        let app = &self.app;
-        let example = format!("apps/{app}/examples/replay.rs");
-        let shown = match system::workspace().join(example).is_file() {
-            true => format!(
-                ", and `cargo run --profile host -p {app} --example replay -- {file}` shows the job \
+        let shown = self.replay_package().map_or(String::new(), |package| {
+            format!(
+                ", and `cargo run --profile host{package} --example replay -- {file}` shows the job \
                  that crashed"
-            ),
-            false => String::new(),
-        };
+            )
+        });
         Ok(Some(format!(
             "{file}: the inputs of the last jobs before the fault; `./scripts/recording {file}` \
              lists them{shown}"
         )))
+    }
+
+    /// Returns how cargo is told the package whose example replays, if there is one: nothing has
+    /// to be said in the app's own repository.
+    fn replay_package(&self) -> Option<String> {
+        const EXAMPLE: &str = "examples/replay.rs";
+        let app = &self.app;
+        let is_ours = (system::workspace().join("apps").join(app).join(EXAMPLE)).is_file();
+        let in_its_own = || Path::new(EXAMPLE).is_file().then(String::new);
+        is_ours.then(|| format!(" -p {app}")).or_else(in_its_own)
     }
 }
 

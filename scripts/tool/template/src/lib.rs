@@ -22,7 +22,8 @@ pub const PERIOD: Duration = Duration::from_millis(10);
 #[must_use]
 pub fn build(jobs: u64) -> Dag {
     let dag = create_dag();
-    dag.name("app-template").jobs(jobs);
+    // By `--record FILE`, what the source returns is written down, to be replayed.
+    dag.name("app-template").jobs(jobs).record::<u32>("distance");
     let mut distance = 100_u32;
     let sense = move || {
         work(800);

@@ -1,0 +1,14 @@
+//! Replays a recording of the app on this computer: `--until app-template/17` shows what each
+//! subtask got and gave in a job.
+
+use std::process::ExitCode;
+
+use fass::finish_create_dags;
+
+fn main() -> ExitCode {
+    virtual_time::replay_command(|_file| {
+        // As many jobs as any run has: those that were not recorded are passed over.
+        finish_create_dags(&[app_template::build(100_000)])?;
+        Ok(())
+    })
+}
