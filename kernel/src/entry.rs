@@ -6,6 +6,9 @@
 //! this library, so that host programs that use the library keep their own.
 
 use core::panic::PanicInfo;
+use core::sync::atomic::Ordering;
+
+use crate::app::bound_verdict::IS_UNOPTIMIZED;
 
 pub use boot::BootInfo;
 
@@ -55,7 +58,7 @@ macro_rules! entry {
         // once; no other symbol has the name.
         #[unsafe(no_mangle)]
         fn kernel_main(info: &'static $crate::entry::BootInfo) -> ! {
-            $crate::entry::start(info, env!("CARGO_PKG_NAME"), $app)
+            $crate::entry::start(info, env!("CARGO_PKG_NAME"), cfg!(unoptimized), $app)
         }
 
         $crate::memory_functions!();
@@ -99,8 +102,10 @@ impl AppNote {
 pub fn start(
     info: &'static BootInfo,
     name: &'static str,
+    is_unoptimized: bool,
     app: fn(&crate::Machine) -> Result<(), crate::Ending>,
 ) -> ! {
+    IS_UNOPTIMIZED.store(is_unoptimized, Ordering::Relaxed);
     crate::start::start(info, name, app)
 }
 

@@ -122,6 +122,12 @@ fn a_response_beyond_its_proven_bound_is_no_success() {
             .reason
             .contains("in job 3, beyond its proven bound of 1.000 ms; ");
     assert!(names_both, "{}", verdict.reason);
+    let several = guest("exceeded").cores(2).end_in(Status::Failure);
+    let shared = several.transcript.verdict().expect("checked before").reason;
+    let cause = "; in mode deterministic cores that compute share one clock: `--cores 1`";
+    assert!(shared.contains(cause), "{shared}");
+    assert!(!verdict.reason.contains("share one clock"));
+    assert!(!shared.contains("does not optimize"));
     // So its WCET has not held either, in as many calls.
     let lines: Vec<_> = outcome.transcript.of_kind("wcet_exceeded").collect();
     let [line] = lines[..] else {

@@ -116,7 +116,10 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
 fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
     let app = repository("replayed", NAME);
     let file = app.join("run.rec").display().to_string();
-    cargo(&app, &format!("run -- --mode deterministic --record {file}"));
+    cargo(
+        &app,
+        &format!("run -- --mode deterministic --record {file}"),
+    );
     let replay = format!("run --example replay -- {file}");
     let said = cargo(&app, &replay);
     assert_eq!(said, "0 values are compared: nothing differs\n");

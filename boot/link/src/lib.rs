@@ -56,6 +56,11 @@ pub fn link_image() {
     }
     println!("cargo::rustc-check-cfg=cfg(linked_as_image)");
     println!("cargo::rustc-cfg=linked_as_image");
+    // So that the kernel can say it where calls take longer than they may.
+    println!("cargo::rustc-check-cfg=cfg(unoptimized)");
+    if std::env::var("OPT_LEVEL").is_ok_and(|level| level == "0") {
+        println!("cargo::rustc-cfg=unoptimized");
+    }
     if let Ok(main) = std::fs::read_to_string("src/main.rs") {
         println!("cargo::rerun-if-changed=src/main.rs");
         for attribute in missing_attributes(&main) {

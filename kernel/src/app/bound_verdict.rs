@@ -13,6 +13,7 @@
 use alloc::format;
 use alloc::string::String;
 use core::cell::{Cell, RefCell};
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
@@ -21,10 +22,15 @@ use crate::report::Ns;
 use crate::report::run::Run;
 use executive::text::json;
 
+/// Whether the app was compiled without optimization, as its entry says.
+pub(crate) static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
+
 /// What is known of bounds in the runs so far.
 #[derive(Debug)]
 pub(crate) struct BoundVerdict {
     are_judged: Cell<bool>,
+    /// Whether several cores share one clock.
+    shares_clock: bool,
     /// Why the app fails, if it does.
     complaint: RefCell<Option<String>>,
 }
@@ -42,9 +48,10 @@ struct Exceeded {
 }
 
 impl BoundVerdict {
-    pub(crate) const fn new(are_judged: bool) -> Self {
+    pub(crate) const fn new(are_judged: bool, shares_clock: bool) -> Self {
         Self {
             are_judged: Cell::new(are_judged),
+            shares_clock,
             complaint: RefCell::new(None),
         }
     }
@@ -64,7 +71,9 @@ impl BoundVerdict {
             several.chain([None]).map(move |sink| (dag, sink))
         });
         for exceeded in ends.filter_map(|(dag, sink)| Exceeded::find(run, dag, sink)) {
-            let text = exceeded.report(run.task_set());
+            let is_unoptimized = IS_UNOPTIMIZED.load(Ordering::Relaxed);
+            let also = causes(is_unoptimized, self.shares_clock);
+            let text = exceeded.report(run.task_set(), also);
             // What the app judges itself is not kept: it would count as in use.
             if self.are_judged.get() {
                 self.complaint.borrow_mut().get_or_insert(text);
@@ -76,6 +85,23 @@ impl BoundVerdict {
     pub(crate) fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
         let complaint = self.complaint.take().filter(|_| self.are_judged.get());
         Ending::or_complaint(result, complaint)
+    }
+}
+
+/// Says what may have made calls longer than WCETs that are right elsewhere.
+const fn causes(is_unoptimized: bool, shares_clock: bool) -> &'static str {
+    match (is_unoptimized, shares_clock) {
+        (false, false) => "",
+        (true, false) => "; the image's profile does not optimize: boot one that does",
+        (false, true) => {
+            "; in mode deterministic cores that compute share one clock: `--cores 1` shows what \
+             each call takes alone"
+        }
+        (true, true) => {
+            "; the image's profile does not optimize: boot one that does; and in mode \
+             deterministic cores that compute share one clock: `--cores 1` shows what each call \
+             takes alone"
+        }
     }
 }
 
@@ -121,7 +147,7 @@ impl Exceeded {
     }
 
     /// Prints it, and returns it in words.
-    fn report(&self, task_set: &TaskSet) -> String {
+    fn report(&self, task_set: &TaskSet, also: &str) -> String {
         let dag = task_set.dag(self.dag);
         let name = dag.name();
         let sink = self.sink.map_or(String::new(), |sink| {
@@ -129,7 +155,7 @@ impl Exceeded {
         });
         let text = format!(
             "{sink}dag `{name}` took {} in job {}, beyond its proven bound of {}; a WCET, or \
-             `overheads_ns`, is stated too small",
+             `overheads_ns`, is stated too small{also}",
             Ns(self.response_ns),
             self.job,
             Ns(self.bound_ns)

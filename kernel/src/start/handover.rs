@@ -364,7 +364,10 @@ fn run_app(info: &'static BootInfo, name: &'static str, app: App) -> Result<(), 
         input: Cell::new(None),
         runs: Cell::new(0),
         fault_verdict: FaultVerdict::default(),
-        bound_verdict: BoundVerdict::new(settings.judges_bounds),
+        bound_verdict: BoundVerdict::new(
+            settings.judges_bounds,
+            info.value("mode") == Some("deterministic") && this_core::all().len() > 1,
+        ),
     };
     let result = app(&machine);
     if let Some(refusal) = edge::refusal() {

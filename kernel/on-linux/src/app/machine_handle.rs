@@ -72,7 +72,7 @@ impl Machine {
             refusal: RefCell::new(None),
             runs: Cell::new(0),
             fault_verdict: FaultVerdict::default(),
-            bound_verdict: BoundVerdict::new(false),
+            bound_verdict: BoundVerdict::new(false, false),
         }
     }
 

@@ -41,7 +41,8 @@ fn of_file(text: &str) -> Result<Vec<String>, String> {
     });
     let said = lines.filter(|(_, said)| !said.is_empty());
     said.map(|(number, said)| {
-        pair(said).ok_or_else(|| format!("{number}: {} is not NAME=VALUE; write it so", quoted(said)))
+        pair(said)
+            .ok_or_else(|| format!("{number}: {} is not NAME=VALUE; write it so", quoted(said)))
     })
     .collect()
 }
@@ -50,7 +51,8 @@ fn of_file(text: &str) -> Result<Vec<String>, String> {
 fn pair(text: &str) -> Option<String> {
     let (name, value) = text.split_once('=')?;
     let parts = [name.trim(), value.trim()];
-    let is_word = |part: &str| !part.is_empty() && !part.contains(|c: char| c.is_whitespace() || c == ',');
+    let is_word =
+        |part: &str| !part.is_empty() && !part.contains(|c: char| c.is_whitespace() || c == ',');
     let is_pair = parts.into_iter().all(is_word);
     is_pair.then(|| parts.join("="))
 }
@@ -70,7 +72,15 @@ mod tests {
 
     #[test]
     fn what_cannot_stand_in_a_word_is_no_pair() {
-        for text in ["gain", "=1", "gain=", "gain=1 2", "ga in=1", "gain=1,2", "gain=1\n2"] {
+        for text in [
+            "gain",
+            "=1",
+            "gain=",
+            "gain=1 2",
+            "ga in=1",
+            "gain=1,2",
+            "gain=1\n2",
+        ] {
             assert_eq!(pair(text), None, "{text}");
         }
         // The value may have what the name has not.
