@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 19] = [
+const KERNELS: [&str; 21] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -33,6 +33,8 @@ const KERNELS: [&str; 19] = [
     "clock",
     "avx",
     "x2apic",
+    "cores",
+    "smt",
 ];
 
 /// The command line, with a note of which words have been taken.
@@ -287,7 +289,7 @@ mod tests {
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
              budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, measure, \
-             idle, console, status, mode, probe, end, clock, avx, x2apic"
+             idle, console, status, mode, probe, end, clock, avx, x2apic, cores, smt"
         );
     }
 

@@ -1,6 +1,7 @@
 //! The kernel boots with one processor and with many, on both boards.
 
 use std::fs;
+use std::path::Path;
 use std::time::Duration;
 
 use harness::Guest;
@@ -279,6 +280,79 @@ fn x2apic_is_refused_where_the_processor_lacks_it() {
     fs::remove_file(&without).expect("it is ours");
     let boot = outcome.transcript.of_kind("boot").next().expect("a line");
     assert!(boot.text.contains("\"x2apic\":false"), "{}", boot.text);
+}
+
+/// Boots two cores of two siblings each, with these words, and returns what it prints and how
+/// many cores and siblings there are.
+fn of_siblings(program: &Path, words: &[&str]) -> (String, [Option<u64>; 2]) {
+    let mut guest = Guest::new("fork-join").cores(4).program(program);
+    for word in ["jobs=2", "subtasks=2"].iter().chain(words) {
+        guest = guest.word(word);
+    }
+    let outcome = guest.succeed();
+    let boot = outcome.transcript.of_kind("boot").next().expect("a line");
+    let numbers = ["cpus", "siblings"].map(|member| boot.number_at(member));
+    (outcome.serial, numbers)
+}
+
+/// Processors state their siblings in several ways.
+#[test]
+fn siblings_are_said_and_left_out_on_demand() {
+    for model in ["max", "core2duo"] {
+        let program = qemu_and(&[("#max", model)], "-smp 4,cores=2,threads=2");
+        let (serial, numbers) = of_siblings(&program, &[]);
+        assert_eq!(numbers, [Some(4), Some(2)], "{model}");
+        let warning = "warning: 2 of 4 cores share a physical core with another";
+        assert!(serial.contains(warning), "{model}: {serial}");
+        let (serial, numbers) = of_siblings(&program, &["smt=off"]);
+        assert_eq!(numbers, [Some(2), Some(0)], "{model}");
+        assert!(!serial.contains("warning: "), "{model}: {serial}");
+        let (_, numbers) = of_siblings(&program, &["smt=off", "cores=0,1,3"]);
+        assert_eq!(numbers, [Some(2), Some(0)], "{model}");
+        let (_, numbers) = of_siblings(&program, &["cores=0,2-3"]);
+        assert_eq!(numbers, [Some(3), Some(1)], "{model}");
+        fs::remove_file(&program).expect("it is ours");
+    }
+}
+
+#[test]
+fn a_list_of_cores_that_are_not_there_is_refused() {
+    for list in ["1-3", "0-4", "4"] {
+        let word = format!("cores={list}");
+        let outcome = Guest::new("fork-join").cores(4).word(&word);
+        let outcome = outcome.end_in(Status::Usage);
+        let why = format!("`cores={list}`: allowed are numbers and ranges such as 0-3,6");
+        assert!(outcome.serial.contains(&why), "{}", outcome.serial);
+    }
+}
+
+/// On no hypervisor the processor is believed. Where it does not say that its timer goes on while
+/// it halts, no core halts, and still all goes on.
+#[test]
+fn what_a_processor_does_not_promise_is_said() {
+    let mute = qemu_with("#max", "max,-hypervisor,-arat");
+    let guest = Guest::new("fork-join")
+        .in_real_time()
+        .cores(2)
+        .program(&mute);
+    let guest = guest
+        .machine(Machine::Q35)
+        .word("jobs=2")
+        .word("subtasks=2");
+    let boots = |guest: &Guest| {
+        let outcome = guest.succeed();
+        let boot = outcome.transcript.of_kind("boot").next().expect("a line");
+        assert!(
+            boot.text
+                .contains("\"counter_invariant\":false,\"timer_in_halt\":false")
+        );
+        let rate = "warning: the processor does not state that its counter keeps one rate";
+        assert!(outcome.serial.contains(rate), "{}", outcome.serial);
+        outcome.serial.contains("so idle cores stay awake")
+    };
+    assert!(boots(&guest));
+    assert!(!boots(&guest.word("idle=halt")));
+    fs::remove_file(&mute).expect("it is ours");
 }
 
 #[test]

@@ -6,7 +6,7 @@
 
 use crate::physical::PhysicalMemory;
 use crate::power::{self, Power, Register};
-use crate::{Full, List, MAX_PROCESSORS};
+use crate::{List, MAX_PROCESSORS};
 
 /// The most I/O APICs that are noted.
 pub const MAX_IO_APICS: usize = 8;
@@ -14,8 +14,10 @@ pub const MAX_IO_APICS: usize = 8;
 /// What the tables tell.
 #[derive(Clone, Copy, Debug)]
 pub struct Platform {
-    /// The local APIC ids of the enabled processors, in the table's order.
+    /// The local APIC ids of the enabled processors, in the table's order, as far as they fit.
     pub apic_ids: List<u32, MAX_PROCESSORS>,
+    /// How many of these there are.
+    pub processors: usize,
     /// The physical address of the local APICs' registers.
     pub local_apic: u64,
     /// The power management timer, if the machine has one.
@@ -32,10 +34,11 @@ pub struct Platform {
 
 impl Platform {
     /// Adds a processor, unless the table has named it already, in its other form of an entry.
-    fn add_processor(&mut self, apic_id: u32) -> Result<(), Full> {
-        match self.apic_ids.as_slice().contains(&apic_id) {
-            true => Ok(()),
-            false => self.apic_ids.push(apic_id),
+    fn add_processor(&mut self, apic_id: u32) {
+        if !self.apic_ids.as_slice().contains(&apic_id) {
+            self.processors += 1;
+            // One more than there is room for can be counted only.
+            let _ = self.apic_ids.push(apic_id);
         }
     }
 }
@@ -119,6 +122,7 @@ pub fn read(memory: &dyn PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, 
     let hpet = find(*b"HPET").and_then(|hpet| hpet_registers(memory, hpet));
     let mut platform = Platform {
         apic_ids: List::new(0),
+        processors: 0,
         local_apic: 0,
         pm_timer: fadt.and_then(|fadt| pm_timer(memory, fadt)),
         hpet,
@@ -211,12 +215,10 @@ fn read_madt(memory: &dyn PhysicalMemory, madt: u64, platform: &mut Platform) ->
         let size = memory.u8(entry + 1).filter(|size| *size >= 2)?;
         match memory.u8(entry)? {
             LOCAL_APIC if memory.u32(entry + 4)? & ENABLED != 0 => {
-                platform
-                    .add_processor(u32::from(memory.u8(entry + 3)?))
-                    .ok()?;
+                platform.add_processor(u32::from(memory.u8(entry + 3)?));
             }
             LOCAL_X2APIC if memory.u32(entry + 8)? & ENABLED != 0 => {
-                platform.add_processor(memory.u32(entry + 4)?).ok()?;
+                platform.add_processor(memory.u32(entry + 4)?);
             }
             IO_APIC => {
                 // One more than there is room for stays as the firmware left it.

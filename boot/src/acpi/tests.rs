@@ -142,6 +142,17 @@ fn finds_processors_with_long_ids_and_each_once() {
     machine.put_table(0x5000, *b"APIC", &entries.concat());
     let platform = read(&machine, Some(RSDP)).unwrap();
     assert_eq!(platform.apic_ids.as_slice(), &[1, 300]);
+    assert_eq!(platform.processors, 2);
+
+    let many = (0..288).flat_map(|id| long(id, 1));
+    let entries = [0; 8].into_iter().chain(many).collect::<Vec<_>>();
+    machine.put_table(0x8000, *b"APIC", &entries);
+    let entries = [0x6000u64, 0x8000].map(u64::to_le_bytes).concat();
+    machine.put_table(0x4000, *b"XSDT", &entries);
+    let platform = read(&machine, Some(RSDP)).unwrap();
+    assert_eq!(platform.processors, 288, "more than there is room for");
+    let first: Vec<u32> = (0..255).collect();
+    assert_eq!(platform.apic_ids.as_slice(), first);
 }
 
 #[test]

@@ -7,9 +7,10 @@ use core::ops::Range;
 
 use boot::acpi::{self, MAX_IO_APICS, Platform};
 use boot::physical::LowMemory;
-use boot::{BootInfo, Framebuffer, List, MAX_REGIONS, Module};
+use boot::{BootInfo, Framebuffer, List, MAX_PROCESSORS, MAX_REGIONS, Module};
 
-use super::{probe, settings};
+use super::announcement::announce;
+use super::{probe, selection, settings};
 use crate::app::bound_verdict::BoundVerdict;
 use crate::app::ending::{self, Ending, Told};
 use crate::app::fault_verdict::FaultVerdict;
@@ -24,12 +25,12 @@ use executive::machine::power::{self, End};
 use executive::machine::this_core::{self, Stacks};
 use executive::machine::{
     agreement, avx, clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic,
-    processors, screen, serial,
+    processors, screen, serial, topology,
 };
 use executive::memory::{self, OutOfMemory};
 use executive::run::platform::KERNEL;
 use executive::run::{containment, contexts, edge, heartbeat, worker};
-use executive::text::{console, json};
+use executive::text::console;
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -111,21 +112,17 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     if !is_early {
         show_text(info, &screen);
     }
-    let wants_x2apic = info.value("x2apic") == Some("on");
+    let mut ids = platform.apic_ids.as_slice().iter();
+    let wants_x2apic = info.value("x2apic") == Some("on") || ids.any(|id| *id > LAST_SHORT_ID);
     // SAFETY: `memory::initialize` mapped one page of registers there.
     unsafe { local_apic::choose(platform.local_apic, wants_x2apic) };
-    let ids = platform.apic_ids.as_slice();
-    assert!(
-        local_apic::is_x2apic() || ids.iter().all(|id| *id <= LAST_SHORT_ID),
-        "a processor's APIC id is above {LAST_SHORT_ID}; give the word `x2apic=on`"
-    );
     // SAFETY: the tables name these registers, and `devices` had them mapped.
     unsafe { power::set_registers(platform.power) };
     for base in platform.io_apics.as_slice() {
         // SAFETY: likewise, and nothing else in this kernel uses them.
         unsafe { io_apic::mask_all(*base) };
     }
-    this_core::create(boot_processor_first(&platform));
+    this_core::create(with_stacks(selected(info, &platform)));
     let core = processors::become_core(local_apic::id());
     let stack = core.context().stack_top();
     let start = Start {
@@ -220,6 +217,10 @@ extern "C" fn start_cores(start: &Start) -> ! {
     if cores > 1 {
         start_others(info, layout, cores);
     }
+    let may_halt = info.value("idle") == Some("halt");
+    if cpu::hypervisor().is_none() && !cpu::has_timer_in_halt() && !may_halt {
+        interrupt_flag::stay_awake();
+    }
     interrupt_flag::enable();
     if !*probes {
         heartbeat::set_heartbeats(0);
@@ -227,29 +228,11 @@ extern "C" fn start_cores(start: &Start) -> ! {
     // A second installation would come from a second boot, which there is not.
     let _ = fass::install(&KERNEL);
     fass::set_clock(&CLOCK);
-    let command_line = info.command_line().unwrap_or("(not UTF-8)");
-    json::report("boot", |line| {
-        line.text("version", env!("CARGO_PKG_VERSION"))
-            .text("app", name)
-            .number("cpus", cores as u64)
-            .number("memory_kib", layout.total_bytes / 1024)
-            .text("clock", rate.clock)
-            .number("counter_khz", rate.khz)
-            .flag("x2apic", local_apic::is_x2apic())
-            .flag("avx", avx::is_on())
-            .flag("clock_undisputed", rate.is_undisputed());
-        if let Some((clock, khz)) = rate.check {
-            line.text("clock_check", clock)
-                .number("clock_check_khz", khz);
-        }
-        line.number("skew_ns", agreement::skew_ns())
-            .number("ready_ns", clock::now_ns())
-            .text("command_line", command_line);
-    });
+    announce(info, name, layout.total_bytes, &rate);
     end(if *probes {
         probe::run()
     } else {
-        run_app(info, name, *app)
+        run_app(info, name, *app, by_number(platform).count())
     })
 }
 
@@ -298,16 +281,32 @@ fn read_platform(info: &BootInfo) -> Platform {
     acpi::read(&memory, info.rsdp).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Returns what each core needs, the boot processor's first.
-fn boot_processor_first(platform: &Platform) -> impl Iterator<Item = (u32, Stacks)> {
+/// Returns the APIC ids of all processors by their numbers.
+fn by_number(platform: &Platform) -> impl Iterator<Item = u32> {
     let own = local_apic::id();
-    let others = platform
-        .apic_ids
-        .as_slice()
-        .iter()
-        .copied()
-        .filter(move |id| *id != own);
-    let ids: Vec<u32> = core::iter::once(own).chain(others).collect();
+    let ids = platform.apic_ids.as_slice().iter().copied();
+    core::iter::once(own).chain(ids.filter(move |id| *id != own))
+}
+
+/// Returns the APIC ids of the processors that become cores. What is wrong in the words is refused
+/// later.
+fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
+    let is_right = |list: &&str| selection::check(list, by_number(platform).count()).is_ok();
+    let list = info.value("cores").filter(is_right);
+    assert!(
+        platform.processors <= MAX_PROCESSORS || list.is_some(),
+        "ACPI names {} processors, of which {MAX_PROCESSORS} can be used; choose by the word \
+         `cores=0-{}`, or turn some off in the firmware's settings",
+        platform.processors,
+        MAX_PROCESSORS - 1
+    );
+    let drops_siblings = info.value("smt") == Some("off");
+    let bits = drops_siblings.then(topology::sibling_bits);
+    selection::select(by_number(platform), list, bits.unwrap_or(0))
+}
+
+/// Returns what each core needs, the boot processor's first.
+fn with_stacks(ids: Vec<u32>) -> impl Iterator<Item = (u32, Stacks)> {
     ids.into_iter().zip(0..).map(|(id, index)| {
         let stacks = stacks(index == 0);
         (
@@ -332,7 +331,12 @@ extern "C" fn other_core(apic_id: u32) -> ! {
     interrupt::begin_work()
 }
 
-fn run_app(info: &'static BootInfo, name: &'static str, app: App) -> Result<(), Ending> {
+fn run_app(
+    info: &'static BootInfo,
+    name: &'static str,
+    app: App,
+    processors: usize,
+) -> Result<(), Ending> {
     let usage = |message: &str| Ending::Usage(crate::options::UsageError::new(message));
     if info.is_command_line_cut {
         return Err(usage(&format!(
@@ -344,7 +348,7 @@ fn run_app(info: &'static BootInfo, name: &'static str, app: App) -> Result<(), 
         .command_line()
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
-    let settings = settings::apply(&options)?;
+    let settings = settings::apply(&options, processors)?;
     KERNEL.set_most_events(settings.events);
     let mut module = module_bytes(info);
     if settings.wcet_bytes > 0 {

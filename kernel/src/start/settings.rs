@@ -23,10 +23,13 @@
 //! | `end=halt\|off\|reset` | what the machine does after the verdict, if no host ends it; it holds from the start on | `halt` |
 //! | `clock=acpi-pm-timer\|hpet\|local-apic-1ghz\|pit` | by which clock time is measured at the start | the first of them that counts |
 //! | `avx=on\|off` | whether functions can use AVX, where the processor has it | `on` |
-//! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left them so, they stay | `off` |
+//! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left them so, or an id asks for it, they are | `off` |
+//! | `cores=0-3,6` | which processors become cores, by their numbers, see `selection` | all |
+//! | `smt=on\|off` | whether siblings, processors that share a physical core, all become cores | `on` |
 
 use fass::edge::Wish;
 
+use super::selection;
 use super::terms::Terms;
 use crate::options::{Options, UsageError};
 use crate::watch::background::{Echo, Wishes};
@@ -93,7 +96,9 @@ impl Settings {
 }
 
 /// Takes the kernel's words and does what they say.
-pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
+///
+/// The machine has so many `processors`, cores or not.
+pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings, UsageError> {
     let terms = Terms::read(options)?;
     KERNEL.set_policy(terms.policy);
     KERNEL.set_preemption(terms.preemption);
@@ -123,6 +128,10 @@ pub(crate) fn apply(options: &Options<'_>) -> Result<Settings, UsageError> {
     // As were these; what is wrong is refused here.
     options.choice("avx", &[("on", ()), ("off", ())])?;
     options.choice("x2apic", &[("off", ()), ("on", ())])?;
+    options.choice("smt", &[("on", ()), ("off", ())])?;
+    if let Some(list) = options.text("cores") {
+        selection::check(list, processors)?;
+    }
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;
     let events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;

@@ -126,6 +126,20 @@ pub fn has_x2apic() -> bool {
     __cpuid(1).ecx & X2APIC != 0
 }
 
+/// Reports whether the processor states that its counter has one rate, whatever its frequency and
+/// its idle state (Intel's SDM volume 3, 18.17.1).
+pub fn has_invariant_counter() -> bool {
+    const POWER: u32 = 0x8000_0007;
+    __cpuid(0x8000_0000).eax >= POWER && __cpuid(POWER).edx & 1 << 8 != 0
+}
+
+/// Reports whether the processor states that the local APIC's timer counts in all idle states
+/// (CPUID 6, ARAT). Else it may stop where a firmware makes more of a halt (C1E).
+pub fn has_timer_in_halt() -> bool {
+    const POWER: u32 = 6;
+    __cpuid(0).eax >= POWER && __cpuid(POWER).eax & 1 << 2 != 0
+}
+
 /// Reads a model-specific register.
 ///
 /// # Safety

@@ -6,7 +6,22 @@
 
 use core::panic::Location;
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use super::{counted_time, cpu, interrupts_off};
+
+/// Whether no core halts.
+static STAYS_AWAKE: AtomicBool = AtomicBool::new(false);
+
+/// Has no core halt from now on, for processors whose timers that might stop.
+pub fn stay_awake() {
+    STAYS_AWAKE.store(true, Ordering::Relaxed);
+}
+
+/// Reports whether no core halts.
+pub fn stays_awake() -> bool {
+    STAYS_AWAKE.load(Ordering::Relaxed)
+}
 
 /// Disables interrupts on this processor and reports whether they were enabled.
 #[track_caller]
@@ -38,12 +53,17 @@ pub fn enable() {
     cpu::set_interrupt_flag();
 }
 
-/// Enables interrupts and halts until one has been handled; leaves them enabled.
+/// Enables interrupts and halts until one has been handled; leaves them enabled. Where cores stay
+/// awake it may return at once, as from an interrupt that changes nothing.
 ///
 /// To be called with interrupts disabled: then no interrupt that the caller has checked
 /// for can leave the processor halted with work to do.
 pub fn enable_and_halt() {
     interrupts_off::end();
+    if stays_awake() {
+        cpu::set_interrupt_flag();
+        return cpu::relax();
+    }
     counted_time::count_before_halt();
     cpu::set_interrupt_flag_and_halt();
 }

@@ -50,7 +50,7 @@ const X2APIC: u64 = 1 << 10;
 pub unsafe fn choose(base: u64, wants_x2apic: bool) {
     assert!(
         !wants_x2apic || cpu::has_x2apic(),
-        "the processor has no x2APIC; leave the word `x2apic=on` out"
+        "the processor has no x2APIC, which `x2apic=on` or an APIC id asks for"
     );
     // SAFETY: every 64-bit processor has the register.
     let is_left_on = unsafe { cpu::read_msr(WAY) } & X2APIC != 0;

@@ -41,6 +41,7 @@ pub mod serial;
 pub mod spinlock;
 pub mod this_core;
 pub mod timer;
+pub mod topology;
 pub mod turns;
 pub mod vector;
 mod wake;

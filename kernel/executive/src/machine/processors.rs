@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::this_core::{self, Core};
-use super::{agreement, avx, clock, cpu, interrupt, local_apic, machine_check};
+use super::{agreement, avx, clock, cpu, interrupt, local_apic, machine_check, topology};
 
 /// Cores that have arrived in their entry function, the boot processor not
 /// counted.
@@ -17,6 +17,8 @@ const LONGEST_JUMP_NS: u64 = 2_000;
 /// segments, interrupt stacks, interrupt table and local APIC.
 pub fn become_core(apic_id: u32) -> &'static Core {
     let core = this_core::load(apic_id);
+    let is_efficient = topology::is_efficiency_core();
+    core.is_efficient.store(is_efficient, Ordering::Relaxed);
     avx::begin();
     interrupt::load_table();
     machine_check::begin();

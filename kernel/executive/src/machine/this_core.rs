@@ -83,6 +83,8 @@ pub struct Core {
     interrupts_off: Meter,
     /// By how much the counter has been behind another core's, in ticks.
     pub(super) behind_ticks: AtomicU64,
+    /// Whether it is an efficiency core.
+    pub(super) is_efficient: AtomicBool,
     /// What runs here, in two words that the layer above chooses; for reports of panics.
     pub running: [AtomicU64; 2],
 }
@@ -118,6 +120,7 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         heartbeat_ns: AtomicU64::new(0),
         interrupts_off: Meter::new(),
         behind_ticks: AtomicU64::new(0),
+        is_efficient: AtomicBool::new(false),
         running: [const { AtomicU64::new(u64::MAX) }; 2],
     });
     // A second call would come from a second boot, which there is not.
@@ -303,6 +306,11 @@ impl Core {
     /// Returns what this core has measured of its sections without interrupts.
     pub(super) const fn meter(&self) -> &Meter {
         &self.interrupts_off
+    }
+
+    /// Reports whether this is an efficiency core.
+    pub fn is_efficient(&self) -> bool {
+        self.is_efficient.load(Ordering::Relaxed)
     }
 
     /// Returns the id that interrupts are addressed to.

@@ -25,7 +25,7 @@ use crate::options::{Options, UsageError};
 use crate::text::graph;
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
-const FOREIGN: [(&str, &str); 14] = [
+const FOREIGN: [(&str, &str); 15] = [
     ("trace_events", "the journal takes what memory it needs"),
     ("measure", "interrupts are Linux's"),
     ("idle", "idle cores are Linux's"),
@@ -37,6 +37,7 @@ const FOREIGN: [(&str, &str); 14] = [
     ("clock", "the clock is Linux's"),
     ("avx", "Linux saves all registers"),
     ("x2apic", "interrupts are Linux's"),
+    ("smt", "processors are Linux's"),
     ("record", "recordings are made on the machine"),
     (
         "replay",
