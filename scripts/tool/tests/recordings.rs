@@ -286,8 +286,9 @@ for make in (make_reader, NonSeekingReader):
         reader = make(file) if make is make_reader else make(file, validate_crcs=True)
         topics = {}
         for schema, channel, message in reader.iter_messages():
-            assert json.loads(schema.data)["type"] == "object"
+            fields = json.loads(schema.data)
             value = json.loads(message.data)
+            assert fields["type"] == "object" and set(fields["required"]) <= set(value)
             assert value["job"] == message.sequence
             assert message.log_time == message.publish_time + 250
             topics[channel.topic] = topics.get(channel.topic, 0) + 1
@@ -297,7 +298,7 @@ with open(sys.argv[1], "rb") as file:
     counts.append({summary.channels[id].topic: count
         for id, count in summary.statistics.channel_message_counts.items()})
     late = list(make_reader(file).iter_messages(topics=["/eye/seen"], start_time=4_999_000_000))
-    assert len(late) == 1 and json.loads(late[0][2].data)["value"][2] == [-1, 7]
+    assert len(late) == 1 and json.loads(late[0][2].data)["value"]["2"] == [-1, 7]
 assert counts[0] == counts[1] == counts[2], counts
 print(sorted(counts[0].items()))
 "#;

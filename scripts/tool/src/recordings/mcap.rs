@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use recording::{Crc, Entry, Header, Recording, What, write_json};
+use recording::{Crc, Entry, Header, Recording, What};
 
-use super::mcap_schema::of_message;
+use super::mcap_json::{of_message, write_message};
 use crate::json::Object;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -70,14 +70,12 @@ pub fn write(recording: &Recording<'_>, out: &mut dyn Write) -> io::Result<u64> 
 /// Returns the number of the channel that an entry is in, and writes its message.
 fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
     json.clear();
-    // Writing into a `String` cannot fail.
-    let _ = write!(json, "{{\"job\":{},\"value\":", entry.job);
     let number = |index: usize| u16::try_from(index).unwrap_or(u16::MAX);
     let channel = header.channels.get(usize::from(entry.place));
-    let id = match (entry.what, channel) {
+    match (entry.what, channel) {
         (What::Value, Some(channel)) => {
             // The reader has gone through every value.
-            let _ = write_json(&channel.schema, entry.value, json);
+            let _ = write_message((entry.job, &channel.schema, entry.value), json);
             entry.place
         }
         (what, channel) => {
@@ -88,12 +86,11 @@ fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
             let event = Object::new()
                 .text("what", what.name())
                 .number("subtask", subtask);
-            *json += &event.end();
+            // Writing into a `String` cannot fail.
+            let _ = write!(json, "{{\"job\":{},\"value\":{}}}", entry.job, event.end());
             number(header.channels.len()).saturating_add(entry.dag)
         }
-    };
-    json.push('}');
-    id
+    }
 }
 
 /// Returns the records of schemas and channels: those of the recording, then one of each DAG

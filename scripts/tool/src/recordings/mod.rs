@@ -5,7 +5,7 @@
 //! file (`mcap`), and made of a table (`table_in`).
 
 pub mod mcap;
-mod mcap_schema;
+mod mcap_json;
 mod summary;
 mod table_in;
 mod table_out;
