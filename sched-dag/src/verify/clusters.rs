@@ -1,6 +1,4 @@
-//! The checks of clusters: their cores, and the one that each DAG is in; and what they say.
-
-use core::fmt;
+//! The checks of clusters: their cores, and the one that each DAG is in.
 
 use super::fault::Fault;
 use super::findings::Findings;
@@ -47,42 +45,4 @@ pub(super) fn check(specs: &[DagSpec], options: &CommitOptions, findings: &mut F
         };
         findings.fault(dag, fault);
     }
-}
-
-impl Fault {
-    /// Writes the text of a fault of clusters.
-    pub(super) fn fmt_cluster(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ClusterWithoutCores { cluster } => {
-                write!(f, "cluster {} has no cores; give it one", cluster.0)
-            }
-            Self::ClustersBeyondCores { wanted, cores } => write!(
-                f,
-                "the clusters have {wanted} cores, and the machine has {cores}; give them fewer"
-            ),
-            Self::NoCluster { dag, clusters } => {
-                write!(f, "{dag} is in no cluster, and the cores are divided; ")?;
-                state_one(*clusters, f)
-            }
-            Self::UnknownCluster {
-                dag,
-                cluster,
-                clusters,
-            } => {
-                write!(f, "{dag} is in cluster {}, and ", cluster.0)?;
-                if *clusters == 0 {
-                    return f
-                        .write_str("this machine's cores are not divided; leave its cluster out");
-                }
-                f.write_str("there is none; ")?;
-                state_one(*clusters, f)
-            }
-            _ => f.write_str(self.code()),
-        }
-    }
-}
-
-/// Writes which clusters can be stated, of so many.
-fn state_one(clusters: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    write!(f, "state one up to cluster {}", clusters.saturating_sub(1))
 }

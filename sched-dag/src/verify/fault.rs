@@ -1,253 +1,250 @@
-//! What makes a commit impossible, one variant a kind.
+//! What makes a commit impossible, one row a kind.
 //!
 //! A fault names everything that a message or a tool needs: the DAG, the
-//! subtasks, the topic, the numbers. Its text (see [`Display`](core::fmt::Display))
-//! states the fact, the offender and the remedy in one line; its
-//! [`code`](Fault::code) never changes and is for machines.
+//! subtasks, the topic, the numbers. Its text states the fact, the offender and
+//! the remedy in one line. Times stand in it as a `Duration` prints them, in the
+//! unit that a person reads and with every digit: `20ms`, `6.000001ms`.
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::label::{DagLabel, SubtaskLabel};
+use super::phrases::{list, ns, one_up_to, own_input, question, ring, undivided};
+use super::worded::worded;
+use crate::MAX_ARITY;
 use crate::ids::ClusterId;
+use crate::spec::STACK_BYTES;
 
-/// One reason why DAGs cannot be scheduled as described.
-///
-/// In every variant `dag` is the DAG and `subtask` the subtask at fault.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-#[allow(missing_docs, reason = "the fields' names are the words of the model")]
-pub enum Fault {
-    /// There is no DAG to schedule.
-    NoDags,
-    /// There is no core to schedule on.
-    NoCores,
-    /// A cluster of 0 cores.
-    ClusterWithoutCores { cluster: ClusterId },
-    /// The clusters have more cores than there are.
-    ClustersBeyondCores { wanted: u64, cores: u32 },
-    /// The cores are divided, and a DAG states no cluster.
-    NoCluster { dag: DagLabel, clusters: usize },
-    /// There is no such cluster. If the cores are not divided, there are 0.
-    UnknownCluster {
-        dag: DagLabel,
-        cluster: ClusterId,
-        clusters: usize,
-    },
-    /// More DAGs than a `u32` counts.
-    TooManyDags { count: usize },
-    /// A DAG without subtasks.
-    NoSubtasks { dag: DagLabel },
-    /// More subtasks than a `u32` counts.
-    TooManySubtasks { dag: DagLabel, count: usize },
-    /// The jobs in flight of all DAGs have more instances than the options
-    /// allow; `dag` is the one that has most.
-    TooManyInstances {
-        dag: DagLabel,
-        in_flight: u64,
-        instances: u128,
-        limit: u32,
-    },
-    /// Two subtasks of a DAG with one name.
-    DuplicateSubtask {
-        dag: DagLabel,
-        first: SubtaskLabel,
-        second: SubtaskLabel,
-    },
-    /// A cycle of two or more subtasks, from the smallest index on; the last
-    /// one precedes the first.
-    Cycle {
-        dag: DagLabel,
-        hops: Vec<SubtaskLabel>,
-    },
-    /// A subtask that precedes itself, by a topic or by an edge without one.
-    SelfEdge {
-        dag: DagLabel,
-        subtask: SubtaskLabel,
-        topic: Option<String>,
-    },
-    /// An edge to or from a subtask that does not exist.
-    EdgeOutOfRange {
-        dag: DagLabel,
-        edge: (usize, usize),
-        subtasks: usize,
-    },
-    /// Two parts of a DAG without any edge between them.
-    NotConnected {
-        dag: DagLabel,
-        parts: usize,
-        one: SubtaskLabel,
-        other: SubtaskLabel,
-    },
-    /// Every subtask has a predecessor or an input.
-    NoSource { dag: DagLabel },
-    /// Several subtasks without predecessor where the policy wants one.
-    SeveralSources {
-        dag: DagLabel,
-        sources: Vec<SubtaskLabel>,
-    },
-    /// Every subtask has a successor.
-    NoSink { dag: DagLabel },
-    /// Several subtasks without successor where the policy wants one.
-    SeveralSinks {
-        dag: DagLabel,
-        sinks: Vec<SubtaskLabel>,
-    },
-    /// A topic that is written and never read.
-    UnreadTopic {
-        dag: DagLabel,
-        topic: String,
-        writer: SubtaskLabel,
-        /// The topic that was probably meant.
-        meant: Option<String>,
-    },
-    /// A topic that is read and never written.
-    UnwrittenTopic {
-        dag: DagLabel,
-        topic: String,
-        reader: SubtaskLabel,
-        /// The topic that was probably meant.
-        meant: Option<String>,
-    },
-    /// A reader that expects another type than the writer writes.
-    TypeMismatch {
-        dag: DagLabel,
-        topic: String,
-        writer: SubtaskLabel,
-        written: &'static str,
-        reader: SubtaskLabel,
-        read: &'static str,
-    },
-    /// Several writers of one topic where the policy wants one.
-    SeveralWriters {
-        dag: DagLabel,
-        topic: String,
-        writers: Vec<SubtaskLabel>,
-    },
-    /// Several readers of a message that can only be moved.
-    SeveralReaders {
-        dag: DagLabel,
-        topic: String,
-        type_name: &'static str,
-        readers: Vec<SubtaskLabel>,
-    },
-    /// One topic in several DAGs.
-    TopicInSeveralDags { topic: String, dags: Vec<DagLabel> },
-    /// One topic twice among the inputs or twice among the outputs of a subtask.
-    DuplicateTopic {
-        dag: DagLabel,
-        subtask: SubtaskLabel,
-        topic: String,
-        direction: Direction,
-    },
-    /// More inputs or more outputs than [`MAX_ARITY`](crate::MAX_ARITY).
-    ArityTooLarge {
-        dag: DagLabel,
-        subtask: SubtaskLabel,
-        direction: Direction,
-        arity: usize,
-    },
-    /// A DAG without period.
-    MissingPeriod { dag: DagLabel },
-    /// A period of 0.
-    ZeroPeriod { dag: DagLabel },
-    /// A DAG without relative deadline.
-    MissingDeadline { dag: DagLabel },
-    /// A relative deadline of 0.
-    ZeroDeadline { dag: DagLabel },
-    /// A sink with a relative deadline of 0.
-    ZeroSinkDeadline { dag: DagLabel, sink: SubtaskLabel },
-    /// A sink whose relative deadline is longer than its DAG's.
-    SinkDeadlineBeyondDag {
-        dag: DagLabel,
-        sink: SubtaskLabel,
-        relative_deadline_ns: u64,
-        of_dag_ns: u64,
-    },
-    /// A subtask with a relative deadline and a successor.
-    DeadlineOfNoSink {
-        dag: DagLabel,
-        subtask: SubtaskLabel,
-        successor: SubtaskLabel,
-    },
-    /// A subtask that alone cannot meet the deadline.
-    WcetExceedsDeadline {
-        dag: DagLabel,
-        subtask: SubtaskLabel,
-        wcet_ns: u64,
-        relative_deadline_ns: u64,
-    },
-    /// A stack that is too small or too large.
-    StackOutOfRange {
-        dag: DagLabel,
-        subtask: SubtaskLabel,
-        bytes: u64,
-    },
-    /// A DAG with a limit of 0 jobs.
-    ZeroJobs { dag: DagLabel },
-    /// A DAG with room for 0 jobs in flight.
-    ZeroInFlight { dag: DagLabel },
-    /// A DAG drops jobs at faults, at most 0 times.
-    ZeroFaults { dag: DagLabel },
-    /// A DAG survives faults within a window of 0 jobs.
-    ZeroWindow { dag: DagLabel },
-    /// A time that 64 bits of nanoseconds do not hold.
-    TimeOverflow { dag: DagLabel, time: Time },
-    /// Under static priority: some subtasks of a DAG have a priority, these not.
-    PrioritiesPartlyGiven {
-        dag: DagLabel,
-        without: Vec<SubtaskLabel>,
-    },
-    /// Priorities were to be derived below those given elsewhere, and the
-    /// numbers up to `u32::MAX` do not suffice.
-    PrioritiesExhausted { dag: DagLabel },
-    /// Two states of a DAG with one name.
-    DuplicateState { dag: DagLabel, state: String },
-    /// A state that no subtask uses.
-    UnusedState { dag: DagLabel, state: String },
-    /// A state that is read and never updated.
-    StateNeverUpdated {
-        dag: DagLabel,
-        state: String,
-        reader: SubtaskLabel,
-    },
-    /// A subtask that uses a state twice.
-    StateUsedTwice {
-        dag: DagLabel,
-        state: String,
-        subtask: SubtaskLabel,
-    },
-    /// Subtasks share a state, and several jobs may be in flight.
-    StateOverJobs {
-        dag: DagLabel,
-        state: String,
-        in_flight: u32,
-        users: Vec<SubtaskLabel>,
-    },
-    /// The latest value of a topic that no subtask writes.
-    LatestUnwritten {
-        dag: DagLabel,
-        topic: String,
-        /// The topic that was probably meant.
-        meant: Option<String>,
-    },
-    /// The latest value of a topic is read as another type than is written.
-    LatestTypeMismatch {
-        dag: DagLabel,
-        topic: String,
-        writer: SubtaskLabel,
-        written: &'static str,
-        read: &'static str,
-    },
-    /// The latest value of a topic, which no subtask reads.
-    LatestUnread { dag: DagLabel, topic: String },
-    /// The latest value of a message that can only be moved, with further readers.
-    LatestOfMoved {
-        dag: DagLabel,
-        topic: String,
-        type_name: &'static str,
-        readers: usize,
-    },
+worded! {
+    /// One reason why DAGs cannot be scheduled as described.
+    ///
+    /// In every variant `dag` is the DAG and `subtask` the subtask at fault;
+    /// `meant` is the topic that was probably meant.
+    pub enum Fault {
+        /// There is no DAG to schedule.
+        NoDags = "no_dags",
+            "the commit has no dag; create one and register its subtasks";
+        /// There is no core to schedule on.
+        NoCores = "no_cores", "the commit is for 0 cores; give the scheduler at least 1";
+        /// A cluster of 0 cores.
+        ClusterWithoutCores { cluster: ClusterId } = "cluster_without_cores",
+            "cluster {} has no cores; give it one", cluster.0;
+        /// The clusters have more cores than there are.
+        ClustersBeyondCores { wanted: u64, cores: u32 } = "clusters_beyond_cores",
+            "the clusters have {wanted} cores, and the machine has {cores}; give them fewer";
+        /// The cores are divided, and a DAG states no cluster.
+        NoCluster { dag: DagLabel, clusters: usize } = "no_cluster",
+            "{dag} is in no cluster, and the cores are divided; {}", one_up_to(*clusters);
+        /// There is no such cluster. If the cores are not divided, there are 0.
+        UnknownCluster { dag: DagLabel, cluster: ClusterId, clusters: usize } = "unknown_cluster",
+            "{dag} is in cluster {}, and {}", cluster.0, undivided(*clusters);
+        /// More DAGs than a `u32` counts.
+        TooManyDags { count: usize } = "too_many_dags",
+            "the commit has {count} DAGs, more than {}; merge some", u32::MAX;
+        /// A DAG without subtasks.
+        NoSubtasks { dag: DagLabel } = "no_subtasks",
+            "{dag} has no subtask; register one or drop the DAG";
+        /// More subtasks than a `u32` counts.
+        TooManySubtasks { dag: DagLabel, count: usize } = "too_many_subtasks",
+            "{dag} has {count} subtasks, more than {}; split it", u32::MAX;
+        /// The jobs in flight of all DAGs have more instances than the options
+        /// allow; `dag` is the one that has most.
+        TooManyInstances { dag: DagLabel, in_flight: u64, instances: u128, limit: u32 } =
+            "too_many_instances",
+            "the jobs in flight need {instances} instances, more than the limit of {limit}, and \
+             {dag} with {in_flight} jobs in flight needs most; lower its in_flight or raise the \
+             instance limit";
+        /// Two subtasks of a DAG with one name.
+        DuplicateSubtask { dag: DagLabel, first: SubtaskLabel, second: SubtaskLabel } =
+            "duplicate_subtask",
+            "{dag} has two subtasks named `{}` (registered as number {} and {}); rename one",
+            first.name, first.id.0, second.id.0;
+        /// A cycle of two or more subtasks, from the smallest index on; the last
+        /// one precedes the first.
+        Cycle { dag: DagLabel, hops: Vec<SubtaskLabel> } = "cycle",
+            "{dag} has a cycle: {}; remove one of these edges", ring(hops);
+        /// A subtask that precedes itself, by a topic or by an edge without one.
+        SelfEdge { dag: DagLabel, subtask: SubtaskLabel, topic: Option<String> } = "self_edge",
+            "{subtask} of {dag} {}", own_input(topic.as_ref());
+        /// An edge to or from a subtask that does not exist.
+        EdgeOutOfRange { dag: DagLabel, edge: (usize, usize), subtasks: usize } =
+            "edge_out_of_range",
+            "{dag} has an edge from {} to {}, but its {subtasks} subtasks are counted from 0; \
+             correct the edge or register the subtask", edge.0, edge.1;
+        /// Two parts of a DAG without any edge between them.
+        NotConnected { dag: DagLabel, parts: usize, one: SubtaskLabel, other: SubtaskLabel } =
+            "not_connected",
+            "{dag} falls into {parts} parts: no edge leads from the part of {one} to the part of \
+             {other}; connect them or make them dags of their own";
+        /// Every subtask has a predecessor or an input.
+        NoSource { dag: DagLabel } = "no_source",
+            "{dag} has no source: every subtask has an input; register a periodic subtask";
+        /// Several subtasks without predecessor where the policy wants one.
+        SeveralSources { dag: DagLabel, sources: Vec<SubtaskLabel> } = "several_sources",
+            "{dag} has {} sources: {}; keep one, or choose a construction policy with several",
+            sources.len(), list(sources);
+        /// Every subtask has a successor.
+        NoSink { dag: DagLabel } = "no_sink",
+            "{dag} has no sink: every subtask has a successor; register a sink subtask";
+        /// Several subtasks without successor where the policy wants one.
+        SeveralSinks { dag: DagLabel, sinks: Vec<SubtaskLabel> } = "several_sinks",
+            "{dag} has {} sinks: {}; keep one, or choose a construction policy with several",
+            sinks.len(), list(sinks);
+        /// A topic that is written and never read.
+        UnreadTopic {
+            dag: DagLabel, topic: String, writer: SubtaskLabel, meant: Option<String>
+        } = "unread_topic",
+            "{writer} of {dag} writes topic `{topic}`, which no subtask reads; {}register a reader \
+             or drop the output", question(meant.as_ref());
+        /// A topic that is read and never written.
+        UnwrittenTopic {
+            dag: DagLabel, topic: String, reader: SubtaskLabel, meant: Option<String>
+        } = "unwritten_topic",
+            "{reader} of {dag} reads topic `{topic}`, which no subtask writes; {}register a writer \
+             or drop the input", question(meant.as_ref());
+        /// A reader that expects another type than the writer writes.
+        TypeMismatch {
+            dag: DagLabel, topic: String, writer: SubtaskLabel, written: &'static str,
+            reader: SubtaskLabel, read: &'static str
+        } = "type_mismatch",
+            "topic `{topic}` of {dag} is written as `{written}` by {writer} and read as `{read}` \
+             by {reader}; make both the same type";
+        /// Several writers of one topic where the policy wants one.
+        SeveralWriters { dag: DagLabel, topic: String, writers: Vec<SubtaskLabel> } =
+            "several_writers",
+            "topic `{topic}` of {dag} has {} writers: {}; give each a topic of its own",
+            writers.len(), list(writers);
+        /// Several readers of a message that can only be moved.
+        SeveralReaders {
+            dag: DagLabel, topic: String, type_name: &'static str, readers: Vec<SubtaskLabel>
+        } = "several_readers",
+            "topic `{topic}` of {dag} carries `{type_name}`, which can only be moved, and has {} \
+             readers: {}; keep one reader or send a type that can be shared",
+            readers.len(), list(readers);
+        /// One topic in several DAGs.
+        TopicInSeveralDags { topic: String, dags: Vec<DagLabel> } = "topic_in_several_dags",
+            "topic `{topic}` is used by {} DAGs: {}; a topic stays inside one dag, so rename it in \
+             the others", dags.len(), list(dags);
+        /// One topic twice among the inputs or twice among the outputs of a subtask.
+        DuplicateTopic {
+            dag: DagLabel, subtask: SubtaskLabel, topic: String, direction: Direction
+        } = "duplicate_topic",
+            "{subtask} of {dag} {} topic `{topic}` twice; drop one of the {}",
+            direction.verb(), direction.noun();
+        /// More inputs or more outputs than [`MAX_ARITY`].
+        ArityTooLarge {
+            dag: DagLabel, subtask: SubtaskLabel, direction: Direction, arity: usize
+        } = "arity_too_large",
+            "{subtask} of {dag} has {arity} {}, more than {MAX_ARITY}; bundle some into one \
+             message", direction.noun();
+        /// A DAG without period.
+        MissingPeriod { dag: DagLabel } = "missing_period",
+            "{dag} has no period; register its source as a periodic subtask";
+        /// A period of 0.
+        ZeroPeriod { dag: DagLabel } = "zero_period",
+            "{dag} has a period of 0; give it at least 1 ns";
+        /// A DAG without relative deadline.
+        MissingDeadline { dag: DagLabel } = "missing_deadline",
+            "{dag} has no relative deadline; register its sink as a sink subtask with one";
+        /// A relative deadline of 0.
+        ZeroDeadline { dag: DagLabel } = "zero_deadline",
+            "{dag} has a relative deadline of 0; give it at least 1 ns";
+        /// A sink with a relative deadline of 0.
+        ZeroSinkDeadline { dag: DagLabel, sink: SubtaskLabel } = "zero_sink_deadline",
+            "{sink} of {dag} has a relative deadline of 0; give it at least 1 ns";
+        /// A sink whose relative deadline is longer than its DAG's.
+        SinkDeadlineBeyondDag {
+            dag: DagLabel, sink: SubtaskLabel, relative_deadline_ns: u64, of_dag_ns: u64
+        } = "sink_deadline_beyond_dag",
+            "{sink} of {dag} has a relative deadline of {:?}, longer than its DAG's of {:?}; \
+             shorten it, or extend the DAG's", ns(*relative_deadline_ns), ns(*of_dag_ns);
+        /// A subtask with a relative deadline and a successor.
+        DeadlineOfNoSink { dag: DagLabel, subtask: SubtaskLabel, successor: SubtaskLabel } =
+            "deadline_of_no_sink",
+            "{subtask} of {dag} has a relative deadline and is no sink, for {successor} follows \
+             it; give the deadline to a sink";
+        /// A subtask that alone cannot meet the deadline.
+        WcetExceedsDeadline {
+            dag: DagLabel, subtask: SubtaskLabel, wcet_ns: u64, relative_deadline_ns: u64
+        } = "wcet_exceeds_deadline",
+            "{subtask} of {dag} has a WCET of {:?}, longer than the relative deadline of {:?}; \
+             shorten it or extend the deadline", ns(*wcet_ns), ns(*relative_deadline_ns);
+        /// A stack that is too small or too large.
+        StackOutOfRange { dag: DagLabel, subtask: SubtaskLabel, bytes: u64 } =
+            "stack_out_of_range",
+            "{subtask} of {dag} states a stack of {bytes} bytes; give it {} to {}, or leave it out",
+            STACK_BYTES.start(), STACK_BYTES.end();
+        /// A DAG with a limit of 0 jobs.
+        ZeroJobs { dag: DagLabel } = "zero_jobs",
+            "{dag} has a limit of 0 jobs; give at least 1, or no limit";
+        /// A DAG with room for 0 jobs in flight.
+        ZeroInFlight { dag: DagLabel } = "zero_in_flight",
+            "{dag} has room for 0 jobs in flight; give at least 1, or leave it out";
+        /// A DAG drops jobs at faults, at most 0 times.
+        ZeroFaults { dag: DagLabel } = "zero_faults",
+            "{dag} survives 0 faults; let it survive at least 1, or end it by a fault";
+        /// A DAG survives faults within a window of 0 jobs.
+        ZeroWindow { dag: DagLabel } = "zero_window",
+            "{dag} survives faults within a window of 0 jobs; give the window at least 1";
+        /// A time that 64 bits of nanoseconds do not hold.
+        TimeOverflow { dag: DagLabel, time: Time } = "time_overflow",
+            "{} of {dag} exceeds {} ns, the last time there is; {}",
+            time.noun(), u64::MAX, time.remedy();
+        /// Under static priority: some subtasks of a DAG have a priority, these not.
+        PrioritiesPartlyGiven { dag: DagLabel, without: Vec<SubtaskLabel> } =
+            "priorities_partly_given",
+            "{dag} has subtasks with and {} without priority: {}; give each a priority, or none",
+            without.len(), list(without);
+        /// Priorities were to be derived below those given elsewhere, and the
+        /// numbers up to `u32::MAX` do not suffice.
+        PrioritiesExhausted { dag: DagLabel } = "priorities_exhausted",
+            "the priorities of {dag}, which follow those given to other dags, exceed {}; give \
+             smaller numbers there", u32::MAX;
+        /// Two states of a DAG with one name.
+        DuplicateState { dag: DagLabel, state: String } = "duplicate_state",
+            "{dag} has two states named `{state}`; rename one";
+        /// A state that no subtask uses.
+        UnusedState { dag: DagLabel, state: String } = "unused_state",
+            "no subtask uses state `{state}` of {dag}; register a user or drop the state";
+        /// A state that is read and never updated.
+        StateNeverUpdated { dag: DagLabel, state: String, reader: SubtaskLabel } =
+            "state_never_updated",
+            "{reader} of {dag} reads state `{state}`, which no subtask updates; register an \
+             updater or give the function a constant";
+        /// A subtask that uses a state twice.
+        StateUsedTwice { dag: DagLabel, state: String, subtask: SubtaskLabel } =
+            "state_used_twice",
+            "{subtask} of {dag} uses state `{state}` twice; state its strongest use once";
+        /// Subtasks share a state, and several jobs may be in flight.
+        StateOverJobs {
+            dag: DagLabel, state: String, in_flight: u32, users: Vec<SubtaskLabel>
+        } = "state_over_jobs",
+            "{dag} allows {in_flight} jobs in flight, and state `{state}` is shared by {}; allow 1 \
+             job in flight, or let one subtask own the state", list(users);
+        /// The latest value of a topic that no subtask writes.
+        LatestUnwritten { dag: DagLabel, topic: String, meant: Option<String> } =
+            "latest_unwritten",
+            "the latest value of topic `{topic}` of {dag} is asked for, and no subtask writes that \
+             topic; {}register a writer or correct the name", question(meant.as_ref());
+        /// The latest value of a topic is read as another type than is written.
+        LatestTypeMismatch {
+            dag: DagLabel, topic: String, writer: SubtaskLabel, written: &'static str,
+            read: &'static str
+        } = "latest_type_mismatch",
+            "topic `{topic}` of {dag} is written as `{written}` by {writer} and its latest value \
+             read as `{read}`; make both the same type";
+        /// The latest value of a topic, which no subtask reads.
+        LatestUnread { dag: DagLabel, topic: String } = "latest_unread",
+            "the latest value of topic `{topic}` of {dag} is used by no subtask; let one sample it \
+             or drop it";
+        /// The latest value of a message that can only be moved, with further readers.
+        LatestOfMoved {
+            dag: DagLabel, topic: String, type_name: &'static str, readers: usize
+        } = "latest_of_moved",
+            "topic `{topic}` of {dag} carries `{type_name}`, which can only be moved, and has \
+             {readers} readers, those of its latest value included; keep one reader or send a type \
+             that can be shared";
+    }
 }
 
 /// Which side of a subtask a topic stands on.
@@ -270,63 +267,36 @@ pub enum Time {
     Volume,
 }
 
-impl Fault {
-    /// Returns the kind of fault as a stable word in snake case.
-    #[must_use]
-    pub const fn code(&self) -> &'static str {
+impl Direction {
+    const fn verb(self) -> &'static str {
         match self {
-            Self::NoDags => "no_dags",
-            Self::NoCores => "no_cores",
-            Self::ClusterWithoutCores { .. } => "cluster_without_cores",
-            Self::ClustersBeyondCores { .. } => "clusters_beyond_cores",
-            Self::NoCluster { .. } => "no_cluster",
-            Self::UnknownCluster { .. } => "unknown_cluster",
-            Self::TooManyDags { .. } => "too_many_dags",
-            Self::NoSubtasks { .. } => "no_subtasks",
-            Self::TooManySubtasks { .. } => "too_many_subtasks",
-            Self::TooManyInstances { .. } => "too_many_instances",
-            Self::DuplicateSubtask { .. } => "duplicate_subtask",
-            Self::Cycle { .. } => "cycle",
-            Self::SelfEdge { .. } => "self_edge",
-            Self::EdgeOutOfRange { .. } => "edge_out_of_range",
-            Self::NotConnected { .. } => "not_connected",
-            Self::NoSource { .. } => "no_source",
-            Self::SeveralSources { .. } => "several_sources",
-            Self::NoSink { .. } => "no_sink",
-            Self::SeveralSinks { .. } => "several_sinks",
-            Self::UnreadTopic { .. } => "unread_topic",
-            Self::UnwrittenTopic { .. } => "unwritten_topic",
-            Self::TypeMismatch { .. } => "type_mismatch",
-            Self::SeveralWriters { .. } => "several_writers",
-            Self::SeveralReaders { .. } => "several_readers",
-            Self::TopicInSeveralDags { .. } => "topic_in_several_dags",
-            Self::DuplicateTopic { .. } => "duplicate_topic",
-            Self::ArityTooLarge { .. } => "arity_too_large",
-            Self::MissingPeriod { .. } => "missing_period",
-            Self::ZeroPeriod { .. } => "zero_period",
-            Self::MissingDeadline { .. } => "missing_deadline",
-            Self::ZeroDeadline { .. } => "zero_deadline",
-            Self::ZeroSinkDeadline { .. } => "zero_sink_deadline",
-            Self::SinkDeadlineBeyondDag { .. } => "sink_deadline_beyond_dag",
-            Self::DeadlineOfNoSink { .. } => "deadline_of_no_sink",
-            Self::WcetExceedsDeadline { .. } => "wcet_exceeds_deadline",
-            Self::StackOutOfRange { .. } => "stack_out_of_range",
-            Self::ZeroJobs { .. } => "zero_jobs",
-            Self::ZeroInFlight { .. } => "zero_in_flight",
-            Self::ZeroFaults { .. } => "zero_faults",
-            Self::ZeroWindow { .. } => "zero_window",
-            Self::TimeOverflow { .. } => "time_overflow",
-            Self::PrioritiesPartlyGiven { .. } => "priorities_partly_given",
-            Self::PrioritiesExhausted { .. } => "priorities_exhausted",
-            Self::DuplicateState { .. } => "duplicate_state",
-            Self::UnusedState { .. } => "unused_state",
-            Self::StateNeverUpdated { .. } => "state_never_updated",
-            Self::StateUsedTwice { .. } => "state_used_twice",
-            Self::StateOverJobs { .. } => "state_over_jobs",
-            Self::LatestUnwritten { .. } => "latest_unwritten",
-            Self::LatestTypeMismatch { .. } => "latest_type_mismatch",
-            Self::LatestUnread { .. } => "latest_unread",
-            Self::LatestOfMoved { .. } => "latest_of_moved",
+            Self::Input => "reads",
+            Self::Output => "writes",
+        }
+    }
+
+    const fn noun(self) -> &'static str {
+        match self {
+            Self::Input => "inputs",
+            Self::Output => "outputs",
+        }
+    }
+}
+
+impl Time {
+    const fn noun(self) -> &'static str {
+        match self {
+            Self::FirstDeadline => "the deadline of the first job",
+            Self::LastDeadline => "the deadline of the last job",
+            Self::Volume => "the sum of the WCETs",
+        }
+    }
+
+    const fn remedy(self) -> &'static str {
+        match self {
+            Self::FirstDeadline => "lower the offset or the relative deadline",
+            Self::LastDeadline => "lower the number of jobs, the period or the offset",
+            Self::Volume => "lower the WCETs",
         }
     }
 }
