@@ -151,6 +151,7 @@ const EDF: Settings = Settings {
         context_switch_ns: 0,
         dispatch_ns: 0,
         interrupt_ns: 0,
+        ready_ns: 0,
     },
 };
 

@@ -219,10 +219,10 @@ impl Linux {
         self.change(|terms| terms.wcets = Some(file.into()))
     }
 
-    /// Has each commit looked at: what it hands over, how that is scheduled, and what an
-    /// instance was charged for overheads.
+    /// Has each commit looked at: what it hands over, how that is scheduled, and what was
+    /// charged for overheads.
     #[must_use = "the machine itself is returned"]
-    pub fn at_commit(self, look: fn(&Plan, SchedulerOptions, Option<u64>)) -> Self {
+    pub fn at_commit(self, look: fn(&Plan, SchedulerOptions, Overheads)) -> Self {
         self.change(|terms| terms.look_at_commit = look)
     }
 

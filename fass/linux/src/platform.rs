@@ -31,7 +31,7 @@ pub(crate) struct Terms {
     /// Whether the commit divides the cores.
     pub(crate) assigns: bool,
     pub(crate) wcets: Option<Cow<'static, str>>,
-    pub(crate) look_at_commit: fn(&Plan, SchedulerOptions, Option<u64>),
+    pub(crate) look_at_commit: fn(&Plan, SchedulerOptions, Overheads),
     pub(crate) allocations: fn() -> u64,
 }
 
@@ -182,8 +182,7 @@ impl Platform for Host {
             preemption: terms.preemption,
             cores: self.cores(),
         };
-        let overhead_ns = terms.overheads.of_an_instance_ns(options.preemption);
-        (terms.look_at_commit)(&plan, options, overhead_ns);
+        (terms.look_at_commit)(&plan, options, terms.overheads);
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;
         let office = Office::new(plan.number, &plan.task_set, letters, terms.levels);

@@ -106,6 +106,7 @@ pub trait Platform: Sync {
     ///     context_switch_ns: 300,
     ///     dispatch_ns: 900,
     ///     interrupt_ns: 2_000,
+    ///     ready_ns: 0,
     /// };
     /// // Into the instance, out of it, one dispatch, one interrupt to preempt another.
     /// assert_eq!(measured.of_an_instance_ns(Preemption::Enabled), Some(3_500));

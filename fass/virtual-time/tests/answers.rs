@@ -259,6 +259,7 @@ fn measured_overheads_are_added_to_every_wcet() {
         context_switch_ns: 100,
         dispatch_ns: 300,
         interrupt_ns: 1_000,
+        ready_ns: 0,
     };
     let bound = |machine: VirtualTime| {
         let dag = chain("two", ms(10), ms(10), [ms(2), ms(3)]);

@@ -7,8 +7,8 @@
 //! while the step has interrupts disabled, and so are released late. Then the preempted instances
 //! go on. All have budgets, so that each dispatch sets an alarm.
 //!
-//! Steps are the longer, the more becomes ready at once. What an app has more of than this is
-//! what the margin is for.
+//! Steps are the longer, the more becomes ready at once. An app that has more of this is charged
+//! by the number (`Overheads::ready_ns`).
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -32,7 +32,8 @@ const BUSY: Duration = Duration::from_micros(400);
 const INTO_IT: Duration = Duration::from_micros(100);
 const WIDE: usize = 16;
 const LONG: usize = 16;
-const AT_ONCE: usize = 8;
+/// How many DAGs are released at one instant.
+pub(super) const AT_ONCE: u64 = 10;
 /// How many are due while that is being decided, and how far from each other.
 const DURING_IT: u32 = 4;
 const APART: Duration = Duration::from_micros(2);
@@ -74,7 +75,8 @@ fn dags() -> Vec<Dag> {
         long.precede(&last, &next);
         last = next;
     }
-    let at_once = (0..AT_ONCE).map(|_| Duration::ZERO);
+    // Besides the wide and the long one.
+    let at_once = (2..AT_ONCE).map(|_| Duration::ZERO);
     let during = (1..=DURING_IT).map(|number| APART * number);
     let singles = at_once.chain(during).map(|later| {
         let single = dag(INTO_IT + later, PERIOD);

@@ -59,14 +59,15 @@ impl Machine {
 /// Measures, and has the commits to come charge it with this margin.
 fn charge(margin_percent: u32) -> Result<(), Ending> {
     let costs = calibration::run()?;
-    let overheads = Overheads::measured(&costs, margin_percent);
+    let overheads = Overheads::measured(&costs, margin_percent, calibration::AT_ONCE);
     KERNEL.set_overheads(overheads);
     KERNEL.set_measured(costs.dispatches, margin_percent);
     crate::println!(
-        "overheads measured: {costs}; with a margin of {margin_percent} %: overheads_ns={},{},{}",
+        "overheads measured: {costs}; with a margin of {margin_percent} %: overheads_ns={},{},{},{}",
         overheads.context_switch_ns,
         overheads.dispatch_ns,
-        overheads.interrupt_ns
+        overheads.interrupt_ns,
+        overheads.ready_ns
     );
     json::emit("overheads", |line| {
         line.number("dispatches", costs.dispatches)

@@ -5,7 +5,7 @@
 //! | `policy=static\|edf` | how ready instances are ordered | `static` |
 //! | `preemption=on\|off` | whether a started instance may lose its core | `on` |
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
-//! | `overheads_ns=S,D,I` | what a commit adds to WCETs: context switch, dispatch, interrupt | 0,0,0 |
+//! | `overheads_ns=S,D,I,R` | what a commit charges: context switch, dispatch, interrupt, and for each instance that becomes ready | 0,0,0,0 |
 //! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
 //! | `record=N` | what crosses the edge of the run is sent to QEMU's debug port, from a buffer of N KiB; 0: nothing is | 0 |
 //! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |

@@ -35,10 +35,14 @@ impl Terms {
 }
 
 fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {
-    let numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
-    let [context_switch_ns, dispatch_ns, interrupt_ns] = numbers[..] else {
+    let mut numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
+    if numbers.len() == 3 {
+        numbers.push(0);
+    }
+    let [context_switch_ns, dispatch_ns, interrupt_ns, ready_ns] = numbers[..] else {
         return Err(UsageError::new(format!(
-            "`overheads_ns` has {} numbers; give three: context switch, dispatch, interrupt",
+            "`overheads_ns` has {} numbers; give three or four: context switch, dispatch, \
+             interrupt, readiness",
             numbers.len()
         )));
     };
@@ -46,5 +50,6 @@ fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {
         context_switch_ns,
         dispatch_ns,
         interrupt_ns,
+        ready_ns,
     })
 }

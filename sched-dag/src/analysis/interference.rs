@@ -8,6 +8,7 @@
 
 use alloc::vec::Vec;
 
+use super::bursts::Bursts;
 use super::cover::covers_and_parts;
 use super::non_preemptive::{Blocking, largest};
 use super::task::Task;
@@ -59,6 +60,7 @@ pub(super) struct Delays {
     /// The workloads of DAGs that may outrank it.
     pub(super) others: Vec<Other>,
     pub(super) blocking: Blocking,
+    pub(super) bursts: Bursts,
 }
 
 /// Adds what DAGs may execute on `m - j` cores, as [`Other::add_to`] does.

@@ -68,6 +68,7 @@
 mod answer;
 mod assign;
 mod bonifaci;
+mod bursts;
 mod capacity;
 mod closure;
 mod cover;

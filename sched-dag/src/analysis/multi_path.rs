@@ -16,6 +16,8 @@
 //! 2022. So none of these can be better, but for the rounding: here divisions round up,
 //! since preemptions need not be at whole nanoseconds.
 //!
+//! Where long steps may keep cores (`bursts`), `m - j` times that is added to the right side.
+//!
 //! Assumes: no core idles while a subtask is ready; `R <= T`, that is one job of the DAG at
 //! a time, which each solution is limited to. Any order inside the DAG.
 //!
@@ -97,7 +99,11 @@ impl Equations<'_> {
 
     /// Returns the forms at a window of at least the length.
     pub(super) fn forms(&self, delays: &Delays, window_ns: u64) -> impl Iterator<Item = Form> {
-        let Delays { others, blocking } = delays;
+        let Delays {
+            others,
+            blocking,
+            bursts,
+        } = delays;
         let times = (window_ns, window_ns - self.task.length_ns());
         let mut plain = vec![Piece::NONE; self.covers.len()];
         let mut clipped = plain.clone();
@@ -109,6 +115,7 @@ impl Equations<'_> {
             let left = u128::from(self.task.volume_ns() - self.covers[j]);
             let form = |is_clipped: bool, own: u128, sum: Piece| {
                 let blocked = blocking.during(self.cores, j, is_clipped);
+                let sum = sum.and(bursts.on(self.cores - j, window_ns));
                 let value = sum.value.saturating_add(own).saturating_add(blocked);
                 Form {
                     cores: (self.cores - j) as u128,

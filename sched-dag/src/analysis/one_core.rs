@@ -29,10 +29,14 @@
 //! stretch in which the core is busy, every deadline is met. Of these `t` it looks at those that
 //! can be false (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last one down.
 //!
+//! What long steps keep the core for in the stretch (`bursts`) is added to both.
+//!
 //! Assumes: releases at least `T` apart; WCETs above 0. The order of equal priorities and
 //! deadlines is fixed. What is never preempted counts as if others preempted it, too.
 
 use alloc::vec::Vec;
+
+use super::bursts::Bursts;
 
 /// The most evaluations of sums under EDF, for all DAGs.
 const STEP_LIMIT: u64 = 4096;
@@ -64,6 +68,7 @@ impl Load {
 /// The equations of a DAG's response time.
 pub(super) struct Response<'a> {
     loads: &'a [Load],
+    bursts: &'a Bursts,
     own: &'a Load,
     /// What may delay it, directly or through others.
     pub(super) others: Vec<usize>,
@@ -71,7 +76,7 @@ pub(super) struct Response<'a> {
 }
 
 impl<'a> Response<'a> {
-    pub(super) fn of(loads: &'a [Load], dag: usize) -> Self {
+    pub(super) fn of(loads: &'a [Load], bursts: &'a Bursts, dag: usize) -> Self {
         let own = &loads[dag];
         let mut least = own.priorities[1];
         loop {
@@ -87,6 +92,7 @@ impl<'a> Response<'a> {
         let blocking_ns = lower.iter().map(|&other| loads[other].keeps_ns).max();
         Self {
             loads,
+            bursts,
             own,
             others,
             blocking: blocking_ns.unwrap_or(0).into(),
@@ -136,7 +142,10 @@ impl<'a> Response<'a> {
             .iter()
             .map(|&other| self.loads[other].released(window));
         let own = self.own_work(back, window);
-        others.fold(self.blocking.saturating_add(own), u128::saturating_add)
+        let first = self.blocking.saturating_add(own);
+        others
+            .fold(first, u128::saturating_add)
+            .saturating_add(self.bursts.during(window))
     }
 
     /// Returns what of that is the DAG's own.
@@ -162,7 +171,7 @@ pub(super) struct Due {
 /// Looks for a time in which more is due than the core can execute. If there is none, returns the
 /// longest stretch in which it is busy, and the times that show it; `None` also if that takes too
 /// many steps.
-pub(super) fn demand(all: &[Due]) -> Option<(u128, Vec<u128>)> {
+pub(super) fn demand(all: &[Due], bursts: &Bursts) -> Option<(u128, Vec<u128>)> {
     let mut steps = STEP_LIMIT;
     let blocking = |after: u128| {
         let later = all.iter().filter(|due| u128::from(due.deadline_ns) > after);
@@ -179,12 +188,16 @@ pub(super) fn demand(all: &[Due]) -> Option<(u128, Vec<u128>)> {
     loop {
         steps = steps.checked_sub(1)?;
         let released = sum(&|due| u128::div_ceil(busy, due.period_ns.into()));
-        match most.saturating_add(released) {
+        match most
+            .saturating_add(released)
+            .saturating_add(bursts.during(busy))
+        {
             u128::MAX => return None,
             after if after == busy => break,
             after => busy = after,
         }
     }
+    let lost = bursts.during(busy);
     // The last time before another at which something is due.
     let last_before = |time: u128| {
         let last = all.iter().filter_map(|due| {
@@ -203,11 +216,11 @@ pub(super) fn demand(all: &[Due]) -> Option<(u128, Vec<u128>)> {
             let left = time.checked_sub(due.deadline_ns.into());
             left.map_or(0, |left| left / u128::from(due.period_ns) + 1)
         });
-        if demand.saturating_add(blocking(time)) > time {
+        if demand.saturating_add(blocking(time)).saturating_add(lost) > time {
             return None;
         }
         // From there on no more is due, and no more may block.
-        next = last_before(time.min(demand + most));
+        next = last_before(time.min(demand + most + lost));
     }
     Some((busy, times))
 }

@@ -10,6 +10,9 @@
 //!   preempts is charged. The switches back to the preempted instance are the
 //!   preempting one's second switch.
 //!
+//! These are of a step in which few instances become ready. For each one that does, `ready` is
+//! what it adds to a step, whatever is then delayed: `bursts` has that term of the bounds.
+//!
 //! Not covered: timer interrupts, caches refilled after a preemption, bus
 //! contention. Measure WCETs with these in them. `docs/proving.md` has the argument for
 //! the charges, and the step of it that is not proven.
@@ -27,6 +30,9 @@ pub struct Overheads {
     /// From the request for an inter-processor interrupt to the first
     /// instruction of its handler, in nanoseconds.
     pub interrupt_ns: u64,
+    /// By how much a step is longer for each instance that becomes ready in it, in
+    /// nanoseconds.
+    pub ready_ns: u64,
 }
 
 /// Where overheads are from.
@@ -45,8 +51,7 @@ pub enum OverheadSource {
 }
 
 impl Overheads {
-    /// Returns what to charge for costs that were measured, with a margin in hundredths: two of
-    /// the three numbers.
+    /// Returns what to charge for costs that were measured, with a margin in hundredths.
     ///
     /// - As *dispatch*, the lateness of an instance's release and once the longest time owed:
     ///   that passes before its own first instruction.
@@ -54,11 +59,14 @@ impl Overheads {
     ///   the next instruction of the one that it has preempted. It has preempted one at most,
     ///   when it became ready, and so each resumption has one that pays for it. That one is
     ///   more urgent than what it preempts, so a bound counts it as interference there.
+    /// - As *ready*, where in one of the steps `at_once` instances became ready, that part of the
+    ///   longest time owed: what each of them took cannot be more. With 0 nothing is: where
+    ///   the costs are of a run of the DAGs themselves, they include their longest steps.
     ///
     /// Work of the platform that interrupts a running instance, a timer's or another core's, is
     /// within that call's time, as it is observed.
     #[must_use]
-    pub const fn measured(costs: &Costs, margin_percent: u32) -> Self {
+    pub const fn measured(costs: &Costs, margin_percent: u32, at_once: u64) -> Self {
         let percent = 100 + margin_percent as u64;
         let owed_ns = costs.owed_ns.saturating_mul(percent).div_ceil(100);
         let late_ns = costs.late_ns.saturating_mul(percent).div_ceil(100);
@@ -66,6 +74,10 @@ impl Overheads {
             context_switch_ns: 0,
             dispatch_ns: owed_ns.saturating_add(late_ns),
             interrupt_ns: owed_ns,
+            ready_ns: match at_once {
+                0 => 0,
+                _ => owed_ns.div_ceil(at_once),
+            },
         }
     }
 
@@ -91,6 +103,7 @@ mod tests {
             context_switch_ns: 100,
             dispatch_ns: 30,
             interrupt_ns: 7,
+            ready_ns: 1,
         };
         assert_eq!(overheads.of_an_instance_ns(Preemption::Enabled), Some(237));
         assert_eq!(overheads.of_an_instance_ns(Preemption::Disabled), Some(230));
@@ -108,11 +121,16 @@ mod tests {
             late_ns: 2,
             ..Costs::default()
         };
-        let charged = |margin| {
-            let of = Overheads::measured(&costs, margin);
-            (of.context_switch_ns, of.dispatch_ns, of.interrupt_ns)
+        let charged = |margin, at_once| {
+            let of = Overheads::measured(&costs, margin, at_once);
+            (
+                of.context_switch_ns,
+                of.dispatch_ns,
+                of.interrupt_ns,
+                of.ready_ns,
+            )
         };
-        assert_eq!(charged(0), (0, 9, 7));
-        assert_eq!(charged(50), (0, 14, 11));
+        assert_eq!(charged(0, 0), (0, 9, 7, 0));
+        assert_eq!(charged(50, 10), (0, 14, 11, 2));
     }
 }

@@ -21,7 +21,7 @@
 //! outrank this one; `own`, what still older jobs may run in the window,
 //! `sum over l >= 1, l T < R of min(volume, p (R - l T))`, twice that if
 //! younger jobs may win over older ones; `blocking`, lower-ranked work that
-//! cannot be preempted. While `X_0 <= T` only `j = 0` is left and `own` is 0:
+//! cannot be preempted; to it all `m` cores add what long steps keep them for (`bursts`). While `X_0 <= T` only `j = 0` is left and `own` is 0:
 //! then this is the equation of Melani et al. 2015, and `multi_path` has better ones.
 //!
 //! Traps, both found in an earlier form:
@@ -245,6 +245,7 @@ impl Figures {
             .saturating_add(own)
             .saturating_add(delays.blocking.along_a_chain(self.cores, back));
         let sum = on_all_cores(&delays.others, window_ns);
+        let sum = sum.and(delays.bursts.on(self.cores, window_ns));
         let value = sum.value.saturating_add(constant);
         Piece { value, ..sum }
     }

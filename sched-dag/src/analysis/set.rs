@@ -18,6 +18,7 @@
 
 use alloc::vec::Vec;
 
+use super::bursts::Bursts;
 use super::interference::{Clip, Delays, Other, Shape};
 use super::multi_path::{Equations, alone};
 use super::pipelined::{Figures, OWN_STEPS, STEP_LIMIT, Unsolved};
@@ -37,6 +38,7 @@ pub(super) struct Set<'a> {
     pub(super) keep_cores: bool,
     /// Which interference counts.
     pub(super) clip: Clip,
+    pub(super) bursts: Bursts,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
 }
@@ -86,6 +88,7 @@ impl<'a> Set<'a> {
             deadlines_limit: false,
             keep_cores: false,
             clip: Clip::Chains,
+            bursts: Bursts::default(),
             known: alloc::vec![None; tasks.len()],
         }
     }
@@ -253,7 +256,11 @@ impl<'a> Set<'a> {
             }
         }
         let blocking = (self.shapes[dag].unblocked).by(&blocking_ns, self.cores);
-        Ok(Delays { others, blocking })
+        Ok(Delays {
+            others,
+            blocking,
+            bursts: self.bursts.clone(),
+        })
     }
 
     /// Describes what a DAG with a response-time bound may execute next to another one.

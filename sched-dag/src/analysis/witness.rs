@@ -7,6 +7,7 @@
 //!
 //! ```text
 //! machine CORES POLICY OVERHEAD_NS            static or edf
+//! bursts READY_NS LATE                        only if it takes time to make instances ready
 //! cluster CLUSTER CLUSTERS                    only of divided cores: which it is, of how many
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
@@ -50,6 +51,7 @@ use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
 use super::answer::{DagBound, Settings, Test};
+use super::bursts::Bursts;
 use super::cover::{Chain, covering, heaviest, peel};
 use super::interference::{Delays, Other};
 use super::intra_task::each_path;
@@ -91,7 +93,7 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> Stri
         let by_demand = |bound: &DagBound| bound.test == Test::Demand;
         let is_asked = case.relation.ranks_sinks && judge::one_core::are_in_time(case);
         if (is_asked || bounds.iter().flatten().any(by_demand))
-            && let Some((busy, times)) = demand(&judge::one_core::all_dues(case))
+            && let Some((busy, times)) = demand(&judge::one_core::all_dues(case), &case.set.bursts)
         {
             let numbers = core::iter::once(busy).chain(times);
             text.list("demand", numbers.map(u128::cast_signed));
@@ -146,6 +148,11 @@ impl Text {
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let (cores, overhead_ns) = (settings.cores, overhead_ns.unwrap_or(u64::MAX));
         self.line(format_args!("machine {cores} {policy} {overhead_ns}"));
+        let bursts = Bursts::of(dags.iter(), settings);
+        if !bursts.are_none() {
+            let ready_ns = settings.overheads.ready_ns;
+            self.line(format_args!("bursts {ready_ns} {}", bursts.late_ns));
+        }
         if let Some((cluster, clusters)) = place {
             self.line(format_args!("cluster {cluster} {clusters}"));
         }
@@ -321,7 +328,7 @@ impl Text {
 
     fn response(&mut self, case: &Case<'_>, dag: usize, bound_ns: u64) {
         let (id, loads) = (case.members[dag], judge::one_core::loads(case));
-        let response = Response::of(&loads, dag);
+        let response = Response::of(&loads, &case.set.bursts, dag);
         let blocked = response.blocking;
         self.line(format_args!("bound {id} {bound_ns} response {blocked}"));
         let windows = response.windows(&mut { u64::MAX }).unwrap_or_default();

@@ -244,11 +244,34 @@ fn overheads_are_charged_to_every_subtask() {
         context_switch_ns: 2,
         dispatch_ns: 1,
         interrupt_ns: 3,
+        ready_ns: 0,
     };
     assert_eq!(
         answer(&task_set, &with).bounds[0].unwrap().bound_ns,
         20 + 2 * 8
     );
+}
+
+#[test]
+fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
+    let fork: Vec<(usize, usize)> = (1..=18).map(|branch| (0, branch)).collect();
+    let one = |priority| spec(100, 100, &[10], &[], priority);
+    let on = |policy, cores, last: sched_dag::DagSpec| {
+        let task_set = commit(&[one(0), last], policy, cores);
+        let mut with = settings((policy, Preemption::Enabled), cores);
+        with.overheads.ready_ns = 1;
+        let bounds = answer(&task_set, &with).bounds;
+        bounds
+            .iter()
+            .map(|bound| bound.map(|bound| bound.bound_ns))
+            .collect::<Vec<_>>()
+    };
+    // Two releases, and a window begins 2 before the first may be served.
+    assert_eq!(on(Policy::StaticPriority, 1, one(1)), [Some(12), Some(22)]);
+    assert_eq!(on(Policy::StaticPriority, 2, one(1)), [Some(12), Some(15)]);
+    // The two that a fork makes ready beyond 16, in two jobs.
+    let wide = spec(100, 100, &[1; 19], &fork, 1);
+    assert_eq!(on(Policy::StaticPriority, 1, wide)[0], Some(12 + 2 * 2));
 }
 
 #[test]

@@ -50,6 +50,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
         };
         let mut settings = sample.settings();
         settings.overheads.dispatch_ns = random.within(0, 2.min(seed));
+        settings.overheads.ready_ns = u64::from(seed % 4 == 2);
         let path = folder.join(seed.to_string());
         fs::write(&path, witness(&task_set, &settings)).unwrap();
         let file = path.to_string_lossy().into_owned();
@@ -62,7 +63,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
         for test in tests.chain(sinks) {
             let count = by_test.entry(test).or_default();
             *count += 1;
-            is_new |= *count <= 3;
+            is_new |= *count <= 4;
         }
         // What is altered is one witness.
         if seed == 1 || is_new && !is_divided {

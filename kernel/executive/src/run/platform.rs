@@ -30,8 +30,8 @@ pub struct Kernel {
     budget_factor: AtomicU64,
     /// The most events that journals from now on have room for.
     most_events: AtomicU64,
-    /// What a commit adds to WCETs: context switch, dispatch, interrupt.
-    overheads_ns: [AtomicU64; 3],
+    /// What a commit charges: context switch, dispatch, interrupt, readiness.
+    overheads_ns: [AtomicU64; 4],
     /// How many dispatches these are the longest of, 0 if they are stated, and the margin in
     /// hundredths.
     measured: [AtomicU64; 2],
@@ -48,7 +48,7 @@ pub static KERNEL: Kernel = Kernel {
     coincidence_ns: AtomicU64::new(0),
     budget_factor: AtomicU64::new(0),
     most_events: AtomicU64::new(u64::MAX),
-    overheads_ns: [const { AtomicU64::new(0) }; 3],
+    overheads_ns: [const { AtomicU64::new(0) }; 4],
     measured: [const { AtomicU64::new(0) }; 2],
     calibrates: AtomicBool::new(false),
     wcets: Once::new(),
@@ -66,8 +66,9 @@ impl Kernel {
             context_switch_ns,
             dispatch_ns,
             interrupt_ns,
+            ready_ns,
         } = overheads;
-        let values = [context_switch_ns, dispatch_ns, interrupt_ns];
+        let values = [context_switch_ns, dispatch_ns, interrupt_ns, ready_ns];
         for (place, value) in self.overheads_ns.iter().zip(values) {
             place.store(value, Ordering::Relaxed);
         }
@@ -159,7 +160,7 @@ impl Platform for Kernel {
     }
 
     fn overheads(&self) -> Overheads {
-        let [context_switch_ns, dispatch_ns, interrupt_ns] = self
+        let [context_switch_ns, dispatch_ns, interrupt_ns, ready_ns] = self
             .overheads_ns
             .each_ref()
             .map(|value| value.load(Ordering::Relaxed));
@@ -167,6 +168,7 @@ impl Platform for Kernel {
             context_switch_ns,
             dispatch_ns,
             interrupt_ns,
+            ready_ns,
         }
     }
 
@@ -249,8 +251,7 @@ impl Platform for Kernel {
             fass::set_clock(&TOLD);
         }
         stacks::watch(&mut plan);
-        let overhead_ns = self.overheads().of_an_instance_ns(options.preemption);
-        graph::dump(&plan, options, overhead_ns);
+        graph::dump(&plan, options, self.overheads());
         execution::prepare(plan, options, terms)
     }
 }

@@ -49,6 +49,7 @@ use analysable::{analysable, first_unknown};
 
 use super::answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
 use super::bonifaci::{bonifaci_dm, bonifaci_edf};
+use super::bursts::Bursts;
 use super::capacity::{gedf_capacity, grm_capacity};
 use super::closure::SUBTASK_LIMIT;
 use super::intra_task::intra_task;
@@ -122,9 +123,8 @@ pub(super) fn with_case(
         .iter()
         .filter_map(|&dag| tasks[dag].as_ref())
         .collect();
-    let is_only_one = own.len() == 1;
     let relation = relation.among(&members);
-    let case = Case::new(dags, (&members, &tasks), is_only_one, relation, settings);
+    let case = Case::new(dags, own, (&members, &tasks), relation, settings);
     work(&case, reasons);
 }
 
@@ -147,8 +147,8 @@ pub(super) struct Case<'a> {
 impl<'a> Case<'a> {
     fn new(
         all: &'a [Dag],
+        own: &[usize],
         (members, tasks): (&'a [usize], &'a [&'a Task]),
-        is_only_one: bool,
         relation: Relation,
         settings: &'a Settings,
     ) -> Self {
@@ -158,7 +158,7 @@ impl<'a> Case<'a> {
         });
         let mut case = Self {
             all,
-            is_only_one,
+            is_only_one: own.len() == 1,
             members,
             tasks,
             settings,
@@ -166,6 +166,7 @@ impl<'a> Case<'a> {
             order,
             set: Set::new(tasks, settings.cores),
         };
+        case.set.bursts = Bursts::of(own.iter().map(|&dag| &all[dag]), settings);
         case.complete();
         case
     }
@@ -248,7 +249,9 @@ impl<'a> Case<'a> {
         let covers = &self.set.shapes[dag].covers;
         let others = multi_path::alone(task, covers, cores.into())?;
         let limit = task.relative_deadline_ns().min(task.period_ns());
-        intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others && bound_ns <= limit)
+        let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
+        let bound = bound.and_then(|bound_ns| self.set.bursts.after(bound_ns));
+        bound.filter(|&bound_ns| bound_ns <= limit)
     }
 
     /// Tells the equations what follows from the attributes.
@@ -295,7 +298,9 @@ impl<'a> Case<'a> {
     /// Returns the utilisation test that accepts the whole set, if one does.
     fn vouching_test(&self) -> Option<Test> {
         let (tasks, cores) = (self.tasks, self.settings.cores);
-        let applies = self.relation.preemption == Mixture::All && !self.relation.ranks_sinks;
+        let applies = self.relation.preemption == Mixture::All
+            && !self.relation.ranks_sinks
+            && self.set.bursts.are_none();
         if !applies || !constrained(tasks, cores) {
             return None;
         }

@@ -28,12 +28,13 @@ pub(in crate::analysis) fn loads(case: &Case<'_>) -> Vec<Load> {
 /// keep their own.
 pub(super) fn responses(case: &Case<'_>) -> Vec<Option<u64>> {
     let loads = loads(case);
+    let (loads, bursts) = (&loads, &case.set.bursts);
     let (mut steps, mut found) = (Steps::of(loads.len()), vec![None; loads.len()]);
     for &dag in &case.order {
-        found[dag] = steps.spend(dag, |steps| Response::of(&loads, dag).solve(steps));
+        found[dag] = steps.spend(dag, |steps| Response::of(loads, bursts, dag).solve(steps));
     }
     let known = (0..loads.len()).map(|dag| {
-        let others = Response::of(&loads, dag).others;
+        let others = Response::of(loads, bursts, dag).others;
         let are_known = others.iter().all(|&other| found[other].is_some());
         found[dag].filter(|_| are_known && !case.is_alone(dag))
     });
@@ -45,7 +46,7 @@ pub(in crate::analysis) fn are_in_time(case: &Case<'_>) -> bool {
     let fit =
         |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
     let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
-    applies && (0..case.tasks.len()).all(fit) && demand(&all_dues(case)).is_some()
+    applies && (0..case.tasks.len()).all(fit) && demand(&all_dues(case), &case.set.bursts).is_some()
 }
 
 /// Returns what is due of all DAGs.

@@ -34,7 +34,7 @@ const JOBS: u64 = 50;
 /// mode: a context switch, a dispatch, an interrupt. The commit adds it to WCETs before
 /// it bounds anything. A dispatch may wait for those of all cores, which take turns.
 fn overheads(cores: u64) -> String {
-    format!("overheads_ns=1000,{},4000", 2500 * cores)
+    format!("overheads_ns=1000,{},4000,1000", 2500 * cores)
 }
 
 /// Reports whether a command line says what the kernel costs, or has it measure that.

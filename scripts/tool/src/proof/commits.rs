@@ -29,7 +29,8 @@ struct Open {
     number: u64,
     options: SchedulerOptions,
     clusters: Clusters,
-    overhead_ns: u64,
+    /// An instance's, and for each that becomes ready.
+    overheads_ns: [u64; 2],
     dags: Vec<DagSpec>,
     lines: Vec<usize>,
     hashes: Vec<u64>,
@@ -65,14 +66,17 @@ fn add(line: &MachineLine, all: &mut Vec<Open>) -> Result<(), Malformed> {
             number,
             options: dag::options(&line)?,
             clusters: dag::clusters(&line)?,
-            overhead_ns: one(&line, "overhead_ns")?.unwrap_or(u64::MAX),
+            overheads_ns: [
+                number_at(&line, "overhead_ns", 0)?.unwrap_or(u64::MAX),
+                number_at(&line, "overhead_ns", 1)?.unwrap_or(0),
+            ],
             dags: Vec::new(),
             lines: Vec::new(),
             hashes: Vec::new(),
             bounds_ns: Vec::new(),
         });
     }
-    let bound_ns = one(&line, "bound_ns")?;
+    let bound_ns = number_at(&line, "bound_ns", 0)?;
     let (spec, hash) = (dag::spec(&line)?, line.number("hash")?);
     if let Some(open) = all.last_mut() {
         open.dags.push(spec);
@@ -83,12 +87,12 @@ fn add(line: &MachineLine, all: &mut Vec<Open>) -> Result<(), Malformed> {
     Ok(())
 }
 
-/// Returns the one number of a list, or `None` of an empty one.
-fn one(line: &Line<'_>, name: &str) -> Result<Option<u64>, Malformed> {
-    match line.elements(name)? {
-        [] => Ok(None),
-        [Value::Integer(number)] if *number >= 0 => Ok(u64::try_from(*number).ok()),
-        _ => Err(line.malformed(format!("`{name}` is a list of one number or none"))),
+/// Returns a number of a list, or `None` of a shorter one.
+fn number_at(line: &Line<'_>, name: &str, place: usize) -> Result<Option<u64>, Malformed> {
+    match line.elements(name)?.get(place) {
+        None => Ok(None),
+        Some(Value::Integer(number)) if *number >= 0 => Ok(u64::try_from(*number).ok()),
+        _ => Err(line.malformed(format!("`{name}` is a list of numbers"))),
     }
 }
 
@@ -106,9 +110,10 @@ fn close(open: Open) -> Result<Commit, Malformed> {
             policy,
             preemption,
             cores,
-            // One number is all that the analysis makes of them.
+            // Two numbers are all that the analysis makes of them.
             overheads: Overheads {
-                dispatch_ns: open.overhead_ns,
+                dispatch_ns: open.overheads_ns[0],
+                ready_ns: open.overheads_ns[1],
                 ..Overheads::default()
             },
         },

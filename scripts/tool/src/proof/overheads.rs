@@ -53,7 +53,8 @@ impl Measured {
             context_switch_ns,
             dispatch_ns,
             interrupt_ns,
-        } = Overheads::measured(&self.0, margin_percent);
+            ..
+        } = Overheads::measured(&self.0, margin_percent, 0);
         format!("overheads_ns={context_switch_ns},{dispatch_ns},{interrupt_ns}")
     }
 

@@ -53,6 +53,7 @@ pub(super) fn sample(random: &mut Random) -> Sample {
             switch_ns: random.within(0, 50),
             dispatch_ns: random.within(0, 200),
             interrupt_ns: random.within(0, 200),
+            ready_ns: random.within(0, 200),
             late_ns: random.within(0, 200),
         },
     }

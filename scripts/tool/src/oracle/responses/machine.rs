@@ -4,6 +4,8 @@
 //!
 //! - a timer interrupt is late, so a release is, unless a completion's step comes first;
 //! - an instance that starts keeps its core for the decision and two switches more;
+//! - a step that releases jobs takes the longer, the more instances become ready; meanwhile no
+//!   core goes on, and no other step begins;
 //! - one that is resumed keeps it for an interrupt more, which the one that preempted it pays.
 //!
 //! What is observed is the response of each job, from its nominal release on.
@@ -24,6 +26,7 @@ pub(super) struct Costs {
     pub(super) switch_ns: u64,
     pub(super) dispatch_ns: u64,
     pub(super) interrupt_ns: u64,
+    pub(super) ready_ns: u64,
     /// From a nominal release to the interrupt for it.
     pub(super) late_ns: u64,
 }
@@ -44,6 +47,7 @@ impl Costs {
             context_switch_ns: self.switch_ns,
             dispatch_ns: self.dispatch_ns + self.late_ns,
             interrupt_ns: self.interrupt_ns,
+            ready_ns: self.ready_ns,
         }
     }
 }
@@ -69,6 +73,8 @@ pub(super) fn longest_responses_ns(
     };
     let mut watch = Watch {
         now_ns: 0,
+        ready: 0,
+        task_set,
         flying: vec![Vec::new(); dags],
         longest_ns: vec![0; dags],
     };
@@ -94,9 +100,11 @@ struct Machine<'r> {
 }
 
 impl Machine<'_> {
-    fn run(&mut self, until_ns: u64, watch: &mut Watch) {
+    fn run(&mut self, until_ns: u64, watch: &mut Watch<'_>) {
         // The scheduler's next event, and when its interrupt comes.
         let mut alarm: Option<(u64, u64)> = None;
+        // When the last step is over.
+        let mut over_ns = 0;
         loop {
             let due_ns = self.scheduler.next_event_ns();
             if alarm.map(|(due_ns, _)| due_ns) != due_ns {
@@ -105,6 +113,7 @@ impl Machine<'_> {
             let finish_ns = self.cores.iter().flatten().map(|(_, finish_ns)| *finish_ns);
             let interrupt_ns = alarm.map(|(_, at_ns)| at_ns.max(watch.now_ns));
             let next_ns = finish_ns.chain(interrupt_ns).min();
+            let next_ns = next_ns.map(|next_ns| next_ns.max(over_ns));
             let Some(now_ns) = next_ns.filter(|next_ns| *next_ns <= until_ns) else {
                 return;
             };
@@ -118,6 +127,11 @@ impl Machine<'_> {
             let decisions = released.dispatch().to_vec();
             for decision in decisions {
                 self.carry_out(decision, now_ns);
+            }
+            let takes_ns = self.draw(core::mem::take(&mut watch.ready) * self.costs.ready_ns);
+            over_ns = now_ns + takes_ns;
+            for (_, finish_ns) in self.cores.iter_mut().flatten() {
+                *finish_ns += takes_ns;
             }
         }
     }
@@ -153,15 +167,19 @@ impl Machine<'_> {
     }
 }
 
-struct Watch {
+struct Watch<'t> {
     now_ns: u64,
+    /// How many instances the step in hand has made ready by releases.
+    ready: u64,
+    task_set: &'t TaskSet,
     /// The jobs in flight of each DAG: number and nominal release.
     flying: Vec<Vec<(u64, u64)>>,
     longest_ns: Vec<u64>,
 }
 
-impl Observer for Watch {
+impl Observer for Watch<'_> {
     fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.ready += self.task_set.dag(dag).sources().len() as u64;
         self.flying[dag.index()].push((job, release_ns));
     }
 
