@@ -1,11 +1,12 @@
 //! What changes a run while it goes on, from any thread.
 
 use std::io;
-use std::sync::Arc;
+use std::sync::{Arc, Barrier};
 use std::thread;
 
 use sched_dag::DagId;
 
+use crate::end_signals::{self, EndSignals};
 use crate::level::Role;
 use crate::office::Office;
 use crate::requests::Request;
@@ -75,21 +76,50 @@ impl Control {
         self.0.request(dag, Request::Stop);
     }
 
+    /// Has the run end in order when a signal that is caught asks for it, or has: nothing more is
+    /// released, and what is in flight goes on to its end.
+    ///
+    /// # Errors
+    ///
+    /// The system has no more threads.
+    pub fn close_when_asked(self, _caught: &EndSignals) -> io::Result<()> {
+        /// How long the thread outlives its run.
+        const MOST_NS: u64 = 1_000_000_000;
+        self.watch("fass-ends", |office| {
+            let has_come = end_signals::wait(sys::now_ns() + MOST_NS);
+            if has_come {
+                office.request_of_all(Request::Close);
+            }
+            !has_come
+        })
+    }
+
     pub(crate) fn raise_on_input(self, dag: DagId, arrivals: sys::Arrivals) -> io::Result<()> {
-        /// How long such a thread outlives its run.
+        /// How long the thread outlives its run.
         const MOST_MS: i32 = 200;
+        self.watch("fass-input", move |office| {
+            if arrivals.wait(MOST_MS) {
+                office.request(dag, Request::Signal);
+            }
+            true
+        })
+    }
+
+    /// Starts a thread that waits for something outside, again and again while there is a run and
+    /// `look` wants more. What it allocates it has when this returns.
+    fn watch(self, name: &str, look: impl Fn(&Office) -> bool + Send + 'static) -> io::Result<()> {
         let office = self.0;
+        let has_begun = Arc::new(Barrier::new(2));
+        let begun = Arc::clone(&has_begun);
         let watch = move || {
             if let Some(levels) = office.levels {
                 levels.bring(sys::thread(), Role::Release);
             }
-            while !office.is_over() {
-                if arrivals.wait(MOST_MS) {
-                    office.request(dag, Request::Signal);
-                }
-            }
+            begun.wait();
+            while !office.is_over() && look(&office) {}
         };
-        let thread = thread::Builder::new().name("fass-input".into());
-        thread.spawn(watch).map(drop)
+        thread::Builder::new().name(name.into()).spawn(watch)?;
+        has_begun.wait();
+        Ok(())
     }
 }

@@ -37,6 +37,7 @@
 
 mod clusters;
 mod control;
+mod end_signals;
 mod lead;
 mod level;
 mod look_out;
@@ -60,6 +61,7 @@ mod wires;
 mod worker;
 
 pub use control::Control;
+pub use end_signals::EndSignals;
 pub use machine::{Linux, Mechanism, StartError, processors};
 pub use run::{Counts, Run};
 pub use state::Fault;

@@ -88,6 +88,12 @@ impl Office {
         self.ring(self.task_set.dag(dag).cluster());
     }
 
+    /// Leaves a request for each DAG.
+    pub(crate) fn request_of_all(&self, request: Request) {
+        let dags = (0..).map(DagId).take(self.task_set.dags().len());
+        dags.for_each(|dag| self.request(dag, request));
+    }
+
     /// Sends a request of one cluster's functions to the others that it concerns, and reports
     /// whether it does not concern the cluster itself.
     pub(crate) fn send(&self, from: ClusterId, request: lifecycle::Request) -> bool {

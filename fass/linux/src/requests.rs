@@ -13,6 +13,7 @@ const SIGNAL: u32 = 1;
 const PAUSE: u32 = 2;
 const RESUME: u32 = 4;
 const STOP: u32 = 8;
+const CLOSE: u32 = 16;
 
 /// What one DAG is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +26,8 @@ pub(crate) enum Request {
     Resume,
     /// It ends for good.
     Stop,
+    /// It releases nothing more, and what is in flight goes on to its end.
+    Close,
 }
 
 /// The requests that have not been served, by DAG.
@@ -43,6 +46,7 @@ impl Requests {
             Request::Pause => (PAUSE, RESUME),
             Request::Resume => (RESUME, PAUSE),
             Request::Stop => (STOP, 0),
+            Request::Close => (CLOSE, 0),
         };
         let change = |bits: u32| Some(bits & !instead_of | bit);
         // The change never refuses.
@@ -72,6 +76,9 @@ impl Requests {
             }
             if bits & STOP != 0 {
                 moment.stop(dag, observer);
+            }
+            if bits & CLOSE != 0 {
+                moment.close(dag, observer);
             }
         }
     }

@@ -3,6 +3,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
+use linux::EndSignals;
+
 use crate::app::ending::{self, Ending, Told};
 use crate::app::machine_handle::{Machine, memory_kib};
 use crate::app::words;
@@ -50,6 +52,8 @@ fn run(
     line: &'static str,
     app: fn(&Machine) -> Result<(), Ending>,
 ) -> Result<(), Ending> {
+    // Who sees the first line may ask for an end.
+    let signals = EndSignals::catch_first();
     let options = Options::parse(line)?;
     let (linux, words) = words::apply(&options)?;
     json::report("boot", |object| {
@@ -65,7 +69,7 @@ fn run(
     for warning in linux.warnings() {
         crate::println!("fass-linux: {warning}");
     }
-    let machine = Machine::new(options, linux, &words);
+    let machine = Machine::new(options, linux, &words, signals);
     let result = app(&machine);
     if result.is_ok() && machine.has_spare_module() {
         crate::println!(

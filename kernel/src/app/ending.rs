@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use alloc::format;
 use alloc::string::String;
 
 use fass::CommitError;
@@ -26,11 +27,19 @@ pub enum Ending {
     Commit(CommitError),
     /// Something else went wrong, in words; QEMU exits with 35.
     Failure(String),
-    /// A person has ended the run at the console; QEMU exits with 33.
+    /// A person has ended the run, at the console or by ctrl-C; QEMU exits with 33.
     Shutdown,
 }
 
 impl Ending {
+    /// Returns how an app ends whose run a person has ended and broke so many rules.
+    pub(crate) fn after_shutdown(violations: usize) -> Self {
+        match violations {
+            0 => Self::Shutdown,
+            count => Self::Failure(format!("shut down before its end, with {count} violations")),
+        }
+    }
+
     /// Returns a complaint of the kernel's as the ending of an app that ends well, or as a
     /// person wants it. The app's own error takes precedence.
     pub(crate) fn or_complaint(
@@ -98,7 +107,7 @@ impl fmt::Display for Ending {
             Self::Usage(error) => error.fmt(f),
             Self::Commit(error) => error.fmt(f),
             Self::Failure(message) => f.write_str(message),
-            Self::Shutdown => f.write_str("shut down at the console"),
+            Self::Shutdown => f.write_str("shut down before its end"),
         }
     }
 }

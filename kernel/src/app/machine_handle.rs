@@ -5,8 +5,6 @@ use core::fmt;
 use core::panic::Location;
 use core::time::Duration;
 
-use alloc::format;
-
 use fass::{Platform, Policy, Preemption, Signal};
 use sched_dag::DagId;
 
@@ -193,7 +191,7 @@ impl Machine {
     /// # Errors
     ///
     /// [`Ending::Failure`] if nothing has been committed since the last run.
-    /// [`Ending::Shutdown`] if a person has ended the run at the console: then each
+    /// [`Ending::Shutdown`] if a person has ended the run, at the console or by ctrl-C: then each
     /// DAG has ended the jobs that it had in flight and released no more. If that
     /// run broke a rule of the model, it is a failure instead.
     ///
@@ -315,12 +313,9 @@ impl Machine {
 /// Reports a run that a person has ended, and returns how its app ends.
 fn shutdown(run: &Run) -> Ending {
     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-        session::show_counts(dag, model, &run.snapshot(dag));
+        session::counts(&run.snapshot(dag)).show(dag, model);
     }
-    match run.violations().count() {
-        0 => Ending::Shutdown,
-        count => Ending::Failure(format!("shut down at the console, with {count} violations")),
-    }
+    Ending::after_shutdown(run.violations().count())
 }
 
 /// Prints the longest section of a run without interrupts.

@@ -5,6 +5,7 @@
 //! while a run goes on, but `latest` by a panic. `kernel/on-linux` compiles the files that know
 //! no machine a second time.
 
+pub(crate) mod counts;
 mod distribution;
 pub(crate) mod latest;
 pub(crate) mod run;

@@ -16,7 +16,7 @@
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
 //! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or how much each subtask uses of its stack | `nothing` |
-//! | `console=off\|on\|echo` | whether a person can talk to the kernel; `echo` sends back what is typed | `off` |
+//! | `console=off\|stop\|on\|echo` | whether a person can end a run by ctrl-C (`stop`), and talk to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
 //! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
 //! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
@@ -137,10 +137,12 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
     let events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
     let status_s = options.number("status", 0..=86_400, 0)?;
     let consoles = [
-        ("off", None),
-        ("on", Some(Echo::Off)),
-        ("echo", Some(Echo::On)),
+        ("off", (None, false)),
+        ("stop", (None, true)),
+        ("on", (Some(Echo::Off), true)),
+        ("echo", (Some(Echo::On), true)),
     ];
+    let (console, stops) = options.choice("console", &consoles)?;
     let wcet_bytes = options.number("wcets", 0..=1 << 32, 0)?;
     let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
     let record_kib = options.number("record", 0..=1 << 20, 0)?;
@@ -161,7 +163,8 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
         dumps_times,
         wishes: Wishes {
             input: None,
-            console: options.choice("console", &consoles)?,
+            console,
+            stops,
             status_ns: status_s * 1_000_000_000,
         },
         judges_bounds: judges_bounds && options.text("mode") != Some("threads"),

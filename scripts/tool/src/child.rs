@@ -1,14 +1,20 @@
 //! A child process with a limit: it is waited for, watched, and killed by its
-//! own process id when its time is over or when we let go of it.
+//! own process id when its time is over or when we let go of it. One that can end in order is
+//! asked to do so first.
 //!
 //! Where the program `setpriv` exists, the system kills the child also if the
 //! tool itself is killed, so nothing is left behind in any case.
 
+use std::fs::File;
 use std::io;
+use std::os::fd::AsFd;
 use std::process::{self, ChildStdin, ChildStdout, Command, ExitStatus};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use linux::EndSignals;
+
+use crate::asking::{Asked, Asking, Step};
 use crate::system;
 
 /// How long one look at the process is from the next.
@@ -30,6 +36,8 @@ pub enum Waited {
     TimedOut,
     /// The watcher gave it up, and it was killed.
     GivenUp,
+    /// A person pressed ctrl-C again before it had ended, and it was killed.
+    Killed,
 }
 
 impl Child {
@@ -64,6 +72,54 @@ impl Child {
             }
             thread::sleep(PAUSE);
         }
+    }
+
+    /// Works like [`wait`](Self::wait), but has `ask` ask the child to end before it is killed.
+    /// `watch` returns how many bytes it has printed, or nothing to give it up. Returns also why
+    /// it was asked.
+    pub fn wait_and_ask(
+        &mut self,
+        limit: Duration,
+        mut ask: impl FnMut(Asked),
+        mut watch: impl FnMut() -> Option<u64>,
+    ) -> (Waited, Option<Asked>) {
+        let (signals, started) = (EndSignals::catch(), self.started);
+        let (mut asking, mut why_killed) = (Asking::new(limit), Waited::GivenUp);
+        let waited = self.wait(Duration::MAX, || {
+            let Some(printed_bytes) = watch() else {
+                return false;
+            };
+            match asking.step(started.elapsed(), signals.count(), printed_bytes) {
+                Step::Wait => return true,
+                Step::Ask(why) => {
+                    if why == Asked::ByPerson {
+                        eprintln!("ending in order; ctrl-C again ends it at once");
+                    }
+                    ask(why);
+                    return true;
+                }
+                Step::Kill => why_killed = Waited::Killed,
+                Step::TimeOut => why_killed = Waited::TimedOut,
+            }
+            false
+        });
+        match waited {
+            Waited::GivenUp => (why_killed, asking.why()),
+            _ => (waited, asking.why()),
+        }
+    }
+
+    /// Returns the child's process id.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.process.id()
+    }
+
+    /// Returns another handle of the child's standard input, if that is a pipe and was not taken.
+    pub fn second_input(&self) -> Option<File> {
+        let input = self.process.stdin.as_ref()?;
+        let other = input.as_fd().try_clone_to_owned();
+        other.ok().map(File::from)
     }
 
     /// Takes the child's standard input, if that is a pipe and was not taken.

@@ -10,7 +10,7 @@
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
 //! - [`elf`], [`image`], [`efi`], [`iso`], [`medium`], [`places`], [`tiny`]: what is booted;
-//! - [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
+//! - [`asking`], [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
 //!   [`output`], [`progress`], [`lasting`]: printing without a panic, and while it takes long;
@@ -35,6 +35,7 @@
 #[macro_use]
 pub mod output;
 
+pub mod asking;
 pub mod bench;
 pub mod child;
 pub mod dag_file;

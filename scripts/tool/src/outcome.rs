@@ -12,11 +12,13 @@ use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
 use std::time::Duration;
 
+use crate::asking::Asked;
 use crate::files;
 use crate::medium::Medium;
 use crate::places::Places;
 use crate::protocol::{MachineLine, Status, Transcript};
 use crate::qemu::{Ending, Qemu};
+use crate::system;
 use crate::tail::Tail;
 
 /// How many of the last serial lines are shown at a failure.
@@ -35,6 +37,8 @@ pub struct Outcome {
     pub log: PathBuf,
     /// Where the image lies that was booted.
     pub image: PathBuf,
+    /// Why it was asked to end before its time, if it was.
+    pub asked: Option<Asked>,
     /// The wall time from start to end.
     pub elapsed: Duration,
     /// What QEMU itself complained of; mostly empty.
@@ -103,6 +107,7 @@ pub fn boot_with_input(
         serial,
         log: log.to_path_buf(),
         image: image.to_path_buf(),
+        asked: running.asked(),
         elapsed: running.elapsed(),
         complaints: running.complaints(),
     };
@@ -190,7 +195,15 @@ impl Outcome {
                 verdict.status
             )));
         }
-        judge_lines(&self.transcript)
+        judge_lines(&self.transcript)?;
+        match self.asked {
+            Some(Asked::ByLimit(limit)) => Err(failure(format!(
+                "no end within {} s, so it was ended in order; {}",
+                limit.as_secs_f64(),
+                system::host_load()
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// Returns the last serial lines, indented, and where all of them are. To
@@ -240,6 +253,7 @@ mod tests {
             transcript: Transcript::read(serial),
             log: "the.log".into(),
             image: "the image".into(),
+            asked: None,
             elapsed: Duration::ZERO,
             complaints: String::new(),
         }

@@ -75,6 +75,7 @@ pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> 
         module: None,
         loader: Loader::Pvh,
         has_input: false,
+        stops: false,
         second: None,
         debugger: None,
         ..machine.clone()

@@ -4,10 +4,14 @@
 
 use std::ffi::OsString;
 use std::fs::{self, File};
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
+use linux::EndSignals;
+
+use crate::asking::Asked;
 use crate::child::{Child, Waited, bound_to_us};
 use crate::outcome::Outcome;
 use crate::protocol::{Status, Transcript};
@@ -15,21 +19,30 @@ use crate::qemu::Ending;
 use crate::system;
 use crate::tail::Tail;
 
-/// Runs a program until its end, or for `limit`, with its output in `log`, and shows each whole
-/// line to `show` as it comes.
+/// A program, and how it is run.
+#[derive(Clone, Copy, Debug)]
+pub struct Order<'a> {
+    /// The program.
+    pub program: &'a Path,
+    /// Its words.
+    pub words: &'a [OsString],
+    /// Whether it reads our standard input; else it has none.
+    pub is_live: bool,
+    /// Whether it ends in order at SIGINT, and so is asked before it is killed.
+    pub stops: bool,
+    /// Where its output goes.
+    pub log: &'a Path,
+    /// How long it may take.
+    pub limit: Duration,
+}
+
+/// Runs a program until its end, or for its limit, and shows each whole line to `show` as it comes.
 ///
 /// # Errors
 ///
 /// In words: it could not be started, or the log could not be written or read.
-pub fn run(
-    program: &Path,
-    words: &[OsString],
-    stdin: Stdio,
-    log: &Path,
-    limit: Duration,
-    show: &mut impl FnMut(&str),
-) -> Result<Outcome, String> {
-    run_for(program, words, stdin, log, limit, show, ExitStatus::code)
+pub fn run(order: &Order<'_>, show: &mut impl FnMut(&str)) -> Result<Outcome, String> {
+    run_for(order, show, ExitStatus::code)
 }
 
 /// Works like [`run`], where `code` tells from the program's end the exit code of what it runs.
@@ -38,32 +51,56 @@ pub fn run(
 ///
 /// As [`run`].
 pub fn run_for(
-    program: &Path,
-    words: &[OsString],
-    stdin: Stdio,
-    log: &Path,
-    limit: Duration,
+    order: &Order<'_>,
     show: &mut impl FnMut(&str),
     code: impl FnOnce(&ExitStatus) -> Option<i32>,
 ) -> Result<Outcome, String> {
+    let &Order {
+        program,
+        words,
+        is_live,
+        stops,
+        log,
+        limit,
+    } = order;
+    let stdin = match is_live {
+        true => Stdio::inherit(),
+        false => Stdio::null(),
+    };
     let place = log.display();
     let file = File::create(log)
         .map_err(|error| format!("cannot write `{place}`: {error}; name a file elsewhere"))?;
     let mut command = bound_to_us(program);
     command.args(words).stdin(stdin).stdout(file);
+    // In the terminal's process group it gets ctrl-C from there, and could not read it elsewhere.
+    let is_apart = stops && !is_live;
+    if is_apart {
+        command.process_group(0);
+    }
     let mut child = Child::start(&mut command)
         .map_err(|error| format!("cannot start `{}`: {error}", program.display()))?;
     let mut tail = Tail::new(log);
-    let waited = child.wait(limit, || {
+    let mut watch = || {
         tail.follow(show);
-        true
-    });
+        fs::metadata(log).map_or(Some(0), |file| Some(file.len()))
+    };
+    let process = child.id();
+    let ask = |why| {
+        if is_apart || why != Asked::ByPerson {
+            EndSignals::send(process);
+        }
+    };
+    let (waited, asked) = match stops {
+        true => child.wait_and_ask(limit, ask, watch),
+        false => (child.wait(limit, || watch().is_some()), None),
+    };
     tail.finish(show);
     let bytes = fs::read(log).map_err(|error| format!("cannot read `{place}`: {error}"))?;
     let serial = String::from_utf8_lossy(&bytes).into_owned();
     let transcript = Transcript::read(&serial);
     let ending = match waited {
         Waited::Ended(status) => ending_of(status, code(&status), &transcript),
+        Waited::Killed => Ending::Killed,
         Waited::TimedOut | Waited::GivenUp => Ending::Program(format!(
             "no end within {} s, the program was killed; {}; `--timeout SECONDS` gives it longer",
             limit.as_secs(),
@@ -76,6 +113,7 @@ pub fn run_for(
         serial,
         log: log.to_path_buf(),
         image: program.to_path_buf(),
+        asked,
         elapsed: child.elapsed(),
         complaints: String::new(),
     })

@@ -6,7 +6,7 @@ use std::io;
 use std::time::Duration;
 
 use fass::{Overheads, Policy, Preemption, Signal};
-use linux::Linux;
+use linux::{EndSignals, Linux};
 use sched_dag::DagId;
 
 use super::bound_verdict::BoundVerdict;
@@ -18,6 +18,7 @@ use super::words::Words;
 use crate::heap;
 use crate::options::{Options, UsageError};
 use crate::report;
+use crate::report::counts::Counts;
 use crate::report::run::Run;
 use crate::text::json;
 
@@ -41,6 +42,8 @@ pub struct Machine {
     runs: Cell<u64>,
     fault_verdict: FaultVerdict,
     bound_verdict: BoundVerdict,
+    /// What ends a run before its time.
+    signals: EndSignals,
 }
 
 /// What of the program's memory is in use while nothing runs.
@@ -57,7 +60,12 @@ pub struct Resources {
 }
 
 impl Machine {
-    pub(crate) fn new(options: Options<'static>, linux: Linux, words: &Words) -> Self {
+    pub(crate) fn new(
+        options: Options<'static>,
+        linux: Linux,
+        words: &Words,
+        signals: EndSignals,
+    ) -> Self {
         Self {
             cores: linux.cores(),
             options,
@@ -73,6 +81,7 @@ impl Machine {
             runs: Cell::new(0),
             fault_verdict: FaultVerdict::default(),
             bound_verdict: BoundVerdict::new(false, false),
+            signals,
         }
     }
 
@@ -140,7 +149,9 @@ impl Machine {
     ///
     /// # Errors
     ///
-    /// [`Ending::Failure`] if nothing has been committed since the last run.
+    /// [`Ending::Failure`] if nothing has been committed since the last run. [`Ending::Shutdown`]
+    /// if SIGINT (ctrl-C) or SIGTERM has ended the run: then each DAG has ended the jobs that it
+    /// had in flight and released no more.
     pub fn run(&self) -> Result<Run, Ending> {
         self.run_when(Linux::run)
     }
@@ -170,6 +181,10 @@ impl Machine {
             let watched = self.linux.raise_on_input(signal, &io::stdin());
             watched.map_err(|why| failure(format!("standard input cannot be watched: {why}")))?;
         }
+        if let Some(control) = self.linux.control() {
+            let watched = control.close_when_asked(&self.signals);
+            watched.map_err(|why| failure(format!("no signal can be waited for: {why}")))?;
+        }
         let run = run(&self.linux).map_err(|why| failure(why.to_string()))?;
         drop(connection);
         tell_faults(&run);
@@ -187,7 +202,10 @@ impl Machine {
         if self.dumps_trace {
             report::trace::dump(&run, self.runs.replace(self.runs.get() + 1));
         }
-        Ok(run)
+        match self.signals.count() {
+            0 => Ok(run),
+            _ => Err(shutdown(&run)),
+        }
     }
 
     /// Makes whatever arrives on standard input raise a signal, in the runs to come.
@@ -231,6 +249,20 @@ impl Machine {
     pub(crate) fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
         self.bound_verdict.judge(self.fault_verdict.judge(result))
     }
+}
+
+/// Reports a run that a signal has ended, and returns how its app ends.
+fn shutdown(run: &Run) -> Ending {
+    for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
+        let counts = Counts {
+            state: "over",
+            statistics: *run.statistics(dag),
+            in_flight: 0,
+            waiting: 0,
+        };
+        counts.show(dag, model);
+    }
+    Ending::after_shutdown(run.violations().count())
 }
 
 /// Says which faults have ended DAGs, as the kernel does at once.

@@ -1,6 +1,8 @@
 //! What is told of a run when it is over, by the kernel's own files; the [`Run`](crate::Run) is
 //! that of Linux.
 
+#[path = "../../../src/report/counts.rs"]
+pub(crate) mod counts;
 #[path = "../../../src/report/distribution.rs"]
 mod distribution;
 pub(crate) mod run;

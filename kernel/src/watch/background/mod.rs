@@ -26,6 +26,7 @@ mod progress;
 pub(crate) mod session;
 mod stall;
 mod status;
+mod stop;
 pub(crate) mod topics;
 pub(crate) mod watchdog;
 pub(crate) mod wire;
@@ -48,6 +49,8 @@ use status::Status;
 pub(crate) struct Wishes {
     /// Whether there is a console, and whether it sends back what is typed.
     pub(crate) console: Option<Echo>,
+    /// Whether one byte ends the run, in order.
+    pub(crate) stops: bool,
     /// The time between two lines of kind `status`; 0: none.
     pub(crate) status_ns: u64,
     /// What each byte of input raises: a plan's number and a sporadic DAG of it.
@@ -127,6 +130,7 @@ pub(crate) fn beat(now_ns: u64) {
         line.beat(now_ns);
     }
     stall::beat(now_ns);
+    stop::beat();
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
     }
@@ -167,6 +171,10 @@ impl Background {
             RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }
         stall::begin();
+        // What a person says to the console is no event.
+        let input = wishes.input.filter(|_| wishes.console.is_none());
+        let listener = input.map(|input| Listener::new(input, wishes.stops));
+        stop::begin(wishes.stops && wishes.console.is_none() && listener.is_none());
         if let Some(line) = LINE.get() {
             line.begin(clock::now_ns());
         }
@@ -174,8 +182,7 @@ impl Background {
             heartbeat_before_ns: before_ns,
             progress: Progress::new(total),
             is_sliced,
-            // What a person says to the console is no event.
-            listener: (wishes.input.filter(|_| wishes.console.is_none())).map(Listener::new),
+            listener,
         }
     }
 
@@ -193,7 +200,7 @@ impl Background {
         SLICED.lock().slice(false) || has_more
     }
 
-    /// Ends it. Reports whether a person has asked for the machine to shut down.
+    /// Ends it. Reports whether a person has asked for the run to end.
     pub(crate) fn end(self) -> bool {
         heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
         stall::end();
@@ -203,7 +210,7 @@ impl Background {
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;
-        let session = sliced.session.take();
-        session.is_some_and(|session| session.is_shutting_down())
+        sliced.session = None;
+        stop::end()
     }
 }

@@ -14,9 +14,10 @@ use sched_dag::{Dag, DagId, TaskSet};
 
 use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
-use super::more;
+use super::{more, stop};
 use crate::options::whole_number;
 use crate::println;
+use crate::report::counts::Counts;
 use executive::machine::serial;
 use executive::run::execution::{self, Control, Snapshot, State};
 use executive::text::json;
@@ -32,7 +33,6 @@ const MOST_BYTES: usize = 16;
 pub(crate) struct Session {
     input: Input,
     echoes: bool,
-    is_shutting_down: bool,
     listing: Option<Listing>,
 }
 
@@ -42,7 +42,7 @@ struct Listing {
     next: DagId,
     /// The first one that is not to be listed.
     end: DagId,
-    print: fn(&Dag, &Snapshot),
+    print: fn(&Counts, &Dag),
 }
 
 impl Session {
@@ -51,14 +51,8 @@ impl Session {
         Self {
             input: Input::new(),
             echoes,
-            is_shutting_down: false,
             listing: None,
         }
-    }
-
-    /// Reports whether a person has asked for the run to end.
-    pub(crate) const fn is_shutting_down(&self) -> bool {
-        self.is_shutting_down
     }
 
     /// Does a little: prints one DAG's line, or takes a few bytes and answers what
@@ -79,6 +73,10 @@ impl Session {
             let Some(byte) = serial::FIRST.receive() else {
                 return false;
             };
+            if byte == stop::BYTE {
+                stop::shut_down();
+                break;
+            }
             if self.echoes {
                 crate::print!("{}", char::from(if byte == b'\r' { b'\n' } else { byte }));
             }
@@ -87,7 +85,6 @@ impl Session {
                 Typed::Line(line) => match answer(line, &task_set) {
                     Answer::Given => {}
                     Answer::List(listing) => self.listing = Some(listing),
-                    Answer::ShutsDown => self.is_shutting_down = true,
                 },
                 Typed::TooLong => refuse("", &"the line is too long: no command is as long"),
                 Typed::NotText => refuse("", &"the line is not UTF-8"),
@@ -103,7 +100,7 @@ impl Listing {
     fn print_one(self, task_set: &TaskSet) -> Option<Listing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
         if let Some(snapshot) = execution::snapshot(dag) {
-            show(dag, model, &snapshot, self.print);
+            counts(&snapshot).show_by(dag, model, self.print);
         }
         let next = DagId(dag.0 + 1);
         (next < self.end).then_some(Listing { next, ..self })
@@ -116,8 +113,6 @@ enum Answer {
     Given,
     /// The DAGs are to be listed.
     List(Listing),
-    /// The run shall end.
-    ShutsDown,
 }
 
 /// Answers a line.
@@ -149,7 +144,7 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
             accept(line);
         }
         Command::Dags => return list(line, task_set, None, describe),
-        Command::Stats(name) => return list(line, task_set, name, count),
+        Command::Stats(name) => return list(line, task_set, name, Counts::print),
         Command::Trace(true)
             if !execution::with_journal(0, |journal| journal.has_room()).unwrap_or(false) =>
         {
@@ -175,17 +170,15 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
         }
         Command::Start(name) => change(line, task_set, name, Control::Resume, "releases jobs"),
         Command::Shutdown => {
-            println!("shutting down: nothing more is released; what is in flight goes on");
-            ids(task_set).for_each(|dag| execution::control(Control::Close(dag)));
+            stop::shut_down();
             accept(line);
-            return Answer::ShutsDown;
         }
     }
     Answer::Given
 }
 
 /// Begins a list of all DAGs, or of the one that is named.
-fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Dag, &Snapshot)) -> Answer {
+fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Counts, &Dag)) -> Answer {
     let chosen = match name.map(|name| find(task_set, name).ok_or(name)) {
         None => None,
         Some(Ok(dag)) => Some(dag),
@@ -202,11 +195,11 @@ fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Dag, &Sna
     })
 }
 
-fn describe(dag: &Dag, snapshot: &Snapshot) {
+fn describe(counts: &Counts, dag: &Dag) {
     println!(
         "`{}`: {}; {} subtasks, {}T = {} us, D = {} us",
         dag.name(),
-        word(snapshot.state),
+        counts.state,
         dag.subtasks().len(),
         if dag.is_sporadic() { "sporadic, " } else { "" },
         dag.period_ns() / 1000,
@@ -214,53 +207,14 @@ fn describe(dag: &Dag, snapshot: &Snapshot) {
     );
 }
 
-fn count(dag: &Dag, snapshot: &Snapshot) {
-    let Snapshot {
-        state,
-        statistics,
-        in_flight,
-        waiting,
-    } = snapshot;
-    println!(
-        "`{}`: {}; {} jobs released, {} completed, {in_flight} in flight, {waiting} waiting; \
-         {} deadlines missed, {} jobs skipped, {} aborted, {} lost to faults",
-        dag.name(),
-        word(*state),
-        statistics.released,
-        statistics.completed,
-        statistics.misses,
-        statistics.skips,
-        statistics.aborts,
-        statistics.failed
-    );
-}
-
-/// Prints the lines of a DAG with its counts.
-pub(crate) fn show_counts(dag: DagId, model: &Dag, snapshot: &Snapshot) {
-    show(dag, model, snapshot, count);
-}
-
-/// Prints the line of a DAG for people, of which `print` makes the rest, and its
-/// machine line.
-fn show(dag: DagId, model: &Dag, snapshot: &Snapshot, print: fn(&Dag, &Snapshot)) {
-    crate::print!("  dag {} ", dag.0);
-    print(model, snapshot);
-    let of = snapshot.statistics;
-    json::emit("dag_status", |line| {
-        line.number("dag", dag.0)
-            .text("name", model.name())
-            .text("state", word(snapshot.state))
-            .number("released", of.released)
-            .number("completed", of.completed)
-            .number("in_flight", snapshot.in_flight)
-            .number("waiting", snapshot.waiting)
-            .number("misses", of.misses)
-            .number("skips", of.skips)
-            .number("aborts", of.aborts)
-            .number("faults", of.faults)
-            .number("failed", of.failed)
-            .number("restarts", of.restarts);
-    });
+/// Returns what is told of a DAG that does so.
+pub(crate) const fn counts(snapshot: &Snapshot) -> Counts {
+    Counts {
+        state: word(snapshot.state),
+        statistics: snapshot.statistics,
+        in_flight: snapshot.in_flight,
+        waiting: snapshot.waiting,
+    }
 }
 
 const fn word(state: State) -> &'static str {

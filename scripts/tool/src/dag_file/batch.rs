@@ -128,6 +128,7 @@ mod tests {
     fn any_name_of_a_file_is_one_member_of_a_machine_line() {
         let serial = "{\"kind\":\"dag_run\",\"dag\":\"x\"}\n";
         let outcome = Outcome {
+            asked: None,
             ending: Ending::Signal,
             serial: serial.into(),
             transcript: Transcript::read(serial),

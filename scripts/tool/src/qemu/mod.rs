@@ -8,8 +8,7 @@
 //!
 //! Serial output goes to a file, for that loses nothing, whereas a slow pipe
 //! drops bytes. The guest ends its run by writing to the port of QEMU's
-//! `isa-debug-exit` device, see [`Ending`]. Input to the serial port, for the
-//! console, comes from us through a pipe.
+//! `isa-debug-exit` device, see [`Ending`]. Input to the serial port comes from us by a pipe.
 
 mod loader;
 mod machine;
@@ -137,6 +136,8 @@ pub struct Qemu {
     pub records: Option<PathBuf>,
     /// Hand what is written to [`Running::input`] to the guest's serial port.
     pub has_input: bool,
+    /// Have the guest end in order before it is killed, by ctrl-C at its first serial port.
+    pub stops: bool,
     /// What the second serial port is connected to; `None`: there is none.
     pub second: Option<Second>,
     /// Write the address of each instruction that is executed to [`Running::log`].
@@ -159,6 +160,7 @@ impl Default for Qemu {
             module: None,
             records: None,
             has_input: false,
+            stops: false,
             second: None,
             logs_instructions: false,
             debugger: None,
@@ -178,7 +180,7 @@ impl Qemu {
         arguments.extend(self.loading(image));
         // A comma would end the file's name in QEMU's syntax unless doubled.
         let serial = with_doubled_commas(serial);
-        if self.has_input {
+        if self.has_input || self.stops {
             // The log file gets every byte; QEMU's own output goes nowhere.
             let mut port = OsString::from("stdio,id=console,signal=off,logfile=");
             port.push(serial);
@@ -263,8 +265,8 @@ impl Qemu {
         }
         command.args(arguments);
         let is_live = self.second.as_ref().is_some_and(|second| second.is_live);
-        let has_input = self.has_input || is_live;
-        Running::start(command, serial, has_input, self.logs_instructions)
+        let (has_input, stops) = (self.has_input || self.stops || is_live, self.stops);
+        Running::start(command, serial, has_input, stops, self.logs_instructions)
     }
 }
 

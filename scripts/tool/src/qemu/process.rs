@@ -5,22 +5,29 @@
 //! `(v << 1) | 1`: 33 for success, 35 for failure, 37 for a refused command
 //! line. No other status is a guest's own word.
 //!
-//! A QEMU started here does not outlive the tool, see [`crate::child`];
-//! ctrl-C reaches it as a member of the terminal's process group.
+//! A QEMU started here does not outlive the tool, see [`crate::child`]. One whose guest ends in
+//! order at ctrl-C is no member of the terminal's process group, which ctrl-C would reach: we tell
+//! the guest, by its serial port.
 
 use std::ffi::OsString;
 use std::fmt;
 use std::fs::{self, File};
+use std::io::Write;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
+use crate::asking::Asked;
 use crate::child::{Child, Waited};
 use crate::protocol::Status;
 use crate::system;
 
 /// The most that a guest may print; beyond it something prints without end.
 const MOST_SERIAL_BYTES: u64 = 64 << 20;
+
+/// What ends a guest's run in order (`console=stop`): what ctrl-C is on a serial line.
+const CTRL_C: &[u8] = &[3];
 
 /// What QEMU says when KVM cannot run the guest any further. It then keeps the guest
 /// paused for ever, and none of its options makes it end.
@@ -47,6 +54,8 @@ pub enum Ending {
         /// How busy the host was then, in words.
         load: String,
     },
+    /// A person pressed ctrl-C again, and it was killed.
+    Killed,
     /// KVM could not run the guest any further, and it was killed.
     KvmFailed,
     /// It printed more than a run may and was killed.
@@ -72,6 +81,7 @@ impl fmt::Display for Ending {
                 "no end within {} s, QEMU was killed; {load}",
                 limit.as_secs_f64()
             ),
+            Ending::Killed => f.write_str("ctrl-C was pressed again, and QEMU was killed"),
             Ending::KvmFailed => {
                 f.write_str("KVM could not run the guest any further, QEMU was killed")
             }
@@ -90,6 +100,9 @@ pub struct Running {
     child: Child,
     serial: PathBuf,
     complaints: PathBuf,
+    /// The way by which the guest is asked to end, if it listens.
+    stop: Option<File>,
+    asked: Option<Asked>,
 }
 
 impl Running {
@@ -98,6 +111,7 @@ impl Running {
         mut command: Command,
         serial: &Path,
         has_input: bool,
+        stops: bool,
         has_log: bool,
     ) -> Result<Running, String> {
         let file_error = |path: &Path| {
@@ -122,12 +136,17 @@ impl Running {
                 Stdio::null()
             })
             .stderr(errors);
+        if stops {
+            command.process_group(0);
+        }
         let child = Child::start(&mut command)
             .map_err(|error| format!("cannot start QEMU: {error}; is it for this machine?"))?;
         Ok(Running {
+            stop: child.second_input().filter(|_| stops),
             child,
             serial: serial.to_path_buf(),
             complaints,
+            asked: None,
         })
     }
 
@@ -136,22 +155,39 @@ impl Running {
     pub fn wait(&mut self, limit: Duration, mut look: impl FnMut()) -> Ending {
         let (serial, complaints) = (&self.serial, &self.complaints);
         let mut kvm_failed = false;
-        let waited = self.child.wait(limit, || {
+        let mut watch = || {
             look();
             let said = fs::read(complaints).unwrap_or_default();
             let said = String::from_utf8_lossy(&said);
             kvm_failed = KVM_FAILURES.iter().any(|failure| said.contains(failure));
-            !kvm_failed && fs::metadata(serial).is_ok_and(|file| file.len() <= MOST_SERIAL_BYTES)
-        });
+            let bytes = fs::metadata(serial).ok()?.len();
+            (!kvm_failed && bytes <= MOST_SERIAL_BYTES).then_some(bytes)
+        };
+        let (waited, asked) = match &mut self.stop {
+            None => (self.child.wait(limit, || watch().is_some()), None),
+            Some(stop) => {
+                // One that has just ended hears nothing any more.
+                let ask = |_| drop(stop.write_all(CTRL_C));
+                self.child.wait_and_ask(limit, ask, watch)
+            }
+        };
+        self.asked = asked;
         match waited {
             Waited::Ended(status) => ending_of(status),
             Waited::TimedOut => Ending::TimedOut {
                 limit,
                 load: system::host_load(),
             },
+            Waited::Killed => Ending::Killed,
             Waited::GivenUp if kvm_failed => Ending::KvmFailed,
             Waited::GivenUp => Ending::TooMuchOutput,
         }
+    }
+
+    /// Returns why the guest was asked to end, if it was.
+    #[must_use]
+    pub fn asked(&self) -> Option<Asked> {
+        self.asked
     }
 
     /// Takes the way to the guest's serial port, if it has one and it was not taken.

@@ -99,6 +99,7 @@ pub fn debug(words: &[OsString]) -> ExitCode {
         Ok(never) => match never {},
         Err(Refusal::Usage(lines)) => DEBUG.refuse(&lines),
         Err(Refusal::Failure(line)) => DEBUG.fail(&line),
+        Err(Refusal::ByPerson) => ExitCode::from(super::BY_PERSON),
     }
 }
 

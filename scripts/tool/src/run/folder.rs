@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use super::{RUN, Refusal, boot_app, conclude, prepare, prove};
+use super::{RUN, Refusal, boot_app, conclude, go_on, prepare, prove};
 use crate::dag_file::batch;
 use crate::files;
 use crate::options::Parsed;
@@ -51,6 +51,7 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
                 refused += 1;
                 continue;
             }
+            Err(Refusal::ByPerson) => return Err(Refusal::ByPerson),
             Err(Refusal::Failure(line)) => {
                 RUN.complain(&format!("{place}: {line}"));
                 failed += 1;
@@ -66,6 +67,7 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
             }
         }
         conclude(&booted, dags.as_ref(), &one);
+        go_on(&booted)?;
         if shows_lines {
             batch::lines(file, &booted.outcome).for_each(|line| println!("{line}"));
         } else {

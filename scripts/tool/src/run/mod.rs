@@ -6,9 +6,10 @@
 //! before the build leaves nothing behind.
 //!
 //! Exit codes: 0 all is well, 1 a failure, 2 a refused command line (ours or
-//! the guest's).
+//! the guest's), 130 a run that a person has ended.
 
 mod boot;
+mod conclusion;
 mod debug;
 mod folder;
 mod gdb;
@@ -41,8 +42,8 @@ use crate::iso;
 use crate::options::Parsed;
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
-use crate::protocol::{Status, Transcript};
-use crate::qemu::{Ending, Mode, Qemu};
+use crate::qemu::{Mode, Qemu};
+use conclusion::{BY_PERSON, conclude, go_on};
 use handed::Handed;
 use log::Log;
 use recording::Recorded;
@@ -58,6 +59,8 @@ enum Refusal {
     Usage(String),
     /// Something else is: exit code 1.
     Failure(String),
+    /// A person has ended a run before others that were to follow: exit code [`BY_PERSON`].
+    ByPerson,
 }
 
 /// Runs the subcommand with the words after its name.
@@ -71,6 +74,7 @@ pub fn run(words: &[OsString]) -> ExitCode {
         Ok(code) => code,
         Err(Refusal::Usage(lines)) => RUN.refuse(&lines),
         Err(Refusal::Failure(line)) => RUN.fail(&line),
+        Err(Refusal::ByPerson) => ExitCode::from(BY_PERSON),
     }
 }
 
@@ -293,6 +297,7 @@ fn describe(
         module: None,
         records: None,
         has_input: options.is_given("console"),
+        stops: seeing::can_stop(options),
         second: wire::second(options),
         logs_instructions: false,
         debugger: options.is_given("gdb").then(|| "tcp::1234".into()),
@@ -328,67 +333,4 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
         screen.say("waiting for a debugger: `gdb IMAGE -ex 'target remote :1234'`");
     }
     screen.say("");
-}
-
-fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitCode {
-    let Booted {
-        outcome,
-        log,
-        screen,
-    } = booted;
-    let Err(fault) = outcome.judge() else {
-        screen.say(&format!(
-            "\nwell ended after {:.1} s",
-            outcome.elapsed.as_secs_f64()
-        ));
-        log.discard();
-        return ExitCode::SUCCESS;
-    };
-    if prove::refused(options, &fault.reason) {
-        log.restore();
-        return ExitCode::from(2);
-    }
-    if fault.status == Status::Usage {
-        let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
-        let who = if on_linux::is_asked_for(options) {
-            "app"
-        } else {
-            "guest"
-        };
-        let lines = of_file
-            .unwrap_or_else(|| format!("the {who} refused its command line: {}", fault.reason));
-        let draws_nothing = options.is_given("seeds") && fault.reason.starts_with("`seed`");
-        let remedy = match draws_nothing {
-            true => "; this app draws nothing by a seed: leave `--seeds` out",
-            false => "",
-        };
-        log.restore();
-        return RUN.refuse(&(lines + remedy));
-    }
-    match outcome.transcript.verdict() {
-        // The screen has shown all that it said.
-        Ok(_) => eprintln!("the serial log is {}", outcome.log.display()),
-        Err(_) => eprint!("{}", outcome.tail()),
-    }
-    let remedy = match outcome.ending {
-        Ending::TimedOut { .. } => format!(
-            "{}; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
-             if it has a WCET or a budget",
-            stalled(&outcome.transcript)
-        ),
-        _ => String::new(),
-    };
-    RUN.fail(&format!("failed: {}{remedy}", fault.reason))
-}
-
-/// Names the subtasks that the guest has found to keep their cores, if it has.
-fn stalled(transcript: &Transcript) -> String {
-    let named = transcript.of_kind("stalled").filter_map(|line| {
-        let (subtask, dag) = (line.text_at("subtask_name")?, line.text_at("dag_name")?);
-        let ms = line.number_at("still_ns")? / 1_000_000;
-        Some(format!(
-            "; subtask `{subtask}` of dag `{dag}` kept its core for more than {ms} ms of its time"
-        ))
-    });
-    named.collect()
 }

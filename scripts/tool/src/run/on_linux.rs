@@ -2,7 +2,6 @@
 //! a guest is. With `--on debian` it is a program of Debian's Linux, in QEMU.
 
 use std::ffi::OsString;
-use std::process::Stdio;
 use std::thread;
 use std::time::Duration;
 
@@ -137,17 +136,26 @@ pub(super) fn run_app(
         }
     };
     let limit = limit(options, dags);
-    let stdin = match wire::is_live(options) {
-        true => Stdio::inherit(),
-        false => Stdio::null(),
+    let order = program::Order {
+        program: &image.path,
+        words: &words,
+        is_live: wire::is_live(options),
+        stops: true,
+        log: &log.path,
+        limit,
     };
     let outcome = match &guest {
-        None => program::run(&image.path, &words, stdin, &log.path, limit, &mut show),
+        None => program::run(&order, &mut show),
         Some(guest) => {
-            let (limit, stdin) = (limit + START, Stdio::null());
-            let (qemu, words) = (&guest.program, &guest.words);
-            let code = |_: &_| guest.code();
-            program::run_for(qemu, words, stdin, &log.path, limit, &mut show, code)
+            let order = program::Order {
+                program: &guest.program,
+                words: &guest.words,
+                is_live: false,
+                stops: false,
+                limit: limit + START,
+                ..order
+            };
+            program::run_for(&order, &mut show, |_| guest.code())
         }
     };
     screen.end();

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use super::{Booted, RUN, Refusal, boot_app, check_files, conclude, prepare};
+use super::{Booted, RUN, Refusal, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::states_overheads;
 use crate::files::{self, Temporary};
 use crate::options::Parsed;
@@ -82,6 +82,7 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
                 RUN.complain(&lines);
                 refused += 1;
             }
+            Err(Refusal::ByPerson) => return Err(Refusal::ByPerson),
             Err(Refusal::Failure(line)) => {
                 RUN.complain(&format!("{}: {line}", files::place(file)));
                 failed += 1;
@@ -125,6 +126,7 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let booted = boot_app(&proving, dags.as_mut(), true)?;
     let is_well = booted.outcome.judge().is_ok();
     let code = conclude(&booted, dags.as_ref(), &proving);
+    go_on(&booted)?;
     let rows = match compare(&booted).map_err(Refusal::Failure) {
         Ok(rows) => rows,
         // There are worse news.
@@ -194,6 +196,7 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         let booted = boot_app(&one, dags.as_mut(), true)?;
         let is_well = booted.outcome.judge().is_ok();
         conclude(&booted, dags.as_ref(), &one);
+        go_on(&booted)?;
         if !is_well {
             return Ok(None);
         }

@@ -12,6 +12,7 @@ use std::process::ChildStdin;
 use std::thread;
 use std::time::Duration;
 
+use super::wire;
 use crate::dot;
 use crate::files;
 use crate::options::Parsed;
@@ -24,11 +25,21 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     let mut words = Vec::new();
     if options.is_given("console") {
         words.push("console=on".into());
-    } else if is_watched(options) {
-        words.push("status=1".into());
+    } else {
+        words.extend(can_stop(options).then(|| "console=stop".into()));
+        words.extend(is_watched(options).then(|| "status=1".into()));
     }
     words.extend(graph_word(options));
     words
+}
+
+/// Reports whether the guest can be asked to end: not where standard input goes to its other port,
+/// since QEMU has one such way in.
+pub(super) fn can_stop(options: &Parsed) -> bool {
+    let says_otherwise = options
+        .text("append")
+        .is_some_and(|words| words.contains("console="));
+    !wire::is_live(options) && !says_otherwise
 }
 
 /// Returns the word by which commits print their DAGs, if the options ask for what needs them.
@@ -86,13 +97,14 @@ pub(super) fn write_witness(options: &Parsed, outcome: &Outcome) -> Result<Optio
 /// it is set up.
 pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
     let log = log.to_path_buf();
+    let is_read = options.is_given("console") || wire::is_live(options);
     let farewell = match options.number("jobs") {
         _ if !options.is_given("console") => "",
         Some(0) => "\nshutdown\n",
         _ => "\n",
     };
     move |input| {
-        if let Some(input) = input {
+        if let Some(input) = input.filter(|_| is_read) {
             hand_on(input, log, farewell);
         }
     }

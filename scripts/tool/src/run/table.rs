@@ -211,7 +211,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         Opt::new(
             "timeout",
             Takes::number(1..=86_400),
-            "Seconds of wall time until the guest is killed; 120 and one a job.",
+            "Seconds of wall time until the run is ended, in order if it can be; 120 and one a job.",
         ),
         Opt::new(
             "serial",
@@ -328,6 +328,10 @@ modes:
 While it runs, progress stands on standard error. Machine lines are JSON, one
 object a line: `./scripts/run | grep '^{'`; docs/serial-protocol.md explains them.
 
-exit codes: 0 all is well; 1 a failure; 2 a refused command line
+Ctrl-C ends a run in order, with counts, recording and trace: nothing more is released, and
+what is in flight goes on. So does the timeout. Ctrl-C again ends it at once, as it does at any
+time with --on debian, and on the machine with --input -.
+
+exit codes: 0 all is well; 1 a failure; 2 a refused command line; 130 ended by ctrl-C
 ",
 };

@@ -143,7 +143,7 @@ fn run_and_read(plan: &Plan, name: &str, mut command: Command, tally: &mut Tally
         }
         Waited::Ended(_) if report.results == 0 => Some("printed no `test result:` line".into()),
         Waited::Ended(_) => None,
-        Waited::TimedOut | Waited::GivenUp => Some(format!(
+        Waited::TimedOut | Waited::GivenUp | Waited::Killed => Some(format!(
             "did not end within {} s and was killed; {}",
             LIMIT.as_secs(),
             system::host_load()

@@ -25,7 +25,7 @@ mod times;
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
-use std::process::{ExitCode, Stdio};
+use std::process::ExitCode;
 use std::time::Duration;
 
 use condition::Condition;
@@ -163,7 +163,15 @@ fn boot_once(
         true => {
             let words = plan.linux_words(condition);
             let words: Vec<OsString> = words.split(' ').map(OsString::from).collect();
-            program::run(image, &words, Stdio::null(), &log, limit, &mut follow)?
+            let order = program::Order {
+                program: image,
+                words: &words,
+                is_live: false,
+                stops: false,
+                log: &log,
+                limit,
+            };
+            program::run(&order, &mut follow)?
         }
         false => boot(&plan.qemu(condition), image, &log, limit, follow)?,
     };

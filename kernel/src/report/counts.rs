@@ -1,0 +1,66 @@
+//! How a DAG does, or did in a run: a line for people, and a machine line of kind `dag_status`.
+
+use sched_dag::{Dag, DagId, DagStatistics};
+
+use executive::text::json;
+
+/// What is told of a DAG.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Counts {
+    /// What it does now, in a word.
+    pub(crate) state: &'static str,
+    /// What has become of its jobs.
+    pub(crate) statistics: DagStatistics,
+    /// Jobs in flight.
+    pub(crate) in_flight: u64,
+    /// Due jobs that wait for an older one to end.
+    pub(crate) waiting: u64,
+}
+
+impl Counts {
+    /// Prints the lines of a DAG with its counts.
+    pub(crate) fn show(&self, dag: DagId, model: &Dag) {
+        self.show_by(dag, model, Self::print);
+    }
+
+    /// Prints the line of a DAG for people, of which `print` makes the rest, and its machine line.
+    pub(crate) fn show_by(&self, dag: DagId, model: &Dag, print: fn(&Self, &Dag)) {
+        crate::print!("  dag {} ", dag.0);
+        print(self, model);
+        let of = self.statistics;
+        json::emit("dag_status", |line| {
+            line.number("dag", dag.0)
+                .text("name", model.name())
+                .text("state", self.state)
+                .number("released", of.released)
+                .number("completed", of.completed)
+                .number("in_flight", self.in_flight)
+                .number("waiting", self.waiting)
+                .number("misses", of.misses)
+                .number("skips", of.skips)
+                .number("aborts", of.aborts)
+                .number("faults", of.faults)
+                .number("failed", of.failed)
+                .number("restarts", of.restarts);
+        });
+    }
+
+    /// Prints the counts.
+    pub(crate) fn print(&self, model: &Dag) {
+        let of = self.statistics;
+        crate::println!(
+            "`{}`: {}; {} jobs released, {} completed, {} in flight, {} waiting; {} deadlines \
+             missed, {} jobs skipped, {} aborted, {} lost to faults",
+            model.name(),
+            self.state,
+            of.released,
+            of.completed,
+            self.in_flight,
+            self.waiting,
+            of.misses,
+            of.skips,
+            of.aborts,
+            of.failed
+        );
+    }
+}

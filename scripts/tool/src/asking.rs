@@ -1,0 +1,131 @@
+//! When a child that can end in order is asked to, and when it is killed all the same.
+//!
+//! It is asked at its limit, and when a *signal* asks us to end, such as ctrl-C. After its limit it
+//! has for as long as it prints, and 10 s; the next signal kills it at once. Before it has
+//! printed anything it does not listen, and is not asked.
+
+use std::time::Duration;
+
+/// For how long a child that was asked at its limit may print nothing.
+const GRACE: Duration = Duration::from_secs(10);
+
+/// Why a child was asked to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// A person has pressed ctrl-C, or this program was asked to end.
+    ByPerson,
+    /// This limit was over.
+    ByLimit(Duration),
+}
+
+/// What to do after a look at the child.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// To look again.
+    Wait,
+    /// To ask it.
+    Ask(Asked),
+    /// To kill it, as a person wants.
+    Kill,
+    /// To kill it, for its time is over.
+    TimeOut,
+}
+
+/// What was seen so far.
+#[derive(Debug)]
+pub(crate) struct Asking {
+    limit: Duration,
+    /// Why, and how many signals there had been then.
+    why: Option<(Asked, u32)>,
+    is_asked: bool,
+    printed_bytes: u64,
+    quiet_since: Duration,
+}
+
+impl Asking {
+    /// Begins at the child's start.
+    pub(crate) const fn new(limit: Duration) -> Asking {
+        Asking {
+            limit,
+            why: None,
+            is_asked: false,
+            printed_bytes: 0,
+            quiet_since: Duration::ZERO,
+        }
+    }
+
+    /// Returns why the child was asked, if it was.
+    pub(crate) fn why(&self) -> Option<Asked> {
+        self.why.map(|(why, _)| why)
+    }
+
+    /// Takes a look: so much time, so many signals and so many bytes since the start.
+    pub(crate) fn step(&mut self, elapsed: Duration, signals: u32, printed_bytes: u64) -> Step {
+        let is_over = elapsed >= self.limit;
+        if printed_bytes > self.printed_bytes {
+            self.printed_bytes = printed_bytes;
+            self.quiet_since = elapsed;
+        }
+        match self.why {
+            Some((_, before)) if signals > before => return Step::Kill,
+            None if signals > 0 => self.why = Some((Asked::ByPerson, signals)),
+            None if is_over => self.why = Some((Asked::ByLimit(self.limit), signals)),
+            _ => {}
+        }
+        match self.why {
+            Some((why, _)) if !self.is_asked && printed_bytes > 0 => {
+                self.is_asked = true;
+                self.quiet_since = elapsed;
+                Step::Ask(why)
+            }
+            _ if is_over && elapsed.saturating_sub(self.quiet_since) >= GRACE => Step::TimeOut,
+            _ => Step::Wait,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Asked, Asking, Step};
+    use std::time::Duration;
+
+    const LIMIT: Duration = Duration::from_secs(60);
+
+    /// Takes these looks: seconds, signals, bytes. Returns all steps but those that wait.
+    fn steps(looks: &[(u64, u32, u64)]) -> Vec<(u64, Step)> {
+        let mut asking = Asking::new(LIMIT);
+        let looks = looks.iter().map(|&(seconds, signals, bytes)| {
+            let elapsed = Duration::from_secs(seconds);
+            (seconds, asking.step(elapsed, signals, bytes))
+        });
+        looks.filter(|(_, step)| *step != Step::Wait).collect()
+    }
+
+    #[test]
+    fn the_first_signal_asks_and_the_second_kills() {
+        let asks = Step::Ask(Asked::ByPerson);
+        let looks = [(1, 0, 9), (2, 1, 9), (3, 1, 9), (4, 2, 9)];
+        assert_eq!(steps(&looks), [(2, asks), (4, Step::Kill)]);
+        // Two at once are one, and nobody is asked who cannot hear.
+        assert_eq!(steps(&[(1, 2, 0), (2, 2, 0), (3, 2, 1)]), [(3, asks)]);
+        assert_eq!(steps(&[(1, 1, 0), (2, 2, 0)]), [(2, Step::Kill)]);
+    }
+
+    #[test]
+    fn at_the_limit_it_is_asked_and_has_as_long_as_it_prints() {
+        let asks = Step::Ask(Asked::ByLimit(LIMIT));
+        let looks = [
+            (59, 0, 9),
+            (60, 0, 9),
+            (69, 0, 10),
+            (78, 0, 10),
+            (79, 0, 10),
+        ];
+        assert_eq!(steps(&looks), [(60, asks), (79, Step::TimeOut)]);
+        assert_eq!(
+            steps(&[(60, 0, 9), (61, 1, 9)]),
+            [(60, asks), (61, Step::Kill)]
+        );
+        assert_eq!(steps(&[(60, 0, 0)]), [(60, Step::TimeOut)]);
+    }
+}
