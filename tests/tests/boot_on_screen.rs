@@ -84,8 +84,8 @@ fn ask(monitor: &Path, command: &str) -> String {
 }
 
 /// Looks at the screen until a verdict is there and all cores halt, ends QEMU and returns the
-/// rows.
-fn watch(monitor: &Path, cores: u64) -> Vec<String> {
+/// rows, and how pages are mapped.
+fn watch(monitor: &Path, cores: u64) -> (Vec<String>, String) {
     let picture = monitor.with_extension("ppm");
     let begun = Instant::now();
     let mut rows = Vec::new();
@@ -99,31 +99,34 @@ fn watch(monitor: &Path, cores: u64) -> Vec<String> {
             break;
         }
     }
+    let pages = ask(monitor, "info tlb");
     ask(monitor, "quit");
     let _ = fs::remove_file(&picture);
-    rows
+    (rows, pages)
 }
 
 /// Boots what the guest describes, with another word in place of one of ours, and returns the
-/// rows of the screen.
-fn rows_of(guest: &Guest, cores: u64, other: &str, word: &str) -> Vec<String> {
+/// rows of the screen, and how pages are mapped.
+fn rows_of(guest: &Guest, cores: u64, other: &str, word: &str) -> (Vec<String>, String) {
     let monitor = system::new_log("monitor").expect("a folder for logs");
     let program = qemu_with_a_screen(&monitor, other, word);
     let guest = guest.clone().cores(cores).program(&program);
     let watcher = thread::spawn(move || watch(&monitor, cores));
     let outcome = guest.boot();
-    let rows = watcher.join().expect("it does not panic");
+    let (rows, pages) = watcher.join().expect("it does not panic");
     let _ = fs::remove_file(&program);
     assert_eq!(outcome.ending, Ending::Status(0), "{}", rows.join("\n"));
     assert_eq!(outcome.serial, "", "there is no serial port");
-    rows
+    (rows, pages)
 }
 
 /// Boots the demo and reads its table on the screen.
 fn shows(loader: Loader) {
     let guest = Guest::new("fork-join").from_stick(loader);
     let guest = guest.word("jobs=3").word("subtasks=2");
-    let rows = rows_of(&guest, 2, "none", "none");
+    let (rows, pages) = rows_of(&guest, 2, "none", "none");
+    // Written through (T), and not uncached (C) as a device's: so the kernel marks the screen's.
+    assert!(pages.contains("-T-W"), "{pages}");
     let all = rows.join("\n");
     let at = |text: &str| rows.iter().position(|row| row.starts_with(text));
     let head = at("N = 2: 3 jobs, 3 joins, 0 semantic violations").expect(&all);
@@ -157,7 +160,7 @@ fn of_grub_under_a_bios() {
 
 /// Boots what cannot run, and reads on the screen why not.
 fn refuses(guest: &Guest, cores: u64, other: &str, word: &str, why: &str) {
-    let rows = rows_of(guest, cores, other, word);
+    let (rows, _) = rows_of(guest, cores, other, word);
     let all = rows.join("\n");
     let says_why = |row: &String| row.trim_start().starts_with(why);
     assert!(rows.iter().any(says_why), "{all}");

@@ -128,6 +128,12 @@ enable_long_mode:
     or eax, 1 << 8                              # long mode
     or eax, ebx
     wrmsr
+    # Of the page attributes (SDM volume 3, 12.12) entry 1, written through at reset, combines writes.
+    # All processors have the same, and no table in use has it before the kernel's.
+    mov ecx, 0x277                              # PAT
+    mov eax, 0x00070106
+    mov edx, 0x00070406
+    wrmsr
     # Paging, write protection, NE, ET, MP, protected mode; no emulation, no trap.
     mov eax, (1 << 31) | (1 << 16) | (1 << 5) | (1 << 4) | (1 << 1) | (1 << 0)
     mov cr0, eax

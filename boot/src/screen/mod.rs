@@ -1,6 +1,9 @@
 //! Text on the screen that a loader has left: letters (`font`), where they stand (`grid`), and
 //! how they are drawn.
 //!
+//! A screen's memory is slow to write, and the less so the fewer and the longer the stores are,
+//! since a processor may gather them: the kernel maps it so. After a letter it sends what it has.
+//!
 //! Letters are white on black, so that the order of the colours does not matter, and as large
 //! as a hundred fit into a row.
 
@@ -16,6 +19,8 @@ use grid::{MOST_COLUMNS, MOST_ROWS};
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
     buffer: Framebuffer,
+    /// Whether each pixel is a word of 32 bits.
+    has_words: bool,
     /// How many pixels, across and down, a pixel of a letter has.
     scale: usize,
     /// How many letters a row has.
@@ -40,8 +45,12 @@ impl Screen {
         const WANTED_COLUMNS: usize = 100;
         let (width, height) = (buffer.width as usize, buffer.height as usize);
         let scale = (width / (WANTED_COLUMNS * CELL_WIDTH)).max(1);
+        let is_word = |bytes: u64| bytes.is_multiple_of(4);
         Self {
             buffer,
+            has_words: buffer.pixel_bytes == 4
+                && is_word(buffer.start)
+                && is_word(buffer.pitch.into()),
             scale,
             columns: (width / (scale * CELL_WIDTH)).min(MOST_COLUMNS),
             rows: (height / (scale * CELL_HEIGHT)).min(MOST_ROWS),
@@ -60,30 +69,75 @@ impl Screen {
     /// Draws a letter, 0 as a blank, in the cell of this number.
     pub fn draw(&self, cell: usize, letter: u8) {
         let (row, column) = (cell / self.columns, cell % self.columns);
+        let left =
+            self.buffer.start + (column * CELL_WIDTH * self.scale * self.pixel_bytes()) as u64;
+        let first = row * CELL_HEIGHT * self.scale;
         for y in 0..CELL_HEIGHT * self.scale {
-            for x in 0..CELL_WIDTH * self.scale {
-                // The upper gap is one pixel of the letter's.
-                let (across, down) = (x / self.scale, (y / self.scale).wrapping_sub(1));
+            // The upper gap is one pixel of the letter's.
+            let down = (y / self.scale).wrapping_sub(1);
+            let mut at = left + (first + y) as u64 * u64::from(self.buffer.pitch);
+            for across in 0..CELL_WIDTH {
                 let is_letter = letter != 0 && across < font::WIDTH && down < font::HEIGHT;
                 let is_lit = is_letter && font::is_lit(letter, across, down);
-                let x = column * CELL_WIDTH * self.scale + x;
-                let y = row * CELL_HEIGHT * self.scale + y;
-                self.set(x, y, is_lit);
+                for _ in 0..self.scale {
+                    self.set(at, is_lit);
+                    at += self.pixel_bytes() as u64;
+                }
             }
         }
+        // SAFETY: the fence only orders; every 64-bit processor has it.
+        unsafe { core::arch::x86_64::_mm_sfence() };
     }
 
-    fn set(&self, x: usize, y: usize, is_lit: bool) {
-        let Framebuffer {
-            start,
-            pitch,
-            pixel_bytes,
-            ..
-        } = self.buffer;
-        let at = start + y as u64 * u64::from(pitch) + x as u64 * u64::from(pixel_bytes);
-        for byte in at..at + u64::from(pixel_bytes) {
+    const fn pixel_bytes(&self) -> usize {
+        self.buffer.pixel_bytes as usize
+    }
+
+    /// Sets the pixel at an address, by one store if it has a word.
+    fn set(&self, at: u64, is_lit: bool) {
+        if self.has_words {
+            let colour = if is_lit { u32::MAX } else { 0 };
+            // SAFETY: the pixel lies on the screen (conditions 1 and 2 of `new`), at a word.
+            return unsafe { (at as *mut u32).write_volatile(colour) };
+        }
+        for byte in at..at + self.pixel_bytes() as u64 {
             // SAFETY: the pixel lies on the screen (conditions 1 and 2 of `new`).
             unsafe { (byte as *mut u8).write_volatile(if is_lit { u8::MAX } else { 0 }) };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_letter_is_drawn_in_its_cell_whatever_a_pixel_takes() {
+        const HEIGHT: usize = 2 * CELL_HEIGHT;
+        for (pixel_bytes, pitch) in [(2, 26), (3, 39), (4, 52), (4, 54)] {
+            let mut bytes = vec![0x55; pitch * HEIGHT];
+            let buffer = Framebuffer {
+                start: bytes.as_mut_ptr() as u64,
+                pitch: u32::try_from(pitch).unwrap(),
+                width: 12,
+                height: 20,
+                pixel_bytes,
+            };
+            // SAFETY: the bytes are the test's, as many as rows need, and those fit the pitch.
+            let screen = unsafe { Screen::new(buffer) };
+            assert_eq!((screen.columns, screen.rows), (2, 2));
+            screen.draw(3, b'g');
+            for (place, byte) in bytes.iter().enumerate() {
+                let (x, y) = (place % pitch / usize::from(pixel_bytes), place / pitch);
+                let expected = match (x.checked_sub(CELL_WIDTH), y.checked_sub(CELL_HEIGHT)) {
+                    (Some(x @ 0..font::WIDTH), Some(y @ 1..=font::HEIGHT)) => {
+                        u8::MAX * u8::from(font::is_lit(b'g', x, y - 1))
+                    }
+                    (Some(0..CELL_WIDTH), Some(_)) => 0,
+                    _ => 0x55,
+                };
+                assert_eq!(*byte, expected, "{pixel_bytes} {pitch}: {x}, {y}");
+            }
         }
     }
 }

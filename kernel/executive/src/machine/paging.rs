@@ -20,18 +20,23 @@ pub(crate) enum Access {
     Code,
     /// Read and write, uncached: a device's registers.
     Device,
+    /// Read and write, uncached, where stores may be gathered: a screen.
+    Screen,
 }
 
 impl Access {
     const fn bits(self) -> u64 {
         const WRITABLE: u64 = 1 << 1;
         const UNCACHED: u64 = 1 << 3 | 1 << 4;
+        /// Entry 1 of the page attributes, as `entry.s` of `boot-entry` sets it.
+        const COMBINING: u64 = 1 << 3;
         const NO_EXECUTE: u64 = 1 << 63;
         match self {
             Self::Constant => NO_EXECUTE,
             Self::Data => WRITABLE | NO_EXECUTE,
             Self::Code => 0,
             Self::Device => WRITABLE | UNCACHED | NO_EXECUTE,
+            Self::Screen => WRITABLE | COMBINING | NO_EXECUTE,
         }
     }
 }

@@ -74,7 +74,7 @@ pub unsafe fn initialize(
     let mut table = unsafe { PageTable::new(&mut new_frame) }?;
     map_all(&mut table, map, pages_of(module), &mut new_frame)?;
     map_devices(&mut table, map, devices, &mut new_frame)?;
-    table.map(screen.clone(), screen.start, Access::Device, &mut new_frame)?;
+    table.map(screen.clone(), screen.start, Access::Screen, &mut new_frame)?;
     let root_table = table.root();
     // SAFETY: image, data (so the boot stack) and all usable memory are mapped
     // to where they were.
