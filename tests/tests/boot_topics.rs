@@ -50,7 +50,7 @@ fn values_are_echoed_and_what_is_left_out_is_counted() {
     for line in [
         "topic `steps` is not recorded; let the app name it by `Dag::record`",
         "there is no topic `gian`; did you mean `gain`?",
-        "there is no topic `velocity`; there are `gain` `steps`",
+        "there is no topic `velocity`; there are `both` `gain` `steps`",
         "`echo` wants the name of a topic, or `off`",
     ] {
         let mut found = outcome.serial.lines();

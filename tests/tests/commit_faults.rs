@@ -230,7 +230,8 @@ fn every_kind_of_fault_has_an_entry() {
         codes.extend(found.into_iter().map(String::from));
     }
     // Others are named where they are found.
-    let others = sources(&["fass/src/draft/modes.rs", "fass/src/commit/inputs.rs"]);
+    let others = sources(&["fass/src/draft/modes.rs", "fass/src/draft/recorded.rs"])
+        + &sources(&["fass/src/commit/inputs.rs"]);
     let found = others.split("add(\"").skip(1);
     codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
     assert_eq!(documented, codes);

@@ -6,6 +6,7 @@ use alloc::rc::Rc;
 use recording::Recordable;
 
 use super::dag::Dag;
+use crate::draft::recorded::check;
 use crate::edge::{self, Crossing, Host, Wish};
 use crate::platform::{expect_installed, record};
 use crate::run::crossing::Edge;
@@ -32,8 +33,9 @@ fn begin(wish: Wish) -> Box<dyn Crossing> {
 impl Dag {
     /// Records the values of a topic, where the platform records.
     ///
-    /// What a source writes is what a replay takes in place of calling it; so of a DAG that shall
-    /// be replayed all topics of its sources are recorded. What another subtask writes is what a
+    /// What a source writes is what a replay takes in place of calling it. So if one topic of a
+    /// source is recorded, the commit refuses the DAG unless all topics of its sources are, and
+    /// all that its other subtasks sample. What another subtask writes is what a
     /// replay compares. What subtasks sample of the topic is recorded, too, and given to them in
     /// a replay. A topic that is recorded counts as read. The type must be the
     /// writer's, which the commit checks; a [`Unique`](crate::Unique) cannot be recorded.
@@ -80,6 +82,7 @@ impl Dag {
         let mut draft = self.open();
         draft.latest.push(Rc::<RecordedTopic<T>>::clone(&recorded));
         draft.recorded.push(recorded);
+        draft.check_recorded = Some(check);
         self
     }
 }

@@ -10,6 +10,7 @@
 pub(crate) mod attributes;
 pub(crate) mod flaw;
 pub(crate) mod modes;
+pub(crate) mod recorded;
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -76,6 +77,8 @@ pub(crate) struct Draft {
     pub(crate) modes: Vec<modes::Modes>,
     /// What finds their faults, if there are any.
     pub(crate) check_modes: Option<modes::Check>,
+    /// What finds the faults of topics that are recorded, if there are any.
+    pub(crate) check_recorded: Option<modes::Check>,
     /// What makes that which serves requests, if it states something of that kind.
     pub(crate) lifecycle: Option<MakeLifecycle>,
     /// What completions of subtasks do beyond the DAG, latest values apart.

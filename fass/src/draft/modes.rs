@@ -26,7 +26,7 @@ pub(crate) type Modes = Rc<RefCell<Vec<ModeDraft>>>;
 /// All drafts of a commit.
 pub(crate) type Drafts = [Rc<RefCell<Draft>>];
 
-/// Reports all that is wrong with the modes of a commit.
+/// Reports all that is wrong with the modes of a commit, or with what it records.
 pub(crate) type Check = fn(&Drafts, &mut dyn FnMut(WordedFault));
 
 /// Returns the DAGs of each mode of a commit.
@@ -127,7 +127,7 @@ fn handler(drafts: &Drafts, draft: &Draft) -> Option<DagId> {
     (0..).map(DagId).nth(drafts.iter().position(is_it)?)
 }
 
-fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
+pub(super) fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
     let mut name = drafts[dag.index()].borrow().spec.name.clone();
     if name.is_empty() {
         name = dag.0.to_string();

@@ -16,9 +16,11 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let (dag, period) = (create_dag(), Duration::from_millis(5));
     dag.name("loop").record::<f64>("gain");
     let named = SubtaskAttributes::named;
-    let read = |(gain, steps): (f64, u32)| (gain, steps);
+    let read = |both: (f64, u32)| (both,);
     dag.using((gain.reading(), steps.reading()))
-        .register_periodic_subtask(read, vec!["gain", "steps"], period, named("read"));
+        .register_periodic_subtask(read, vec!["both"], period, named("read"));
+    let part = |(both,): ((f64, u32),)| both;
+    dag.register_subtask(part, vec!["both"], vec!["gain", "steps"], named("part"));
     let mut last = None;
     let show = move |now: (f64, u32)| {
         if last.replace(now) != Some(now) {

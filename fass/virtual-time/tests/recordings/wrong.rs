@@ -1,6 +1,6 @@
 //! Recordings that are of something else, have lost something, or say what cannot be.
 
-use fass::{CommitError, Dag, OverrunPolicy, create_dag, finish_create_dags};
+use fass::{CommitError, Dag, Fault, OverrunPolicy, Sample, create_dag, finish_create_dags};
 use recording::{Entry, Recording, Role, What, Writer};
 use virtual_time::VirtualTime;
 
@@ -114,25 +114,33 @@ fn what_has_no_room_is_lost_and_the_recording_says_so() {
 }
 
 #[test]
-fn a_source_that_is_recorded_in_part_is_named() {
-    let build = || {
-        let dag = create_dag();
-        dag.name("half").jobs(1).record::<u8>("a");
-        dag.register_periodic_subtask(|| (1_u8, 2_u8), vec!["a", "b"], ms(10), named("source"));
-        dag.register_sink_subtask(|_: (u8, u8)| (), vec!["a", "b"], ms(10), named("sink"));
-        dag
+fn what_is_recorded_in_part_is_refused() {
+    let faults = |topics: &[&str]| {
+        let (teller, half) = (create_dag(), create_dag());
+        teller.name("teller").jobs(1).relative_deadline(ms(10));
+        teller.register_periodic_subtask(|| (1_u8,), vec!["told"], ms(10), named("tell"));
+        half.name("half").jobs(1);
+        half.register_periodic_subtask(|| (1_u8, 2_u8), vec!["a", "b"], ms(10), named("source"));
+        let sink = |_: Option<Sample<'_, u8>>, _: (u8, u8)| ();
+        let uses = teller.latest::<u8>("told").sample();
+        (half.using(uses)).register_sink_subtask(sink, vec!["a", "b"], ms(10), named("sink"));
+        for topic in topics {
+            let dag = if *topic == "told" { &teller } else { &half };
+            dag.record::<u8>(topic);
+        }
+        let _machine = VirtualTime::new();
+        let refused = finish_create_dags(&[teller, half]).err();
+        let faults = refused
+            .map(|error| error.faults().to_vec())
+            .unwrap_or_default();
+        faults.iter().map(Fault::code).collect::<Vec<_>>()
     };
-    let recording = record(&VirtualTime::new(), &[build()]);
-    let machine = VirtualTime::new().replay(&recording).expect("whole");
-    finish_create_dags(&[build()]).expect("sound");
-    let said = machine
-        .try_run()
-        .expect_err("`b` cannot be replayed")
-        .to_string();
-    assert!(
-        said.contains("topic `b` is not recorded, and another one of the source is"),
-        "{said}"
-    );
+    let (part, sample) = ("source_partly_recorded", "sample_not_recorded");
+    assert_eq!(faults(&["a"]), [part, sample]);
+    assert_eq!(faults(&["a", "b"]), [sample]);
+    for sound in [&[][..], &["told"], &["a", "b", "told"]] {
+        assert_eq!(faults(sound), [""; 0]);
+    }
 }
 
 #[test]

@@ -82,6 +82,8 @@ pub const CASES: &[Case] = &[
     ("switched_not_committed", shared::switched_not_committed),
     ("taken_by_no_source", shared::taken_by_no_source),
     ("taken_twice", shared::taken_twice),
+    ("source_partly_recorded", shared::source_partly_recorded),
+    ("sample_not_recorded", shared::sample_not_recorded),
     ("duplicate_mode", modes::duplicate_mode),
     ("several_sets_of_modes", modes::several_sets_of_modes),
     ("mode_not_committed", modes::mode_not_committed),

@@ -203,6 +203,29 @@ pub(super) fn taken_twice() -> Vec<Dag> {
     vec![dag]
 }
 
+pub(super) fn source_partly_recorded() -> Vec<Dag> {
+    let dag = named("lidar");
+    dag.record::<u32>("points");
+    let read = SubtaskAttributes::named("read");
+    dag.register_periodic_subtask(|| (1_u32, 2_u32), vec!["points", "heat"], PERIOD, read);
+    joining_sink(&dag, "store", ["points", "heat"]);
+    vec![dag]
+}
+
+pub(super) fn sample_not_recorded() -> Vec<Dag> {
+    let lidar = sound("lidar", "points");
+    let points = lidar.latest::<u32>("points");
+    let planner = named("planner");
+    planner.record::<u32>("ticks");
+    source(&planner, "tick", "ticks");
+    let attributes = SubtaskAttributes::named("plan");
+    let plan = |_: Option<Sample<'_, u32>>, (_,): (u32,)| ();
+    planner
+        .using(points.sample())
+        .register_sink_subtask(plan, vec!["ticks"], PERIOD, attributes);
+    vec![lidar, planner]
+}
+
 /// A DAG of one subtask, which samples.
 fn planner(latest: &Latest<u32>) -> Dag {
     let planner = named("planner");
