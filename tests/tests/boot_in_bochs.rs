@@ -19,6 +19,8 @@ fn two_processors_by_x2apic() {
     let transcript = bochs::succeed("fork-join", words, "corei7_skylake_x", 2);
     let boot = transcript.of_kind("boot").next().expect("a boot line");
     assert!(boot.text.contains("\"x2apic\":true"), "{}", boot.text);
+    let promised = "\"counter_invariant\":true,\"timer_in_halt\":true";
+    assert!(boot.text.contains(promised), "{}", boot.text);
     assert_eq!(boot.text_at("clock"), Some("acpi-pm-timer"));
     assert_eq!(boot.text_at("clock_check"), Some("hpet"), "{}", boot.text);
     assert!(
