@@ -16,8 +16,14 @@ pub const COUNTED_NS: u64 = 50_000;
 /// Where time is real.
 pub const REAL_NS: u64 = 1_000_000;
 
-/// On Linux, where other programs, interrupts and a hypervisor have their time, too.
-pub const LINUX_NS: u64 = 100_000_000;
+/// On Linux by SCHED_FIFO, where interrupts and a hypervisor have their time, too.
+pub const FIFO_NS: u64 = 5_000_000;
+
+/// On Linux by `sched_ext`, where all real-time programs have theirs, too.
+pub const SCHED_EXT_NS: u64 = 10_000_000;
+
+/// On Linux by threads like all others, which all programs delay.
+pub const NORMAL_NS: u64 = 100_000_000;
 
 /// Returns the bound that a person has chosen, or else that of the run's mode.
 pub(super) fn of(run: &Run, options: &Parsed) -> u64 {
@@ -26,13 +32,15 @@ pub(super) fn of(run: &Run, options: &Parsed) -> u64 {
 }
 
 /// Returns the bound of the runs of a boot, by what its line says: the tool tells each guest its
-/// mode, and on Linux the clock is Linux's.
+/// mode, and a program on Linux says whether it can preempt, and by which mechanism.
 pub(super) fn usual_ns(boot: &MachineLine) -> u64 {
     let words = boot.text_at("command_line").unwrap_or_default();
-    let mode = words.split(' ').find_map(|word| word.strip_prefix("mode="));
-    match mode.and_then(Mode::from_name) {
+    let word = |name: &str| words.split(' ').find_map(|word| word.strip_prefix(name));
+    match word("mode=").and_then(Mode::from_name) {
         Some(Mode::Deterministic) => COUNTED_NS,
-        _ if boot.text_at("clock") == Some("linux") => LINUX_NS,
-        _ => REAL_NS,
+        _ if boot.text_at("clock") != Some("linux") => REAL_NS,
+        _ if !boot.text.contains("\"preemptive\":true") => NORMAL_NS,
+        _ if word("mechanism=") == Some("sched_ext") => SCHED_EXT_NS,
+        _ => FIFO_NS,
     }
 }

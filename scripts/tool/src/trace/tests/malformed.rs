@@ -269,15 +269,20 @@ fn a_chain_of_many_subtasks_is_no_cycle() {
 
 #[test]
 fn a_log_says_how_strictly_it_is_judged() {
-    use crate::trace::bound::{COUNTED_NS, LINUX_NS, REAL_NS};
+    use crate::trace::bound::{COUNTED_NS, FIFO_NS, NORMAL_NS, REAL_NS, SCHED_EXT_NS};
     let of = |clock: &str, words: &str| {
+        let (clock, preempts) = clock.split_once(' ').unwrap_or((clock, "false"));
         let boot = r#"{"kind":"boot","version":"1","app":"a","cpus":2,"memory_kib":1"#;
-        let rest = format!("\"clock\":\"{clock}\",\"command_line\":\"{words}\"}}");
+        let rest = format!(
+            "\"clock\":\"{clock}\",\"preemptive\":{preempts},\"command_line\":\"{words}\"}}"
+        );
         let mut runs = read(&format!("{boot},{rest}\n{GOOD}")).unwrap();
         runs.remove(0).usual_bound_ns
     };
     assert_eq!(of("pit", "policy=edf mode=deterministic"), COUNTED_NS);
     assert_eq!(of("pit", "mode=threads"), REAL_NS);
-    assert_eq!(of("linux", "policy=edf"), LINUX_NS);
+    assert_eq!(of("linux true", "policy=edf"), FIFO_NS);
+    assert_eq!(of("linux true", "mechanism=sched_ext"), SCHED_EXT_NS);
+    assert_eq!(of("linux", "mechanism=fifo"), NORMAL_NS);
     assert_eq!(read(GOOD).unwrap().remove(0).usual_bound_ns, REAL_NS);
 }
