@@ -10,10 +10,10 @@ use alloc::vec::Vec;
 
 use super::label::{DagLabel, SubtaskLabel};
 use super::phrases::{list, ns, one_up_to, own_input, question, ring, undivided};
-use super::worded::worded;
 use crate::MAX_ARITY;
 use crate::ids::ClusterId;
 use crate::spec::STACK_BYTES;
+use crate::worded;
 
 worded! {
     /// One reason why DAGs cannot be scheduled as described.

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 
 use super::label::{DagLabel, SubtaskLabel};
 use super::phrases::{list, members};
-use super::worded::worded;
 use crate::policy::Priority;
+use crate::worded;
 
 worded! {
     /// One oddity that does not prevent scheduling.

@@ -2,15 +2,19 @@
 
 /// Declares an enum whose variants each have a code, which never changes and is for
 /// machines, and a text of one line. The text names the fields; what has to be
-/// computed of them (they are references there) follows it, as in `write!`.
+/// computed of them (they are references there) follows it, as in `write!`. A variant
+/// may hold one other text instead, with a name in parentheses; `of` says whose code it has
+/// then.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! worded {
     (
         $(#[$about:meta])*
         pub enum $Table:ident {
             $(
                 $(#[$doc:meta])*
-                $Kind:ident $({ $($field:ident: $Type:ty),+ })? =
-                    $code:literal, $text:literal $(, $value:expr)*;
+                $Kind:ident $({ $($field:ident: $Type:ty),+ })? $(($inner:ident: $Inner:ty))? =
+                    $($code:literal)? $(of $whose:expr)?, $text:literal $(, $value:expr)*;
             )+
         }
     ) => {
@@ -19,15 +23,19 @@ macro_rules! worded {
         #[non_exhaustive]
         #[allow(missing_docs, reason = "the fields' names are the words of the model")]
         pub enum $Table {
-            $($(#[$doc])* $Kind $({ $($field: $Type),+ })?,)+
+            $($(#[$doc])* $Kind $({ $($field: $Type),+ })? $(($Inner))?,)+
         }
 
         impl $Table {
+            /// Every code that is a variant's own.
+            pub const CODES: &'static [&'static str] = &[$($($code,)?)+];
+
             /// Returns the kind as a stable word in snake case.
             #[must_use]
-            pub const fn code(&self) -> &'static str {
+            #[allow(unused_variables, reason = "few codes depend on a field")]
+            pub fn code(&self) -> &'static str {
                 match self {
-                    $(Self::$Kind { .. } => $code,)+
+                    $(Self::$Kind $({ $($field),+ })? $(($inner))? => $($code)? $($whose)?,)+
                 }
             }
         }
@@ -36,11 +44,9 @@ macro_rules! worded {
             #[allow(unused_variables, reason = "a text may leave out a field")]
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
                 match self {
-                    $(Self::$Kind $({ $($field),+ })? => write!(f, $text $(, $value)*),)+
+                    $(Self::$Kind $({ $($field),+ })? $(($inner))? => write!(f, $text $(, $value)*),)+
                 }
             }
         }
     };
 }
-
-pub(super) use worded;
