@@ -1,4 +1,4 @@
-//! What can be wrong with a commit, in words.
+//! Reasons why a commit is refused, in words.
 //!
 //! Every fault states a fact, names the offender, and says what to do. The
 //! faults of the graph itself are [`sched_dag::Fault`]s; the ones here can only

@@ -1,4 +1,4 @@
-//! What makes a commit impossible, one row a kind.
+//! Reasons why a commit is impossible, one row a kind.
 //!
 //! A fault names everything that a message or a tool needs: the DAG, the
 //! subtasks, the topic, the numbers. Its text states the fact, the offender and

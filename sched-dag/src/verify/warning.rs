@@ -1,4 +1,4 @@
-//! What a commit accepts and its author may not have meant.
+//! Oddities of a commit that its author may not have meant, and that prevent nothing.
 
 use alloc::string::String;
 use alloc::vec::Vec;

@@ -1,11 +1,12 @@
 //! Tests of the cells, on real threads. They also serve under Miri, where the
 //! counts shrink so that a run ends.
 
-use super::{SetOnce, Shared, ring};
+use super::{SetOnce, Shared, Writer, ring};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
-use std::{iter, thread, vec::Vec};
+use std::{iter, vec::Vec};
 
 const JOBS: u64 = if cfg!(miri) { 100 } else { 200_000 };
 
@@ -166,23 +167,30 @@ fn a_value_that_is_given_up_makes_room_and_is_dropped_once() {
     assert_eq!(alive.load(Ordering::Relaxed), 0);
 }
 
+/// The message of the races below: several words, so that a torn hand-over would show.
+type Message = ([u64; 5], Counted);
+
+/// Sends every job's message from a thread of its own.
+fn send(mut writer: Writer<Message>, alive: &Arc<AtomicUsize>, end: &Arc<End>) -> JoinHandle<()> {
+    let (alive, end) = (Arc::clone(alive), Arc::clone(end));
+    thread::spawn(move || {
+        end.send_jobs(|job| {
+            let mut message = ([job; 5], Counted::new(&alive, job));
+            while let Err(back) = writer.put(job, message) {
+                message = back;
+                thread::yield_now();
+            }
+        });
+    })
+}
+
 /// The reader takes every other job's value and gives up the rest, at full speed.
 #[test]
 fn given_up_slots_race_with_their_writer() {
     for slots in [1, 2, 4] {
-        let alive = Arc::new(AtomicUsize::new(0));
-        let (mut writer, mut reader) = ring(slots);
-        let (counter, end) = (Arc::clone(&alive), End::new());
-        let its_end = Arc::clone(&end);
-        let sender = thread::spawn(move || {
-            its_end.send_jobs(|job| {
-                let mut message = ([job; 5], Counted::new(&counter, job));
-                while let Err(back) = writer.put(job, message) {
-                    message = back;
-                    thread::yield_now();
-                }
-            });
-        });
+        let (alive, end) = (Arc::new(AtomicUsize::new(0)), End::new());
+        let (writer, mut reader) = ring(slots);
+        let sender = send(writer, &alive, &end);
         for job in 0.. {
             let is_there = || {
                 let mut slots = iter::once(&reader.ring.near).chain(&reader.ring.others);
@@ -211,20 +219,9 @@ fn given_up_slots_race_with_their_writer() {
 #[test]
 fn two_threads_hand_over_every_job_intact() {
     for slots in [1, 2, 3, 8] {
-        let alive = Arc::new(AtomicUsize::new(0));
-        let (mut writer, mut reader) = ring(slots);
-        let (counter, end) = (Arc::clone(&alive), End::new());
-        let its_end = Arc::clone(&end);
-        let sender = thread::spawn(move || {
-            its_end.send_jobs(|job| {
-                // Several words, so that a torn hand-over would show.
-                let mut message = ([job; 5], Counted::new(&counter, job));
-                while let Err(back) = writer.put(job, message) {
-                    message = back;
-                    thread::yield_now();
-                }
-            });
-        });
+        let (alive, end) = (Arc::new(AtomicUsize::new(0)), End::new());
+        let (writer, mut reader) = ring(slots);
+        let sender = send(writer, &alive, &end);
         for job in 0.. {
             let Some((words, counted)) = end.wait(job, || reader.take(job)) else {
                 break;

@@ -109,89 +109,50 @@ fn a_queue_of_any_size_costs_no_more_than_the_arrivals() {
 
 #[test]
 fn malformed_files_are_refused_with_their_line() {
-    for (text, from, to, line, reason) in [
-        (EXACT, "case e", "kase e", 1, "expected a `case` record"),
-        (EXACT, "exact 2 5", "exact 2", 1, "takes 4 words, found 3"),
-        (EXACT, "exact 2 5", "exactly 2 5", 1, "found `exactly`"),
-        (EXACT, "exact 2 5", "exact 0 5", 1, "1 to 1024 topics"),
-        (EXACT, "exact 2 5", "exact 1025 5", 1, "1 to 1024 topics"),
-        (EXACT, "exact 2 5", "exact 2 -5", 1, "not a whole number"),
-        (EXACT, "a 0 7 1", "a 2 7 1", 2, "there is no topic 2"),
+    let exact = [
+        ("case e", "kase e", 1, "expected a `case` record"),
+        ("exact 2 5", "exact 2", 1, "takes 4 words, found 3"),
+        ("exact 2 5", "exactly 2 5", 1, "found `exactly`"),
+        ("exact 2 5", "exact 0 5", 1, "1 to 1024 topics"),
+        ("exact 2 5", "exact 1025 5", 1, "1 to 1024 topics"),
+        ("exact 2 5", "exact 2 -5", 1, "not a whole number"),
+        ("a 0 7 1", "a 2 7 1", 2, "there is no topic 2"),
         (
-            EXACT,
             "a 0 8 2",
             "a 0 7 2",
             3,
             "message 7 of topic 0 arrives twice",
         ),
-        (EXACT, "a 1 4 2", "a 1 4 2.5", 4, "not a whole number"),
-        (EXACT, "a 1 4 2", "a 1 4", 4, "takes 3 words, found 2"),
+        ("a 1 4 2", "a 1 4 2.5", 4, "not a whole number"),
+        ("a 1 4 2", "a 1 4", 4, "takes 3 words, found 2"),
+        ("a 1 4 2", "a 1 4 18446744073709551616", 4, "too large"),
+        ("s 2 8 4", "s 3 8 4", 5, "there is no arrival 3"),
+        ("s 2 8 4", "s 2 8", 5, "takes 3 words, found 2"),
+        ("s 2 8 4", "s 2 8 x", 5, "not a whole number"),
+        ("s 2 8 4", "t 2 8 4", 5, "expected `a`, `s`, `r` or `end`"),
+        ("r 2 0 7", "r 2 2 7", 6, "there is no topic 2"),
+        ("r 2 0 7", "r 9 0 7", 6, "there is no arrival 9"),
+        ("r 2 0 7", "r 2 0 7\nr 2 0 7", 7, "leaves twice"),
+        ("end", "end 1", 7, "takes 0 words, found 1"),
+        ("end\n", "", 7, "the file ends where `end` should be"),
+    ];
+    let approximate = [
+        ("approximate 2 5", "approximate 2 0", 1, "at least 1"),
+        ("approximate 2 5", "exact 2 5", 2, "found `approximate`"),
+        ("100 1 0 0 0", "100 1 0 0", 2, "takes 5 words, found 4"),
+        ("100 1 0 0 0", "1e2 1 0 0 0", 2, "not a whole number"),
+        ("100 1 0 0 0", "100 0 0 0 0", 2, "out of range"),
+        ("100 1 0 0 0", "100 1 128 0 0", 2, "out of range"),
         (
-            EXACT,
-            "a 1 4 2",
-            "a 1 4 18446744073709551616",
-            4,
-            "too large",
-        ),
-        (EXACT, "s 2 8 4", "s 3 8 4", 5, "there is no arrival 3"),
-        (EXACT, "s 2 8 4", "s 2 8", 5, "takes 3 words, found 2"),
-        (EXACT, "s 2 8 4", "s 2 8 x", 5, "not a whole number"),
-        (
-            EXACT,
-            "s 2 8 4",
-            "t 2 8 4",
-            5,
-            "expected `a`, `s`, `r` or `end`",
-        ),
-        (EXACT, "r 2 0 7", "r 2 2 7", 6, "there is no topic 2"),
-        (EXACT, "r 2 0 7", "r 9 0 7", 6, "there is no arrival 9"),
-        (EXACT, "r 2 0 7", "r 2 0 7\nr 2 0 7", 7, "leaves twice"),
-        (EXACT, "end", "end 1", 7, "takes 0 words, found 1"),
-        (EXACT, "end\n", "", 7, "the file ends where `end` should be"),
-        (
-            APPROXIMATE,
-            "approximate 2 5",
-            "approximate 2 0",
-            1,
-            "at least 1",
-        ),
-        (
-            APPROXIMATE,
-            "approximate 2 5",
-            "exact 2 5",
-            2,
-            "found `approximate`",
-        ),
-        (
-            APPROXIMATE,
-            "100 1 0 0 0",
-            "100 1 0 0",
-            2,
-            "takes 5 words, found 4",
-        ),
-        (
-            APPROXIMATE,
-            "100 1 0 0 0",
-            "1e2 1 0 0 0",
-            2,
-            "not a whole number",
-        ),
-        (APPROXIMATE, "100 1 0 0 0", "100 0 0 0 0", 2, "out of range"),
-        (
-            APPROXIMATE,
-            "100 1 0 0 0",
-            "100 1 128 0 0",
-            2,
-            "out of range",
-        ),
-        (
-            APPROXIMATE,
             "approximate 100 1 0 0 0\n",
             "",
             2,
             "expected a `approximate` record",
         ),
-    ] {
+    ];
+    let exact = exact.map(|case| (EXACT, case));
+    let approximate = approximate.map(|case| (APPROXIMATE, case));
+    for (text, (from, to, line, reason)) in exact.into_iter().chain(approximate) {
         assert!(text.contains(from), "{from}");
         let malformed = parse(&text.replacen(from, to, 1)).expect_err(to);
         assert_eq!(malformed.line, line, "{to}: {malformed}");
