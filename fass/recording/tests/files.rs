@@ -54,6 +54,7 @@ fn recording() -> Vec<u8> {
             5 => entry(What::Lost, 0, 0, &[]),
             6 => entry(What::Skip, 0, 0, &[]),
             7 => entry(What::Cut, 0, 3, &[]),
+            8 => entry(What::Fault, 0, 3, &[]),
             _ => entry(What::Value, 0, 0, &value),
         });
         writer.write(&entry(What::Value, 1, 1, &sample));
@@ -231,10 +232,10 @@ fn foreign_and_newer_files_are_told() {
     let foreign = "at byte 0: expected the mark of a recording, 0x89 and `FASSREC`";
     assert_eq!(said(b""), foreign);
     assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
-    let newer = [&MAGIC[..], &[3, 0]].concat();
+    let newer = [&MAGIC[..], &[4, 0]].concat();
     assert_eq!(
         said(&newer),
-        "at byte 8: expected version 1 or 2 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 3 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);

@@ -22,12 +22,13 @@ pub(super) struct Tag {
     pub(super) subtask: u32,
 }
 
-const EVENTS: [What; 5] = [
+const EVENTS: [What; 6] = [
     What::Signal,
     What::Skip,
     What::Cut,
     What::Restart,
     What::Clock,
+    What::Fault,
 ];
 
 impl Tag {

@@ -14,6 +14,7 @@ use sched_dag::journal::What;
 use sched_dag::{DagId, Instance};
 
 use super::drain::{Releases, SIGNALS};
+use super::guard::narrow;
 use super::replay::Outcome;
 use super::{Crossing, Drain, Drained, Happened, name, open};
 use crate::run::crossing::Recorded;
@@ -37,7 +38,8 @@ struct Kept {
     latest: LatestJobs,
     releases: Vec<Releases>,
     lines: Vec<LineOf>,
-    has_failed: bool,
+    /// The first instance of each DAG that has failed, and when.
+    faults: Vec<(Instance, u64)>,
 }
 
 impl Latest {
@@ -68,7 +70,7 @@ impl Crossing for Latest {
             latest,
             releases: Releases::of_all(&plan.task_set),
             lines: mem::take(&mut plan.lines),
-            has_failed: false,
+            faults: Vec::with_capacity(plan.task_set.dags().len()),
         });
         Ok(())
     }
@@ -102,14 +104,20 @@ impl Crossing for Latest {
                 of.line.show(at_ns, |sample| kept.latest.take(sample));
             }
             kept.latest.hold(instance.dag.index(), instance.job);
-            kept.has_failed = true;
+            if kept
+                .faults
+                .iter()
+                .all(|(other, _)| other.dag != instance.dag)
+            {
+                kept.faults.push((instance, at_ns));
+            }
         }
     }
 
     fn lend(&self, _channel: u16, _job: u64, _take: &mut dyn FnMut(&[u8])) {}
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
-        let kept = self.kept.take_if(|kept| kept.has_failed)?;
+        let kept = self.kept.take_if(|kept| !kept.faults.is_empty())?;
         Some(Box::new(OfLatest { kept, stream: None }))
     }
 
@@ -130,6 +138,7 @@ impl Drain for OfLatest {
             header,
             latest,
             releases,
+            faults,
             ..
         } = &self.kept;
         let mut stream = Stream::begin(header, send);
@@ -166,6 +175,22 @@ impl Drain for OfLatest {
                 value: value.bytes.unwrap_or_default(),
             };
             stream.write(&entry, send);
+        }
+        for &(instance, at_ns) in faults {
+            let Some((dag, place)) = narrow(instance) else {
+                continue;
+            };
+            let release_ns = releases[usize::from(dag)].of(instance.job);
+            let fault = Entry {
+                what: recording::What::Fault,
+                dag,
+                place,
+                job: instance.job,
+                release_ns: release_ns.unwrap_or(at_ns),
+                at_ns,
+                value: &[],
+            };
+            stream.write(&fault, send);
         }
         self.stream = Some(stream);
     }
@@ -291,7 +316,7 @@ mod tests {
         let mut send = |bytes: &[u8]| file.extend_from_slice(bytes);
         drain.begin(&mut send);
         assert!(!drain.step(&mut send));
-        assert_eq!(drain.end(&mut send).expect("a file").entries, 3 * 16);
+        assert_eq!(drain.end(&mut send).expect("a file").entries, 3 * 16 + 1);
 
         let recording = Recording::read(&file).expect("it is one");
         assert!(recording.is_cut());
@@ -305,5 +330,6 @@ mod tests {
         let of_fails = || (15..=30).map(|job| (job, due_ns(job)));
         assert!(of(value, FAILS).eq(of_fails()));
         assert!(of(recording::What::Signal, FAILS).eq(of_fails()));
+        assert!(of(recording::What::Fault, FAILS).eq([(30, due_ns(30))]));
     }
 }

@@ -70,6 +70,12 @@ impl Crossing for OfMachine {
         }
     }
 
+    fn failed(&mut self, instance: Instance, _at_ns: u64, _clock_ns: u64) {
+        if let Some(replay) = &mut self.replay {
+            replay.meet_fault(instance);
+        }
+    }
+
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, _at_ns: u64) -> u64 {
         let told = (self.replay.as_mut()).and_then(|replay| replay.next_told_ns(instance));
         told.unwrap_or(clock_ns)

@@ -258,6 +258,7 @@ pub fn recorded(what: What, is_sporadic: bool) -> Option<recording::What> {
         What::Skipped => Some(recording::What::Skip),
         What::Cancelled => Some(recording::What::Cut),
         What::Restarted => Some(recording::What::Restart),
+        What::Ended => Some(recording::What::Fault),
         _ => None,
     }
 }

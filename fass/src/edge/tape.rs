@@ -144,6 +144,14 @@ impl Crossing for Tape {
                 take(&self.given, &self.lost, sample, at_ns);
             });
         }
+        let failed = Happened {
+            dag: instance.dag,
+            subtask: instance.subtask.0,
+            job: instance.job,
+            release_ns: None,
+            at_ns,
+        };
+        self.put(recording::What::Fault, &failed);
     }
 
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {

@@ -128,7 +128,8 @@ fn replay(
             .until(dag, *job)
             .map_err(|error| error.to_string())?;
         println!("{shown}");
-        return Ok(ExitCode::from(u8::from(shown.times.is_none())));
+        let is_right = shown.times.is_some() && shown.unmet_fault.is_none();
+        return Ok(ExitCode::from(u8::from(!is_right)));
     }
     let report = machine.run(None).map_err(|error| error.to_string())?;
     println!("{}", summary(&report));
@@ -167,5 +168,8 @@ fn summary(report: &Report) -> String {
         0 => String::new(),
         count => format!("\n{count} panics, first of all in this job:"),
     };
-    format!("{compared} values are compared{uncompared}: {differs}{panics}")
+    let lacking = (report.lacking.as_ref()).map_or(String::new(), |(dag, first)| {
+        format!("\nwhat functions of dag `{dag}` remember of jobs before {first} is not recorded")
+    });
+    format!("{compared} values are compared{uncompared}: {differs}{lacking}{panics}")
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use recording::Role;
 use sched_dag::{DagId, Instance, JobOutcome, SubtaskId};
 
-use crate::edge::{Crossed, Edge};
+use crate::edge::{Crossed, Divergence, Edge};
 use crate::record::{InstanceRecord, JobRecord};
 use crate::report::Report;
 
@@ -22,6 +22,8 @@ pub struct JobShown {
     pub times: Option<JobRecord>,
     /// Its subtasks, in an order in which they may run.
     pub subtasks: Vec<SubtaskShown>,
+    /// A fault that the job had in the recorded run, and has not had in this one.
+    pub unmet_fault: Option<Divergence>,
 }
 
 /// What a subtask got and gave in a job.
@@ -112,6 +114,7 @@ impl JobShown {
                 .find(|times| times.dag == dag && times.job == job)
                 .copied(),
             subtasks: model.topological_order().iter().map(subtask).collect(),
+            unmet_fault: edge.unmet_fault(dag, job),
         }
     }
 }
@@ -150,9 +153,10 @@ impl fmt::Display for JobShown {
             f,
             "job {job} of dag `{dag}`, due at {release_ns} ns: {outcome}"
         )?;
-        self.subtasks
-            .iter()
-            .try_for_each(|subtask| write!(f, "\n{subtask}"))
+        for subtask in &self.subtasks {
+            write!(f, "\n{subtask}")?;
+        }
+        (self.unmet_fault.iter()).try_for_each(|fault| write!(f, "\n{fault}"))
     }
 }
 

@@ -63,6 +63,9 @@ pub struct Report {
     pub uncompared: u64,
     /// In a replay, the first value that is not the recorded one.
     pub divergence: Option<Divergence>,
+    /// In a replay, a DAG and its first job that is recorded, if that is not the first one it had:
+    /// what its functions remember of jobs before is lacking.
+    pub lacking: Option<(String, u64)>,
     pub(crate) task_set: Arc<TaskSet>,
     pub(crate) options: SchedulerOptions,
     /// Whether interrupts may have been late.

@@ -146,7 +146,7 @@ fn what_is_no_recording_and_no_such_table_is_refused_in_one_line() {
     let mut altered = whole.clone();
     altered[whole.len() / 2] ^= 4;
     let mut newer = whole.clone();
-    newer[8] = 3;
+    newer[8] = 4;
     let half = &whole[..whole.len() - 30];
     for (name, content, words) in [
         (
@@ -157,7 +157,7 @@ fn what_is_no_recording_and_no_such_table_is_refused_in_one_line() {
         (
             "newer",
             &newer,
-            "at byte 8: expected version 1 or 2 of recordings",
+            "at byte 8: expected version 1 to 3 of recordings",
         ),
         (
             "half",

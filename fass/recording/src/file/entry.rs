@@ -51,10 +51,12 @@ pub enum What {
     /// The instance of a subtask asked for the time: the value is a `Vec<u64>` of the answers,
     /// in nanoseconds. Since version 2 of the format.
     Clock,
+    /// The instance of the subtask failed. Since version 3 of the format.
+    Fault,
 }
 
 impl What {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Value,
         Self::Signal,
         Self::Skip,
@@ -62,6 +64,7 @@ impl What {
         Self::Restart,
         Self::Lost,
         Self::Clock,
+        Self::Fault,
     ];
 
     /// Returns the word for it.
@@ -77,6 +80,7 @@ impl What {
             Self::Restart => "restart",
             Self::Lost => "lost",
             Self::Clock => "clock",
+            Self::Fault => "fault",
         }
     }
 }
@@ -92,7 +96,7 @@ impl<'v> Entry<'v> {
 
     pub(super) fn decode(payload: &'v [u8]) -> Result<Self, Malformed> {
         let mut input = Decoder::new(payload);
-        let malformed = input.expected("what happened, a number from 0 to 6");
+        let malformed = input.expected("what happened, a number from 0 to 7");
         let number = usize::from(u8::decode(&mut input)?);
         let what = *What::ALL.get(number).ok_or(malformed)?;
         let (dag, place, job, release_ns, at_ns) = Recordable::decode(&mut input)?;
@@ -130,7 +134,7 @@ impl<'v> Entry<'v> {
                 }
             }
             What::Clock => Vec::<u64>::schema().walk(&mut rest, &mut |_| ()),
-            What::Signal | What::Skip | What::Cut | What::Restart => Ok(()),
+            What::Signal | What::Skip | What::Cut | What::Restart | What::Fault => Ok(()),
         };
         checked
             .and_then(|()| rest.end())

@@ -25,9 +25,10 @@ pub(crate) mod write;
 /// found, which would alter the rest.
 pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 
-/// The version of the format that is written, of values included. The one before, which is read,
-/// too, has no entries of [`What::Clock`](crate::What::Clock).
-pub const VERSION: u16 = 2;
+/// The version of the format that is written, of values included. Those before are read, too: the
+/// first has no entries of [`What::Clock`](crate::What::Clock), and neither of
+/// [`What::Fault`](crate::What::Fault).
+pub const VERSION: u16 = 3;
 
 /// The versions that are read.
 const READ: RangeInclusive<u16> = 1..=VERSION;

@@ -81,6 +81,7 @@ impl Replay {
             }
         }
         self.find_inputs(task_set);
+        self.name_faults(task_set);
         let is_result = |((place, _), _): &&((u16, u64), _)| {
             self.header.channels[usize::from(*place)].role == Role::Result
         };

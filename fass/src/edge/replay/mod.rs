@@ -1,5 +1,6 @@
 //! What a replay takes from a recording, and what it finds.
 
+mod faults;
 mod fit;
 
 use alloc::borrow::Cow;
@@ -16,6 +17,7 @@ use sched_dag::{DagId, Instance, TaskSet};
 use super::guard::{Passed, guard, narrow};
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
+use faults::Fault;
 
 /// A recording that takes the place of what enters.
 #[derive(Debug)]
@@ -36,6 +38,8 @@ pub struct Replay {
     first_signals: BTreeMap<DagId, u64>,
     /// What has no value.
     events: Vec<Entry<'static>>,
+    /// The instances that have failed in the recorded run, and in this one not yet.
+    faults: Vec<Fault>,
     /// The first value of a source that is lost: its channel and job.
     lost: Option<(u16, u64)>,
     /// What the plan says of itself.
@@ -69,22 +73,25 @@ pub struct Outcome {
     pub uncompared: u64,
     /// The first value that is not the recorded one.
     pub divergence: Option<Divergence>,
+    /// The first DAG of whose first jobs nothing is recorded, and its first job of which something
+    /// is: what its functions remember of jobs before is lacking.
+    pub lacking: Option<(String, u64)>,
 }
 
 /// The first value of a replay that is not the recorded one, or, if all that were computed are,
-/// the first recorded one that was not computed.
+/// the first recorded one that was not computed, or else a recorded fault that has not come again.
 ///
 /// See [`Outcome`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Divergence {
     /// The name of the DAG.
     pub dag: String,
-    /// The topic.
+    /// The topic; of a fault, the subtask.
     pub topic: String,
     /// The job.
     pub job: u64,
-    /// The recorded value, as JSON.
-    pub recorded: String,
+    /// The recorded value, as JSON; none for a fault.
+    pub recorded: Option<String>,
     /// The value of this run, as JSON; none if the run is over and has computed none.
     pub computed: Option<String>,
 }
@@ -98,6 +105,14 @@ impl fmt::Display for Divergence {
             recorded,
             computed,
         } = self;
+        let Some(recorded) = recorded else {
+            return write!(
+                f,
+                "subtask `{topic}` of dag `{dag}` failed in job {job} of the recorded run, and has \
+                 not in this one; a replay knows nothing of what functions remember of jobs that \
+                 are not recorded, keeps no budget, and calls no recorded source"
+            );
+        };
         write!(
             f,
             "topic `{topic}` of dag `{dag}` diverges in job {job}: {recorded} is recorded, and {} is \
@@ -128,6 +143,7 @@ impl Replay {
         values.try_reserve_exact(count).map_err(no_memory)?;
         is_compared.try_reserve_exact(count).map_err(no_memory)?;
         let (mut cuts, mut clock, mut lost) = (Vec::new(), BTreeMap::new(), None);
+        let mut faults = Vec::new();
         let mut signals = BTreeMap::<DagId, VecDeque<u64>>::new();
         let (mut first_signals, mut events) = (BTreeMap::new(), Vec::new());
         for entry in recording.entries() {
@@ -140,7 +156,7 @@ impl Replay {
                 value,
                 ..
             } = entry;
-            if matches!(what, What::Signal | What::Skip | What::Cut | What::Restart) {
+            if !matches!(what, What::Value | What::Lost | What::Clock) {
                 events.push(Entry {
                     value: &[],
                     ..entry
@@ -153,6 +169,7 @@ impl Replay {
                     is_compared.push(false);
                 }
                 What::Cut => cuts.push((dag, place, job)),
+                What::Fault => faults.push(Fault::new(dag, place, job)),
                 What::Signal | What::Skip => {
                     first_signals.entry(DagId(dag.into())).or_insert(job);
                     let of_dag = signals.entry(DagId(dag.into())).or_default();
@@ -184,6 +201,7 @@ impl Replay {
             signals,
             first_signals,
             events,
+            faults,
             lost,
             own: Header::default(),
             channels: Vec::new(),
@@ -278,10 +296,12 @@ impl Replay {
             self.describe(channel, *job, place, Some(&self.computed))
         });
         let missing = || is_over.then(|| self.missing()).flatten();
+        let unmet = || is_over.then(|| self.unmet_fault(None)).flatten();
         Outcome {
             compared: self.compared,
             uncompared: self.to_compare - self.compared,
-            divergence: differs.or_else(missing),
+            divergence: differs.or_else(missing).or_else(unmet),
+            lacking: self.lacking(),
         }
     }
 
@@ -312,13 +332,14 @@ impl Replay {
             dag: self.own.dags[usize::from(channel.dag)].name.clone(),
             topic: channel.topic.clone(),
             job,
-            recorded: shown(&self.bytes[recorded.clone()]),
+            recorded: Some(shown(&self.bytes[recorded.clone()])),
             computed: computed.map(shown),
         }
     }
 
     /// Cuts all that waits for an instance in its job.
     pub fn cut_behind(&mut self, instance: Instance, task_set: &TaskSet) {
+        self.meet_fault(instance);
         let Instance { dag, subtask, job } = instance;
         let mut behind = task_set.dag(dag).successors(subtask).to_vec();
         while let Some(subtask) = behind.pop() {

@@ -197,6 +197,12 @@ impl Edge {
         (replay.as_ref()).map_or_else(Outcome::default, |replay| replay.outcome(is_over))
     }
 
+    /// Returns a fault of a job that is recorded and has not come again.
+    pub(crate) fn unmet_fault(&self, dag: DagId, job: u64) -> Option<Divergence> {
+        let replay = self.replay.borrow();
+        replay.as_ref()?.unmet_fault(Some((dag, job)))
+    }
+
     /// Reports whether a topic of a DAG is recorded.
     pub(crate) fn records(&self, dag: DagId, topic: &str) -> bool {
         let header = self.header.borrow();

@@ -182,6 +182,7 @@ impl Session {
             compared,
             uncompared,
             divergence,
+            lacking,
         } = edge.outcome(is_over);
         let dags = (0..).map(DagId).zip(self.task_set.dags());
         let sink_misses = |(dag, model): (DagId, &Dag)| {
@@ -210,6 +211,7 @@ impl Session {
             compared,
             uncompared,
             divergence,
+            lacking,
             task_set: Arc::clone(&self.task_set),
             options: self.options,
             is_late: self.is_late,

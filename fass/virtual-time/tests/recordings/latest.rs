@@ -82,11 +82,67 @@ fn the_inputs_of_the_last_jobs_lead_to_the_same_faults() {
             .collect();
         panics.sort_unstable();
         assert_eq!(panics, [(1, 340, "odd"), (2, 350, "found 701")]);
+        assert_eq!(report.divergence, None);
         let job = machine.until("frail", 350).expect("it is there");
         assert_eq!(job.subtasks[1].panic.as_deref(), Some("found 701"));
         let sampled = Value::Json("[700,700000000,701]".into());
         assert_eq!(job.subtasks[1].takes[1].value, sampled);
     }
+}
+
+#[test]
+fn a_fault_that_does_not_come_again_is_told() {
+    // It follows from what a function remembers of jobs that are not recorded.
+    let build = || {
+        let dag = create_dag();
+        dag.name("tired").jobs(100).record::<u8>("go");
+        dag.register_periodic_subtask(|| (1_u8,), vec!["go"], ms(1), named("source"));
+        let mut calls = 0;
+        let count = move |_: (u8,)| {
+            calls += 1;
+            assert!(calls != 60, "tired");
+        };
+        dag.register_sink_subtask(count, vec!["go"], ms(1), named("count"));
+        dag
+    };
+    let bytes = record(
+        &VirtualTime::new().contain_panics().keep_latest(16),
+        &[build()],
+    );
+    let machine = VirtualTime::new()
+        .contain_panics()
+        .replay(&bytes)
+        .expect("whole");
+    finish_create_dags(&[build()]).expect("sound");
+    let job = machine.until("tired", 59).expect("it is there").to_string();
+    let said = "subtask `count` of dag `tired` failed in job 59 of the recorded run, and has not in \
+         this one; ";
+    assert!(job.contains(": in time\n") && job.contains(said), "{job}");
+    let job = machine.until("tired", 58).expect("it is there");
+    assert_eq!(job.unmet_fault, None);
+    let report = machine.run();
+    assert_eq!(report.panics, []);
+    assert_eq!(report.lacking, Some(("tired".into(), 44)));
+    assert!(
+        report
+            .divergence
+            .expect("a fault")
+            .to_string()
+            .starts_with(said)
+    );
+
+    // The whole run has all that they remember.
+    let bytes = record(&VirtualTime::new().contain_panics(), &[build()]);
+    let machine = VirtualTime::new()
+        .contain_panics()
+        .replay(&bytes)
+        .expect("whole");
+    finish_create_dags(&[build()]).expect("sound");
+    let report = machine.run();
+    assert_eq!(
+        (report.panics.len(), report.divergence, report.lacking),
+        (1, None, None)
+    );
 }
 
 #[test]

@@ -266,16 +266,23 @@ fn report(outcome: &Outcome) {
     crate::println!(
         "replay: {compared} values were compared, {uncompared} recorded ones were not computed"
     );
+    if let Some((dag, first)) = &outcome.lacking {
+        crate::println!(
+            "replay: what functions of dag `{dag}` remember of jobs before {first} is not recorded"
+        );
+    }
     json::emit("replayed", |line| {
         line.number("compared", outcome.compared)
             .number("uncompared", outcome.uncompared);
         if let Some(divergence) = &outcome.divergence {
             line.text("dag_name", &divergence.dag)
                 .text("topic", &divergence.topic)
-                .number("job", divergence.job)
-                .text("recorded", &divergence.recorded);
-            if let Some(computed) = &divergence.computed {
-                line.text("computed", computed);
+                .number("job", divergence.job);
+            let (recorded, computed) = (&divergence.recorded, &divergence.computed);
+            for (name, value) in [("recorded", recorded), ("computed", computed)] {
+                if let Some(value) = value {
+                    line.text(name, value);
+                }
             }
         }
     });

@@ -15,6 +15,7 @@ pub(super) fn of(recording: &Recording<'_>) -> String {
         (What::Cut, 0),
         (What::Restart, 0),
         (What::Clock, 0),
+        (What::Fault, 0),
     ];
     let mut span_ns: Option<(u64, u64)> = None;
     for entry in recording.entries() {

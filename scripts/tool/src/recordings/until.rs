@@ -78,7 +78,7 @@ pub(super) fn of(recording: &Recording<'_>, job: &str) -> Result<String, String>
                     "  {at_ns} ns, subtask {place}, told the time: {shown}"
                 )
             }
-            (What::Cut | What::Restart, _) => {
+            (What::Cut | What::Restart | What::Fault, _) => {
                 writeln!(text, "  {at_ns} ns, subtask {place}: {}", what.name())
             }
             _ => writeln!(text, "  {at_ns} ns: {}", what.name()),
