@@ -39,6 +39,17 @@ pub const CRIMES: [(&str, Crime); 18] = [
     ("endless_wait", wait_for_ever),
 ];
 
+/// Those that come one after the other where faults come thick and fast.
+pub const RECURRING: [Crime; 7] = [
+    panic,
+    write_to_null,
+    read_non_canonical,
+    divide_by_zero,
+    execute_undefined,
+    overflow_the_stack,
+    wait_for_ever,
+];
+
 fn panic() -> Unpunished {
     panic!("a panic on purpose")
 }

@@ -5,6 +5,8 @@
 //! which its middle subtask commits a crime. What is shown is how many jobs of
 //! the healthy DAG met their deadlines before, while and after that happened, and what
 //! it cost the doomed DAG, under each [`Policy`].
+//!
+//! A [`restless`] DAG commits one crime after the other, thousands of them, and goes on.
 
 #![cfg_attr(not(test), no_std)]
 
@@ -19,7 +21,7 @@ use core::time::Duration;
 
 use fass::{Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag};
 
-use crimes::{Crime, Unpunished};
+use crimes::{Crime, RECURRING, Unpunished};
 
 /// The time between two jobs of either DAG, and their relative deadline.
 pub const PERIOD: Duration = Duration::from_millis(10);
@@ -66,6 +68,48 @@ pub const POLICIES: [(&str, Policy); 3] = [
 #[must_use]
 pub fn healthy() -> Dag {
     pipeline("healthy", 0, None, Some(BUDGET), Policy::End)
+}
+
+/// The time between two jobs where faults come thick and fast.
+const SHORT_PERIOD: Duration = Duration::from_millis(1);
+
+/// Builds a healthy DAG, and a restless one that survives so many faults, one in every second
+/// job.
+#[must_use]
+pub fn restless(faults: u32) -> [Dag; 2] {
+    let jobs = u64::from(faults) * 2;
+    let healthy = create_dag();
+    healthy.name("healthy").jobs(jobs);
+    let dag = create_dag();
+    dag.name("restless").jobs(jobs).survive_faults(FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: faults,
+    });
+    for (dag, name, priority) in [(&healthy, "healthy", 0), (&dag, "restless", 1)] {
+        let mut jobs = 0_u64..;
+        let attributes = SubtaskAttributes::named("read").priority(priority);
+        let read = move || (jobs.next().unwrap_or_default(),);
+        dag.register_periodic_subtask(read, vec![name], SHORT_PERIOD, attributes);
+    }
+    let attributes = |priority| {
+        let attributes = SubtaskAttributes::named("process").priority(priority);
+        attributes.budget(SHORT_PERIOD / 4)
+    };
+    let execute = |(_,): (u64,)| fass::execute_for(SHORT_PERIOD / 20, Occupation::Hold);
+    healthy.register_sink_subtask(execute, vec!["healthy"], SHORT_PERIOD, attributes(0));
+    let commit = |(job,): (u64,)| {
+        let number = usize::try_from(job / 2).unwrap_or(0) % RECURRING.len();
+        if job % 2 == 1 {
+            let Unpunished = RECURRING[number]();
+        }
+    };
+    dag.restarting(move || commit).register_sink_subtask(
+        vec!["restless"],
+        SHORT_PERIOD,
+        attributes(1),
+    );
+    [healthy, dag]
 }
 
 /// Builds the DAG that commits `crime` in its job [`FATAL_JOB`].

@@ -1,4 +1,5 @@
-//! Boots into one fault after the other and shows which DAGs survive.
+//! Boots into one fault after the other and shows which DAGs survive; with `faults=N` into N of one
+//! DAG, and shows what memory they cost.
 
 #![no_std]
 #![no_main]
@@ -9,7 +10,7 @@ use alloc::format;
 
 use fass::finish_create_dags;
 use faults::crimes::{CRIMES, Crime};
-use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy};
+use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy, restless};
 use kernel::{Ending, Machine, Run, json, println};
 use sched_dag::DagId;
 
@@ -25,7 +26,11 @@ const DURING: u64 = 2;
 fn main(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let only = options.text("fault");
-    options.finish(&["fault"])?;
+    let times = options.number("faults", 0..=1_000_000, 0)?;
+    options.finish(&["fault", "faults"])?;
+    if let Ok(times @ 1..) = u32::try_from(times) {
+        return endure(machine, times);
+    }
     let known = only.is_none_or(|only| CRIMES.iter().any(|(name, _)| *name == only));
     if !known {
         let names = CRIMES.map(|(name, _)| name).join(", ");
@@ -62,6 +67,36 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         return Err(Ending::Failure(format!(
             "{harmful} of {tried} faults did harm"
         )));
+    }
+    Ok(())
+}
+
+/// Runs a DAG with a hundred faults, and with so many, and judges what memory is left.
+fn endure(machine: &Machine, times: u32) -> Result<(), Ending> {
+    machine.accept_faults(); // here they are what is wanted
+    let mut before = None;
+    for faults in [100, times] {
+        finish_create_dags(&restless(faults))?;
+        let run = machine.run()?;
+        let held_bytes = machine.resources().heap_bytes;
+        let (healthy, restless) = (*run.statistics(HEALTHY), *run.statistics(DOOMED));
+        let violations = run.violations().count();
+        drop(run);
+        let now = machine.resources();
+        json::emit("endurance", |line| {
+            line.number("faults", restless.faults)
+                .number("restarts", restless.restarts)
+                .number("completed", restless.completed)
+                .number("healthy_jobs", healthy.completed)
+                .number("misses", healthy.misses + restless.misses)
+                .number("violations", violations as u64)
+                .number("held_bytes", held_bytes as u64)
+                .number("heap_bytes", now.heap_bytes as u64)
+                .number("contexts", now.contexts as u64);
+        });
+        if now != *before.get_or_insert(now) || now.contexts != now.contexts_free {
+            return Err(Ending::Failure(format!("{faults} faults took memory")));
+        }
     }
     Ok(())
 }

@@ -1,12 +1,11 @@
 //! Registering a subtask whose function another one replaces after a fault.
 //!
 //! Where a DAG drops a job at a fault and goes on ([`Dag::survive_faults`]), the function that
-//! failed cannot: what it had is abandoned as it is. So its next jobs are another
-//! function's, which the commit has made: one *made anew* by the same factory, or one to
-//! *fall back* on, which does the work in a simpler way.
+//! failed cannot: what it had is given up as it is. So its next jobs are another
+//! function's: one *made anew* by the same factory, or one to *fall back* on, which does the
+//! work in a simpler way.
 
 use alloc::boxed::Box;
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
@@ -18,7 +17,7 @@ use super::signal::Signal;
 use super::uses::{ResettableUses, Uses};
 use super::using::Using;
 use crate::draft::attributes::SubtaskAttributes;
-use crate::run::replaceable::{Function, Functions};
+use crate::run::replaceable::{Anew, Functions, Two};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 /// A DAG whose next subtask has a function that can be replaced after a fault. Made by
@@ -86,13 +85,13 @@ impl Dag {
 
     /// Begins the registration of a subtask whose function is made anew after a fault.
     ///
-    /// The commit calls `make` for the function, and once more for each fault that the
-    /// DAG survives in all.
+    /// The commit calls `make` for the function. The first instance after a fault calls it again,
+    /// in its own time; a fault of `make` then ends the DAG.
     ///
     /// See [`Replaceable`].
-    pub fn restarting<M, F, Args, Ret>(&self, mut make: M) -> Replaceable<'_, Args, Ret>
+    pub fn restarting<M, F, Args, Ret>(&self, make: M) -> Replaceable<'_, Args, Ret>
     where
-        M: FnMut() -> F + 'static,
+        M: FnMut() -> F + Send + 'static,
         F: FnMut(Args) -> Ret + Send + 'static,
         Args: VecToSubs,
         Ret: VecToPubs,
@@ -100,10 +99,12 @@ impl Dag {
         Replaceable {
             dag: self,
             functions: Functions {
-                make: Box::new(move || Box::new(make())),
-                fallback: None,
-                restarts: true,
-                states: Arc::new([]),
+                alternatives: Box::new(Anew {
+                    make,
+                    present: None,
+                    call: |f: &mut F, args| f(args),
+                }),
+                states: Vec::new(),
             },
         }
     }
@@ -131,24 +132,14 @@ impl Dag {
         Replaceable {
             dag: self,
             functions: Functions {
-                make: once(first),
-                fallback: Some(Box::new(second)),
-                restarts: false,
-                states: Arc::new([]),
+                alternatives: Box::new(Two {
+                    first: Some(first),
+                    second,
+                }),
+                states: Vec::new(),
             },
         }
     }
-}
-
-/// Returns what makes one function, once.
-fn once<Args: VecToSubs, Ret: VecToPubs>(
-    f: impl FnMut(Args) -> Ret + Send + 'static,
-) -> Box<dyn FnMut() -> Function<Args, Ret>> {
-    let mut f: Option<Function<Args, Ret>> = Some(Box::new(f));
-    Box::new(move || {
-        f.take()
-            .expect("a function that is not made anew is asked for once")
-    })
 }
 
 // The bound is each method's own, so that the compiler says our sentence where it is not met.
@@ -158,23 +149,25 @@ impl<'d, U: Uses + 'static> Using<'d, U> {
     ///
     /// See [`Replaceable`].
     #[track_caller]
-    pub fn restarting<M, F, Args, Ret>(self, mut make: M) -> Replaceable<'d, Args, Ret>
+    pub fn restarting<M, F, Args, Ret>(self, make: M) -> Replaceable<'d, Args, Ret>
     where
         U: ResettableUses,
-        M: FnMut() -> F + 'static,
+        M: FnMut() -> F + Send + 'static,
         F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        let (dag, held) = self.hold();
-        let states = U::states(&held).into();
-        let make = move || wrap::<U, _, _, _>(U::another(&held), make());
+        let (dag, mut held) = self.hold();
+        let states = U::states(&held);
+        let call = move |f: &mut F, args| f(U::borrow(&mut U::enter(&mut held)), args);
         Replaceable {
             dag,
             functions: Functions {
-                make: Box::new(make),
-                fallback: None,
-                restarts: true,
+                alternatives: Box::new(Anew {
+                    make,
+                    present: None,
+                    call,
+                }),
                 states,
             },
         }
@@ -206,14 +199,13 @@ impl<'d, U: Uses + 'static> Using<'d, U> {
         Ret: VecToPubs,
     {
         let (dag, held) = self.hold();
-        let states = U::states(&held).into();
-        let fallback = wrap::<U, _, _, _>(U::another(&held), second);
+        let states = U::states(&held);
+        let second = wrap::<U, _, _, _>(U::another(&held), second);
+        let first = Some(wrap::<U, _, _, _>(held, first));
         Replaceable {
             dag,
             functions: Functions {
-                make: once(wrap::<U, _, _, _>(held, first)),
-                fallback: Some(fallback),
-                restarts: false,
+                alternatives: Box::new(Two { first, second }),
                 states,
             },
         }
@@ -224,13 +216,13 @@ impl<'d, U: Uses + 'static> Using<'d, U> {
 fn wrap<U: ResettableUses + 'static, F, Args, Ret>(
     mut held: U::Held,
     mut f: F,
-) -> Function<Args, Ret>
+) -> impl FnMut(Args) -> Ret + Send
 where
     F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
     Args: VecToSubs,
     Ret: VecToPubs,
 {
-    Box::new(move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args))
+    move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args)
 }
 
 impl<Args: VecToSubs, Ret: VecToPubs> Replaceable<'_, Args, Ret> {

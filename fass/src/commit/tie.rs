@@ -40,7 +40,7 @@ pub(crate) fn tie(
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
     let mut lines = Vec::new();
-    let (bodies, others) = ((0..)
+    let bodies = ((0..)
         .map(DagId)
         .zip(dags)
         .zip(task_set.dags())
@@ -74,17 +74,13 @@ pub(crate) fn tie(
             OnFault::DropJob(limit) => limit.in_all,
         };
         resets.into_iter().for_each(|provide| provide.1(faults));
-        let mut wiring = Wiring::new(&spec, &latest, slots, faults);
+        let mut wiring = Wiring::new(&spec, &latest, slots);
         let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
             let any = of_dag.first();
             any.and_then(|any| any.source(of_dag, &spec, &mut wiring, subtask))
                 .unwrap_or_else(|| make_body(&mut wiring, subtask))
         };
         let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
-        let mut others: Vec<Vec<Body>> = bodies.iter().map(|_| Vec::new()).collect();
-        for (subtask, of_subtask) in wiring.others {
-            others[subtask] = of_subtask;
-        }
         for (subtask, effect) in effects {
             bodies[subtask].add_effects([effect]);
         }
@@ -93,23 +89,20 @@ pub(crate) fn tie(
                 (subtask.outputs.iter()).any(|port| port.topic == latest.topic())
             };
             if let Some(writer) = spec.subtasks.iter().position(writes) {
-                for body in others[writer].iter_mut().chain([&mut bodies[writer]]) {
-                    body.add_effects(latest.effects());
-                }
+                bodies[writer].add_effects(latest.effects());
             }
         }
         if let (Some(any), Some(sampled)) = (any, sampled) {
             any.attach(sampled, &mut bodies);
         }
-        (bodies, others)
+        bodies
     })
-    .unzip();
+    .collect();
     let handler = |dag: &Dag| Some(dag.draft.borrow().on_fault.as_ref()?.get()?.1);
     Plan {
         task_set,
         number,
         bodies,
-        others,
         bounds_ns: answers.bounds_ns(),
         sink_bounds_ns: answers.sink_bounds_ns(),
         after_fault: dags.iter().map(handler).collect(),

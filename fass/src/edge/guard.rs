@@ -7,7 +7,7 @@ use core::mem;
 
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use crate::run::plan::{Body, Plan, Subtask};
+use crate::run::plan::{Body, Plan, Replacement, Subtask};
 
 /// The instances whose functions are not called.
 #[derive(Clone, Debug)]
@@ -74,27 +74,27 @@ impl Subtask for Guarded {
         self.subtask.discard(job);
     }
 
-    fn can_take_over(&self) -> bool {
-        self.subtask.can_take_over()
+    fn replacement(&self) -> Option<Replacement> {
+        self.subtask.replacement()
     }
 
-    fn take_over(&mut self) {
-        self.subtask.take_over();
+    fn replace(&mut self) {
+        self.subtask.replace();
     }
 
-    fn is_fallback(&self) -> bool {
-        self.subtask.is_fallback()
+    fn forget(self: Box<Self>) {
+        self.subtask.forget();
     }
 }
 
 /// Makes all bodies of a plan pass over these.
 pub(super) fn guard(plan: &mut Plan, passed: &Arc<Passed>) {
-    let guarded = |bodies: &mut Vec<Body>, dag, subtask: &dyn Fn(u32) -> u32| {
-        let of_bodies = (0..).zip(mem::take(bodies));
-        *bodies = (of_bodies.map(|(number, body): (u32, Body)| {
+    for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
+        let of_subtasks = (0..).map(SubtaskId).zip(mem::take(bodies));
+        let guarded = of_subtasks.map(|(subtask, body): (_, Body)| {
             let of = Instance {
                 dag,
-                subtask: SubtaskId(subtask(number)),
+                subtask,
                 job: 0,
             };
             let passed = Arc::clone(passed);
@@ -105,15 +105,7 @@ pub(super) fn guard(plan: &mut Plan, passed: &Arc<Passed>) {
                     passed,
                 })
             })
-        }))
-        .collect();
-    };
-    for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
-        guarded(bodies, dag, &|number| number);
-    }
-    for (dag, of_dag) in (0..).map(DagId).zip(&mut plan.others) {
-        for (subtask, bodies) in (0..).zip(of_dag) {
-            guarded(bodies, dag, &|_| subtask);
-        }
+        });
+        *bodies = guarded.collect();
     }
 }

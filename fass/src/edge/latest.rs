@@ -258,7 +258,6 @@ mod tests {
             task_set: Arc::new(task_set),
             number: 1,
             bodies: Vec::new(),
-            others: Vec::new(),
             bounds_ns: Vec::new(),
             sink_bounds_ns: Vec::new(),
             after_fault: Vec::new(),

@@ -29,8 +29,7 @@ impl Signals {
     pub(super) fn take_over(plan: &mut Plan, replay: &mut Replay) -> Self {
         plan.number = REPLAYED;
         plan.after_fault.fill(None);
-        let others = plan.others.iter_mut().flatten();
-        for body in plan.bodies.iter_mut().chain(others).flatten() {
+        for body in plan.bodies.iter_mut().flatten() {
             body.mute();
         }
         let dags = (0..).map(DagId).zip(plan.task_set.dags());

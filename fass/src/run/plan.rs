@@ -38,9 +38,6 @@ pub struct Plan {
     pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<Body>>,
-    /// The bodies that replace these after faults: `others[dag][subtask]`, the next one
-    /// last. Empty for a subtask whose faults end its DAG.
-    pub others: Vec<Vec<Vec<Body>>>,
     /// The response time of each DAG that the commit has proven, if it has
     /// ([`Commit::answers`](crate::Commit::answers)).
     pub bounds_ns: Vec<Option<u64>>,
@@ -98,17 +95,58 @@ pub(crate) trait Subtask: Send {
     /// Gives up what has arrived for a job that the subtask will not run.
     fn discard(&mut self, job: u64);
 
-    /// Reports whether it could go on where another body of its subtask was lost.
-    fn can_take_over(&self) -> bool {
-        false
+    /// Returns what would go on where a fault ends the function.
+    fn replacement(&self) -> Option<Replacement> {
+        None
     }
 
-    /// Gives up the states that the lost one used.
-    fn take_over(&mut self) {}
+    /// Gives the function up, and the states that it used: the next turn is another one's.
+    fn replace(&mut self) {}
 
-    /// Reports whether its function is the one to fall back on.
-    fn is_fallback(&self) -> bool {
-        false
+    /// Gives back what it has, after a fault: all but what the app's function owns, of which no
+    /// destructor can be called.
+    fn forget(self: Box<Self>);
+}
+
+/// What there is of functions to replace one that a fault ends. It can be asked at any time,
+/// also while the body runs.
+///
+/// ```
+/// use fass::{Body, Replacement};
+///
+/// fn is_survived(body: &Body) -> bool {
+///     body.replacement().is_some_and(|next: Replacement| next.is_there())
+/// }
+/// ```
+#[derive(Clone)]
+pub struct Replacement(pub(crate) Arc<dyn Next>);
+
+/// Which function is the next one.
+pub(crate) trait Next: Send + Sync {
+    fn is_there(&self) -> bool;
+    fn is_fallback(&self) -> bool;
+}
+
+impl Replacement {
+    /// Reports whether another function could go on if a fault ended the present one now: there
+    /// is one, and values are not just being handed over.
+    ///
+    /// See [`Replacement`].
+    #[must_use]
+    pub fn is_there(&self) -> bool {
+        self.0.is_there()
+    }
+
+    /// Reports whether it is the one that the subtask falls back on: then its DAG is degraded.
+    ///
+    /// ```
+    /// fn is_degrading(next: &fass::Replacement) -> bool {
+    ///     next.is_there() && next.is_fallback()
+    /// }
+    /// ```
+    #[must_use]
+    pub fn is_fallback(&self) -> bool {
+        self.0.is_fallback()
     }
 }
 
@@ -260,49 +298,41 @@ impl Body {
         self.subtask.discard(job);
     }
 
-    /// Reports whether it can [take over](Self::take_over), from a body that a fault has
-    /// ended: it is one of [`Plan::others`], and the fault did not come while the lost
-    /// body received or sent its values.
+    /// Returns what would replace the function after a fault; `None`: its faults end the DAG.
     ///
-    /// ```
-    /// fn is_replaceable(others: &[fass::Body]) -> bool {
-    ///     others.last().is_some_and(|next| next.can_take_over())
-    /// }
-    /// ```
+    /// See [`Replacement`].
     #[must_use]
-    pub fn can_take_over(&self) -> bool {
-        self.subtask.can_take_over()
+    pub fn replacement(&self) -> Option<Replacement> {
+        self.subtask.replacement()
     }
 
-    /// Makes it go on where another body of its subtask was lost to a fault: the states
-    /// that this one used are reset.
+    /// Makes it go on with another function, where a fault has ended the present one: that is
+    /// given up without a destructor, and the states that it used are reset. The next
+    /// [`run`](Self::run) makes the other function, if it has to be made.
     ///
-    /// To be called once, before anything else of the DAG starts that was not started at
-    /// the fault, on one that [can](Self::can_take_over). The lost body must not be used
-    /// any more. Takes a bounded time and runs no code of the app.
+    /// To be called once for a fault, before anything else of the DAG starts that was not started
+    /// then, and if the [`Replacement`] is there. Takes a bounded time and runs no code of the app.
     ///
     /// ```
-    /// fn replacement(others: &mut Vec<fass::Body>) -> Option<fass::Body> {
-    ///     let mut next = others.pop()?;
-    ///     next.take_over();
-    ///     Some(next)
+    /// fn survived(body: &mut fass::Body) {
+    ///     body.replace(); // and run the next job
     /// }
     /// ```
-    pub fn take_over(&mut self) {
-        self.subtask.take_over();
+    pub fn replace(&mut self) {
+        self.subtask.replace();
+        self.job = NO_JOB;
     }
 
-    /// Reports whether its function is the one that its subtask falls back on: then its
-    /// DAG is degraded.
+    /// Gives back the memory of a body that a fault has ended in mid-function, without
+    /// unwinding: all but what the app's function owns.
     ///
     /// ```
-    /// fn is_degraded(bodies: &[fass::Body]) -> bool {
-    ///     bodies.iter().any(fass::Body::is_fallback)
+    /// fn ended(lost: Vec<fass::Body>) {
+    ///     lost.into_iter().for_each(fass::Body::forget);
     /// }
     /// ```
-    #[must_use]
-    pub fn is_fallback(&self) -> bool {
-        self.subtask.is_fallback()
+    pub fn forget(self) {
+        self.subtask.forget();
     }
 }
 

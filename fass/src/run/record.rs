@@ -277,4 +277,7 @@ impl Subtask for ReplayedSource {
     }
 
     fn discard(&mut self, _job: u64) {}
+
+    // It has no function.
+    fn forget(self: Box<Self>) {}
 }

@@ -1,82 +1,181 @@
 //! A subtask whose function another one can replace after a fault.
 //!
-//! What a fault has abandoned stays where it is: the function, what it has on its stack,
-//! and the body. The ends of the topics are shared by all bodies of the subtask, and each
-//! *claims* them for the time in which it receives or sends, as it would a state. While
-//! the app's function runs nobody has a claim; so the next body finds the ends free. If
-//! it does not, the fault came while values were handed over, and the subtask cannot go on.
+//! Of what a fault has ended nothing is dropped: it may be half changed. The function's place is
+//! used again, what it owned is lost. The ends of the topics are *claimed* for the time in which
+//! the subtask receives or sends, as a state would be. While the app's function runs nobody has a
+//! claim; so the next function finds the ends as they should be. If they are claimed, the fault
+//! came while values were handed over, and the subtask cannot go on.
+//!
+//! A function that is *made anew* is made by the next instance, in its time. So, however many
+//! faults are survived, there is one place for it.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::mem;
 use core::pin::pin;
+use core::sync::atomic::{AtomicU8, Ordering};
 use core::task::{Context, Poll, Waker};
 
 use super::cell::{Changing, Shared};
-use super::plan::{Body, Subtask};
+use super::plan::{Body, Next, Replacement, Subtask};
 use super::reset::Reset;
 use super::subtask::MakeBody;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
-/// A function of a subtask, whichever.
-pub(crate) type Function<Args, Ret> = Box<dyn FnMut(Args) -> Ret + Send>;
-
-/// What makes the functions of a subtask: the first one, and those that replace it.
+/// The functions of a subtask, and the states that they use.
 pub(crate) struct Functions<Args, Ret> {
-    pub(crate) make: Box<dyn FnMut() -> Function<Args, Ret>>,
-    /// What comes after all others.
-    pub(crate) fallback: Option<Function<Args, Ret>>,
-    /// Whether `make` makes more than the first one.
-    pub(crate) restarts: bool,
-    /// The states that they use.
-    pub(crate) states: Arc<[Arc<dyn Reset>]>,
+    pub(crate) alternatives: Box<dyn Alternatives<Args, Ret>>,
+    pub(crate) states: Vec<Arc<dyn Reset>>,
 }
 
-/// Defers making the bodies until the commit knows the wiring, and how many faults are
-/// survived.
+/// Functions of which one is the *present* one.
+pub(crate) trait Alternatives<Args, Ret>: Send {
+    /// Reports whether the one after the present one is made anew, each time.
+    fn restarts(&self) -> bool;
+
+    /// Makes the present one, if it is not there.
+    fn prepare(&mut self);
+
+    /// Calls the present one.
+    fn call(&mut self, args: Args) -> Ret;
+
+    /// Gives the present one up, without a destructor: the next one takes its place.
+    fn lose(&mut self);
+
+    /// Gives their own memory back, without a destructor of what they own.
+    fn forget(self: Box<Self>);
+}
+
+/// Functions that `make` makes, which are called by way of `call`.
+pub(crate) struct Anew<M, F, C> {
+    pub(crate) make: M,
+    pub(crate) present: Option<F>,
+    pub(crate) call: C,
+}
+
+impl<Args, Ret, M, F, C> Alternatives<Args, Ret> for Anew<M, F, C>
+where
+    M: FnMut() -> F + Send,
+    F: Send,
+    C: FnMut(&mut F, Args) -> Ret + Send,
+{
+    fn restarts(&self) -> bool {
+        true
+    }
+
+    fn prepare(&mut self) {
+        self.present.get_or_insert_with(&mut self.make);
+    }
+
+    fn call(&mut self, args: Args) -> Ret {
+        let present = self.present.get_or_insert_with(&mut self.make);
+        (self.call)(present, args)
+    }
+
+    fn lose(&mut self) {
+        mem::forget(self.present.take());
+    }
+
+    fn forget(self: Box<Self>) {
+        mem::forget(*self);
+    }
+}
+
+/// A function, and the one to fall back on.
+pub(crate) struct Two<F, G> {
+    pub(crate) first: Option<F>,
+    pub(crate) second: G,
+}
+
+impl<Args, Ret, F, G> Alternatives<Args, Ret> for Two<F, G>
+where
+    F: FnMut(Args) -> Ret + Send,
+    G: FnMut(Args) -> Ret + Send,
+{
+    fn restarts(&self) -> bool {
+        false
+    }
+
+    fn prepare(&mut self) {}
+
+    fn call(&mut self, args: Args) -> Ret {
+        match &mut self.first {
+            Some(first) => first(args),
+            None => (self.second)(args),
+        }
+    }
+
+    fn lose(&mut self) {
+        mem::forget(self.first.take());
+    }
+
+    fn forget(self: Box<Self>) {
+        mem::forget(*self);
+    }
+}
+
+/// Defers making the body until the commit knows the wiring.
 pub(crate) fn defer<Args: VecToSubs, Ret: VecToPubs>(
     mut functions: Functions<Args, Ret>,
 ) -> MakeBody {
     Box::new(move |wiring, subtask| {
-        let ends = Arc::new(Shared::new((
+        functions.alternatives.prepare();
+        let restarts = functions.alternatives.restarts();
+        let both = Shared::new((
             <Args as VecToSubs>::gen_subs(wiring.ports(subtask)),
             <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask)),
-        )));
-        let body = |f, is_fallback| {
-            Body::new(Box::new(Replaceable {
-                f,
-                ends: Arc::clone(&ends),
-                states: Arc::clone(&functions.states),
-                is_fallback,
-            }))
-        };
-        let first = body((functions.make)(), false);
-        // The last one is taken first.
-        let fallback = functions.fallback.take().map(|f| body(f, true));
-        let restarts = if functions.restarts { wiring.faults } else { 0 };
-        let anew = (0..restarts).map(|_| body((functions.make)(), false));
-        let others = fallback.into_iter().chain(anew).collect();
-        wiring.others.push((subtask, others));
-        first
+        ));
+        let next = AtomicU8::new(if restarts { ANEW } else { FALLBACK });
+        let ends = Arc::new(Ends { both, next });
+        Body::new(Box::new(Replaceable { functions, ends }))
     })
 }
 
 struct Replaceable<Args: VecToSubs, Ret: VecToPubs> {
-    f: Function<Args, Ret>,
-    ends: Arc<Shared<(Args::Subs, Ret::Pubs)>>,
-    states: Arc<[Arc<dyn Reset>]>,
-    is_fallback: bool,
+    functions: Functions<Args, Ret>,
+    ends: Arc<Ends<(Args::Subs, Ret::Pubs)>>,
 }
 
-impl<Args: VecToSubs, Ret: VecToPubs> Replaceable<Args, Ret> {
-    fn claim(&self) -> Changing<'_, (Args::Subs, Ret::Pubs)> {
-        self.ends.change().unwrap_or_else(|| refuse())
+/// The ends of the topics, and which function is next: all that others may look at while the
+/// present one runs.
+struct Ends<T> {
+    both: Shared<T>,
+    next: AtomicU8,
+}
+
+/// There is no other function.
+const NONE: u8 = 0;
+/// The next one is made anew.
+const ANEW: u8 = 1;
+/// The next one is that to fall back on.
+const FALLBACK: u8 = 2;
+
+impl<T: Send + Sync> Next for Ends<T> {
+    fn is_there(&self) -> bool {
+        self.next.load(Ordering::Relaxed) != NONE && self.both.change().is_some()
+    }
+
+    fn is_fallback(&self) -> bool {
+        self.next.load(Ordering::Relaxed) == FALLBACK
+    }
+}
+
+impl<T> Ends<T> {
+    fn claim(&self) -> Changing<'_, T> {
+        self.both.change().unwrap_or_else(|| refuse())
     }
 }
 
 impl<Args: VecToSubs, Ret: VecToPubs> Subtask for Replaceable<Args, Ret> {
     fn take_turn(&mut self, job: u64) {
         let context = &mut Context::from_waker(Waker::noop());
-        let mut ends = self.claim();
+        let mut ends = self.ends.claim();
+        // A fault in here ends the DAG: what makes functions may be half changed.
+        let next = self.ends.next.load(Ordering::Relaxed);
+        self.ends.next.store(NONE, Ordering::Relaxed);
+        self.functions.alternatives.prepare();
+        self.ends.next.store(next, Ordering::Relaxed);
         ends.0.grant(job);
         ends.1.grant(job);
         let received = pin!(ends.0.recv_all()).poll(context);
@@ -84,27 +183,32 @@ impl<Args: VecToSubs, Ret: VecToPubs> Subtask for Replaceable<Args, Ret> {
         let Poll::Ready(args) = received else {
             return;
         };
-        let results = (self.f)(args);
-        let sent = pin!(self.claim().1.send_all(results)).poll(context);
+        let results = self.functions.alternatives.call(args);
+        let sent = pin!(self.ends.claim().1.send_all(results)).poll(context);
         debug_assert!(sent.is_ready());
     }
 
     fn discard(&mut self, job: u64) {
-        if let Some(mut ends) = self.ends.change() {
+        if let Some(mut ends) = self.ends.both.change() {
             ends.0.discard_all(job);
         }
     }
 
-    fn can_take_over(&self) -> bool {
-        self.ends.change().is_some()
+    fn replacement(&self) -> Option<Replacement> {
+        let ends: Arc<Ends<_>> = Arc::clone(&self.ends);
+        Some(Replacement(ends))
     }
 
-    fn take_over(&mut self) {
-        self.states.iter().for_each(|state| state.reset());
+    fn replace(&mut self) {
+        self.functions.alternatives.lose();
+        self.functions.states.iter().for_each(|state| state.reset());
+        if self.ends.is_fallback() {
+            self.ends.next.store(NONE, Ordering::Relaxed);
+        }
     }
 
-    fn is_fallback(&self) -> bool {
-        self.is_fallback
+    fn forget(self: Box<Self>) {
+        self.functions.alternatives.forget();
     }
 }
 

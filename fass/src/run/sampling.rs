@@ -37,4 +37,8 @@ impl Subtask for Sampling {
     fn discard(&mut self, job: u64) {
         self.subtask.discard(job);
     }
+
+    fn forget(self: Box<Self>) {
+        self.subtask.forget();
+    }
 }

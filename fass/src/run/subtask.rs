@@ -98,4 +98,8 @@ where
     fn discard(&mut self, job: u64) {
         self.subs.discard_all(job);
     }
+
+    fn forget(self: Box<Self>) {
+        core::mem::forget(self.f);
+    }
 }

@@ -22,7 +22,6 @@ use sched_dag::{DagSpec, sorted_by_key};
 use super::cell::{Reader, Writer, ring};
 use super::latest::{AnyLatest, Stage};
 use super::message::Message;
-use super::plan::Body;
 
 /// The reading end of a topic in one subtask. Made by the commit only.
 ///
@@ -189,21 +188,12 @@ pub(crate) struct Wiring {
     /// For each latest value its topic, and where the writer puts it: a
     /// `Vec<Box<dyn Stage<T>>>`; or what shall stand between, a [`Wrap<T>`].
     stages: Vec<(String, Box<dyn Any>)>,
-    /// How many faults of the DAG are survived.
-    pub(crate) faults: u32,
-    /// The bodies that replace those of subtasks after faults.
-    pub(crate) others: Vec<(usize, Vec<Body>)>,
 }
 
 impl Wiring {
     /// Numbers the edges of a verified DAG: one a reading port, then those
     /// between untyped subtasks.
-    pub(crate) fn new(
-        spec: &DagSpec,
-        latest: &[Rc<dyn AnyLatest>],
-        in_flight: usize,
-        faults: u32,
-    ) -> Self {
+    pub(crate) fn new(spec: &DagSpec, latest: &[Rc<dyn AnyLatest>], in_flight: usize) -> Self {
         let mut topics = Vec::new();
         let mut edges_of_inputs = Vec::with_capacity(spec.subtasks.len());
         for subtask in &spec.subtasks {
@@ -237,8 +227,6 @@ impl Wiring {
             stages: (latest.iter())
                 .map(|latest| (latest.topic().into(), latest.stages()))
                 .collect(),
-            faults,
-            others: Vec::new(),
         }
     }
 

@@ -34,4 +34,8 @@ impl<F: FnMut(u64) + Send> Subtask for Untyped<F> {
     fn discard(&mut self, job: u64) {
         self.before.iter_mut().for_each(|edge| edge.discard(job));
     }
+
+    fn forget(self: Box<Self>) {
+        core::mem::forget(self.f);
+    }
 }

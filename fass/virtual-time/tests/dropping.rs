@@ -120,6 +120,30 @@ fn a_fault_too_many_ends_the_dag() {
 }
 
 #[test]
+fn a_fault_while_the_next_function_is_made_ends_the_dag() {
+    let machine = VirtualTime::new().contain_panics();
+    let dag = counting(12);
+    dag.survive_faults(FaultLimit {
+        window: 1,
+        ..FAULT_LIMIT
+    });
+    let mut made = 0;
+    let make = move || {
+        made += 1;
+        assert!(made < 3, "there is no third one");
+        |(job,): (u64,)| assert!(job != 2 && job != 4, "job {job}")
+    };
+    dag.restarting(make)
+        .register_sink_subtask(vec!["job"], ms(10), named("sink"));
+    commit(&[dag]);
+    let report = machine.run();
+    // Jobs 2 and 4 are lost; the function for job 5 cannot be made.
+    assert_eq!(counts(&report.statistics[0]), [3, 2, 3]);
+    assert_eq!(report.statistics[0].restarts, 2);
+    assert_eq!(report.violations(), []);
+}
+
+#[test]
 fn the_second_function_is_fallen_back_on_once() {
     let machine = VirtualTime::new().contain_panics();
     let dag = counting(12);

@@ -239,6 +239,7 @@ impl Machine {
         let ended = execution::end().ok_or_else(nothing)?;
         edge::end(outgoing, !shuts_down);
         let run = Run::new(ended, allocations, locks, epoch_ns);
+        report::left::dump(&run);
         let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);

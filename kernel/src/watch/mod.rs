@@ -14,5 +14,6 @@ pub(crate) fn beat(core: &Core, now_ns: u64) {
     background::watchdog::look(core, now_ns);
     if core.index == 0 {
         background::beat(now_ns);
+        panic::beat(now_ns);
     }
 }

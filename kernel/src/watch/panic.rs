@@ -3,7 +3,8 @@
 //! The core that panics stops all others first, so the report is not torn
 //! apart and nothing runs on with broken data. A panic during the report ends
 //! the run with what was said so far. Faults of subtasks do not get here:
-//! `containment` ends their DAG instead.
+//! `containment` ends their DAG instead. A `drop` of what a run has left behind does, after the
+//! run: that is one line, which names the DAG.
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
@@ -48,6 +49,18 @@ pub(crate) fn exception(exception: &Exception<'_>, interrupted: &mut Interrupted
     }
 }
 
+/// The longest that what one DAG has left behind may take to be dropped.
+const LONGEST_CLEARING_NS: u64 = 5_000_000_000;
+
+/// Ends the kernel if the `drop` of something that a run has left behind does not return. In
+/// core 0's heartbeat.
+pub(super) fn beat(now_ns: u64) {
+    let took_ns = execution::look_at_clearing(|_, since_ns| now_ns.saturating_sub(since_ns));
+    if took_ns > Some(LONGEST_CLEARING_NS) {
+        die("stall", &"no return", &"within 5 s", None);
+    }
+}
+
 fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option<&Registers>) -> ! {
     interrupt_flag::disable();
     let core = this_core::is_ready().then(this_core::get);
@@ -61,7 +74,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
             write_in_emergency(format_args!(
                 "(a second {what} in the report)\n  at {place}\n"
             ));
-            give_verdict(what)
+            give_verdict(&what)
         }
         Err(FAILED) => exit::exit(exit::Status::Failure),
         // Another core reports, and is about to stop this one.
@@ -69,6 +82,16 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
     }
     if core.is_some() {
         non_maskable::stop_others();
+    }
+    let clearing = execution::look_at_clearing(|dag, _| {
+        Excerpt::<MESSAGE_BYTES>::of(format_args!(
+            "dag `{dag}` has left behind what cannot be dropped: {message} ({place}); mend the \
+             `drop` of its values"
+        ))
+    });
+    if let Some(reason) = clearing {
+        write_in_emergency(format_args!("\n{reason}\n"));
+        give_verdict(&reason);
     }
     let instance = core.and_then(execution::running);
     write_in_emergency(format_args!(
@@ -106,11 +129,11 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
     });
     let line = json::line("backtrace", |line| spot.write(index, line));
     write_line_in_emergency(&line);
-    give_verdict(what)
+    give_verdict(&what)
 }
 
 /// Says that the run has failed, and ends it.
-fn give_verdict(what: &str) -> ! {
+fn give_verdict(what: &dyn Display) -> ! {
     let verdict = json::line("verdict", |line| {
         line.text("status", "failure").text("reason", what);
     });

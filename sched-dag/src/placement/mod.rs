@@ -120,6 +120,18 @@ impl<Body, Parked> Placement<Body, Parked> {
         *self.place(vertex) = Place::Resting(body);
     }
 
+    /// Takes the body of a subtask out, if no instance of it has started.
+    pub fn take(&mut self, vertex: Vertex) -> Option<Body> {
+        let place = self.place(vertex);
+        match core::mem::replace(place, Place::Lost) {
+            Place::Resting(body) => Some(body),
+            other => {
+                *place = other;
+                None
+            }
+        }
+    }
+
     /// Takes note that an instance has finished that no core has: on a driver where a
     /// parked one may still be executed.
     pub fn finish_parked(&mut self, vertex: Vertex, body: Body) {

@@ -53,6 +53,17 @@ fn what_finishes_while_it_is_parked_is_wanted_nowhere() {
 }
 
 #[test]
+fn only_what_rests_is_taken_out_and_once() {
+    let mut cores = Cores::with_bodies();
+    cores.decide(0, Some(X));
+    assert_eq!(cores.next(0), Next::Start(X, 'x'));
+    assert_eq!(cores.take(X), None);
+    cores.finish(0, X, 'x');
+    assert_eq!((cores.take(X), cores.take(X)), (Some('x'), None));
+    assert_eq!(cores.take(Y), Some('y'));
+}
+
+#[test]
 fn a_preempted_instance_continues_on_any_core() {
     let mut cores = about_to_preempt();
     assert_eq!(suspend(&mut cores, "context of x"), None);

@@ -17,6 +17,7 @@ mod exceeded;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
+mod left;
 mod lifecycle;
 mod limits;
 mod modes;
@@ -43,7 +44,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 43] = [
+const TESTS: [(&str, Test); 46] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -89,6 +90,9 @@ const TESTS: [(&str, Test); 43] = [
     ("stacks", stacks::run),
     ("stacks_of_chain", stacks::chain),
     ("stalled", stalled::run),
+    ("left", left::keep),
+    ("drop_panics", |machine| left::behind(machine, false)),
+    ("drop_loops", |machine| left::behind(machine, true)),
     ("spend_stacks", limits::spend_stacks),
     ("storm", storm::run),
     ("suspend", limits::suspend),

@@ -54,22 +54,13 @@
 //! > `CHANGING`, or from any smaller count to the next; it is given back by a
 //! > `Release` change. So all that one holder did happens before all that the next
 //! > conflicting one does.
-//!
-//! # The set-once
-//!
-//! [`SetOnce`] holds what is given later, such as the platform: empty, then set for good.
-//!
-//! > **Set-once invariant.** The caller that moves the state from `EMPTY` to
-//! > `WRITING` is the only one that ever writes the value, and does so before it stores
-//! > `SET` with `Release`. After `SET` nobody writes. Readers read only after
-//! > an `Acquire` load gave `SET`.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::cell::UnsafeCell;
-use core::mem::MaybeUninit;
+use core::mem::{ManuallyDrop, MaybeUninit};
 use core::ops::{Deref, DerefMut};
-use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// The turn of a slot that holds no value.
 const EMPTY_SLOT: u64 = 0;
@@ -254,7 +245,7 @@ const CHANGING: u32 = u32::MAX;
 /// A value that one may change or several look at.
 pub(crate) struct Shared<T> {
     claims: AtomicU32,
-    value: UnsafeCell<T>,
+    value: UnsafeCell<ManuallyDrop<T>>,
 }
 
 // SAFETY: by the claim invariant threads have either one `&mut T` or several `&T`
@@ -272,7 +263,7 @@ impl<T> Shared<T> {
     pub(crate) const fn new(value: T) -> Self {
         Self {
             claims: AtomicU32::new(0),
-            value: UnsafeCell::new(value),
+            value: UnsafeCell::new(ManuallyDrop::new(value)),
         }
     }
 
@@ -291,6 +282,16 @@ impl<T> Shared<T> {
             .claims
             .fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more);
         claim.ok().map(|_| Looking(self))
+    }
+}
+
+impl<T> Drop for Shared<T> {
+    fn drop(&mut self) {
+        // One that a fault has left half changed stays as it is.
+        if *self.claims.get_mut() != CHANGING {
+            // SAFETY: `&mut self` shows that no claim is in use, and it is done once.
+            unsafe { ManuallyDrop::drop(self.value.get_mut()) };
+        }
     }
 }
 
@@ -334,67 +335,10 @@ impl<T> Drop for Looking<'_, T> {
     }
 }
 
-const EMPTY: u8 = 0;
-const WRITING: u8 = 1;
-const SET: u8 = 2;
-
-/// A value that is set at most once and then read by everybody.
-pub(crate) struct SetOnce<T> {
-    state: AtomicU8,
-    value: UnsafeCell<MaybeUninit<T>>,
-}
-
-// SAFETY: by the set-once invariant the value is written by one thread before
-// any thread reads it. `T: Send` as the owner drops it, `T: Sync` as all look at it.
-unsafe impl<T: Send + Sync> Sync for SetOnce<T> {}
-
-impl<T> SetOnce<T> {
-    pub(crate) const fn new() -> Self {
-        Self {
-            state: AtomicU8::new(EMPTY),
-            value: UnsafeCell::new(MaybeUninit::uninit()),
-        }
-    }
-
-    /// Sets the value, and reports whether this call was the one that did.
-    pub(crate) fn set(&self, value: T) -> bool {
-        let claim =
-            self.state
-                .compare_exchange(EMPTY, WRITING, Ordering::Relaxed, Ordering::Relaxed);
-        if claim.is_err() {
-            return false;
-        }
-        let place = self.value.get().cast::<T>();
-        // SAFETY: we moved the state from `EMPTY` to `WRITING`, so by the
-        // set-once invariant we alone may write, and nobody reads yet.
-        unsafe { place.write(value) };
-        self.state.store(SET, Ordering::Release);
-        true
-    }
-
-    /// Returns the value, or `None` while none is set.
-    #[inline]
-    pub(crate) fn get(&self) -> Option<&T> {
-        if self.state.load(Ordering::Acquire) != SET {
-            return None;
-        }
-        let place = self.value.get().cast::<T>();
-        // SAFETY: the state is `SET`, so by the set-once invariant the value is
-        // initialised and no longer written, as long as this borrow of the cell lasts.
-        Some(unsafe { &*place })
-    }
-}
-
-impl<T> Drop for SetOnce<T> {
-    fn drop(&mut self) {
-        if *self.state.get_mut() == SET {
-            // SAFETY: by the set-once invariant it is initialised, and `&mut self` is alone.
-            unsafe { self.value.get_mut().assume_init_drop() };
-        }
-    }
-}
-
 pub(crate) mod current;
 pub(crate) mod outbox;
+mod set_once;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use set_once::SetOnce;

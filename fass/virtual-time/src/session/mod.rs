@@ -36,8 +36,6 @@ pub(crate) struct Session {
     after_fault: Vec<Option<DagId>>,
     /// Whether interrupts may be late.
     is_late: bool,
-    /// What replaces them after faults.
-    others: Vec<Vec<Vec<Body>>>,
     recording: Recording,
 }
 
@@ -58,7 +56,6 @@ impl Session {
             },
             bodies: plan.bodies,
             after_fault: plan.after_fault,
-            others: plan.others,
             task_set,
         }
     }
@@ -107,7 +104,6 @@ impl Session {
             machine,
             bodies: &mut self.bodies,
             after_fault: &self.after_fault,
-            others: &mut self.others,
             recording: &mut self.recording,
             panic: None,
             has_arrived,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use fass::Body;
+use fass::{Body, Replacement};
 use sched_dag::Recorder;
 use sched_dag::journal::What;
 use sched_dag::lifecycle::Request;
@@ -36,7 +36,6 @@ pub(super) struct Runner<'s> {
     pub(super) machine: &'s Surroundings,
     pub(super) bodies: &'s mut [Vec<Body>],
     pub(super) after_fault: &'s [Option<DagId>],
-    pub(super) others: &'s mut [Vec<Vec<Body>>],
     pub(super) recording: &'s mut Recording,
     /// The panic that fails the run and stops it. In what is left of its instant
     /// nothing runs, and nothing is recorded.
@@ -65,13 +64,16 @@ impl Runner<'_> {
         }
     }
 
-    /// Puts another body into the place of one that a fault has ended, if there is one.
+    /// Returns what takes the place of a function that a fault has ended, if anything does.
+    fn next(&mut self, instance: Instance) -> Option<Replacement> {
+        (self.body(instance).replacement()).filter(Replacement::is_there)
+    }
+
+    /// Puts it there.
     fn replace(&mut self, instance: Instance) {
-        let others = &mut self.others[instance.dag.index()][instance.subtask.index()];
-        if let Some(mut next) = others.pop() {
-            next.take_over();
+        if let Some(next) = self.next(instance) {
             self.recording.degraded[instance.dag.index()] |= next.is_fallback();
-            *self.body(instance) = next;
+            self.body(instance).replace();
         }
     }
 }
@@ -137,8 +139,7 @@ impl Workload for Runner<'_> {
     }
 
     fn is_replaceable(&mut self, instance: Instance) -> bool {
-        let others = &self.others[instance.dag.index()][instance.subtask.index()];
-        others.last().is_some_and(Body::can_take_over)
+        self.next(instance).is_some()
     }
 
     fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {

@@ -135,6 +135,12 @@ pub(super) fn load(apic_id: u32) -> &'static Core {
         .iter()
         .find(|core| core.apic_id == apic_id)
         .expect("only processors that ACPI names are started");
+    // First of all: the heap looks at who allocates.
+    let address = core::ptr::from_ref(core) as u64;
+    core.this.store(address, Ordering::Relaxed);
+    // SAFETY: every 64-bit processor has the register; the value establishes
+    // the own-core invariant.
+    unsafe { cpu::write_msr(GS_BASE, address) };
     let [exception, double_fault, non_maskable, machine_check] = core.exception_stacks;
     let context = core.context().frame_end();
     let tops = [
@@ -147,11 +153,6 @@ pub(super) fn load(apic_id: u32) -> &'static Core {
     let task_state = Box::leak(Box::new(TaskState::new(tops)));
     core.task_state.store(task_state, Ordering::Relaxed);
     descriptors::load_segments(core.task_state.load(Ordering::Relaxed));
-    let address = core::ptr::from_ref(core) as u64;
-    core.this.store(address, Ordering::Relaxed);
-    // SAFETY: every 64-bit processor has the register; the value establishes
-    // the own-core invariant.
-    unsafe { cpu::write_msr(GS_BASE, address) };
     core
 }
 
@@ -173,10 +174,11 @@ pub fn is_ready() -> bool {
     CORES.get().is_some()
 }
 
-/// Reports whether something runs on the core that executes this, in the sense of
+/// Returns the first word of what runs on the core that executes this, in the sense of
 /// [`Core::note_running`]. Interrupts are disabled.
-pub fn runs_something() -> bool {
-    is_ready() && get().running[0].load(Ordering::Relaxed) != u64::MAX
+pub fn running() -> Option<u64> {
+    let word = is_ready().then(|| get().running[0].load(Ordering::Relaxed));
+    word.filter(|word| *word != u64::MAX)
 }
 
 /// Returns all cores, in the order of their index.

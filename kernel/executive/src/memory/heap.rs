@@ -4,6 +4,9 @@
 //! and its last completion nothing of the kernel's allocates, and the counters
 //! here are the proof.
 //!
+//! What an instance allocates is its DAG's, as the word says that the layer above notes of what
+//! runs ([`OWNER_BIT`]). So after a run it can be told what faults have left in use.
+//!
 //! An app's function may use up the heap all the same. So subtasks cannot have the
 //! last [`RESERVE`] of it: what is left serves the reports, and the app's main function.
 
@@ -21,11 +24,14 @@ static HEAP: SpinLock<Tlsf> = SpinLock::new(Tlsf::new());
 /// Subtasks leave the heap its capacity divided by this.
 const RESERVE: usize = 32;
 
+/// From this bit on, the word that is noted of what runs says who owns what it allocates.
+pub const OWNER_BIT: u32 = 44;
+
 /// Reports whether the code that allocates can have `bytes` more. Interrupts are disabled.
 fn may_have(heap: &Tlsf, bytes: usize) -> bool {
     let usage = heap.usage();
     let free = usage.capacity_bytes - usage.in_use_bytes;
-    free.saturating_sub(usage.capacity_bytes / RESERVE) >= bytes || !this_core::runs_something()
+    free.saturating_sub(usage.capacity_bytes / RESERVE) >= bytes || this_core::running().is_none()
 }
 
 /// The image's global allocator; the `entry!` macro makes it so.
@@ -52,8 +58,26 @@ pub fn usage() -> Usage {
 
 fn allocate(layout: Layout) -> Option<NonNull<u8>> {
     let mut heap = HEAP.lock();
-    let may_have = may_have(&heap, layout.size());
-    may_have.then(|| heap.allocate(layout)).flatten()
+    if !may_have(&heap, layout.size()) {
+        return None;
+    }
+    let block = heap.allocate(layout)?;
+    if let Some(word) = this_core::running() {
+        let owner = u32::try_from(word >> OWNER_BIT).map_or(0, |owner| owner + 1);
+        // SAFETY: it was allocated just now.
+        unsafe { heap.set_owner(block, owner) };
+    }
+    Some(block)
+}
+
+/// Returns how many bytes that `owner` has allocated are in use for each of these owners, and
+/// forgets what anybody owns. Takes time for each block of the heap.
+pub fn take_owned(owners: &mut [usize]) {
+    HEAP.lock().take_owned(|owner, bytes| {
+        if let Some(sum) = owners.get_mut(owner as usize - 1) {
+            *sum += bytes;
+        }
+    });
 }
 
 // SAFETY: the allocator behind the lock gives each block to one owner until it

@@ -146,7 +146,7 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
 /// Ends this core's instance, whose context a handler has interrupted.
 fn end_interrupted(interrupted: &mut Interrupted) {
     let abandoned = interrupted.abandon(contexts::begin());
-    execution::fail();
+    execution::fail(&abandoned);
     contexts::give_back(abandoned.recover());
 }
 

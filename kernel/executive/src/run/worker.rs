@@ -2,9 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use alloc::boxed::Box;
-
-use super::execution::{self, Runner, Work};
+use super::execution::{self, Loan, Work};
 use super::heartbeat;
 use crate::machine::context::Parked;
 use crate::machine::this_core::{self, Core};
@@ -42,7 +40,7 @@ fn find_work() -> Work {
 }
 
 /// Calls a subtask's function, with interrupts enabled meanwhile.
-fn run(mut runner: Box<Runner>) -> Work {
+fn run(mut runner: Loan) -> Work {
     interrupt_flag::enable();
     runner.run();
     interrupt_flag::disable_enabled();

@@ -8,7 +8,7 @@
 //!
 //! ```text
 //!  |<-------------- size (multiple of 16) ------------->|
-//!  | size, free bit | previous | links, while free  ... | header of the next
+//!  | size, free bit, owner | previous | links, while free  ... | header of the next
 //!  ^ block, 16-aligned         ^ payload, 16-aligned
 //! ```
 //!
@@ -30,6 +30,8 @@ const _: () = assert!(MIN_BLOCK_SIZE == 2 * GRANULE && align_of::<Links>() <= GR
 
 /// The bit of [`Header::size_and_free`] that is set while the block is free.
 const FREE: usize = 1;
+/// From this bit on there is the owner of a used block, above any size.
+pub(super) const OWNER: u32 = 40;
 
 /// A block of the tiling, or an end marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +40,7 @@ pub(super) struct Block(NonNull<Header>);
 #[derive(Clone, Copy)]
 #[repr(C, align(16))]
 struct Header {
-    /// The size; its lowest bits, zero in a multiple of 16, hold [`FREE`].
+    /// The size; its lowest bits, zero in a multiple of 16, hold [`FREE`], its highest the owner.
     size_and_free: usize,
     /// The block that ends where this one starts; none for a region's first.
     previous: Option<Block>,
@@ -93,7 +95,21 @@ impl Block {
 
     /// Returns the size in bytes, header included; 0 for an end marker.
     pub(super) fn size(self) -> usize {
-        self.read().size_and_free & !FREE
+        self.read().size_and_free & ((1 << OWNER) - 1) & !FREE
+    }
+
+    /// Returns the owner of a used block, 0 if it has none.
+    pub(super) fn owner(self) -> u32 {
+        u32::try_from(self.read().size_and_free >> OWNER).unwrap_or(0)
+    }
+
+    /// Gives a used block an owner, of 24 bits.
+    pub(super) fn set_owner(self, owner: u32) {
+        let owner = owner as usize & (usize::MAX >> OWNER);
+        self.write(Header {
+            size_and_free: self.size() | owner << OWNER,
+            ..self.read()
+        });
     }
 
     pub(super) fn is_free(self) -> bool {
@@ -111,13 +127,12 @@ impl Block {
         self.at_offset(self.size())
     }
 
-    /// Marks the block as free, or as used. Only the free lists may: **Listing**.
+    /// Marks the block as free, or as used, by nobody. Only the free lists may: **Listing**.
     pub(super) fn set_free(self, free: bool) {
-        let header = self.read();
         let flag = if free { FREE } else { 0 };
         self.write(Header {
-            size_and_free: header.size_and_free & !FREE | flag,
-            ..header
+            size_and_free: self.size() | flag,
+            ..self.read()
         });
     }
 
@@ -126,15 +141,15 @@ impl Block {
     pub(super) fn split(self, size: usize) -> Self {
         let whole = self.read();
         debug_assert!(size >= MIN_BLOCK_SIZE && size.is_multiple_of(GRANULE));
-        debug_assert!(whole.size_and_free - size >= MIN_BLOCK_SIZE);
+        debug_assert!(self.size() - size >= MIN_BLOCK_SIZE);
         let after = self.next();
         let rest = self.at_offset(size);
         rest.write(Header {
-            size_and_free: whole.size_and_free - size,
+            size_and_free: self.size() - size,
             previous: Some(self),
         });
         self.write(Header {
-            size_and_free: size,
+            size_and_free: whole.size_and_free - (self.size() - size),
             ..whole
         });
         after.set_previous(rest);

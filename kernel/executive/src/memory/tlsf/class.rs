@@ -5,7 +5,7 @@
 //! would be narrower than a granule, share the first range with one class per
 //! granule. Pure arithmetic: nothing here touches memory.
 
-use super::block::{GRANULE, HEADER_SIZE, MIN_BLOCK_SIZE};
+use super::block::{GRANULE, HEADER_SIZE, MIN_BLOCK_SIZE, OWNER};
 
 /// Ranges of the first level; the last ends at [`SIZE_LIMIT`].
 pub(super) const FIRST_LEVEL: usize = 32;
@@ -13,6 +13,7 @@ pub(super) const FIRST_LEVEL: usize = 32;
 pub(super) const SECOND_LEVEL: usize = 1 << SECOND_LEVEL_LOG2;
 /// Block sizes, in bytes, are below this: 1 TiB.
 pub(super) const SIZE_LIMIT: usize = LINEAR_LIMIT << (FIRST_LEVEL - 1);
+const _: () = assert!(SIZE_LIMIT <= 1 << OWNER);
 
 /// The paper's recommended trade-off between waste (1/32) and list heads.
 const SECOND_LEVEL_LOG2: u32 = 5;

@@ -68,6 +68,8 @@ use usage::Usage;
 pub(crate) struct Tlsf {
     free: FreeLists,
     usage: Usage,
+    /// The first block of the region that was added last.
+    first: Option<Block>,
 }
 
 // SAFETY: by Ownership no one else reaches the memory behind the pointers of the
@@ -82,6 +84,7 @@ impl Tlsf {
         Self {
             free: FreeLists::new(),
             usage: Usage::new(),
+            first: None,
         }
     }
 
@@ -111,7 +114,32 @@ impl Tlsf {
         // the region; with (1) and (2) this establishes Ownership.
         let block = unsafe { Block::create_region(first, size) };
         self.usage.capacity_bytes += size;
+        self.first = Some(block);
         self.free.insert(block);
+    }
+
+    /// Notes whose an allocation is, by a number of 24 bits; 0 is nobody.
+    ///
+    /// # Safety
+    ///
+    /// `payload` came from [`allocate`](Self::allocate) of this allocator, and was not deallocated
+    /// since.
+    pub(crate) unsafe fn set_owner(&mut self, payload: NonNull<u8>, owner: u32) {
+        // SAFETY: by the caller's promise it is the payload of a used block of the tiling.
+        unsafe { Block::of_payload(payload) }.set_owner(owner);
+    }
+
+    /// Hands over the owner and the size of each block in use that has an owner, and makes it
+    /// nobody's: of the region that was added last. Takes a step for each block, used or free.
+    pub(crate) fn take_owned(&mut self, mut take: impl FnMut(u32, usize)) {
+        let mut next = self.first;
+        while let Some(block) = next.filter(|block| block.size() > 0) {
+            if !block.is_free() && block.owner() > 0 {
+                take(block.owner(), block.size());
+                block.set_owner(0);
+            }
+            next = Some(block.next());
+        }
     }
 
     /// Returns memory for `layout`, or `None` when no class that is sure to fit

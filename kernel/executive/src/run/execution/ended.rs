@@ -1,12 +1,29 @@
 //! A run that has ended: what its clusters have left behind.
+//!
+//! The bodies, and the values that waited for them, are dropped at once, DAG by DAG: outside any
+//! instance, so a `drop` of the app's that panics or never returns cannot be contained. It can be
+//! named ([`look_at_clearing`]).
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions, SubtaskId, TaskSet};
+use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, SubtaskId, TaskSet};
 
-use super::{Execution, cluster, divided};
-use crate::machine::this_core;
+use super::watcher::Watcher;
+use super::{Execution, Loan, cluster, divided};
+use crate::machine::spinlock::SpinLock;
+use crate::machine::{clock, this_core};
+
+/// The DAG whose bodies are being dropped, and since when.
+static CLEARING: SpinLock<Option<(Arc<TaskSet>, DagId, u64)>> = SpinLock::new(None);
+
+/// Hands over the name of the DAG whose bodies are being dropped, if that goes on, and since when
+/// it does.
+pub fn look_at_clearing<R>(look: impl FnOnce(&str, u64) -> R) -> Option<R> {
+    let clearing = CLEARING.try_lock()?;
+    let (task_set, dag, since_ns) = clearing.as_ref()?;
+    Some(look(task_set.dag(*dag).name(), *since_ns))
+}
 
 /// A run, taken out.
 pub struct Ended {
@@ -22,6 +39,29 @@ impl Ended {
             divided::merge(first, others);
         }
         Some(Self { parts })
+    }
+
+    /// Drops what it has left behind, and gives back what faults have left.
+    pub(super) fn clear(&mut self) {
+        let task_set = Arc::clone(self.task_set());
+        for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
+            let Watcher {
+                placement, lost, ..
+            } = &mut self.parts[dag.cluster().index()].watcher;
+            *CLEARING.lock() = Some((Arc::clone(&task_set), id, clock::now_ns()));
+            let of_dag = |lost: &mut Loan| lost.instance.dag == id;
+            let lost = lost.extract_if(.., of_dag);
+            lost.for_each(|lost| lost.give_back().body.forget());
+            for subtask in (0..).map(SubtaskId).take(dag.subtasks().len()) {
+                let any = Instance {
+                    dag: id,
+                    job: 0,
+                    subtask,
+                };
+                drop(placement.take(task_set.vertex(any)).map(Loan::give_back));
+            }
+            drop(CLEARING.lock().take());
+        }
     }
 
     /// Returns the scheduler of a DAG, for its counters.

@@ -5,16 +5,15 @@
 //! there is something to decide, and wakes the other cores after the lock is
 //! free again.
 
-use alloc::boxed::Box;
-
 use sched_dag::journal::{Subject, What};
 
 use super::core_set::CoreSet;
-use super::runner::Runner;
+use super::loans::Loan;
 use super::status::note_running;
 use super::step::Ended;
 use super::time::{instance_time_ns, seat, since_epoch};
 use super::{Occasion, Work, cluster};
+use crate::machine::abandoned::Abandoned;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
 use crate::machine::{clock, section, this_core, turns};
@@ -44,7 +43,7 @@ fn take_turns(core: &Core, work: Work) -> Work {
 
 /// Reports that this core has run its instance, and finds what it is to do
 /// next. Interrupts are disabled.
-pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
+pub fn complete(mut finished: Loan, finish_ns: u64) -> Work {
     let core = this_core::get();
     let here = seat(core);
     let mut place = finished.cluster().execution.lock_uninterrupted();
@@ -83,16 +82,16 @@ pub fn complete(mut finished: Box<Runner>, finish_ns: u64) -> Work {
     take_turns(core, work)
 }
 
-/// Ends this core's instance because of a fault, and with it its DAG or its job. The
-/// context that ran it must not be resumed. Interrupts are disabled.
-pub fn fail() {
+/// Ends this core's instance because of a fault, and with it its DAG or its job. Its context was
+/// `left` here. Interrupts are disabled.
+pub fn fail(left: &Abandoned) {
     let core = this_core::get();
     let mut place = cluster::of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;
     };
     let here = seat(core);
-    let Some(vertex) = execution.watcher.placement.lose(here.index()) else {
+    let Some(vertex) = execution.watcher.recover(here, left) else {
         return;
     };
     let instance = execution.scheduler.instance_of(vertex);

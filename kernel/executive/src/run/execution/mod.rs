@@ -17,6 +17,8 @@ mod divided;
 mod ended;
 mod events;
 mod letters;
+#[allow(unsafe_code, reason = "what a fault has left on a stack is taken back")]
+mod loans;
 mod runner;
 mod signals;
 mod stacks;
@@ -27,7 +29,6 @@ mod watcher;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -40,9 +41,10 @@ use crate::machine::context::Parked;
 pub use cluster::{count as clusters, first_core};
 pub use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
 pub use divided::{Division, division, is_finished, set_division};
-pub use ended::Ended;
+pub use ended::{Ended, look_at_clearing};
 pub use events::{complete, fail, find_work, interrupt};
-pub use runner::Runner;
+pub use loans::Loan;
+use runner::Runner;
 use signals::Signals;
 pub use signals::{raise, raise_in_interrupt};
 pub use status::{
@@ -55,7 +57,7 @@ use watcher::Watcher;
 /// What a core is to do next.
 pub enum Work {
     /// Call the subtask's function for the instance.
-    Run(Box<Runner>),
+    Run(Loan),
     /// Go on with this context.
     Continue(Parked),
     /// Nothing.
@@ -159,16 +161,10 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
             proven: Arc::clone(&proven),
         })
         .collect();
-    let number_of = |runner: &Runner| task_set.dag(runner.instance.dag).cluster().index();
     for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
-        let watcher = &mut executions[number_of(&runner)].watcher;
-        watcher.placement.replace(runner.vertex, runner);
-    }
-    for others in runner::others(task_set, plan.others, terms.budget_factor) {
-        if let Some(any) = others.first() {
-            let (number, vertex) = (number_of(any), any.vertex.index());
-            executions[number].watcher.others[vertex] = others;
-        }
+        let cluster = task_set.dag(runner.instance.dag).cluster();
+        let watcher = &mut executions[cluster.index()].watcher;
+        watcher.begin(runner);
     }
     for (number, execution) in executions.into_iter().enumerate() {
         *cluster::nth(number).execution.lock() = Some(execution);
@@ -192,10 +188,12 @@ pub fn begin(epoch_ns: u64) -> Option<u64> {
     Some(jobs.sum())
 }
 
-/// Takes the run out when it has ended.
+/// Takes the run out when it has ended, and drops what it has left behind.
 pub fn end() -> Option<Ended> {
     let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
-    Ended::of(parts.collect())
+    let mut ended = Ended::of(parts.collect())?;
+    ended.clear();
+    Some(ended)
 }
 
 impl Execution {

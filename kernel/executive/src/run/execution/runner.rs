@@ -1,6 +1,5 @@
 //! What runs the instances of one subtask.
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use fass::Body;
@@ -12,7 +11,7 @@ use super::cluster::{self, Cluster};
 /// A subtask's body, and what running an instance of it takes.
 ///
 /// There is one for each subtask, as a subtask has one started instance at a time
-/// (R2). It is boxed: between its place and the core that runs it moves a pointer.
+/// (R2). Between its place and the core that runs it moves a [`Loan`](super::Loan).
 pub struct Runner {
     pub(super) body: Body,
     pub(super) vertex: Vertex,
@@ -68,47 +67,17 @@ pub(super) fn runners(
     task_set: &TaskSet,
     bodies: Vec<Vec<Body>>,
     budget_factor: u64,
-) -> impl Iterator<Item = Box<Runner>> {
-    let of_subtasks = by_subtask(bodies);
-    of_subtasks.map(move |(any, body)| runner(task_set, any, body, budget_factor))
-}
-
-/// What takes the places of runners that faults have lost, by vertex, the next one last.
-#[allow(clippy::vec_box, reason = "at the fault nothing may be boxed any more")]
-pub(super) type Others = Box<[Vec<Box<Runner>>]>;
-
-/// Makes a runner for each body that takes the place of another one, by vertex.
-#[allow(clippy::vec_box, reason = "at the fault nothing may be boxed any more")]
-pub(super) fn others(
-    task_set: &TaskSet,
-    bodies: Vec<Vec<Vec<Body>>>,
-    budget_factor: u64,
-) -> impl Iterator<Item = Vec<Box<Runner>>> {
-    by_subtask(bodies).map(move |(any, bodies): (Instance, Vec<Body>)| {
-        let bodies = bodies.into_iter();
-        let runners = bodies.map(|body| runner(task_set, any, body, budget_factor));
-        runners.collect()
-    })
-}
-
-/// Returns what there is of each subtask, with any instance of that.
-fn by_subtask<T>(of_dags: Vec<Vec<T>>) -> impl Iterator<Item = (Instance, T)> {
-    let of_dags = (0..).map(DagId).zip(of_dags);
-    of_dags.flat_map(|(dag, of_dag)| {
+) -> impl Iterator<Item = Runner> {
+    let of_dags = (0..).map(DagId).zip(bodies);
+    of_dags.flat_map(move |(dag, of_dag)| {
         let of_subtasks = (0..).map(SubtaskId).zip(of_dag);
-        of_subtasks.map(move |(subtask, of)| {
-            (
-                Instance {
-                    dag,
-                    job: 0,
-                    subtask,
-                },
-                of,
-            )
+        of_subtasks.map(move |(subtask, body)| {
+            let any = Instance {
+                dag,
+                job: 0,
+                subtask,
+            };
+            Runner::new(body, task_set, any, budget_factor)
         })
     })
-}
-
-fn runner(task_set: &TaskSet, any: Instance, body: Body, budget_factor: u64) -> Box<Runner> {
-    Box::new(Runner::new(body, task_set, any, budget_factor))
 }

@@ -3,10 +3,21 @@
 use core::sync::atomic::Ordering;
 
 use sched_dag::journal::Subject;
-use sched_dag::{Instance, Journal};
+use sched_dag::{DagId, Instance, Journal, SubtaskId};
 
 use super::cluster::{self, FIRST_SEAT};
 use crate::machine::this_core::{self, Core};
+use crate::memory::heap;
+
+const _: () = {
+    let any = Instance {
+        dag: DagId(1),
+        job: 0,
+        subtask: SubtaskId(0),
+    };
+    // The heap tells by this whose memory it is.
+    assert!(Subject::of(any).ids == 1 << heap::OWNER_BIT);
+};
 
 /// Stands where the ids of an instance do, for none.
 const NOTHING: u64 = u64::MAX;
@@ -87,9 +98,9 @@ pub fn cost_of_fault(instance: Instance) -> Cost {
     };
     let vertex = execution.task_set().vertex(instance);
     let is_survived = execution.scheduler.survives(instance.dag, instance.job);
-    match execution.watcher.other(vertex).filter(|_| is_survived) {
+    match execution.watcher.next(vertex).filter(|_| is_survived) {
         None => Cost::Dag,
-        Some(other) if other.body.is_fallback() => Cost::Degraded,
+        Some(next) if next.is_fallback() => Cost::Degraded,
         Some(_) => Cost::Job,
     }
 }

@@ -2,14 +2,13 @@
 
 use core::sync::atomic::Ordering;
 
-use alloc::boxed::Box;
-
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Next;
 use sched_dag::{CoreId, Decision, HandOff, Instance, Vertex};
 
 use super::cluster::{FIRST_SEAT, MAY_DIVIDE};
 use super::core_set::CoreSet;
+use super::loans::Loan;
 use super::runner::Runner;
 use super::status::note_running;
 use super::time::{here, instance_time_ns, seat, since_epoch};
@@ -24,7 +23,7 @@ use crate::run::contexts;
 /// What comes of [`Execution::hand_off`].
 pub(super) enum Ended {
     /// The core has its next instance, and nothing else is to do.
-    HandedOff(Box<Runner>),
+    HandedOff(Loan),
     /// The scheduler's step is not over.
     Open,
     /// When the next event is due may have changed; then the core may have a
@@ -101,7 +100,7 @@ impl Execution {
         watcher.instant_ns = instant_ns.max(scheduler.now_ns());
         let is_survived = match occasion {
             Occasion::Failed(failed) if scheduler.survives(failed.dag, failed.job) => {
-                watcher.other(watcher.task_set.vertex(failed)).is_some()
+                watcher.next(watcher.task_set.vertex(failed)).is_some()
             }
             _ => false,
         };

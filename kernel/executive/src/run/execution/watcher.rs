@@ -4,8 +4,10 @@ use core::sync::atomic::Ordering;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 
+use fass::Replacement;
 use fass::edge::Happened;
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Placement;
@@ -14,8 +16,9 @@ use sched_dag::{TaskSet, Vertex};
 
 use super::Runner;
 use super::cluster::{self, Cluster};
-use super::runner::Others;
+use super::loans::{Loan, Loans};
 use super::time::here;
+use crate::machine::abandoned::Abandoned;
 use crate::machine::context::Parked;
 use crate::machine::this_core;
 use crate::run::edge;
@@ -27,15 +30,20 @@ pub(super) struct Watcher {
     cluster: &'static Cluster,
     pub(super) journal: Journal,
     /// The bodies, and which core has which.
-    pub(super) placement: Placement<Box<Runner>, Parked>,
-    pub(super) others: Others,
+    pub(super) placement: Placement<Loan, Parked>,
+    /// What would replace the functions of these, by vertex.
+    next: Box<[Option<Replacement>]>,
+    loans: Loans,
+    /// The runners whose functions faults have ended, unless they go on with others. There is
+    /// room for all.
+    pub(super) lost: Vec<Loan>,
     pub(super) task_set: Arc<TaskSet>,
     /// The instant, on the run's time.
     pub(super) instant_ns: u64,
     /// Whether anything has happened to a job as a whole.
     pub(super) has_job_news: bool,
     /// What this core has just finished, as long as nothing else is reported, and when.
-    pub(super) finished: Option<Box<Runner>>,
+    pub(super) finished: Option<Loan>,
     pub(super) finish_ns: u64,
 }
 
@@ -48,7 +56,9 @@ impl Watcher {
             cluster: cluster::nth(id.index()),
             journal,
             placement: Placement::empty(task_set.vertices(), cores.len()),
-            others: (0..task_set.vertices()).map(|_| Vec::new()).collect(),
+            next: vec![None; task_set.vertices()].into(),
+            loans: Loans::new(task_set.vertices()),
+            lost: Vec::with_capacity(task_set.vertices()),
             task_set: Arc::clone(task_set),
             instant_ns: 0,
             has_job_news: false,
@@ -74,18 +84,32 @@ impl Watcher {
 
     /// Notes that this core has just finished something.
     #[inline]
-    pub(super) fn note_finish(&mut self, finished: Box<Runner>, finish_ns: u64) {
+    pub(super) fn note_finish(&mut self, finished: Loan, finish_ns: u64) {
         let before = self.finished.replace(finished);
         debug_assert!(before.is_none());
-        // The compiler need not find that out each time.
-        core::mem::forget(before);
         self.finish_ns = finish_ns;
     }
 
-    /// Returns what would take the place of a body if a fault lost it now.
-    pub(super) fn other(&self, vertex: Vertex) -> Option<&Runner> {
-        let next = self.others[vertex.index()].last()?;
-        next.body.can_take_over().then_some(&**next)
+    /// Puts the runner of a vertex into its place, at the commit.
+    pub(super) fn begin(&mut self, runner: Runner) {
+        let (vertex, loan) = (runner.vertex, Loan::of(runner));
+        self.next[vertex.index()] = loan.body.replacement();
+        self.loans.note(&loan);
+        self.placement.replace(vertex, loan);
+    }
+
+    /// Returns what would take the place of a function if a fault ended it now.
+    pub(super) fn next(&self, vertex: Vertex) -> Option<&Replacement> {
+        let next = self.next[vertex.index()].as_ref()?;
+        next.is_there().then_some(next)
+    }
+
+    /// Takes back what this core had with it as a fault ended that, and returns its vertex.
+    pub(super) fn recover(&mut self, here: CoreId, left: &Abandoned) -> Option<Vertex> {
+        let lost = (self.loans).recover(&mut self.placement, here.index(), left)?;
+        let vertex = lost.vertex;
+        self.lost.push(lost);
+        Some(vertex)
     }
 
     /// Writes down what has happened to a whole job.
@@ -153,9 +177,9 @@ impl Observer for Watcher {
         let Instance { dag, subtask, job } = instance;
         self.tell(What::Restarted, (dag, subtask.0, job), None);
         let vertex = self.task_set.vertex(instance);
-        if let Some(mut next) = self.others[vertex.index()].pop() {
-            next.body.take_over();
-            self.placement.replace(vertex, next);
+        if let Some(mut runner) = self.lost.pop_if(|lost| lost.vertex == vertex) {
+            runner.body.replace();
+            self.placement.replace(vertex, runner);
         }
     }
 

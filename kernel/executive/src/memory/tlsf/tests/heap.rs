@@ -57,6 +57,20 @@ impl TestHeap {
         self.tlsf.allocate(layout)
     }
 
+    /// The tests pass what they got from `allocate`, before they deallocate it.
+    pub(super) fn set_owner(&mut self, payload: NonNull<u8>, owner: u32) {
+        // SAFETY: it came from `allocate`, and was not deallocated since.
+        unsafe { self.tlsf.set_owner(payload, owner) };
+    }
+
+    /// Returns what blocks have owners: the owner and the size of each.
+    pub(super) fn take_owned(&mut self) -> Vec<(u32, usize)> {
+        let mut owned = Vec::new();
+        self.tlsf
+            .take_owned(|owner, bytes| owned.push((owner, bytes)));
+        owned
+    }
+
     /// The tests pass what they got from `allocate`, once, with its size.
     pub(super) fn deallocate(&mut self, payload: NonNull<u8>, size: usize, align: usize) {
         let layout = Layout::from_size_align(size, align).expect("a sound layout");

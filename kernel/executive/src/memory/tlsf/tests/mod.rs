@@ -97,6 +97,26 @@ fn an_alignment_or_size_beyond_all_memory_fails() {
 }
 
 #[test]
+fn a_block_has_its_owner_until_it_is_freed_or_the_owner_is_taken() {
+    let mut heap = TestHeap::new(&[LENGTH]);
+    let blocks = three_blocks(&mut heap);
+    for (block, owner) in blocks.into_iter().zip([7, 0xff_ffff, 7]) {
+        heap.set_owner(block, owner);
+    }
+    // Sizes, neighbours and lists are as if there were no owners.
+    assert_eq!(heap.validate().used_blocks, 3);
+    heap.deallocate(blocks[0], 112, 8);
+    assert_eq!(heap.take_owned(), [(0xff_ffff, 128), (7, 128)]);
+    assert_eq!(heap.take_owned(), []);
+    let again = heap.allocate(112, 8).expect("it was freed");
+    assert_eq!((again, heap.take_owned()), (blocks[0], Vec::new()));
+    for block in blocks {
+        heap.deallocate(block, 112, 8);
+    }
+    assert_eq!(heap.validate().free_sizes, [WHOLE]);
+}
+
+#[test]
 fn an_exhausted_heap_recovers() {
     let mut heap = TestHeap::new(&[LENGTH]);
     let mut blocks = Vec::new();

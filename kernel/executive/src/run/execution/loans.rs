@@ -1,0 +1,87 @@
+//! Who has the runner of each subtask, so that a fault does not cost it.
+//!
+//! A *loan* is what one uses a runner by. It moves between the runner's place and the core that
+//! runs an instance. If a fault ends that, the loan is somewhere on the stack of a context that
+//! was left for good. So it is noted at the commit where each runner is, and the loan is made
+//! again.
+//!
+//! **Loan invariant**: of each runner there is one loan that anything will ever use. While the
+//! runner is of a core's current instance, it is on the stack of the context that runs there.
+
+use alloc::boxed::Box;
+use core::ops::{Deref, DerefMut};
+use core::ptr::NonNull;
+
+use sched_dag::placement::Placement;
+
+use super::Runner;
+use crate::machine::abandoned::Abandoned;
+use crate::machine::context::Parked;
+
+/// A runner that is to be [given back](Self::give_back).
+#[derive(Debug)]
+pub struct Loan(NonNull<Runner>);
+
+// SAFETY: by the loan invariant it is the one way to the runner, which is `Send`.
+unsafe impl Send for Loan where Runner: Send {}
+
+impl Loan {
+    /// Lends a runner.
+    pub(super) fn of(runner: Runner) -> Self {
+        Self(NonNull::from(Box::leak(Box::new(runner))))
+    }
+
+    /// Returns the runner itself.
+    pub(super) fn give_back(self) -> Runner {
+        // SAFETY: `of` has leaked a box, and by the loan invariant this ends its one loan.
+        *unsafe { Box::from_raw(self.0.as_ptr()) }
+    }
+}
+
+impl Deref for Loan {
+    type Target = Runner;
+
+    #[inline]
+    fn deref(&self) -> &Runner {
+        // SAFETY: by the loan invariant nothing else reaches the runner.
+        unsafe { self.0.as_ref() }
+    }
+}
+
+impl DerefMut for Loan {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut Runner {
+        // SAFETY: by the loan invariant nothing else reaches the runner.
+        unsafe { self.0.as_mut() }
+    }
+}
+
+/// Where all runners are, by vertex.
+pub(super) struct Loans(Box<[Option<NonNull<Runner>>]>);
+
+// SAFETY: the addresses are used for loans only, which are `Send`.
+unsafe impl Send for Loans {}
+
+impl Loans {
+    /// Makes room for so many vertices.
+    pub(super) fn new(vertices: usize) -> Self {
+        Self((0..vertices).map(|_| None).collect())
+    }
+
+    /// Notes where a runner is.
+    pub(super) fn note(&mut self, loan: &Loan) {
+        self.0[loan.vertex.index()] = Some(loan.0);
+    }
+
+    /// Takes the runner of a core's current instance back, whose context was `_left` there.
+    pub(super) fn recover(
+        &self,
+        placement: &mut Placement<Loan, Parked>,
+        core: usize,
+        _left: &Abandoned,
+    ) -> Option<Loan> {
+        let vertex = placement.lose(core)?;
+        // By the loan invariant the other loan lies on the stack that nothing runs on any more.
+        self.0[vertex.index()].map(Loan)
+    }
+}
