@@ -66,14 +66,9 @@ fn d2_the_next_instance_may_start_at_the_instant_of_the_fault() {
     let (events, _) = run_failing(&[spec], PREEMPTIVE, &[instance(0, 0, 0)], |_| 12);
     assert_events(
         &events,
-        "0 ready 0.0.0
-         0 start 0.0.0 on 0
-         12 fail 0.0.0
-         12 restarted 0.0.0
-         12 ready 0.1.0
-         12 start 0.1.0 on 0
-         24 ready 0.2.0
-         24 start 0.2.0 on 0",
+        "0 ready 0.0.0, start 0.0.0 on 0
+         12 fail 0.0.0, restarted 0.0.0, ready 0.1.0, start 0.1.0 on 0
+         24 ready 0.2.0, start 0.2.0 on 0",
     );
 }
 
@@ -89,18 +84,11 @@ fn d3_what_is_ready_is_cancelled_and_what_has_started_ends() {
     assert_events(
         &events,
         "0 ready 0.0.0
-         1 ready 0.0.1
-         1 ready 0.0.2
-         1 ready 0.0.3
-         4 fail 0.0.1
-         4 restarted 0.0.1
-         4 cancelled 0.0.3
-         8 cancelled 0.0.4
-         8 ended 0.0 Failed
+         1 ready 0.0.1, ready 0.0.2, ready 0.0.3
+         4 fail 0.0.1, restarted 0.0.1, cancelled 0.0.3
+         8 cancelled 0.0.4, ended 0.0 Failed
          20 ready 0.1.0
-         21 ready 0.1.1
-         21 ready 0.1.2
-         21 ready 0.1.3
+         21 ready 0.1.1, ready 0.1.2, ready 0.1.3
          28 ready 0.1.4
          29 ended 0.1 Met",
     );
@@ -122,9 +110,7 @@ fn d3_an_aborted_job_stays_aborted() {
     assert_events(
         &events,
         "10 aborted 0.0
-         15 fail 0.0.0
-         15 restarted 0.0.0
-         15 ended 0.0 Aborted
+         15 fail 0.0.0, restarted 0.0.0, ended 0.0 Aborted
          17 ended 0.1 Met
          22 ended 0.2 Met",
     );
@@ -168,8 +154,7 @@ fn d4_other_jobs_in_flight_go_on() {
         "0 released 0.0 of 0
          10 released 0.1 of 10
          20 released 0.2 of 20
-         26 restarted 0.0.1
-         26 ended 0.0 Failed
+         26 restarted 0.0.1, ended 0.0 Failed
          51 ended 0.1 Met
          76 ended 0.2 Met",
     );
@@ -187,8 +172,7 @@ fn d5_only_deadlines_before_the_fault_are_missed() {
         &events,
         "3 restarted 0.0.0
          6 ended 0.0 Failed
-         15 missed 0.1 of 14
-         15 restarted 0.1.0
+         15 missed 0.1 of 14, restarted 0.1.0
          19 ended 0.1 Failed
          21 ended 0.2 Met",
     );
@@ -203,11 +187,7 @@ fn d6_the_first_fault_that_is_not_survived_ends_the_dag() {
     let (events, statistics) = run_failing(&[spec], TWO_CORES, &failing, |_| 5);
     assert_events(
         &events,
-        "5 fail 0.0.0
-         5 restarted 0.0.0
-         5 fail 0.0.1
-         5 end 0
-         5 ended 0.0 Failed",
+        "5 fail 0.0.0, restarted 0.0.0, fail 0.0.1, end 0, ended 0.0 Failed",
     );
     assert_eq!((statistics[0].faults, statistics[0].restarts), (2, 1));
 }

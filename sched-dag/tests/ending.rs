@@ -43,10 +43,7 @@ fn e1_the_failing_instances_core_is_free_at_once() {
     assert_events(
         &events,
         "0 start 0.0.0 on 0
-         5 fail 0.0.0
-         5 end 0
-         5 ended 0.0 DagEnded
-         5 start 1.0.0 on 0
+         5 fail 0.0.0, end 0, ended 0.0 DagEnded, start 1.0.0 on 0
          10 start 1.0.1 on 0
          15 ended 1.0 Met",
     );
@@ -80,11 +77,8 @@ fn e2_nothing_is_released_from_the_instant_of_the_end_on() {
     assert_events(
         &events,
         "0 released 0.0 of 0
-         10 ended 0.0 Met
-         10 released 0.1 of 10
-         20 fail 0.1.0
-         20 end 0
-         20 ended 0.1 DagEnded",
+         10 ended 0.0 Met, released 0.1 of 10
+         20 fail 0.1.0, end 0, ended 0.1 DagEnded",
     );
     assert_eq!((statistics[0].released, statistics[0].dropped), (2, 0));
 }
@@ -102,9 +96,7 @@ fn e2_waiting_releases_are_dropped_and_counted() {
          21 missed 0.1 of 20
          30 queued 0.3
          31 missed 0.2 of 30
-         35 fail 0.0.0
-         35 end 0
-         35 ended 0.0 DagEnded",
+         35 fail 0.0.0, end 0, ended 0.0 DagEnded",
     );
     let counted = statistics[0];
     assert_eq!((counted.queued, counted.dropped), (3, 3));
@@ -121,14 +113,9 @@ fn e3_and_e4_what_is_ready_is_cancelled_and_what_has_started_ends() {
     assert_events(
         &events,
         "0 start 0.0.0 on 0
-         1 finish 0.0.0
-         1 start 0.0.1 on 0
-         1 start 0.0.2 on 1
-         4 fail 0.0.1
-         4 end 0
-         8 finish 0.0.2
-         8 cancelled 0.0.3
-         8 ended 0.0 DagEnded",
+         1 finish 0.0.0, start 0.0.1 on 0, start 0.0.2 on 1
+         4 fail 0.0.1, end 0
+         8 finish 0.0.2, cancelled 0.0.3, ended 0.0 DagEnded",
     );
 }
 
@@ -139,13 +126,8 @@ fn e3_what_is_ready_is_cancelled_at_once() {
     assert_events(
         &events,
         "0 ready 0.0.0
-         2 ready 0.0.1
-         2 ready 0.0.2
-         4 fail 0.0.1
-         4 end 0
-         4 cancelled 0.0.2
-         4 cancelled 0.0.3
-         4 ended 0.0 DagEnded",
+         2 ready 0.0.1, ready 0.0.2
+         4 fail 0.0.1, end 0, cancelled 0.0.2, cancelled 0.0.3, ended 0.0 DagEnded",
     );
 }
 
@@ -162,16 +144,8 @@ fn e3_instances_of_all_jobs_in_flight_are_cancelled_once() {
          2 ready 0.0.1
          10 ready 0.1.0
          20 ready 0.2.0
-         27 fail 0.0.1
-         27 end 0
-         27 cancelled 0.0.2
-         27 cancelled 0.1.1
-         27 cancelled 0.2.1
-         27 cancelled 0.1.2
-         27 ended 0.0 DagEnded
-         27 cancelled 0.2.2
-         27 ended 0.1 DagEnded
-         27 ended 0.2 DagEnded",
+         27 fail 0.0.1, end 0, cancelled 0.0.2, cancelled 0.1.1, cancelled 0.2.1, cancelled 0.1.2
+         27 ended 0.0 DagEnded, cancelled 0.2.2, ended 0.1 DagEnded, ended 0.2 DagEnded",
     );
     assert_eq!(statistics[0].cut_short, 3);
 }
@@ -188,15 +162,10 @@ fn e4_a_preempted_instance_goes_on_at_its_key() {
     });
     assert_events(
         &events,
-        "0 start 0.0.1 on 0
-         0 start 0.0.0 on 1
-         2 preempt 0.0.0 on 1
-         2 start 1.0.0 on 1
-         4 fail 0.0.1
-         4 end 0
-         4 resume 0.0.0 on 0
-         12 cancelled 0.0.2
-         12 ended 0.0 DagEnded
+        "0 start 0.0.1 on 0, start 0.0.0 on 1
+         2 preempt 0.0.0 on 1, start 1.0.0 on 1
+         4 fail 0.0.1, end 0, resume 0.0.0 on 0
+         12 cancelled 0.0.2, ended 0.0 DagEnded
          22 ended 1.0 Met",
     );
     assert_eq!(statistics[0].faults, 1);
@@ -210,11 +179,8 @@ fn e4_a_further_instance_may_fail() {
     });
     assert_events(
         &events,
-        "4 fail 0.0.1
-         4 end 0
-         8 fail 0.0.2
-         8 cancelled 0.0.3
-         8 ended 0.0 DagEnded",
+        "4 fail 0.0.1, end 0
+         8 fail 0.0.2, cancelled 0.0.3, ended 0.0 DagEnded",
     );
     assert_eq!((statistics[0].faults, statistics[0].cut_short), (2, 1));
 }
@@ -226,10 +192,7 @@ fn e5_a_job_that_was_aborted_before_ends_as_that() {
     assert_events(
         &events,
         "10 aborted 0.0
-         14 fail 0.0.0
-         14 end 0
-         14 cancelled 0.0.1
-         14 ended 0.0 Aborted",
+         14 fail 0.0.0, end 0, cancelled 0.0.1, ended 0.0 Aborted",
     );
     let counted = statistics[0];
     assert_eq!(
@@ -248,12 +211,7 @@ fn e5_a_job_that_is_complete_at_the_instant_of_the_end_counts() {
     assert_events(
         &events,
         "5 finish 0.0.0
-         15 finish 0.0.1
-         15 ended 0.0 Met
-         15 fail 0.1.0
-         15 end 0
-         15 cancelled 0.1.1
-         15 ended 0.1 DagEnded",
+         15 finish 0.0.1, ended 0.0 Met, fail 0.1.0, end 0, cancelled 0.1.1, ended 0.1 DagEnded",
     );
 }
 

@@ -40,30 +40,16 @@ fn queue_releases_late_and_keeps_the_nominal_times() {
     );
     assert_events(
         &events,
-        "0 released 0.0 of 0
-         0 ready 0.0.0
-         0 start 0.0.0 on 0
+        "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
          10 queued 0.1
          11 missed 0.0 of 10
          20 queued 0.2
          21 missed 0.1 of 20
-         25 finish 0.0.0
-         25 ended 0.0 Missed
-         25 released 0.1 of 10
-         25 ready 0.1.0
-         25 start 0.1.0 on 0
-         27 finish 0.1.0
-         27 ended 0.1 Missed
-         27 released 0.2 of 20
-         27 ready 0.2.0
-         27 start 0.2.0 on 0
-         29 finish 0.2.0
-         29 ended 0.2 Met
-         30 released 0.3 of 30
-         30 ready 0.3.0
-         30 start 0.3.0 on 0
-         32 finish 0.3.0
-         32 ended 0.3 Met",
+         25 finish 0.0.0, ended 0.0 Missed, released 0.1 of 10, ready 0.1.0, start 0.1.0 on 0
+         27 finish 0.1.0, ended 0.1 Missed, released 0.2 of 20, ready 0.2.0, start 0.2.0 on 0
+         29 finish 0.2.0, ended 0.2 Met
+         30 released 0.3 of 30, ready 0.3.0, start 0.3.0 on 0
+         32 finish 0.3.0, ended 0.3 Met",
     );
     let counted = statistics[0];
     assert_eq!(
@@ -102,8 +88,7 @@ fn a_release_at_the_instant_of_a_completion_finds_the_room() {
         assert_events(
             &events,
             "0 released 0.0 of 0
-             10 ended 0.0 Met
-             10 released 0.1 of 10
+             10 ended 0.0 Met, released 0.1 of 10
              20 ended 0.1 Met",
         );
         assert_eq!((statistics[0].queued, statistics[0].skips), (0, 0));
@@ -119,19 +104,13 @@ fn skip_drops_releases_and_keeps_the_jobs_numbers() {
     );
     assert_events(
         &events,
-        "0 released 0.0 of 0
-         0 ready 0.0.0
-         0 start 0.0.0 on 0
+        "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
          10 skipped 0.1
          11 missed 0.0 of 10
          20 skipped 0.2
-         25 finish 0.0.0
-         25 ended 0.0 Missed
-         30 released 0.3 of 30
-         30 ready 0.3.0
-         30 start 0.3.0 on 0
-         32 finish 0.3.0
-         32 ended 0.3 Met",
+         25 finish 0.0.0, ended 0.0 Missed
+         30 released 0.3 of 30, ready 0.3.0, start 0.3.0 on 0
+         32 finish 0.3.0, ended 0.3 Met",
     );
     let counted = statistics[0];
     assert_eq!(
@@ -159,30 +138,15 @@ fn abort_lets_the_started_instance_end_and_cancels_the_rest() {
     });
     assert_events(
         &events,
-        "0 released 0.0 of 0
-         0 ready 0.0.0
-         0 start 0.0.0 on 0
-         10 aborted 0.0
-         10 queued 0.1
-         14 finish 0.0.0
-         14 cancelled 0.0.1
-         14 ended 0.0 Aborted
-         14 released 0.1 of 10
-         14 ready 0.1.0
+        "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
+         10 aborted 0.0, queued 0.1
+         14 finish 0.0.0, cancelled 0.0.1, ended 0.0 Aborted, released 0.1 of 10, ready 0.1.0
          14 start 0.1.0 on 0
-         16 finish 0.1.0
-         16 ready 0.1.1
-         16 start 0.1.1 on 0
-         18 finish 0.1.1
-         18 ended 0.1 Met
-         20 released 0.2 of 20
-         20 ready 0.2.0
-         20 start 0.2.0 on 0
-         22 finish 0.2.0
-         22 ready 0.2.1
-         22 start 0.2.1 on 0
-         24 finish 0.2.1
-         24 ended 0.2 Met",
+         16 finish 0.1.0, ready 0.1.1, start 0.1.1 on 0
+         18 finish 0.1.1, ended 0.1 Met
+         20 released 0.2 of 20, ready 0.2.0, start 0.2.0 on 0
+         22 finish 0.2.0, ready 0.2.1, start 0.2.1 on 0
+         24 finish 0.2.1, ended 0.2 Met",
     );
     let counted = statistics[0];
     assert_eq!(
@@ -207,27 +171,12 @@ fn abort_frees_the_slot_at_once_if_nothing_has_started() {
     );
     assert_events(
         &events,
-        "0 released 0.0 of 0
-         0 released 1.0 of 0
-         10 aborted 0.0
-         10 cancelled 0.0.0
-         10 cancelled 0.0.1
-         10 ended 0.0 Aborted
-         10 released 0.1 of 10
-         20 aborted 0.1
-         20 cancelled 0.1.0
-         20 cancelled 0.1.1
-         20 ended 0.1 Aborted
-         20 released 0.2 of 20
-         25 ended 1.0 Met
-         25 start 0.2.0 on 0
+        "0 released 0.0 of 0, released 1.0 of 0, start 1.0.0 on 0
+         10 aborted 0.0, cancelled 0.0.0, cancelled 0.0.1, ended 0.0 Aborted, released 0.1 of 10
+         20 aborted 0.1, cancelled 0.1.0, cancelled 0.1.1, ended 0.1 Aborted, released 0.2 of 20
+         25 ended 1.0 Met, start 0.2.0 on 0
          27 start 0.2.1 on 0
-         29 ended 0.2 Met"
-            .replace(
-                "0 released 1.0 of 0",
-                "0 released 1.0 of 0\n0 start 1.0.0 on 0",
-            )
-            .as_str(),
+         29 ended 0.2 Met",
     );
     assert_eq!((statistics[0].aborts, statistics[0].queued), (2, 0));
 }
@@ -248,15 +197,10 @@ fn abort_lets_a_preempted_instance_end_at_its_key() {
     assert_events(
         &events,
         "0 start 0.0.0 on 0
-         5 preempt 0.0.0 on 0
-         5 start 1.0.0 on 0
-         10 aborted 0.0
-         10 queued 0.1
-         25 ended 1.0 Met
-         25 resume 0.0.0 on 0
-         28 cancelled 0.0.1
-         28 ended 0.0 Aborted
-         28 start 0.1.0 on 0
+         5 preempt 0.0.0 on 0, start 1.0.0 on 0
+         10 aborted 0.0, queued 0.1
+         25 ended 1.0 Met, resume 0.0.0 on 0
+         28 cancelled 0.0.1, ended 0.0 Aborted, start 0.1.0 on 0
          36 start 0.1.1 on 0
          44 ended 0.1 Missed",
     );
@@ -272,19 +216,12 @@ fn abort_with_several_in_flight_takes_the_oldest_first() {
         &events,
         "0 released 0.0 of 0
          10 released 0.1 of 10
-         20 aborted 0.0
-         20 queued 0.2
-         30 aborted 0.1
-         30 queued 0.3
-         36 cancelled 0.1.1
-         36 ended 0.0 Aborted
-         36 ended 0.1 Aborted
-         36 released 0.2 of 20
+         20 aborted 0.0, queued 0.2
+         30 aborted 0.1, queued 0.3
+         36 cancelled 0.1.1, ended 0.0 Aborted, ended 0.1 Aborted, released 0.2 of 20
          36 released 0.3 of 30
-         40 aborted 0.2
-         40 queued 0.4
-         72 ended 0.2 Aborted
-         72 released 0.4 of 40
+         40 aborted 0.2, queued 0.4
+         72 ended 0.2 Aborted, released 0.4 of 40
          107 ended 0.3 Missed
          142 ended 0.4 Missed",
     );
@@ -300,14 +237,10 @@ fn abort_skips_the_oldest_waiting_if_all_in_flight_are_aborted() {
     assert_events(
         &events,
         "0 released 0.0 of 0
-         10 aborted 0.0
-         10 queued 0.1
-         20 skipped 0.1
-         20 queued 0.2
-         30 skipped 0.2
-         30 queued 0.3
-         35 ended 0.0 Aborted
-         35 released 0.3 of 30
+         10 aborted 0.0, queued 0.1
+         20 skipped 0.1, queued 0.2
+         30 skipped 0.2, queued 0.3
+         35 ended 0.0 Aborted, released 0.3 of 30
          37 ended 0.3 Met",
     );
     let counted = statistics[0];
@@ -339,29 +272,16 @@ fn a_job_is_announced_before_it_is_late_however_late_the_driver_comes() {
     for (overrun, expected) in [
         (
             OverrunPolicy::Queue,
-            "0 released 0.0 of 0
-             0 missed 0.0 of 10
-             0 queued 0.1
-             0 missed 0.1 of 20
-             0 queued 0.2",
+            "0 released 0.0 of 0, missed 0.0 of 10, queued 0.1, missed 0.1 of 20, queued 0.2",
         ),
         (
             OverrunPolicy::Skip,
-            "0 released 0.0 of 0
-             0 missed 0.0 of 10
-             0 skipped 0.1
-             0 skipped 0.2",
+            "0 released 0.0 of 0, missed 0.0 of 10, skipped 0.1, skipped 0.2",
         ),
         (
             OverrunPolicy::Abort,
-            "0 released 0.0 of 0
-             0 missed 0.0 of 10
-             0 aborted 0.0
-             0 ended 0.0 Aborted
-             0 released 0.1 of 10
-             0 missed 0.1 of 20
-             0 aborted 0.1
-             0 ended 0.1 Aborted
+            "0 released 0.0 of 0, missed 0.0 of 10, aborted 0.0, ended 0.0 Aborted
+             0 released 0.1 of 10, missed 0.1 of 20, aborted 0.1, ended 0.1 Aborted
              0 released 0.2 of 20",
         ),
     ] {

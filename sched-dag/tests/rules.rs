@@ -21,12 +21,9 @@ fn r1_nothing_of_a_job_runs_before_its_release() {
     let (events, _) = run(&[spec], cores(2), |_| 1);
     assert_events(
         &events,
-        "3 released 0.0 of 3
-         3 start 0.0.0 on 0
-         13 released 0.1 of 13
-         13 start 0.1.0 on 0
-         23 released 0.2 of 23
-         23 start 0.2.0 on 0",
+        "3 released 0.0 of 3, start 0.0.0 on 0
+         13 released 0.1 of 13, start 0.1.0 on 0
+         23 released 0.2 of 23, start 0.2.0 on 0",
     );
 }
 
@@ -49,12 +46,9 @@ fn r2_join_waits_for_all_predecessors() {
     assert_events(
         &events,
         "0 ready 0.0.0
-         1 finish 0.0.0
-         1 ready 0.0.1
-         1 ready 0.0.2
+         1 finish 0.0.0, ready 0.0.1, ready 0.0.2
          3 finish 0.0.1
-         8 finish 0.0.2
-         8 ready 0.0.3
+         8 finish 0.0.2, ready 0.0.3
          9 finish 0.0.3",
     );
 }
@@ -70,8 +64,7 @@ fn r2_a_subtask_is_sequential_over_its_own_jobs() {
     assert_events(
         &events,
         "0 ready 0.0.0
-         3 ready 0.0.1
-         3 ready 0.1.0
+         3 ready 0.0.1, ready 0.1.0
          8 ready 0.1.1",
     );
 }
@@ -82,10 +75,8 @@ fn r2_jobs_of_one_dag_overlap() {
     assert_events(
         &events,
         "0 start 0.0.0 on 0
-         4 start 0.1.0 on 0
-         4 start 0.0.1 on 1
-         8 start 0.2.0 on 1
-         8 start 0.1.1 on 0
+         4 start 0.1.0 on 0, start 0.0.1 on 1
+         8 start 0.2.0 on 1, start 0.1.1 on 0
          12 start 0.2.1 on 1",
     );
 }
@@ -97,10 +88,7 @@ fn r3_all_edges_of_an_instance_are_released_at_its_completion() {
     assert_events(
         &events,
         "0 ready 0.0.0
-         2 finish 0.0.0
-         2 ready 0.0.1
-         2 ready 0.0.2
-         2 ready 0.0.3
+         2 finish 0.0.0, ready 0.0.1, ready 0.0.2, ready 0.0.3
          4 finish 0.0.1
          6 finish 0.0.2
          8 finish 0.0.3",
@@ -124,8 +112,7 @@ fn r4_the_deadline_itself_is_in_time_and_the_next_instant_is_not() {
     assert_events(
         &events,
         "5 ended 0.0 Met
-         6 missed 1.0 of 5
-         6 ended 1.0 Missed",
+         6 missed 1.0 of 5, ended 1.0 Missed",
     );
     assert_eq!((statistics[0].misses, statistics[1].misses), (0, 1));
 }
@@ -196,10 +183,8 @@ fn r5_the_instances_with_the_smallest_keys_run() {
     assert_events(
         &events,
         "0 start 0.0.0 on 0
-         2 preempt 0.0.0 on 0
-         2 start 1.0.0 on 0
-         6 finish 1.0.0
-         6 resume 0.0.0 on 0
+         2 preempt 0.0.0 on 0, start 1.0.0 on 0
+         6 finish 1.0.0, resume 0.0.0 on 0
          8 finish 0.0.0",
     );
 }
@@ -212,8 +197,7 @@ fn r5_between_equal_priorities_the_rest_of_the_key_decides_preemption_too() {
     assert_events(
         &events,
         "0 start 1.0.0 on 0
-         2 preempt 1.0.0 on 0
-         2 start 0.0.0 on 0
+         2 preempt 1.0.0 on 0, start 0.0.0 on 0
          6 resume 1.0.0 on 0",
     );
 }
@@ -276,10 +260,8 @@ fn r5_a_non_preemptive_subtask_keeps_its_core_among_preemptive_ones() {
     let (events, _) = run(&specs, cores(2), |_| 4);
     assert_events(
         &events,
-        "0 start 1.0.0 on 0
-         0 start 0.0.0 on 1
-         2 preempt 1.0.0 on 0
-         2 start 2.0.0 on 0
+        "0 start 1.0.0 on 0, start 0.0.0 on 1
+         2 preempt 1.0.0 on 0, start 2.0.0 on 0
          4 start 2.0.1 on 1
          6 resume 1.0.0 on 0",
     );
@@ -307,16 +289,9 @@ fn r5_completions_come_before_releases_and_both_before_the_dispatch() {
     let (events, _) = run(&specs, cores(1), |_| 4);
     assert_events(
         &events,
-        "0 released 0.0 of 0
-         0 ready 0.0.0
-         0 start 0.0.0 on 0
-         4 finish 0.0.0
-         4 ready 0.0.1
-         4 released 1.0 of 4
-         4 ready 1.0.0
-         4 start 1.0.0 on 0
-         8 finish 1.0.0
-         8 start 0.0.1 on 0
+        "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
+         4 finish 0.0.0, ready 0.0.1, released 1.0 of 4, ready 1.0.0, start 1.0.0 on 0
+         8 finish 1.0.0, start 0.0.1 on 0
          12 finish 0.0.1",
     );
 }
@@ -343,9 +318,7 @@ fn r5_is_work_conserving() {
     );
     assert_events(
         &events,
-        "0 start 0.0.3 on 0
-         0 start 0.0.2 on 1
-         0 start 0.0.1 on 2
+        "0 start 0.0.3 on 0, start 0.0.2 on 1, start 0.0.1 on 2
          2 start 0.0.0 on 0",
     );
 }
@@ -360,9 +333,7 @@ fn r5_the_core_that_completed_last_is_taken_first() {
     );
     assert_events(
         &events,
-        "0 start 0.0.0 on 0
-         0 start 0.0.1 on 1
-         0 start 0.0.2 on 2
+        "0 start 0.0.0 on 0, start 0.0.1 on 1, start 0.0.2 on 2
          5 start 0.0.3 on 1",
     );
 }
@@ -372,15 +343,7 @@ fn an_instance_may_execute_for_no_time() {
     let (events, _) = run(&[dag(10, 1, 2, &[0, 0], &[(0, 1)])], cores(1), |_| 0);
     assert_events(
         &events,
-        "0 start 0.0.0 on 0
-         0 finish 0.0.0
-         0 start 0.0.1 on 0
-         0 finish 0.0.1
-         0 ended 0.0 Met
-         10 start 0.1.0 on 0
-         10 finish 0.1.0
-         10 start 0.1.1 on 0
-         10 finish 0.1.1
-         10 ended 0.1 Met",
+        "0 start 0.0.0 on 0, finish 0.0.0, start 0.0.1 on 0, finish 0.0.1, ended 0.0 Met
+         10 start 0.1.0 on 0, finish 0.1.0, start 0.1.1 on 0, finish 0.1.1, ended 0.1 Met",
     );
 }

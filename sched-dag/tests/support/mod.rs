@@ -175,15 +175,17 @@ pub(crate) fn run_failing(
     (log.lines, statistics)
 }
 
-/// Compares events with an expected text, one event a line. Of the events only
+/// Compares events with an expected text, those of an instant on a line or several. Of the events only
 /// those of the kinds that the expected text has are compared.
 #[track_caller]
 pub(crate) fn assert_events(events: &[String], expected: &str) {
-    let expected: Vec<&str> = expected
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty())
-        .collect();
+    let at_one_time = |line: &str| {
+        let (time, events) = line.trim().split_once(' ').unwrap_or_default();
+        let timed = |event: &str| format!("{time} {event}");
+        events.split(", ").map(timed).collect::<Vec<_>>()
+    };
+    let lines = expected.lines().filter(|line| !line.trim().is_empty());
+    let expected: Vec<String> = lines.flat_map(at_one_time).collect();
     let kind = |line: &str| line.split(' ').nth(1).map(str::to_owned);
     let events: Vec<&str> = events
         .iter()
