@@ -8,8 +8,8 @@ use sched_dag::virtual_time::{End, VirtualTime};
 use sched_dag::{DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy};
 use support::written::Written;
 use support::{
-    Log, PREEMPTIVE, TWO_CORES, assert_events, commit, dag, instance, overrunning, run,
-    run_failing, scheduler,
+    Log, PREEMPTIVE, TWO_CORES, Timeline, commit, dag, instance, overrunning, run, run_failing,
+    scheduler,
 };
 
 /// Lets a DAG survive `faults` within `window` jobs, `in_all` in all.
@@ -64,8 +64,7 @@ fn d1_a_fault_that_cannot_be_replaced_ends_the_dag() {
 fn d2_the_next_instance_may_start_at_the_instant_of_the_fault() {
     let spec = surviving(1, 1, 9, dag(10, 30, 3, &[0], &[]));
     let (events, _) = run_failing(&[spec], PREEMPTIVE, &[instance(0, 0, 0)], |_| 12);
-    assert_events(
-        &events,
+    events.must_be(
         "0 ready 0.0.0, start 0.0.0 on 0
          12 fail 0.0.0, restarted 0.0.0, ready 0.1.0, start 0.1.0 on 0
          24 ready 0.2.0, start 0.2.0 on 0",
@@ -81,8 +80,7 @@ fn d3_what_is_ready_is_cancelled_and_what_has_started_ends() {
     let (events, statistics) = run_failing(&[spec], TWO_CORES, &failing, |instance| {
         [1, 3, 7, 1, 1][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 ready 0.0.0
          1 ready 0.0.1, ready 0.0.2, ready 0.0.3
          4 fail 0.0.1, restarted 0.0.1, cancelled 0.0.3
@@ -107,8 +105,7 @@ fn d3_an_aborted_job_stays_aborted() {
     let (events, statistics) = run_failing(&[spec], PREEMPTIVE, &[instance(0, 0, 0)], |it| {
         [15, 2, 2][usize::try_from(it.job).expect("few jobs")]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "10 aborted 0.0
          15 fail 0.0.0, restarted 0.0.0, ended 0.0 Aborted
          17 ended 0.1 Met
@@ -132,8 +129,7 @@ fn d3_a_job_that_is_cut_is_not_aborted() {
         0 => [5, 15][it.subtask.index()],
         _ => 1,
     });
-    assert_events(
-        &events,
+    events.must_be(
         "5 restarted 0.0.0
          10 skipped 0.1
          15 ended 0.0 Failed
@@ -149,8 +145,7 @@ fn d4_other_jobs_in_flight_go_on() {
     let (events, statistics) = run_failing(&[spec], TWO_CORES, &failing, |it| {
         [1, 25][it.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0
          10 released 0.1 of 10
          20 released 0.2 of 20
@@ -168,8 +163,7 @@ fn d5_only_deadlines_before_the_fault_are_missed() {
     let (events, statistics) = run_failing(&[spec], TWO_CORES, &failing, |it| {
         [[3, 5, 1], [6, 9, 1]][it.subtask.index()][usize::try_from(it.job).expect("few jobs")]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "3 restarted 0.0.0
          6 ended 0.0 Failed
          15 missed 0.1 of 14, restarted 0.1.0
@@ -185,10 +179,7 @@ fn d6_the_first_fault_that_is_not_survived_ends_the_dag() {
     let spec = surviving(1, 1, 9, dag(10, 10, 3, &[0, 0], &[]));
     let failing = [instance(0, 0, 0), instance(0, 0, 1)];
     let (events, statistics) = run_failing(&[spec], TWO_CORES, &failing, |_| 5);
-    assert_events(
-        &events,
-        "5 fail 0.0.0, restarted 0.0.0, fail 0.0.1, end 0, ended 0.0 Failed",
-    );
+    events.must_be("5 fail 0.0.0, restarted 0.0.0, fail 0.0.1, end 0, ended 0.0 Failed");
     assert_eq!((statistics[0].faults, statistics[0].restarts), (2, 1));
 }
 

@@ -5,7 +5,7 @@ mod support;
 
 use sched_dag::{CoreId, DagId, DagSpec, Decision, Instance, OverrunPolicy, Scheduler};
 use support::{
-    PREEMPTIVE, TWO_CORES, assert_events, dag, instance, overrunning, run, run_failing, scheduler,
+    PREEMPTIVE, TWO_CORES, Timeline, dag, instance, overrunning, run, run_failing, scheduler,
     start, step,
 };
 
@@ -40,8 +40,7 @@ fn e1_the_failing_instances_core_is_free_at_once() {
         dag(100, 100, 1, &[1, 1], &[(0, 1)]),
     ];
     let (events, statistics) = run_failing(&specs, PREEMPTIVE, &[instance(0, 0, 0)], |_| 5);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          5 fail 0.0.0, end 0, ended 0.0 DagEnded, start 1.0.0 on 0
          10 start 1.0.1 on 0
@@ -74,8 +73,7 @@ fn e2_nothing_is_released_from_the_instant_of_the_end_on() {
         &[instance(0, 1, 0)],
         |_| 10,
     );
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0
          10 ended 0.0 Met, released 0.1 of 10
          20 fail 0.1.0, end 0, ended 0.1 DagEnded",
@@ -87,8 +85,7 @@ fn e2_nothing_is_released_from_the_instant_of_the_end_on() {
 fn e2_waiting_releases_are_dropped_and_counted() {
     let spec = overrunning(dag(10, 10, 9, &[0], &[]), 1, OverrunPolicy::Queue);
     let (events, statistics) = run_failing(&[spec], PREEMPTIVE, &[instance(0, 0, 0)], |_| 35);
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0
          10 queued 0.1
          11 missed 0.0 of 10
@@ -110,8 +107,7 @@ fn e3_and_e4_what_is_ready_is_cancelled_and_what_has_started_ends() {
     let (events, _) = run_failing(&[diamond(3)], TWO_CORES, &[instance(0, 0, 1)], |instance| {
         [1, 3, 7, 1][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          1 finish 0.0.0, start 0.0.1 on 0, start 0.0.2 on 1
          4 fail 0.0.1, end 0
@@ -123,8 +119,7 @@ fn e3_and_e4_what_is_ready_is_cancelled_and_what_has_started_ends() {
 fn e3_what_is_ready_is_cancelled_at_once() {
     // On one core subtask 2 is ready and waits while subtask 1 runs and fails.
     let (events, _) = run_failing(&[diamond(3)], PREEMPTIVE, &[instance(0, 0, 1)], |_| 2);
-    assert_events(
-        &events,
+    events.must_be(
         "0 ready 0.0.0
          2 ready 0.0.1, ready 0.0.2
          4 fail 0.0.1, end 0, cancelled 0.0.2, cancelled 0.0.3, ended 0.0 DagEnded",
@@ -138,8 +133,7 @@ fn e3_instances_of_all_jobs_in_flight_are_cancelled_once() {
     let (events, statistics) = run_failing(&[spec], TWO_CORES, &[instance(0, 0, 1)], |instance| {
         [2, 25, 1][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 ready 0.0.0
          2 ready 0.0.1
          10 ready 0.1.0
@@ -160,8 +154,7 @@ fn e4_a_preempted_instance_goes_on_at_its_key() {
     let (events, statistics) = run_failing(&specs, TWO_CORES, &[instance(0, 0, 1)], |instance| {
         [[10, 4, 1], [20, 0, 0]][instance.dag.index()][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.1 on 0, start 0.0.0 on 1
          2 preempt 0.0.0 on 1, start 1.0.0 on 1
          4 fail 0.0.1, end 0, resume 0.0.0 on 0
@@ -177,8 +170,7 @@ fn e4_a_further_instance_may_fail() {
     let (events, statistics) = run_failing(&[diamond(3)], TWO_CORES, &failing, |instance| {
         [1, 3, 7, 1][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "4 fail 0.0.1, end 0
          8 fail 0.0.2, cancelled 0.0.3, ended 0.0 DagEnded",
     );
@@ -189,8 +181,7 @@ fn e4_a_further_instance_may_fail() {
 fn e5_a_job_that_was_aborted_before_ends_as_that() {
     let spec = overrunning(dag(10, 10, 3, &[1, 0], &[(0, 1)]), 1, OverrunPolicy::Abort);
     let (events, statistics) = run_failing(&[spec], PREEMPTIVE, &[instance(0, 0, 0)], |_| 14);
-    assert_events(
-        &events,
+    events.must_be(
         "10 aborted 0.0
          14 fail 0.0.0, end 0, cancelled 0.0.1, ended 0.0 Aborted",
     );
@@ -208,8 +199,7 @@ fn e5_a_job_that_is_complete_at_the_instant_of_the_end_counts() {
     let (events, _) = run_failing(&[spec], TWO_CORES, &[instance(0, 1, 0)], |instance| {
         [5, 10][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "5 finish 0.0.0
          15 finish 0.0.1, ended 0.0 Met, fail 0.1.0, end 0, cancelled 0.1.1, ended 0.1 DagEnded",
     );

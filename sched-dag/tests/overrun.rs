@@ -4,8 +4,9 @@
 
 mod support;
 
-use sched_dag::{DagSpec, Instance, OverrunPolicy};
-use support::{PREEMPTIVE, TWO_CORES, assert_events, cores, dag, overrunning, run};
+use sched_dag::OverrunPolicy::{self, Abort, Queue, Skip};
+use sched_dag::{DagSpec, Instance};
+use support::{PREEMPTIVE, TWO_CORES, Timeline, cores, dag, overrunning, run};
 
 /// A chain of two subtasks.
 const CHAIN: &[(usize, usize)] = &[(0, 1)];
@@ -33,13 +34,8 @@ fn long_once(execution_ns: u64) -> impl FnMut(Instance) -> u64 {
 
 #[test]
 fn queue_releases_late_and_keeps_the_nominal_times() {
-    let (events, statistics) = run(
-        &one_subtask(4, 1, OverrunPolicy::Queue),
-        PREEMPTIVE,
-        long_once(25),
-    );
-    assert_events(
-        &events,
+    let (events, statistics) = run(&one_subtask(4, 1, Queue), PREEMPTIVE, long_once(25));
+    events.must_be(
         "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
          10 queued 0.1
          11 missed 0.0 of 10
@@ -63,11 +59,10 @@ fn queue_releases_late_and_keeps_the_nominal_times() {
 
 #[test]
 fn queue_lets_the_given_number_of_jobs_overlap() {
-    let (events, _) = run(&chain(4, 2, OverrunPolicy::Queue), cores(4), |instance| {
+    let (events, _) = run(&chain(4, 2, Queue), cores(4), |instance| {
         [9, 18][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0
          10 released 0.1 of 10
          20 queued 0.2
@@ -79,14 +74,9 @@ fn queue_lets_the_given_number_of_jobs_overlap() {
 
 #[test]
 fn a_release_at_the_instant_of_a_completion_finds_the_room() {
-    for overrun in [
-        OverrunPolicy::Queue,
-        OverrunPolicy::Skip,
-        OverrunPolicy::Abort,
-    ] {
+    for overrun in [Queue, Skip, Abort] {
         let (events, statistics) = run(&one_subtask(2, 1, overrun), PREEMPTIVE, |_| 10);
-        assert_events(
-            &events,
+        events.must_be(
             "0 released 0.0 of 0
              10 ended 0.0 Met, released 0.1 of 10
              20 ended 0.1 Met",
@@ -97,13 +87,8 @@ fn a_release_at_the_instant_of_a_completion_finds_the_room() {
 
 #[test]
 fn skip_drops_releases_and_keeps_the_jobs_numbers() {
-    let (events, statistics) = run(
-        &one_subtask(4, 1, OverrunPolicy::Skip),
-        PREEMPTIVE,
-        long_once(25),
-    );
-    assert_events(
-        &events,
+    let (events, statistics) = run(&one_subtask(4, 1, Skip), PREEMPTIVE, long_once(25));
+    events.must_be(
         "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
          10 skipped 0.1
          11 missed 0.0 of 10
@@ -122,9 +107,8 @@ fn skip_drops_releases_and_keeps_the_jobs_numbers() {
 
 #[test]
 fn skip_is_over_when_the_last_release_is_skipped() {
-    let (events, statistics) = run(&one_subtask(2, 1, OverrunPolicy::Skip), PREEMPTIVE, |_| 15);
-    assert_events(
-        &events,
+    let (events, statistics) = run(&one_subtask(2, 1, Skip), PREEMPTIVE, |_| 15);
+    events.must_be(
         "10 skipped 0.1
          15 ended 0.0 Missed",
     );
@@ -133,11 +117,10 @@ fn skip_is_over_when_the_last_release_is_skipped() {
 
 #[test]
 fn abort_lets_the_started_instance_end_and_cancels_the_rest() {
-    let (events, statistics) = run(&chain(3, 1, OverrunPolicy::Abort), PREEMPTIVE, |instance| {
+    let (events, statistics) = run(&chain(3, 1, Abort), PREEMPTIVE, |instance| {
         if instance.job == 0 { 14 } else { 2 }
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
          10 aborted 0.0, queued 0.1
          14 finish 0.0.0, cancelled 0.0.1, ended 0.0 Aborted, released 0.1 of 10, ready 0.1.0
@@ -160,7 +143,7 @@ fn abort_lets_the_started_instance_end_and_cancels_the_rest() {
 fn abort_frees_the_slot_at_once_if_nothing_has_started() {
     // DAG 1 keeps the only core, so DAG 0's jobs never start before 25.
     let mut specs = [
-        overrunning(dag(10, 10, 3, &[5, 5], CHAIN), 1, OverrunPolicy::Abort),
+        overrunning(dag(10, 10, 3, &[5, 5], CHAIN), 1, Abort),
         dag(100, 100, 1, &[0], &[]),
     ];
     specs[0].name = "behind".to_owned();
@@ -169,8 +152,7 @@ fn abort_frees_the_slot_at_once_if_nothing_has_started() {
         PREEMPTIVE,
         |instance| if instance.dag.0 == 1 { 25 } else { 2 },
     );
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0, released 1.0 of 0, start 1.0.0 on 0
          10 aborted 0.0, cancelled 0.0.0, cancelled 0.0.1, ended 0.0 Aborted, released 0.1 of 10
          20 aborted 0.1, cancelled 0.1.0, cancelled 0.1.1, ended 0.1 Aborted, released 0.2 of 20
@@ -185,7 +167,7 @@ fn abort_frees_the_slot_at_once_if_nothing_has_started() {
 fn abort_lets_a_preempted_instance_end_at_its_key() {
     // DAG 0 starts, is preempted by DAG 1 from 5 to 25, and aborted at 10.
     let mut specs = [
-        overrunning(dag(10, 10, 2, &[5, 5], CHAIN), 1, OverrunPolicy::Abort),
+        overrunning(dag(10, 10, 2, &[5, 5], CHAIN), 1, Abort),
         dag(100, 100, 1, &[0], &[]),
     ];
     specs[1].offset_ns = 5;
@@ -194,8 +176,7 @@ fn abort_lets_a_preempted_instance_end_at_its_key() {
         PREEMPTIVE,
         |instance| if instance.dag.0 == 1 { 20 } else { 8 },
     );
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          5 preempt 0.0.0 on 0, start 1.0.0 on 0
          10 aborted 0.0, queued 0.1
@@ -209,11 +190,10 @@ fn abort_lets_a_preempted_instance_end_at_its_key() {
 #[test]
 fn abort_with_several_in_flight_takes_the_oldest_first() {
     // Two in flight; the first subtask is quick, the second takes 35.
-    let (events, _) = run(&chain(5, 2, OverrunPolicy::Abort), TWO_CORES, |instance| {
+    let (events, _) = run(&chain(5, 2, Abort), TWO_CORES, |instance| {
         [1, 35][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0
          10 released 0.1 of 10
          20 aborted 0.0, queued 0.2
@@ -229,13 +209,8 @@ fn abort_with_several_in_flight_takes_the_oldest_first() {
 
 #[test]
 fn abort_skips_the_oldest_waiting_if_all_in_flight_are_aborted() {
-    let (events, statistics) = run(
-        &one_subtask(4, 1, OverrunPolicy::Abort),
-        PREEMPTIVE,
-        long_once(35),
-    );
-    assert_events(
-        &events,
+    let (events, statistics) = run(&one_subtask(4, 1, Abort), PREEMPTIVE, long_once(35));
+    events.must_be(
         "0 released 0.0 of 0
          10 aborted 0.0, queued 0.1
          20 skipped 0.1, queued 0.2
@@ -249,11 +224,9 @@ fn abort_skips_the_oldest_waiting_if_all_in_flight_are_aborted() {
 
 #[test]
 fn a_driver_that_comes_late_finds_every_release_and_every_miss() {
-    for (overrun, released, skipped, misses) in [
-        (OverrunPolicy::Queue, 1, 0, 4),
-        (OverrunPolicy::Skip, 1, 4, 1),
-        (OverrunPolicy::Abort, 5, 0, 4),
-    ] {
+    for (overrun, released, skipped, misses) in
+        [(Queue, 1, 0, 4), (Skip, 1, 4, 1), (Abort, 5, 0, 4)]
+    {
         let specs = one_subtask(5, 1, overrun);
         let mut scheduler = support::scheduler(&specs, PREEMPTIVE);
         let decisions = scheduler.at(45).release_due(&mut ()).dispatch();
@@ -271,15 +244,15 @@ fn a_driver_that_comes_late_finds_every_release_and_every_miss() {
 fn a_job_is_announced_before_it_is_late_however_late_the_driver_comes() {
     for (overrun, expected) in [
         (
-            OverrunPolicy::Queue,
+            Queue,
             "0 released 0.0 of 0, missed 0.0 of 10, queued 0.1, missed 0.1 of 20, queued 0.2",
         ),
         (
-            OverrunPolicy::Skip,
+            Skip,
             "0 released 0.0 of 0, missed 0.0 of 10, skipped 0.1, skipped 0.2",
         ),
         (
-            OverrunPolicy::Abort,
+            Abort,
             "0 released 0.0 of 0, missed 0.0 of 10, aborted 0.0, ended 0.0 Aborted
              0 released 0.1 of 10, missed 0.1 of 20, aborted 0.1, ended 0.1 Aborted
              0 released 0.2 of 20",
@@ -289,6 +262,6 @@ fn a_job_is_announced_before_it_is_late_however_late_the_driver_comes() {
         let mut log = support::Log::new(|_| 0);
         let decisions = scheduler.at(25).release_due(&mut log).dispatch();
         assert_eq!(decisions.len(), 1, "{overrun:?}");
-        assert_events(&log.lines, expected);
+        log.lines.must_be(expected);
     }
 }

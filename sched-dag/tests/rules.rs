@@ -3,7 +3,7 @@
 mod support;
 
 use sched_dag::{DagStatistics, Policy, Preemption, SchedulerOptions};
-use support::{PREEMPTIVE, assert_events, cores, dag, run, scheduler, under};
+use support::{PREEMPTIVE, Timeline, cores, dag, run, scheduler, under};
 
 const DIAMOND: &[(usize, usize)] = &[(0, 1), (0, 2), (1, 3), (2, 3)];
 
@@ -19,8 +19,7 @@ fn r1_nothing_of_a_job_runs_before_its_release() {
     let mut spec = dag(10, 10, 3, &[0], &[]);
     spec.offset_ns = 3;
     let (events, _) = run(&[spec], cores(2), |_| 1);
-    assert_events(
-        &events,
+    events.must_be(
         "3 released 0.0 of 3, start 0.0.0 on 0
          13 released 0.1 of 13, start 0.1.0 on 0
          23 released 0.2 of 23, start 0.2.0 on 0",
@@ -43,8 +42,7 @@ fn r2_join_waits_for_all_predecessors() {
         cores(2),
         |instance| [1, 2, 7, 1][instance.subtask.index()],
     );
-    assert_events(
-        &events,
+    events.must_be(
         "0 ready 0.0.0
          1 finish 0.0.0, ready 0.0.1, ready 0.0.2
          3 finish 0.0.1
@@ -61,8 +59,7 @@ fn r2_a_subtask_is_sequential_over_its_own_jobs() {
         cores(4),
         |instance| [3, 5][instance.subtask.index()],
     );
-    assert_events(
-        &events,
+    events.must_be(
         "0 ready 0.0.0
          3 ready 0.0.1, ready 0.1.0
          8 ready 0.1.1",
@@ -72,8 +69,7 @@ fn r2_a_subtask_is_sequential_over_its_own_jobs() {
 #[test]
 fn r2_jobs_of_one_dag_overlap() {
     let (events, _) = run(&[dag(4, 12, 3, &[0, 1], &[(0, 1)])], cores(2), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          4 start 0.1.0 on 0, start 0.0.1 on 1
          8 start 0.2.0 on 1, start 0.1.1 on 0
@@ -85,8 +81,7 @@ fn r2_jobs_of_one_dag_overlap() {
 fn r3_all_edges_of_an_instance_are_released_at_its_completion() {
     let edges = &[(0, 1), (0, 2), (0, 3)];
     let (events, _) = run(&[dag(100, 100, 1, &[0; 4], edges)], cores(1), |_| 2);
-    assert_events(
-        &events,
+    events.must_be(
         "0 ready 0.0.0
          2 finish 0.0.0, ready 0.0.1, ready 0.0.2, ready 0.0.3
          4 finish 0.0.1
@@ -102,15 +97,14 @@ fn r4_a_job_ends_with_its_last_sink() {
         cores(2),
         |instance| [1, 3, 8][instance.subtask.index()],
     );
-    assert_events(&events, "9 ended 0.0 Met");
+    events.must_be("9 ended 0.0 Met");
 }
 
 #[test]
 fn r4_the_deadline_itself_is_in_time_and_the_next_instant_is_not() {
     let specs = [dag(100, 5, 1, &[0], &[]), dag(100, 5, 1, &[1], &[])];
     let (events, statistics) = run(&specs, cores(2), |instance| 5 + u64::from(instance.dag.0));
-    assert_events(
-        &events,
+    events.must_be(
         "5 ended 0.0 Met
          6 missed 1.0 of 5, ended 1.0 Missed",
     );
@@ -120,8 +114,7 @@ fn r4_the_deadline_itself_is_in_time_and_the_next_instant_is_not() {
 #[test]
 fn r4_a_miss_is_noticed_when_the_deadline_passes() {
     let (events, _) = run(&[dag(100, 5, 1, &[0], &[])], cores(1), |_| 50);
-    assert_events(
-        &events,
+    events.must_be(
         "6 missed 0.0 of 5
          50 ended 0.0 Missed",
     );
@@ -152,7 +145,7 @@ fn r4_a_job_meets_its_deadlines_if_each_sink_meets_its_own() {
             happened.iter().any(|event| event.contains("missed")),
             !is_met
         );
-        assert_events(&happened, events);
+        happened.must_be(events);
         assert_eq!(statistics[0].misses, u64::from(!is_met));
     }
 }
@@ -165,8 +158,7 @@ fn r5_between_jobs_of_one_dag_with_one_deadline_the_older_one_goes_first() {
     let (events, _) = run(&[spec], under(Policy::Edf), |instance| {
         [1, 12][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          1 start 0.0.1 on 0
          13 start 0.1.0 on 0
@@ -180,8 +172,7 @@ fn r5_the_instances_with_the_smallest_keys_run() {
     let mut urgent = dag(100, 100, 1, &[0], &[]);
     urgent.offset_ns = 2;
     let (events, _) = run(&[dag(100, 100, 1, &[5], &[]), urgent], cores(1), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          2 preempt 0.0.0 on 0, start 1.0.0 on 0
          6 finish 1.0.0, resume 0.0.0 on 0
@@ -194,8 +185,7 @@ fn r5_between_equal_priorities_the_rest_of_the_key_decides_preemption_too() {
     let mut first = dag(100, 100, 1, &[5], &[]);
     first.offset_ns = 2;
     let (events, _) = run(&[first, dag(100, 100, 1, &[5], &[])], cores(1), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 1.0.0 on 0
          2 preempt 1.0.0 on 0, start 0.0.0 on 0
          6 resume 1.0.0 on 0",
@@ -207,8 +197,7 @@ fn r5_a_newer_job_never_goes_before_an_older_one_of_the_same_priority() {
     let (events, _) = run(&[dag(4, 4, 2, &[0, 0], &[(0, 1)])], cores(1), |instance| {
         [1, 4][instance.subtask.index()]
     });
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          1 start 0.0.1 on 0
          5 start 0.1.0 on 0
@@ -223,8 +212,7 @@ fn r5_edf_orders_by_absolute_deadline() {
     late.offset_ns = 3;
     let specs = [late, dag(100, 12, 1, &[9], &[])];
     let (events, _) = run(&specs, under(Policy::Edf), |_| 5);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 1.0.0 on 0
          5 start 0.0.0 on 0",
     );
@@ -238,8 +226,7 @@ fn r5_without_preemption_a_started_instance_keeps_its_core() {
     middle.offset_ns = 1;
     let specs = [dag(100, 100, 1, &[5], &[]), middle, urgent];
     let (events, _) = run(&specs, non_preemptive(), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          4 start 2.0.0 on 0
          8 start 1.0.0 on 0",
@@ -258,8 +245,7 @@ fn r5_a_non_preemptive_subtask_keeps_its_core_among_preemptive_ones() {
     specs[0].subtasks[0].non_preemptive = true;
     // Both cores are busy: of the two, only DAG 1's subtask gives way.
     let (events, _) = run(&specs, cores(2), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 1.0.0 on 0, start 0.0.0 on 1
          2 preempt 1.0.0 on 0, start 2.0.0 on 0
          4 start 2.0.1 on 1
@@ -272,8 +258,7 @@ fn r5_a_non_preemptive_subtask_still_waits_for_smaller_keys_to_start() {
     let mut specs = [dag(100, 100, 1, &[5], &[]), dag(100, 100, 1, &[4], &[])];
     specs[0].subtasks[0].non_preemptive = true;
     let (events, _) = run(&specs, cores(1), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 1.0.0 on 0
          4 start 0.0.0 on 0",
     );
@@ -287,8 +272,7 @@ fn r5_completions_come_before_releases_and_both_before_the_dispatch() {
     urgent.offset_ns = 4;
     let specs = [dag(100, 100, 1, &[5, 5], &[(0, 1)]), urgent];
     let (events, _) = run(&specs, cores(1), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 released 0.0 of 0, ready 0.0.0, start 0.0.0 on 0
          4 finish 0.0.0, ready 0.0.1, released 1.0 of 4, ready 1.0.0, start 1.0.0 on 0
          8 finish 1.0.0, start 0.0.1 on 0
@@ -301,8 +285,7 @@ fn r5_no_instance_is_preempted_while_a_core_is_idle() {
     let mut urgent = dag(100, 100, 1, &[0], &[]);
     urgent.offset_ns = 2;
     let (events, _) = run(&[dag(100, 100, 1, &[5], &[]), urgent], cores(2), |_| 4);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0
          2 start 1.0.0 on 1",
     );
@@ -316,8 +299,7 @@ fn r5_is_work_conserving() {
         cores(3),
         |instance| 5 - u64::from(instance.subtask.0),
     );
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.3 on 0, start 0.0.2 on 1, start 0.0.1 on 2
          2 start 0.0.0 on 0",
     );
@@ -331,8 +313,7 @@ fn r5_the_core_that_completed_last_is_taken_first() {
         cores(3),
         |instance| [2, 5, 3, 1][instance.subtask.index()],
     );
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0, start 0.0.1 on 1, start 0.0.2 on 2
          5 start 0.0.3 on 1",
     );
@@ -341,8 +322,7 @@ fn r5_the_core_that_completed_last_is_taken_first() {
 #[test]
 fn an_instance_may_execute_for_no_time() {
     let (events, _) = run(&[dag(10, 1, 2, &[0, 0], &[(0, 1)])], cores(1), |_| 0);
-    assert_events(
-        &events,
+    events.must_be(
         "0 start 0.0.0 on 0, finish 0.0.0, start 0.0.1 on 0, finish 0.0.1, ended 0.0 Met
          10 start 0.1.0 on 0, finish 0.1.0, start 0.1.1 on 0, finish 0.1.1, ended 0.1 Met",
     );

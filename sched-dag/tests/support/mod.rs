@@ -175,24 +175,31 @@ pub(crate) fn run_failing(
     (log.lines, statistics)
 }
 
-/// Compares events with an expected text, those of an instant on a line or several. Of the events only
-/// those of the kinds that the expected text has are compared.
-#[track_caller]
-pub(crate) fn assert_events(events: &[String], expected: &str) {
-    let at_one_time = |line: &str| {
-        let (time, events) = line.trim().split_once(' ').unwrap_or_default();
-        let timed = |event: &str| format!("{time} {event}");
-        events.split(", ").map(timed).collect::<Vec<_>>()
-    };
-    let lines = expected.lines().filter(|line| !line.trim().is_empty());
-    let expected: Vec<String> = lines.flat_map(at_one_time).collect();
-    let kind = |line: &str| line.split(' ').nth(1).map(str::to_owned);
-    let events: Vec<&str> = events
-        .iter()
-        .map(String::as_str)
-        .filter(|event| expected.iter().any(|line| kind(line) == kind(event)))
-        .collect();
-    assert_eq!(events, expected, "\nhappened:\n{}\n", events.join("\n"));
+/// Events as lines, to be compared with what is expected.
+pub(crate) trait Timeline {
+    /// Fails unless they are as the text says, which has those of an instant on a line or
+    /// several. Only those of the kinds that the text has are compared.
+    fn must_be(&self, expected: &str);
+}
+
+impl Timeline for [String] {
+    #[track_caller]
+    fn must_be(&self, expected: &str) {
+        let at_one_time = |line: &str| {
+            let (time, events) = line.trim().split_once(' ').unwrap_or_default();
+            let timed = |event: &str| format!("{time} {event}");
+            events.split(", ").map(timed).collect::<Vec<_>>()
+        };
+        let lines = expected.lines().filter(|line| !line.trim().is_empty());
+        let expected: Vec<String> = lines.flat_map(at_one_time).collect();
+        let kind = |line: &str| line.split(' ').nth(1).map(str::to_owned);
+        let events: Vec<&str> = self
+            .iter()
+            .map(String::as_str)
+            .filter(|event| expected.iter().any(|line| kind(line) == kind(event)))
+            .collect();
+        assert_eq!(events, expected, "\nhappened:\n{}\n", events.join("\n"));
+    }
 }
 
 struct Short(Instance);

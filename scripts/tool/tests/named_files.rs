@@ -232,7 +232,7 @@ fn too_long_a_command_line_of_the_guest_is_2() {
         &format!("run --mode deterministic --append {words}"),
         &folder,
     );
-    let expected = "run: the guest's command line has 2124 bytes, and 2048 is the most that it \
+    let expected = "run: the guest's command line has 2137 bytes, and 2048 is the most that it \
                     takes; give fewer or shorter words\n";
     assert_eq!(said, expected);
 }

@@ -189,11 +189,10 @@ pub fn read_line(number: usize, line: &str) -> Option<Result<MachineLine, Protoc
 
 fn missing_member(kind: &str, value: &Value) -> Option<&'static str> {
     let (_, members) = kinds().find(|(name, _)| *name == kind)?;
-    let is_missing = |member: &&&str| {
+    members.split(' ').find(|member| {
         let path: Vec<&str> = member.split('.').collect();
         value.at(&path).is_none()
-    };
-    members.iter().find(is_missing).copied()
+    })
 }
 
 #[cfg(test)]
@@ -277,7 +276,7 @@ ok
             let section = document.split(&heading).nth(1);
             let section = section.unwrap_or_else(|| panic!("no section `{kind}`"));
             let section = section.split("\n### ").next().unwrap();
-            for member in members.iter().flat_map(|path| path.split('.').take(1)) {
+            for member in members.split(' ').flat_map(|path| path.split('.').take(1)) {
                 let named = section.contains(&format!("`{member}`"));
                 assert!(named, "section `{kind}` does not name `{member}`");
             }
