@@ -206,7 +206,7 @@ impl Account {
         panics: u64,
     ) -> impl Iterator<Item = String> {
         let fault = trouble.of(dag.index()).fault;
-        let drawn = fault.map_or(0, |fault| u64::from(fault.call.is_some()));
+        let drawn = u64::from(fault.is_some());
         let survives = fault.is_some_and(|fault| fault.then != Then::End);
         // All its jobs run, so the fatal one does.
         let is_certain = overrun == OverrunPolicy::Queue && !trouble.pauses(dag.index());

@@ -146,7 +146,7 @@ pub fn build(
         let frail = of_dag.fault.map(|fault| {
             let calls = 1..=jobs.div_ceil(2);
             Arc::new(Frail {
-                fatal_call: fault.call.map_or(0, |number| scale(number, calls)),
+                fatal_call: scale(fault.call, calls),
                 round_ns: executed.round_ns,
                 calls: AtomicU64::new(0),
                 instances: AtomicU64::new(0),
@@ -206,7 +206,7 @@ fn register_frail(dag: &Dag, priority: u32, fault: FaultPlan, frail: &Arc<Frail>
         dag.survive_faults(FaultLimit {
             faults: 1,
             window: 1,
-            in_all: fault.survives,
+            in_all: 1,
         });
     }
     let call = |frail: &Arc<Frail>| {

@@ -12,7 +12,6 @@ extern crate alloc;
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
-use core::ops::Range;
 use core::time::Duration;
 
 use fass::{ConstructionPolicy, OverrunPolicy, finish_create_dags_with};
@@ -91,7 +90,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         soak.overrun_name
     );
     let all = first..first.saturating_add(rounds);
-    let mut baseline = soak.warm_up(machine, all.clone())?;
+    let mut baseline = soak.warm_up(machine)?;
     let mut total = Account::default();
     let mut violations = 0;
     let mut complaint = None;
@@ -111,27 +110,20 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 impl Soak<'_> {
-    /// Runs the largest set for a moment, on divided cores, in either cluster, and on others, so that all memory
-    /// that is kept from run to run is there, with a stack for each fault of the rounds to
-    /// come. Returns what then is in use.
-    fn warm_up(&self, machine: &Machine, rounds: Range<u64>) -> Result<Resources, Ending> {
-        let mut trouble = Trouble::default();
+    /// Runs the largest set for a moment, on divided cores, in either cluster, and on others,
+    /// so that all memory that is kept from run to run is there. Returns what then is in use.
+    fn warm_up(&self, machine: &Machine) -> Result<Resources, Ending> {
         if self.has_trouble {
-            let faults: usize = rounds
-                .map(|round| self.draw(machine, round).1.faults())
-                .sum();
             let plans = largest_set();
-            trouble = Trouble::stock(u32::try_from(faults).unwrap_or(u32::MAX));
             for most_in in [0, 1] {
-                let mut divided = trouble.clone().divided(&plans, machine.cores());
+                let mut divided = Trouble::default().divided(&plans, machine.cores());
                 for (number, dag) in divided.dags.iter_mut().enumerate() {
                     dag.cluster = if number > 0 { most_in } else { 1 - most_in };
                 }
                 self.run(machine, &plans, Duration::ZERO, &divided)?;
             }
         }
-        self.run(machine, &largest_set(), Duration::ZERO, &trouble)?;
-        drop(trouble);
+        self.run(machine, &largest_set(), Duration::ZERO, &Trouble::default())?;
         Ok(machine.resources())
     }
 

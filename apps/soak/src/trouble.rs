@@ -36,10 +36,8 @@ pub struct FaultPlan {
     /// What follows it.
     pub then: Then,
     /// Which call of the subtask's function panics: of as many as half of its DAG's jobs, what
-    /// this number makes of it. None: no call does.
-    pub call: Option<u64>,
-    /// How many faults the DAG would survive, unless the first one ends it.
-    pub survives: u32,
+    /// this number makes of it.
+    pub call: u64,
 }
 
 /// What follows a fault.
@@ -70,8 +68,7 @@ impl Trouble {
         for (number, dag) in dags.iter_mut().enumerate().filter(|_| !is_quiet) {
             dag.fault = random.once_in(2).then(|| FaultPlan {
                 then: Then::ALL[random.index(Then::ALL.len())],
-                call: Some(random.number()),
-                survives: 1,
+                call: random.number(),
             });
             let others = plans.len() - 1;
             let other = random.once_in(2) && others > 0;
@@ -112,29 +109,6 @@ impl Trouble {
         }
         self.clusters = sizes.to_vec();
         self
-    }
-
-    /// Returns no trouble, but a stock of stacks for so many faults, if any.
-    #[must_use]
-    pub fn stock(faults: u32) -> Self {
-        let fault = (faults > 0).then_some(FaultPlan {
-            then: Then::Restart,
-            call: None,
-            survives: faults,
-        });
-        Self {
-            clusters: Vec::new(),
-            dags: vec![DagTrouble {
-                fault,
-                ..DagTrouble::default()
-            }],
-        }
-    }
-
-    /// Returns how many faults there are at most.
-    #[must_use]
-    pub fn faults(&self) -> usize {
-        self.dags.iter().filter(|dag| dag.fault.is_some()).count()
     }
 
     /// Returns what befalls a DAG.

@@ -163,10 +163,6 @@ impl<T: Message + Sync> Uses for Sampling<T> {
     type Held = Sampler<T>;
     type Guard<'a> = Looked<'a, T>;
 
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
-
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let (sampler, number) = self.shared.sampler();
         let mut draft = dag.draft.borrow_mut();

@@ -214,10 +214,6 @@ impl Uses for Switching {
     type Held = Wish;
     type Guard<'a> = &'a AtomicU8;
 
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
-
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let mut draft = dag.draft.borrow_mut();
         draft.switches.push((subtask, Arc::clone(&self.target)));
@@ -237,10 +233,6 @@ impl Uses for ShuttingDown {
     type Borrowed<'a> = Shutdown<'a>;
     type Held = Wish;
     type Guard<'a> = &'a AtomicU8;
-
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let mut draft = dag.draft.borrow_mut();

@@ -166,10 +166,6 @@ impl Uses for Entering {
     type Held = Wish;
     type Guard<'a> = &'a AtomicU8;
 
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
-
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let mut draft = dag.draft.borrow_mut();
         draft.modes.push(self.0.modes);

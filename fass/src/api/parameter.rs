@@ -334,10 +334,6 @@ impl<T: ParameterValue> Uses for Reading<T> {
     type Held = Parameter<T>;
     type Guard<'a> = (T, PhantomData<&'a ()>);
 
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
-
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let takes = format!("reads parameter `{}`", self.0.0.name);
         dag.draft.borrow_mut().outside.push((subtask, takes));

@@ -250,10 +250,6 @@ impl Uses for Raising {
     type Held = Arc<AtomicBool>;
     type Guard<'a> = &'a AtomicBool;
 
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
-
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let raised = Arc::new(AtomicBool::new(false));
         let mut draft = dag.draft.borrow_mut();

@@ -64,9 +64,11 @@ pub trait Uses: sealed::Sealed {
     #[doc(hidden)]
     type Guard<'a>;
 
-    /// Reports whether it may be used by subtasks of this DAG.
+    /// Reports whether it may be used by subtasks of this DAG, as most may by those of any.
     #[doc(hidden)]
-    fn is_of(&self, dag: &Dag) -> bool;
+    fn is_of(&self, _dag: &Dag) -> bool {
+        true
+    }
 
     /// Notes that a subtask uses it.
     #[doc(hidden)]

@@ -99,10 +99,6 @@ impl<T: 'static> Uses for Receiving<T> {
     type Held = Receiver<T>;
     type Guard<'a> = &'a mut Receiver<T>;
 
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
-
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let takes = format!("receives on wire `{}`", self.wire.name());
         dag.draft.borrow_mut().outside.push((subtask, takes));
@@ -135,10 +131,6 @@ impl Uses for Sending {
     type Borrowed<'a> = Sender<'a>;
     type Held = Wire;
     type Guard<'a> = &'a Wire;
-
-    fn is_of(&self, _dag: &Dag) -> bool {
-        true
-    }
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let effect = Departure(Arc::clone(&self.0.shared.outgoing));

@@ -120,6 +120,7 @@ fn attempt(own: &Parsed) -> Result<std::convert::Infallible, Refusal> {
     let mode = run.text("mode").and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let mut qemu = super::describe(&run, &program, mode, memory_mib, None);
+    qemu.stops = false; // ctrl-C is gdb's
     qemu.guest_words += &format!(" budget_factor=0{}", handed.guest_words());
     qemu.module = handed.module();
     qemu.check_words().map_err(Refusal::Usage)?;
