@@ -11,7 +11,7 @@ use crate::{List, MAX_PROCESSORS};
 /// The most I/O APICs that are noted.
 pub const MAX_IO_APICS: usize = 8;
 
-/// What the tables tell.
+/// The facts that the tables tell.
 #[derive(Clone, Copy, Debug)]
 pub struct Platform {
     /// The local APIC ids of the enabled processors, in the table's order, as far as they fit.
@@ -28,7 +28,7 @@ pub struct Platform {
     pub io_apics: List<u64, MAX_IO_APICS>,
     /// How it is powered off and reset.
     pub power: Power,
-    /// What is wrong with a table that could be done without, if anything is.
+    /// The fault of a table that could be done without, if there is any.
     pub warning: Option<AcpiError>,
 }
 

@@ -1,4 +1,4 @@
-//! What enters a DAG from outside: only sources take it, and each thing once, so that a job has
+//! The inputs of a DAG from outside: only sources take it, and each thing once, so that a job has
 //! one value of it.
 
 use alloc::format;

@@ -1,4 +1,4 @@
-//! What is wrong with modes, and with topics that are recorded: asked only where there are some, so
+//! The faults of modes, and of topics that are recorded: asked only where there are some, so
 //! that no other image has the code.
 
 use alloc::vec::Vec;

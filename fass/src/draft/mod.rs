@@ -63,7 +63,7 @@ pub(crate) struct Draft {
     /// The latest values that subtasks sample, of whatever DAG, and the number that the subtask
     /// has there.
     pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>, usize)>,
-    /// What subtasks take from outside: "reads parameter `gain`".
+    /// The inputs of subtasks from outside: "reads parameter `gain`".
     pub(crate) outside: Vec<(usize, String)>,
     /// The signals that subtasks may raise, of whatever DAG.
     pub(crate) raises: Vec<(usize, Arc<Target>)>,
@@ -77,7 +77,7 @@ pub(crate) struct Draft {
     pub(crate) modes: Vec<modes::Modes>,
     /// What finds their faults, if there are any.
     pub(crate) check_modes: Option<modes::Check>,
-    /// What finds the faults of topics that are recorded, if there are any.
+    /// The check of topics that are recorded, if there are any.
     pub(crate) check_recorded: Option<modes::Check>,
     /// What makes that which serves requests, if it states something of that kind.
     pub(crate) lifecycle: Option<MakeLifecycle>,

@@ -108,7 +108,7 @@ pub(crate) trait Subtask: Send {
     fn forget(self: Box<Self>);
 }
 
-/// What there is of functions to replace one that a fault ends. It can be asked at any time,
+/// The functions to replace one that a fault ends. They can be asked for at any time,
 /// also while the body runs.
 ///
 /// ```

@@ -4,12 +4,12 @@ use sched_dag::{Dag, DagId, DagStatistics};
 
 use executive::text::json;
 
-/// What is told of a DAG.
+/// The facts that are told of a DAG.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counts {
-    /// What it does now, in a word.
+    /// Its state now, in a word.
     pub(crate) state: &'static str,
-    /// What has become of its jobs.
+    /// The fates of its jobs.
     pub(crate) statistics: DagStatistics,
     /// Jobs in flight.
     pub(crate) in_flight: u64,

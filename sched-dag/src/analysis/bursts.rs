@@ -22,7 +22,7 @@ use super::workload::Piece;
 use crate::ids::SubtaskId;
 use crate::task_set::Dag;
 
-/// What one completion may make ready, for which each instance is charged already.
+/// The most that one completion makes ready, for which each instance is charged already.
 const WIDE: usize = 16;
 
 /// The most evaluations of a sum, which then counts as endless.

@@ -70,7 +70,7 @@ pub(super) struct Response<'a> {
     loads: &'a [Load],
     bursts: &'a Bursts,
     own: &'a Load,
-    /// What may delay it, directly or through others.
+    /// The DAGs that may delay it, directly or through others.
     pub(super) others: Vec<usize>,
     pub(super) blocking: u128,
 }
@@ -159,7 +159,7 @@ impl<'a> Response<'a> {
     }
 }
 
-/// What of each job of a DAG is due at the same time, under EDF.
+/// The part of each job of a DAG that is due at the same time, under EDF.
 pub(super) struct Due {
     pub(super) deadline_ns: u64,
     pub(super) period_ns: u64,

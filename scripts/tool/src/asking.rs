@@ -18,7 +18,7 @@ pub enum Asked {
     ByLimit(Duration),
 }
 
-/// What to do after a look at the child.
+/// The next step after a look at the child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Step {
     /// To look again.
@@ -31,7 +31,7 @@ pub(crate) enum Step {
     TimeOut,
 }
 
-/// What was seen so far.
+/// The state of a child as seen so far.
 #[derive(Debug)]
 pub(crate) struct Asking {
     limit: Duration,

@@ -1,4 +1,4 @@
-//! What a run leaves behind: memory that faults have kept, and values that cannot be dropped.
+//! The remains of a run: memory that faults have kept, and values that cannot be dropped.
 
 use alloc::vec;
 use alloc::vec::Vec;

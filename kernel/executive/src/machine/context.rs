@@ -152,7 +152,7 @@ pub(super) struct Section {
     pub(super) outer: *mut Section,
 }
 
-/// What a context notes of its sections.
+/// A context's note of its sections.
 #[derive(Debug)]
 pub(super) struct Sections {
     /// The innermost one; null if there is none.

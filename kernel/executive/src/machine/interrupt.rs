@@ -36,7 +36,7 @@ pub struct Handlers {
     pub timer: fn(&mut Interrupted),
     /// Another core asked for attention.
     pub wake: fn(&mut Interrupted),
-    /// What was running asks for its own end.
+    /// The code that was running asks for its own end.
     pub end: fn(&mut Interrupted),
     /// The core's heartbeat, with the time: looks in on the run.
     pub beat: fn(&Core, u64),

@@ -1,4 +1,4 @@
-//! What a processor states of its kind, and of those that it shares a core with.
+//! The statements of a processor on its kind, and on those that it shares a core with.
 //!
 //! *Siblings* are processors that share one physical core (SMT): each slows down the other.
 //! Their APIC ids differ in their lowest bits only. *Efficiency cores* are slower than the

@@ -4,7 +4,7 @@
 pub const TIMER: u8 = 0x40;
 /// Another core has work for this one.
 pub const WAKE: u8 = 0x41;
-/// What this core runs asks for its own end, by an instruction.
+/// The code that this core runs asks for its own end, by an instruction.
 pub const END: u8 = 0x42;
 /// The local APIC withdrew an interrupt; needs no acknowledgement.
 pub const SPURIOUS: u8 = 0xff;

@@ -30,7 +30,7 @@ pub struct Kernel {
     budget_factor: AtomicU64,
     /// The most events that journals from now on have room for.
     most_events: AtomicU64,
-    /// What a commit charges: context switch, dispatch, interrupt, readiness.
+    /// The charges of a commit: context switch, dispatch, interrupt, readiness.
     overheads_ns: [AtomicU64; 4],
     /// How many dispatches these are the longest of, 0 if they are stated, and the margin in
     /// hundredths.

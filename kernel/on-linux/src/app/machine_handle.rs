@@ -42,7 +42,7 @@ pub struct Machine {
     runs: Cell<u64>,
     fault_verdict: FaultVerdict,
     bound_verdict: BoundVerdict,
-    /// What ends a run before its time.
+    /// The reasons that end a run before its time.
     signals: EndSignals,
 }
 

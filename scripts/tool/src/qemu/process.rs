@@ -26,7 +26,7 @@ use crate::system;
 /// The most that a guest may print; beyond it something prints without end.
 const MOST_SERIAL_BYTES: u64 = 64 << 20;
 
-/// What ends a guest's run in order (`console=stop`): what ctrl-C is on a serial line.
+/// The byte that ends a guest's run in order (`console=stop`): ctrl-C on a serial line.
 const CTRL_C: &[u8] = &[3];
 
 /// What QEMU says when KVM cannot run the guest any further. It then keeps the guest

@@ -31,7 +31,7 @@ pub(super) struct Watcher {
     pub(super) journal: Journal,
     /// The bodies, and which core has which.
     pub(super) placement: Placement<Loan, Parked>,
-    /// What would replace the functions of these, by vertex.
+    /// The functions that would replace those of these, by vertex.
     next: Box<[Option<Replacement>]>,
     loans: Loans,
     /// The runners whose functions faults have ended, unless they go on with others. There is
