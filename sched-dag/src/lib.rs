@@ -81,7 +81,7 @@
 //! - *A platform that keeps values on edges*: at most [`Dag::in_flight`] jobs of
 //!   a DAG are in flight, and no two of them have the same number modulo that.
 //!   An instance that was released ends exactly once, by a completion, by a
-//!   failure or by [`Observer::cancelled`].
+//!   failure or by [`What::Cancelled`](journal::What::Cancelled).
 //! - *An app's author*: schedules that, core numbers apart, do not depend on the
 //!   number or the order of a driver's calls, only on their times; with the same
 //!   execution times, the same schedule on every driver.
@@ -97,6 +97,7 @@ extern crate alloc;
 pub mod analysis;
 pub mod chains;
 mod clusters;
+pub mod engine;
 mod fnv;
 mod ids;
 pub mod journal;
@@ -108,7 +109,6 @@ mod order;
 pub mod placement;
 mod policy;
 mod priorities;
-mod recorder;
 mod scheduler;
 mod spec;
 mod task_set;
@@ -126,8 +126,7 @@ pub use policy::{
     Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,
     Priority, SchedulerOptions,
 };
-pub use recorder::{Events, Recorder};
-pub use scheduler::{DagStatistics, Decision, HandOff, Moment, Observer, Released, Scheduler};
+pub use scheduler::{DagStatistics, Decision, HandOff, Log, Moment, Notice, Released, Scheduler};
 pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;

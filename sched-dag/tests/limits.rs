@@ -2,6 +2,7 @@
 
 mod support;
 
+use sched_dag::Told as _;
 use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
 use sched_dag::{
     Activation, CoreId, DagId, DagSpec, Instance, JobOutcome, Observer, OverrunPolicy, Policy,
@@ -38,7 +39,7 @@ impl Observer for Log {
 }
 
 fn step(scheduler: &mut Scheduler, now_ns: u64, completed: Option<Instance>, log: &mut Log) {
-    let mut moment = scheduler.at(now_ns);
+    let mut moment = scheduler.told(now_ns);
     if let Some(completed) = completed {
         moment.complete(completed, log);
     }
@@ -117,7 +118,7 @@ fn a_signal_whose_deadline_is_no_time_is_dropped() {
     let mut scheduler = scheduler(&[spec], PREEMPTIVE);
     let mut log = Log::default();
     let signal = |now_ns: u64, scheduler: &mut Scheduler, log: &mut Log| {
-        let mut moment = scheduler.at(now_ns);
+        let mut moment = scheduler.told(now_ns);
         moment.signal(DAG, log);
         let _ = moment.release_due(log).dispatch();
     };
@@ -151,7 +152,7 @@ fn of_a_sporadic_job_the_instant_after_the_deadline_has_to_be_a_time() {
     for (at_ns, job) in [(u64::MAX - 6, Some(u64::MAX - 6)), (u64::MAX - 5, None)] {
         let mut scheduler = scheduler(std::slice::from_ref(&spec), PREEMPTIVE);
         let mut log = Log::default();
-        scheduler.at(at_ns).signal(DAG, &mut log);
+        scheduler.told(at_ns).signal(DAG, &mut log);
         assert_eq!(log.0, [format!("signalled 0 {job:?}")]);
     }
 }
@@ -166,7 +167,7 @@ fn a_signal_at_the_instant_of_the_kept_ones_release_is_dropped() {
     let mut scheduler = scheduler(&[spec], PREEMPTIVE);
     let mut log = Log::default();
     for (now_ns, completed) in [(0, None), (3, Some(0)), (10, None), (10, Some(1))] {
-        let mut moment = scheduler.at(now_ns);
+        let mut moment = scheduler.told(now_ns);
         if let Some(job) = completed {
             moment.complete(instance(0, job, 0), &mut log);
         }
@@ -195,9 +196,9 @@ fn a_signal_after_the_kept_ones_release_counts_even_if_the_driver_comes_late() {
     };
     let mut scheduler = scheduler(&[spec], PREEMPTIVE);
     let mut log = Log::default();
-    scheduler.at(0).signal(DAG, &mut log);
+    scheduler.told(0).signal(DAG, &mut log);
     // Job 0 was due at 5.
-    scheduler.at(9).signal(DAG, &mut log);
+    scheduler.told(9).signal(DAG, &mut log);
     let expected = [
         "signalled 0 Some(5)",
         "released 0 of 5",
@@ -279,7 +280,7 @@ fn a_dag_without_limit_of_jobs_is_never_finished() {
     spec.jobs = None;
     let mut scheduler = scheduler(&[spec], PREEMPTIVE);
     for job in 0..1000 {
-        let mut moment = scheduler.at(10 * job);
+        let mut moment = scheduler.told(10 * job);
         if job > 0 {
             moment.complete(instance(0, job - 1, 0), &mut ());
         }

@@ -2,6 +2,7 @@
 
 mod support;
 
+use sched_dag::Told as _;
 use sched_dag::{DagStatistics, Policy, Preemption, SchedulerOptions};
 use support::{PREEMPTIVE, Timeline, cores, dag, run, scheduler, under};
 
@@ -30,7 +31,7 @@ fn r1_nothing_of_a_job_runs_before_its_release() {
 fn r1_releases_follow_the_nominal_grid_and_not_the_drivers_delay() {
     let mut scheduler = scheduler(&[dag(10, 10, 3, &[0], &[])], PREEMPTIVE);
     assert_eq!(scheduler.next_event_ns(), Some(0));
-    let decisions = scheduler.at(4).release_due(&mut ()).dispatch();
+    let decisions = scheduler.told(4).release_due(&mut ()).dispatch();
     assert_eq!(decisions.len(), 1);
     assert_eq!(scheduler.next_event_ns(), Some(10));
 }

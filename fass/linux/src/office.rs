@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use sched_dag::lifecycle::{self, Letters};
-use sched_dag::{ClusterId, DagId, Moment, Observer, TaskSet};
+use sched_dag::{ClusterId, DagId, Moment, TaskSet};
 
 use crate::level::Levels;
 use crate::requests::{Request, Requests};
@@ -114,14 +114,9 @@ impl Office {
     }
 
     /// Tells a cluster's scheduler all that was asked for from outside.
-    pub(crate) fn serve(
-        &self,
-        cluster: ClusterId,
-        moment: &mut Moment<'_>,
-        observer: &mut impl Observer,
-    ) {
+    pub(crate) fn serve(&self, cluster: ClusterId, moment: &mut Moment<'_>) {
         let is_here = |dag| self.task_set.dag(dag).cluster() == cluster;
-        self.requests.serve(is_here, moment, observer);
+        self.requests.serve(is_here, moment);
     }
 
     /// Takes note, after a step of a cluster's release thread, of how often letters were taken, and

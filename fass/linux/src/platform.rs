@@ -8,7 +8,7 @@ use fass::{
     Body, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
 };
 use sched_dag::lifecycle::{self, Parts, Requests};
-use sched_dag::{Dag, DagId, Journal, OnFault, Scheduler, SchedulerOptions, TaskSet, Vertex};
+use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, SubtaskId, TaskSet};
 
 use crate::level::Levels;
 use crate::office::Office;
@@ -169,14 +169,6 @@ impl Platform for Host {
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
         }
-        let drops_jobs = |dag: &&Dag| dag.on_fault() != OnFault::EndDag;
-        if let Some(dag) = plan.task_set.dags().iter().find(drops_jobs) {
-            return Err(LaunchError::new(format!(
-                "dag `{}` drops a job at a fault and goes on, which Linux does not do; let a fault \
-                 end it, or run it on the kernel or in virtual time",
-                dag.name()
-            )));
-        }
         let options = SchedulerOptions {
             policy: terms.policy,
             preemption: terms.preemption,
@@ -215,16 +207,17 @@ fn teams(
 ) -> Vec<Arc<Team>> {
     let task_set = &plan.task_set;
     let dags = task_set.dags().len();
-    let mut bodies: Vec<Vec<(Vertex, Body)>> = task_set.clusters().map(|_| Vec::new()).collect();
-    let mut vertices = (0..).map(Vertex);
-    for (dag, of_dag) in task_set.dags().iter().zip(plan.bodies) {
-        let vertices = vertices.by_ref();
-        bodies[dag.cluster().index()].extend(
-            of_dag
-                .into_iter()
-                .zip(vertices)
-                .map(|(body, vertex)| (vertex, body)),
-        );
+    let mut bodies: Vec<Vec<(Instance, Body, Vec<Body>)>> =
+        task_set.clusters().map(|_| Vec::new()).collect();
+    let of_dags = plan.bodies.into_iter().zip(plan.others);
+    for (dag, (of_dag, others)) in task_set.ids().zip(of_dags) {
+        let subtasks = (0..).map(SubtaskId);
+        let all = of_dag.into_iter().zip(others).zip(subtasks);
+        let own = &mut bodies[task_set.dag(dag).cluster().index()];
+        own.extend(all.map(|((body, others), subtask)| {
+            let job = 0;
+            (Instance { dag, job, subtask }, body, others)
+        }));
     }
     let share = JOURNAL_BYTES / bodies.len();
     let clusters = task_set.clusters().zip(bodies).zip(parts);

@@ -7,7 +7,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use sched_dag::{DagId, Moment, Observer};
+use sched_dag::{DagId, Moment};
 
 const SIGNAL: u32 = 1;
 const PAUSE: u32 = 2;
@@ -54,28 +54,23 @@ impl Requests {
     }
 
     /// Tells the scheduler of these DAGs all that are left for it.
-    pub(crate) fn serve(
-        &self,
-        is_here: impl Fn(DagId) -> bool,
-        moment: &mut Moment<'_>,
-        observer: &mut impl Observer,
-    ) {
+    pub(crate) fn serve(&self, is_here: impl Fn(DagId) -> bool, moment: &mut Moment<'_>) {
         for (dag, place) in (0..).map(DagId).zip(&self.0) {
             if place.load(Ordering::Relaxed) == 0 || !is_here(dag) {
                 continue;
             }
             let bits = place.swap(0, Ordering::Acquire);
             if bits & RESUME != 0 {
-                moment.resume(dag, observer);
+                moment.resume(dag);
             }
             if bits & PAUSE != 0 {
-                moment.pause(dag, observer);
+                moment.pause(dag);
             }
             if bits & SIGNAL != 0 {
-                moment.signal(dag, observer);
+                moment.signal(dag);
             }
             if bits & STOP != 0 {
-                moment.stop(dag, observer);
+                moment.stop(dag);
             }
             if bits & CLOSE != 0 {
                 moment.close(dag, observer);

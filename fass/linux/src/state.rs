@@ -8,13 +8,11 @@
 use std::sync::Arc;
 
 use fass::Body;
-use sched_dag::journal::What;
-use sched_dag::lifecycle::{Request, Requests};
-use sched_dag::placement::{Next, Placement};
-use sched_dag::{
-    ClusterId, CoreId, DagId, Decision, Instance, Journal, Moment, Observer, Recorder, Scheduler,
-    TaskSet, Vertex,
-};
+use sched_dag::desk::{self, Carrier, Desk};
+use sched_dag::journal::{Subject, What};
+use sched_dag::lifecycle::{Letters, Request, Requests};
+use sched_dag::placement::Next;
+use sched_dag::{ClusterId, CoreId, DagId, Instance, Journal, Moment, Scheduler, Vertex};
 
 use crate::level::{Levels, Role};
 use crate::office::Office;
@@ -25,6 +23,8 @@ use crate::worker::Worker;
 pub(crate) struct Runner {
     pub(crate) body: Body,
     pub(crate) vertex: Vertex,
+    /// The same of all its instances.
+    ids: u64,
     /// The job whose instance it runs, or ran last.
     pub(crate) job: u64,
 }
@@ -53,12 +53,8 @@ pub struct Fault {
 
 /// The scheduler of a cluster, its bodies, and which worker runs what.
 pub(crate) struct State {
-    pub(crate) cluster: ClusterId,
     pub(crate) office: Arc<Office>,
-    pub(crate) scheduler: Scheduler,
-    pub(crate) recorder: Recorder<Journal>,
-    pub(crate) placement: Placement<Box<Runner>, Number>,
-    pub(crate) task_set: Arc<TaskSet>,
+    pub(crate) desk: Desk<Box<Runner>, Number>,
     /// By core, the worker that runs what the core should.
     pub(crate) active: Box<[Number]>,
     /// By worker, the core of which it is the active one.
@@ -75,15 +71,11 @@ pub(crate) struct State {
     pub(crate) spare: Vec<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
-    pub(crate) requests: Requests,
     /// How often letters were taken that the release thread has not settled yet.
     pub(crate) opened: u64,
-    /// By DAG, the one that gets a signal when a fault ends it.
-    after_fault: Vec<Option<DagId>>,
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
     called: Vec<CoreId>,
-    decisions: Vec<Decision>,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
     /// Time 0 of the run on the clock; `u64::MAX` until the run has begun.
@@ -91,14 +83,71 @@ pub(crate) struct State {
     pub(crate) preemptions: u64,
 }
 
-/// Has bodies drop what arrived for instances that will not run.
-struct Discard<'a>(&'a mut Placement<Box<Runner>, Number>, &'a TaskSet);
+/// What Linux adds to a cluster's desk.
+pub(crate) struct Post<'s> {
+    office: &'s Office,
+    cluster: ClusterId,
+    epoch_ns: u64,
+    active: &'s [Number],
+    workers: &'s [Worker],
+    opened: &'s mut u64,
+}
 
-impl Observer for Discard<'_> {
-    fn cancelled(&mut self, instance: Instance) {
-        if let Some(runner) = self.0.resting(self.1.vertex(instance)) {
-            runner.body.discard(instance.job);
-        }
+impl Carrier<Box<Runner>> for Post<'_> {
+    fn now_ns(&self) -> u64 {
+        sys::now_ns().saturating_sub(self.epoch_ns)
+    }
+
+    fn on_clock(&self, time_ns: u64) -> u64 {
+        time_ns.saturating_add(self.epoch_ns)
+    }
+
+    #[inline]
+    fn begin(&mut self, core: CoreId, _: &mut Box<Runner>) -> u64 {
+        self.workers[self.active[core.index()]].run();
+        self.now_ns()
+    }
+
+    fn send(&mut self, request: Request) -> bool {
+        self.office.send(self.cluster, request)
+    }
+
+    fn open(&mut self) -> Option<&Letters> {
+        let has_letters = self.office.open(self.cluster);
+        *self.opened += u64::from(has_letters);
+        has_letters.then_some(&self.office.letters)
+    }
+}
+
+impl desk::Body for Box<Runner> {
+    fn set_job(&mut self, job: u64) {
+        self.job = job;
+    }
+
+    fn subject(&self) -> Subject {
+        let ids = self.ids;
+        Subject { ids, job: self.job }
+    }
+
+    fn discard(&mut self, job: u64) {
+        self.body.discard(job);
+    }
+
+    #[inline]
+    fn has_effects(&self) -> bool {
+        self.body.has_effects()
+    }
+
+    fn complete(&mut self, finish_ns: u64, keep: &mut dyn FnMut(Request)) {
+        self.body.complete(finish_ns, keep);
+    }
+
+    fn can_take_over(&self) -> bool {
+        self.body.can_take_over()
+    }
+
+    fn take_over(&mut self) {
+        self.body.take_over();
     }
 }
 
@@ -107,31 +156,41 @@ impl State {
     pub(crate) fn new(
         (cluster, office): (ClusterId, &Arc<Office>),
         scheduler: Scheduler,
-        bodies: Vec<(Vertex, Body)>,
+        bodies: Vec<(Instance, Body, Vec<Body>)>,
         (requests, after_fault): (Requests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
         levels: Option<Levels>,
     ) -> Self {
-        let task_set = Arc::clone(scheduler.task_set());
-        let (cores, dags) = (processors.len(), task_set.dags().len());
-        let mut placement = Placement::empty(task_set.vertices(), cores);
+        let dags = scheduler.task_set().dags().len();
+        let cores = processors.len();
         let workers = cores + bodies.len();
-        for (vertex, body) in bodies {
-            let job = 0;
-            placement.replace(vertex, Box::new(Runner { body, vertex, job }));
+        let mut desk = Desk::new::<Post<'_>>(cluster, scheduler, journal, requests, after_fault);
+        for (any, body, others) in bodies {
+            let vertex = desk.task_set.vertex(any);
+            let runner = |body| {
+                let job = 0;
+                let ids = Subject::of(any).ids;
+                Box::new(Runner {
+                    body,
+                    vertex,
+                    ids,
+                    job,
+                })
+            };
+            desk.put(
+                vertex,
+                runner(body),
+                others.into_iter().map(runner).collect(),
+            );
         }
         let mut seats = vec![None; workers].into_boxed_slice();
         for (core, seat) in (0..).map(CoreId).zip(&mut seats[..cores]) {
             *seat = Some(core);
         }
         Self {
-            cluster,
             office: Arc::clone(office),
-            recorder: Recorder::into(Arc::clone(&task_set), journal),
-            placement,
-            task_set,
-            scheduler,
+            desk,
             active: (0..cores).collect(),
             seats,
             pinned: vec![None; workers].into_boxed_slice(),
@@ -140,12 +199,9 @@ impl State {
             left: Vec::with_capacity(workers),
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
-            requests,
             opened: 0,
-            after_fault,
             faults: Vec::with_capacity(dags),
             called: Vec::with_capacity(2 * cores),
-            decisions: Vec::with_capacity(2 * cores),
             processors,
             levels,
             epoch_ns: u64::MAX,
@@ -165,92 +221,59 @@ impl State {
 
     /// Writes down what happened to an instance at a time on the clock.
     pub(crate) fn note_at(&mut self, time_ns: u64, what: What, core: CoreId, vertex: Vertex) {
-        self.recorder.now_ns = self.since_epoch(time_ns);
-        let instance = self.scheduler.instance_of(vertex);
-        self.recorder.on_core(what, instance, core);
+        let time_ns = self.since_epoch(time_ns);
+        self.desk.note(what, core, vertex, time_ns);
+    }
+
+    /// Returns the desk, and what Linux adds to it.
+    #[inline]
+    pub(crate) fn parts<'s>(
+        &'s mut self,
+        workers: &'s [Worker],
+    ) -> (&'s mut Desk<Box<Runner>, Number>, Post<'s>) {
+        let post = Post {
+            office: &self.office,
+            cluster: self.desk.cluster,
+            epoch_ns: self.epoch_ns,
+            active: &self.active,
+            workers,
+            opened: &mut self.opened,
+        };
+        (&mut self.desk, post)
     }
 
     /// Lets the scheduler see what happens now, and decide.
-    pub(crate) fn step(
-        &mut self,
-        workers: &[Worker],
-        event: impl FnOnce(&mut Moment<'_>, &mut dyn Observer),
-    ) {
-        let now_ns = self.since_epoch(sys::now_ns());
-        self.recorder.now_ns = now_ns;
-        let discard = Discard(&mut self.placement, &self.task_set);
-        let mut observer = (&mut self.recorder, discard);
-        let mut moment = self.scheduler.at(now_ns);
-        event(&mut moment, &mut observer);
-        if self.office.open(self.cluster) {
-            self.opened += 1;
-            let (letters, cluster) = (&self.office.letters, self.cluster);
-            (self.requests).serve_letters(letters, cluster, &mut moment, &mut observer);
-        } else {
-            self.requests.serve(&mut moment, &mut observer);
-        }
-        let decisions = moment.release_due(&mut observer).dispatch();
-        self.decisions.clear();
-        self.decisions.extend_from_slice(decisions);
+    pub(crate) fn step(&mut self, workers: &[Worker], event: impl FnOnce(&mut Moment<'_>)) {
+        let (desk, mut post) = self.parts(workers);
+        let (now_ns, here) = (post.now_ns(), desk.scheduler.log.here);
+        desk.step((now_ns, here), &mut post, event);
         self.carry_out(workers);
     }
 
-    /// Ends an instance's DAG because of a fault.
-    pub(crate) fn fail(&mut self, workers: &[Worker], fault: Fault) {
-        let instance = fault.instance;
+    /// Ends an instance's DAG, or its job, because of a fault.
+    pub(crate) fn fail(&mut self, workers: &[Worker], core: CoreId, vertex: Vertex, fault: Fault) {
+        let (desk, mut post) = self.parts(workers);
+        let now_ns = post.now_ns();
+        desk.fail((now_ns, core), vertex, &mut post);
         self.faults.push(fault);
-        let handler = self.after_fault[instance.dag.index()];
-        let handler =
-            handler.filter(|&handler| !self.office.send(self.cluster, Request::Signal(handler)));
-        self.step(workers, |moment, mut observer| {
-            moment.fail(instance, &mut observer);
-            if let Some(handler) = handler {
-                moment.signal(handler, &mut observer);
-            }
-        });
+        self.carry_out(workers);
     }
 
-    /// Hands a completion over to the scheduler in the shortest way.
-    #[inline]
-    pub(crate) fn hand_off(&mut self, core: CoreId, vertex: Vertex) -> sched_dag::HandOff {
-        let discard = Discard(&mut self.placement, &self.task_set);
-        let mut observer = (&mut self.recorder, discard);
-        // Not when the function returned: another one may have been quicker to the lock.
-        let now_ns = sys::now_ns().saturating_sub(self.epoch_ns);
-        observer.0.now_ns = now_ns;
-        self.scheduler.hand_off(now_ns, core, vertex, &mut observer)
-    }
-
-    fn carry_out(&mut self, workers: &[Worker]) {
+    pub(crate) fn carry_out(&mut self, workers: &[Worker]) {
         if let Some((core, occupant)) = self.interrupted.take() {
             let now_ns = sys::now_ns();
             // It may have returned already, and wait for the lock.
             self.resumed_ns[self.active[core.index()]] = now_ns;
             self.note_at(now_ns, What::Resume, core, occupant);
         }
-        let mut preempted = None;
-        for place in 0..self.decisions.len() {
-            let decision = self.decisions[place];
-            let core = decision.core();
-            let vertex = self.task_set.vertex(decision.instance());
-            if let Decision::Preempt { .. } = decision {
-                self.placement.set_target(core, None);
-                preempted = Some(core);
-            } else {
-                self.placement.set_target(core, Some(vertex));
-                if preempted == Some(core) {
-                    self.note(What::Request, core, vertex);
-                }
-            }
-        }
-        for place in 0..self.decisions.len() {
-            let core = self.decisions[place].core();
-            if self.placement.must_suspend(core.index()) {
+        for place in 0..self.desk.decisions().len() {
+            let core = self.desk.decisions()[place].core();
+            if self.desk.placement.must_suspend(core.index()) {
                 self.suspend(core, workers);
             }
         }
-        for place in 0..self.decisions.len() {
-            self.call_if_wanted(self.decisions[place].core());
+        for place in 0..self.desk.decisions().len() {
+            self.call_if_wanted(self.desk.decisions()[place].core());
         }
     }
 
@@ -260,14 +283,15 @@ impl State {
         if !workers[demoted].demote(self.levels, Role::Demoted) {
             return;
         }
-        let Some(vertex) = self.placement.detach(core.index()) else {
+        if self.desk.placement.current(core.index()).is_none() {
             return;
-        };
+        }
         self.preemptions += 1;
-        self.note(What::Suspend, core, vertex);
+        let now_ns = self.since_epoch(sys::now_ns());
+        let waiting = self.desk.suspend(core, now_ns, demoted);
         self.seats[demoted] = None;
         self.replace(core, workers);
-        if let Some(waiting) = self.placement.suspend(vertex, demoted) {
+        if let Some(waiting) = waiting {
             self.call_if_wanted(waiting);
         }
     }
@@ -299,14 +323,14 @@ impl State {
     }
 
     pub(crate) fn call_if_wanted(&mut self, core: CoreId) {
-        if self.placement.is_wanted(core.index()) && !self.called.contains(&core) {
+        if self.desk.placement.is_wanted(core.index()) && !self.called.contains(&core) {
             self.called.push(core);
         }
     }
 
     /// Returns workers that are to look for work, `most` at a time, and forgets them.
     pub(crate) fn take_called(&mut self, most: usize) -> impl Iterator<Item = Number> + '_ {
-        let (active, placement) = (&self.active, &self.placement);
+        let (active, placement) = (&self.active, &self.desk.placement);
         let left = self.called.len().saturating_sub(most);
         let called = self.called.drain(left..);
         // The one that makes the step has looked already.
@@ -325,11 +349,9 @@ impl State {
             self.spare.push(me);
             return None;
         };
-        match self.placement.next(core.index()) {
-            Next::Start(vertex, runner) => {
-                let job = self.scheduler.instance_of(vertex).job;
-                Some(self.begin(me, core, runner, job, workers))
-            }
+        let (desk, mut post) = self.parts(workers);
+        match desk.next(core, &mut post) {
+            Next::Start(_, runner) => Some(runner),
             Next::Continue(parked) => {
                 self.seats[me] = None;
                 self.spare.push(me);
@@ -338,7 +360,7 @@ impl State {
                 if self.has_left(parked) {
                     workers[parked].call();
                 }
-                if let Some(vertex) = self.placement.current(core.index()) {
+                if let Some(vertex) = self.desk.placement.current(core.index()) {
                     self.resumed_ns[parked] = sys::now_ns();
                     self.note_at(self.resumed_ns[parked], What::Resume, core, vertex);
                 }
@@ -346,21 +368,5 @@ impl State {
             }
             Next::Nothing => None,
         }
-    }
-
-    /// Lets a worker begin an instance, as soon as the lock is free.
-    #[inline]
-    pub(crate) fn begin(
-        &mut self,
-        me: Number,
-        core: CoreId,
-        mut runner: Box<Runner>,
-        job: u64,
-        workers: &[Worker],
-    ) -> Box<Runner> {
-        runner.job = job;
-        workers[me].run();
-        self.note(What::Start, core, runner.vertex);
-        runner
     }
 }

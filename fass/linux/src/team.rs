@@ -8,8 +8,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use sched_dag::journal::What;
-use sched_dag::{ClusterId, HandOff, Moment, Observer};
+use sched_dag::ClusterId;
+use sched_dag::desk::{After, Carrier as _};
 
 use crate::lead::Lead;
 use crate::level::{Levels, Role};
@@ -52,7 +52,7 @@ impl Team {
         Self {
             workers: state.seats.iter().map(|_| Worker::default()).collect(),
             levels: state.levels,
-            cluster: state.cluster,
+            cluster: state.desk.cluster,
             office: Arc::clone(office),
             look_out: LookOut::new(),
             looks_at_ns: AtomicU64::new(u64::MAX),
@@ -116,10 +116,9 @@ impl Team {
                     let mut state = self.lock();
                     let core = state.seats[me];
                     // The others' workers may still sleep.
-                    let prefer = |moment: &mut Moment<'_>, _: &mut dyn Observer| {
+                    state.step(&self.workers, |moment| {
                         core.into_iter().for_each(|core| moment.prefer(core));
-                    };
-                    state.step(&self.workers, prefer);
+                    });
                     match core {
                         Some(_) => self.go_on(me, state),
                         None => None,
@@ -216,57 +215,43 @@ impl Team {
     ) -> Option<Box<Runner>> {
         let (workers, vertex) = (&self.workers, runner.vertex);
         let state_now = &mut *state;
-        if outcome.is_ok() {
-            state_now.let_effects_happen(&mut runner, finish_ns);
-        }
-        let what = match outcome {
-            Ok(()) => What::Finish,
-            Err(_) => What::Ended,
-        };
         let seat = state_now.seats[me];
-        match seat {
-            Some(core) => {
-                let end_ns = state_now.end_of(me, finish_ns);
-                state_now.note_at(end_ns, what, core, vertex);
-                state_now.placement.finish(core.index(), vertex, runner);
-                let is_usual = outcome.is_ok() && state_now.left.is_empty();
-                if is_usual && state_now.requests.are_none() {
-                    match state_now.hand_off(core, vertex) {
-                        HandOff::To(successor, decision) => {
-                            if let Some(runner) = state_now.placement.start(core, successor) {
-                                let job = decision.instance().job;
-                                let runner = state_now.begin(me, core, runner, job, workers);
-                                self.hand_offs.fetch_add(1, Ordering::Relaxed);
-                                self.announce(&state);
-                                return Some(runner);
-                            }
-                            state_now.placement.set_target(core, Some(successor));
-                        }
-                        HandOff::Idle => {}
-                        HandOff::Open => state_now.step(workers, |_, _| ()),
+        match (outcome, seat) {
+            (Ok(()), Some(core)) => {
+                let end_ns = state_now.since_epoch(state_now.end_of(me, finish_ns));
+                let is_alone = state_now.left.is_empty();
+                let (desk, mut post) = state_now.parts(workers);
+                let ended = (core, vertex);
+                match desk.complete(ended, runner, end_ns, is_alone, &mut post) {
+                    After::Run(runner) => {
+                        self.hand_offs.fetch_add(1, Ordering::Relaxed);
+                        self.announce(&state);
+                        return Some(runner);
                     }
-                    return self.go_on(me, state);
+                    After::Look { .. } => {}
+                    After::Step(ended) => {
+                        let now_ns = post.now_ns();
+                        desk.step((now_ns, core), &mut post, |moment| {
+                            ended.into_iter().for_each(|ended| moment.complete(ended));
+                        });
+                        state_now.carry_out(workers);
+                    }
                 }
             }
-            None => {
-                // It ran on although it was preempted, where it was then.
-                state_now.note_end_of_parked(me, what, vertex);
-                state_now.placement.finish_parked(vertex, runner);
-            }
-        }
-        let instance = state_now.scheduler.instance_of(vertex);
-        match outcome {
-            Ok(()) => state_now.step(workers, |moment, mut observer| {
-                moment.complete(instance, &mut observer);
-            }),
-            Err(cause) => {
-                let is_overrun = false;
+            (Ok(()), None) => state_now.end_parked(me, runner, finish_ns, workers),
+            (Err(cause), _) => {
+                let core = seat.unwrap_or_else(|| state_now.core_of(me));
+                runner.body.failed(finish_ns);
+                match seat {
+                    Some(core) => (state_now.desk.placement).finish(core.index(), vertex, runner),
+                    None => state_now.desk.placement.finish_parked(vertex, runner),
+                }
                 let fault = Fault {
-                    instance,
+                    instance: state_now.desk.scheduler.instance_of(vertex),
                     cause,
-                    is_overrun,
+                    is_overrun: false,
                 };
-                state_now.fail(workers, fault);
+                state_now.fail(workers, core, vertex, fault);
             }
         }
         if let Some(core) = seat {
@@ -317,9 +302,9 @@ impl Team {
     /// Sees to it that the release thread looks in time.
     #[inline]
     pub(crate) fn announce(&self, state: &State) {
-        let next_ns = match state.scheduler.next_event_ns() {
+        let next_ns = match state.desk.scheduler.next_event_ns() {
             Some(next_ns) => next_ns.saturating_add(state.epoch_ns),
-            None if state.scheduler.is_finished() => 0,
+            None if state.desk.scheduler.is_finished() => 0,
             None => u64::MAX,
         };
         self.look_out.announce(next_ns);

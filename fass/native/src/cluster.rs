@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::thread;
 
-use sched_dag::{ClusterId, CoreId, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{ClusterId, CoreId, Journal, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::execute::Execute;
 use crate::others::Others;
@@ -28,9 +28,8 @@ pub(crate) struct Place<'a> {
 pub(crate) fn run<B: Execute, W: Watch, O: Others>(
     place: Place<'_>,
     mut bodies: Vec<B>,
-    watch: W,
     others: O,
-) -> (Scheduler, W) {
+) -> Scheduler {
     let _end = EndOnPanic(others);
     let Place {
         task_set, start, ..
@@ -38,13 +37,16 @@ pub(crate) fn run<B: Execute, W: Watch, O: Others>(
     let mut cores = task_set.cores_of(place.cluster, place.options.cores);
     let first = cores.start;
     let mut scheduler = Scheduler::of_cluster(Arc::clone(task_set), place.options, place.cluster);
-    if cores.len() == 1 {
-        let mut reports = Reports::new(task_set, watch, &mut bodies[..]);
-        start.ready(first);
-        alone::run(&mut scheduler, &mut reports, others);
-        return (scheduler, reports.watch);
+    if W::STEP_NS > 0 {
+        scheduler.log.journal = Journal::growing();
     }
-    let team = team::Team::new(scheduler, bodies, watch, others);
+    if cores.len() == 1 {
+        let mut reports = Reports::new(&mut scheduler, &mut bodies[..]);
+        start.ready(first);
+        alone::run::<B, W>(&mut scheduler, &mut reports, others);
+        return scheduler;
+    }
+    let team = team::Team::<B, W, O>::new(scheduler, bodies, others);
     let work = |worker| {
         let _end = EndOnPanic(others);
         start.ready(worker);

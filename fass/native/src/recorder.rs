@@ -2,38 +2,20 @@
 
 use std::sync::Arc;
 
-use sched_dag::Recorder;
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{Terms, dispatch_violations, violations};
-use sched_dag::{CoreId, Instance, SchedulerOptions, TaskSet};
+use sched_dag::{CoreId, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::report::{Recorded, Report};
-use crate::watch::Watch;
 
-impl Watch for Recorder {
-    const STEP_NS: u64 = 1;
-
-    fn instant(&mut self, now_ns: u64) {
-        self.now_ns = now_ns;
-    }
-
-    fn started(&mut self, instance: Instance, core: CoreId) {
-        self.on_core(What::Start, instance, core);
-    }
-
-    fn finished(&mut self, instance: Instance, core: CoreId) {
-        self.on_core(What::Finish, instance, core);
-    }
-}
-
-/// Checks everything, of the recorders of all clusters.
+/// Checks everything, of the schedulers of all clusters.
 pub(crate) fn judge(
-    recorders: &[Recorder],
+    schedulers: &[Scheduler],
     report: Report,
     task_set: &Arc<TaskSet>,
     options: SchedulerOptions,
 ) -> Recorded {
-    let events = merged(recorders, task_set, options.cores);
+    let events = merged(schedulers, task_set, options.cores);
     let events = events.iter().copied();
     let mut found = violations(task_set, Terms::EXACT, events.clone());
     let of_dispatch = dispatch_violations(task_set, &options, Terms::EXACT, events.clone());
@@ -50,15 +32,15 @@ pub(crate) fn judge(
     }
 }
 
-/// Returns the events of all clusters, whose recorders count cores from their first one. Nothing
+/// Returns the events of all clusters, whose schedulers count cores from their first one. Nothing
 /// in one depends on another, since each DAG and each core is in one cluster: so any order between
 /// them tells the same run, and the law wants that of time.
-fn merged(recorders: &[Recorder], task_set: &TaskSet, cores: u32) -> Vec<Event> {
+fn merged(schedulers: &[Scheduler], task_set: &TaskSet, cores: u32) -> Vec<Event> {
     let mut all = Vec::new();
-    for (cluster, recorder) in task_set.clusters().zip(recorders) {
+    for (cluster, scheduler) in task_set.clusters().zip(schedulers) {
         let first = task_set.cores_of(cluster, cores).start;
         let mut latest_ns = 0;
-        all.extend(recorder.events.iter().map(|&event| {
+        all.extend(scheduler.log.journal.events().map(|event| {
             // What is said of a time before stays where it was said.
             latest_ns = event.time_ns.max(latest_ns);
             let core = CoreId(event.core.0 + first);

@@ -19,15 +19,16 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use sched_dag::{DagId, Instance, JobOutcome, Observer, TaskSet};
+use sched_dag::journal::What;
+use sched_dag::{News, Scheduler};
 
 use crate::execute::Execute;
 
-/// Passes all on to `watch`, and has bodies discard what cancelled instances got.
-pub(crate) struct Reports<W, B> {
-    pub(crate) watch: W,
+/// Has bodies discard what cancelled instances got.
+pub(crate) struct Reports<B> {
     pub(crate) bodies: B,
-    task_set: Arc<TaskSet>,
+    /// Room for news.
+    news: Vec<News>,
 }
 
 /// Bodies at rest can be found among them, by vertex.
@@ -58,62 +59,31 @@ impl<B: Execute> Bodies for Shared<B> {
     }
 }
 
-impl<W, B> Reports<W, B> {
-    pub(crate) fn new(task_set: &Arc<TaskSet>, watch: W, bodies: B) -> Self {
+impl<B: Bodies> Reports<B> {
+    pub(crate) fn new(scheduler: &mut Scheduler, bodies: B) -> Self {
+        scheduler.log.want([What::Cancelled], 64);
         Self {
-            watch,
             bodies,
-            task_set: Arc::clone(task_set),
+            news: Vec::with_capacity(64),
         }
     }
-}
 
-impl<W: Observer, B: Bodies> Observer for Reports<W, B> {
+    /// Has bodies discard what cancelled instances got.
+    #[inline]
+    pub(crate) fn act(&mut self, scheduler: &mut Scheduler) {
+        if scheduler.log.has_news() {
+            self.discard(scheduler);
+        }
+    }
+
     // Apart, so that the way of instances that run stays as short as without it.
     #[cold]
     #[inline(never)]
-    fn cancelled(&mut self, instance: Instance) {
-        self.watch.cancelled(instance);
-        let vertex = self.task_set.vertex(instance);
-        self.bodies.discard(vertex.index(), instance.job);
-    }
-
-    #[inline]
-    fn ready(&mut self, instance: Instance) {
-        self.watch.ready(instance);
-    }
-
-    #[inline]
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.watch.released(dag, job, release_ns);
-    }
-
-    #[inline]
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.watch.job_completed(dag, job, outcome);
-    }
-
-    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.watch.queued(dag, job, release_ns);
-    }
-
-    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.watch.skipped(dag, job, release_ns);
-    }
-
-    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
-        self.watch.signalled(dag, job, release_ns);
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        self.watch.aborted(dag, job);
-    }
-
-    fn ended(&mut self, dag: DagId) {
-        self.watch.ended(dag);
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        self.watch.deadline_missed(dag, job, deadline_ns);
+    fn discard(&mut self, scheduler: &mut Scheduler) {
+        scheduler.log.exchange_news(&mut self.news);
+        for instance in self.news.iter().filter_map(|news| news.event.instance()) {
+            let vertex = scheduler.vertex(instance);
+            self.bodies.discard(vertex.index(), instance.job);
+        }
     }
 }

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::thread;
 
-use sched_dag::Recorder;
 use sched_dag::{ClusterId, Dag, DagId, Policy, Preemption, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::cluster::{self, Place, join};
@@ -79,7 +78,7 @@ pub(crate) fn run_bodies<B: Execute>(
     bodies: Vec<Vec<B>>,
     setting: Setting,
 ) -> Report {
-    run_watched(&task_set, bodies, setting, || ()).0
+    run_watched::<B, ()>(&task_set, bodies, setting).0
 }
 
 pub(crate) fn run_bodies_recorded<B: Execute>(
@@ -95,9 +94,8 @@ pub(crate) fn run_bodies_recorded<B: Execute>(
             endless.name()
         );
     }
-    let watch = || Recorder::new(Arc::clone(&task_set));
-    let (report, recorders) = run_watched(&task_set, bodies, setting, watch);
-    judge(&recorders, report, &task_set, options(setting))
+    let (report, schedulers) = run_watched::<B, crate::watch::Recorded>(&task_set, bodies, setting);
+    judge(&schedulers, report, &task_set, options(setting))
 }
 
 const fn options(setting: Setting) -> SchedulerOptions {
@@ -113,8 +111,7 @@ fn run_watched<B: Execute, W: Watch>(
     task_set: &Arc<TaskSet>,
     bodies: Vec<Vec<B>>,
     setting: Setting,
-    watch: impl Fn() -> W,
-) -> (Report, Vec<W>) {
+) -> (Report, Vec<Scheduler>) {
     let dags = task_set.dags();
     assert!(
         dags.iter()
@@ -142,14 +139,14 @@ fn run_watched<B: Execute, W: Watch>(
         start: &start,
     };
     let ran = if task_set.is_divided() {
-        run_divided(place, bodies, watch)
+        run_divided::<B, W>(place, bodies)
     } else {
-        let (place, watch) = (place(ClusterId(0)), watch());
+        let place = place(ClusterId(0));
         let bodies = bodies.into_iter().flatten().collect();
-        let run = || cluster::run(place, bodies, watch, ());
+        let run = || cluster::run::<B, W, ()>(place, bodies, ());
         vec![thread::scope(|scope| join(scope.spawn(run)))]
     };
-    let (schedulers, watches): (Vec<Scheduler>, Vec<W>) = ran.into_iter().unzip();
+    let schedulers = ran;
     let scheduler_of = |dag| &schedulers[task_set.dag(dag).cluster().index()];
     let ids = (0..).map(DagId).zip(dags);
     let sink_misses = |(dag, model): (DagId, &Dag)| {
@@ -164,15 +161,14 @@ fn run_watched<B: Execute, W: Watch>(
         statistics: ids.map(statistics).collect(),
         pinning: start.pinning(),
     };
-    (report, watches)
+    (report, schedulers)
 }
 
 /// Runs all clusters, and returns what each leaves.
 fn run_divided<'a, B: Execute, W: Watch>(
     place: impl Fn(ClusterId) -> Place<'a>,
     mut bodies: Vec<Vec<B>>,
-    watch: impl Fn() -> W,
-) -> Vec<(Scheduler, W)> {
+) -> Vec<Scheduler> {
     let task_set = place(ClusterId(0)).task_set;
     let office = Office::new(task_set);
     thread::scope(|scope| {
@@ -187,9 +183,9 @@ fn run_divided<'a, B: Execute, W: Watch>(
                 }
                 own.resize_with(end, || None);
             }
-            let (place, watch) = (place(cluster), watch());
+            let place = place(cluster);
             let others = office.seen_from(cluster);
-            clusters.push(scope.spawn(move || cluster::run(place, own, watch, others)));
+            clusters.push(scope.spawn(move || cluster::run::<_, W, _>(place, own, others)));
         }
         clusters.into_iter().map(join).collect()
     })

@@ -38,7 +38,7 @@ const EVENTS_WITHOUT_END: usize = 1 << 18;
 const FINEST: u32 = 5;
 
 /// The events of a run, the latest ones if it is long.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Journal {
     /// As many as there is room for; none while nothing is recorded.
     events: Vec<[u64; 3]>,
@@ -52,6 +52,10 @@ pub struct Journal {
     tally: Option<Tally>,
     /// Whether each lost event is counted in the tally.
     is_complete: bool,
+    /// Whether there is room for all, as much as there is memory.
+    grows: bool,
+    /// Whether nothing more is written down.
+    is_closed: bool,
 }
 
 impl Journal {
@@ -102,7 +106,38 @@ impl Journal {
             lost: 0,
             tally,
             is_complete: true,
+            grows: false,
+            is_closed: false,
         }
+    }
+
+    /// Makes one that has no room.
+    #[must_use]
+    pub const fn none() -> Self {
+        Self {
+            events: Vec::new(),
+            put_away: Vec::new(),
+            oldest: 0,
+            lost: 0,
+            tally: None,
+            is_complete: true,
+            grows: false,
+            is_closed: false,
+        }
+    }
+
+    /// Writes nothing down any more.
+    pub fn close(&mut self) {
+        self.events.shrink_to_fit();
+        self.is_closed = true;
+    }
+
+    /// Makes one that keeps all, as long as there is memory.
+    #[must_use]
+    pub const fn growing() -> Self {
+        let mut journal = Self::none();
+        journal.grows = true;
+        journal
     }
 
     /// Writes down that something has happened.
@@ -131,8 +166,11 @@ impl Journal {
     #[cold]
     #[inline(never)]
     fn replace_oldest(&mut self, time_ns: u64, job: u64, rest: u64) {
+        if self.is_closed {
+            return;
+        }
         let words = [time_ns, job, rest];
-        if self.events.len() < self.events.capacity() {
+        if self.grows || self.events.len() < self.events.capacity() {
             self.events.push(words);
             return;
         }

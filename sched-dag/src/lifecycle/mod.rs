@@ -34,7 +34,7 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use crate::ids::{ClusterId, DagId, ModeId};
-use crate::scheduler::{Moment, Observer};
+use crate::scheduler::Moment;
 pub use changes::Changes;
 pub use letters::{Letters, Parts, divide};
 
@@ -150,18 +150,18 @@ impl Requests {
     }
 
     /// Passes on what has come from other clusters, and what is kept.
+    #[inline]
     pub fn serve_letters(
         &mut self,
         letters: &Letters,
         cluster: ClusterId,
         moment: &mut Moment<'_>,
-        observer: &mut impl Observer,
     ) {
         letters.take(cluster, |request| match request {
-            Request::Signal(dag) => moment.signal(dag, observer),
+            Request::Signal(dag) => moment.signal(dag),
             other => self.keep(other),
         });
-        self.serve(moment, observer);
+        self.serve(moment);
     }
 
     /// Passes the requests on, after the completions of the instant.
@@ -169,20 +169,20 @@ impl Requests {
     /// No pointer to the scheduler leaves this function, so where that is a static, the compiler
     /// knows its address in all of the scheduler's code, which is 4 % of a release.
     #[inline(always)]
-    pub fn serve(&mut self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
+    pub fn serve(&mut self, moment: &mut Moment<'_>) {
         let mut waits = false;
         for request in self.kept.drain(..) {
             match (request, &mut self.lifecycle) {
-                (Request::Signal(dag), _) => moment.signal(dag, observer),
+                (Request::Signal(dag), _) => moment.signal(dag),
                 (_, Some(lifecycle)) => lifecycle.serve(request, &mut self.changes),
                 // Without it nothing is asked for.
                 (_, None) => {}
             }
             for change in self.changes.drain(..) {
                 match change {
-                    Change::Pause(dag) => moment.pause(dag, observer),
-                    Change::Resume(dag) => moment.resume(dag, observer),
-                    Change::Close(dag) => moment.close(dag, observer),
+                    Change::Pause(dag) => moment.pause(dag),
+                    Change::Resume(dag) => moment.resume(dag),
+                    Change::Close(dag) => moment.close(dag),
                     Change::Await(dag) if moment.in_flight(dag) == 0 => {}
                     Change::Await(_) => {
                         waits = true;
@@ -190,7 +190,7 @@ impl Requests {
                     }
                     Change::Enter(mode) => {
                         waits = false;
-                        observer.entered(mode);
+                        moment.entered(mode);
                     }
                 }
             }

@@ -18,21 +18,21 @@
 
 use super::Scheduler;
 use crate::ids::DagId;
-use crate::scheduler::Observer;
 
 impl Scheduler {
     /// Closes a DAG (C1, C2).
-    pub(super) fn close(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn close(&mut self, dag: DagId) {
         if self.is_closed(dag) {
             return;
         }
-        self.judge(dag, None, observer);
+        self.judge(dag, None);
         let state = &mut self.dags[dag.index()];
         state.jobs.close();
         state.is_paused = false;
-        observer.closed(dag);
+        self.log.closed(dag);
         while self.waiting(dag) > 0 {
-            self.skip_oldest_waiting(dag, observer);
+            self.skip_oldest_waiting(dag);
         }
         self.set_timer(dag);
     }

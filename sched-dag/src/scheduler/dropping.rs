@@ -30,7 +30,7 @@
 use alloc::boxed::Box;
 use alloc::vec;
 
-use super::{Observer, Scheduler};
+use super::Scheduler;
 use crate::ids::{DagId, Instance};
 use crate::policy::{JobOutcome, OnFault};
 
@@ -97,24 +97,25 @@ impl Scheduler {
     }
 
     /// Ends an instance that has started, and cuts its job or ends its DAG (D1).
-    pub(super) fn fail_replaceable(&mut self, instance: Instance, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn fail_replaceable(&mut self, instance: Instance) {
         let dag = instance.dag;
         if self.is_ended(dag) || !self.dags[dag.index()].survived.take(instance.job) {
-            self.fail(instance, observer);
+            self.fail(instance);
             return;
         }
         let vertex = self.take_off(instance, "fails");
-        self.judge(dag, None, observer);
+        self.judge(dag, None);
         let sequence = self.vertices.get(vertex).progress;
         let state = &mut self.dags[dag.index()];
         state.statistics.faults += 1;
         state.statistics.restarts += 1;
-        observer.restarted(instance);
+        self.log.restarted(instance);
         if state.jobs.cut(sequence, JobOutcome::Failed) {
             state.statistics.failed += 1;
-            self.cancel_ready(dag, sequence, observer);
+            self.cancel_ready(dag, sequence);
         }
-        self.end(vertex, observer);
+        self.end(vertex);
         self.set_timer(dag);
     }
 }

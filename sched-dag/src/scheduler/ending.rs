@@ -38,31 +38,32 @@
 
 use super::Scheduler;
 use crate::ids::{DagId, Instance};
-use crate::scheduler::Observer;
 
 impl Scheduler {
     /// Ends an instance that has started, and its DAG (E1).
-    pub(super) fn fail(&mut self, instance: Instance, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn fail(&mut self, instance: Instance) {
         let vertex = self.take_off(instance, "fails");
         let dag = instance.dag;
         self.dags[dag.index()].statistics.faults += 1;
-        self.stop(dag, observer);
+        self.stop(dag);
         // Only now its job may end, so that the job counts as cut short.
-        self.end(vertex, observer);
+        self.end(vertex);
     }
 
     /// Ends a DAG.
-    pub(super) fn stop(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn stop(&mut self, dag: DagId) {
         if self.is_ended(dag) {
             return;
         }
-        self.judge(dag, None, observer);
+        self.judge(dag, None);
         let state = &mut self.dags[dag.index()];
         let (cut_short, dropped) = state.jobs.end_all();
         state.statistics.cut_short += cut_short;
         state.statistics.dropped += dropped;
         self.set_timer(dag);
-        observer.ended(dag);
-        self.cancel_ready(dag, u64::MAX, observer);
+        self.log.ended(dag);
+        self.cancel_ready(dag, u64::MAX);
     }
 }

@@ -22,8 +22,9 @@
 
 use super::instances::line_up;
 use super::vertices::{Phase, Vertices};
-use super::{Decision, OWED, Observer, Scheduler};
+use super::{Decision, OWED, Scheduler};
 use crate::ids::{CoreId, Vertex};
+use crate::journal::What;
 
 /// What comes of a completion by [`Scheduler::hand_off`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,33 +49,21 @@ impl Scheduler {
     ///
     /// If no instance of the vertex has started, or it has ended before.
     #[inline]
-    pub fn hand_off(
-        &mut self,
-        now_ns: u64,
-        core: CoreId,
-        vertex: Vertex,
-        observer: &mut impl Observer,
-    ) -> HandOff {
-        let (done, is_untold) = self.pass_on(now_ns, core, vertex, observer);
-        tell(done, is_untold, observer)
+    pub fn hand_off(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> HandOff {
+        let (done, is_untold) = self.pass_on(now_ns, core, vertex);
+        self.tell(done, is_untold, now_ns, core, vertex)
     }
 
-    /// Does the same, except that the observer is *not* told that an instance has become
-    /// ready if that is the only one and the core begins it: for drivers to which that and
-    /// the start are one moment. Reports whether that is so.
+    /// Does the same, except that neither the finish nor that an instance has become ready is
+    /// written down if that is the only one and the core begins it: for drivers to which finish,
+    /// ready and start are one entry. Reports whether that is so.
     ///
     /// # Panics
     ///
     /// As [`hand_off`](Self::hand_off).
     #[inline(always)]
-    pub fn pass_on(
-        &mut self,
-        now_ns: u64,
-        core: CoreId,
-        vertex: Vertex,
-        observer: &mut impl Observer,
-    ) -> (HandOff, bool) {
-        let done = self.end_shortly(now_ns, core, vertex, core, observer);
+    pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, bool) {
+        let done = self.end_shortly(now_ns, core, vertex, core);
         if let HandOff::Idle = done.0 {
             self.cores.free(core);
         }
@@ -98,9 +87,8 @@ impl Scheduler {
         core: CoreId,
         vertex: Vertex,
         idle: CoreId,
-        observer: &mut impl Observer,
     ) -> HandOff {
-        let (done, is_untold) = self.end_shortly(now_ns, core, vertex, idle, observer);
+        let (done, is_untold) = self.end_shortly(now_ns, core, vertex, idle);
         if let HandOff::Open = done {
             return done;
         }
@@ -109,7 +97,7 @@ impl Scheduler {
         if let HandOff::Idle = done {
             self.cores.free(idle);
         }
-        tell(done, is_untold, observer)
+        self.tell(done, is_untold, now_ns, core, vertex)
     }
 
     /// Fetches into this processor's cache what the completion of the instance on
@@ -128,8 +116,8 @@ impl Scheduler {
 
     /// Ends the instance on `core`, and gives `taker` the first in line if only one core is
     /// concerned: then `core` is not idle yet, and `taker` not taken from the
-    /// idle ones. If more is to be decided, `core` is idle. Reports whether the observer
-    /// has still to be told that the instance given is ready.
+    /// idle ones. If more is to be decided, `core` is idle. Reports whether it has still to be
+    /// written down that the one has finished and the other is ready.
     #[inline(always)]
     fn end_shortly(
         &mut self,
@@ -137,39 +125,55 @@ impl Scheduler {
         core: CoreId,
         vertex: Vertex,
         taker: CoreId,
-        observer: &mut impl Observer,
     ) -> (HandOff, bool) {
-        self.now_ns = self.now_ns.max(now_ns);
+        self.log.now_ns = self.log.now_ns.max(now_ns);
         let ending = self.vertices.get(vertex.0);
         // Otherwise a dispatch is owed from before, or the instance was to move.
         if self.fresh != 0 || ending.phase != Phase::Running(core) {
-            self.finish(self.instance_of(vertex), observer);
+            let instance = self.instance_of(vertex);
+            self.write_finish(core, vertex, now_ns);
+            self.finish(instance);
             return (HandOff::Open, false);
         }
-        let is_quiet = self.now_ns < self.quiet_until_ns;
+        let is_quiet = self.log.now_ns < self.quiet_until_ns;
         if ending.only_passes_on && is_quiet {
             let (fresh, next) = self.vertices.pass_on(vertex.0);
             match fresh {
-                0 => return (self.give_first(taker), false),
-                1 => return self.pass(next, taker, observer),
-                _ => self.line_up_successors(vertex.0, observer),
+                0 => {
+                    self.write_finish(core, vertex, now_ns);
+                    return (self.give_first(taker), false);
+                }
+                1 if self.ready.is_empty() => return self.pass(next, taker),
+                _ => {
+                    self.write_finish(core, vertex, now_ns);
+                    self.line_up_successors(vertex.0);
+                }
             }
         } else {
-            self.end(vertex.0, observer);
+            self.write_finish(core, vertex, now_ns);
+            self.end(vertex.0);
         }
         let concerns_others = self.fresh > 1 && self.cores.count() > 1;
-        if concerns_others || self.now_ns >= self.quiet_until_ns {
-            return (self.leave_open(core, vertex, observer), false);
+        if concerns_others || self.log.now_ns >= self.quiet_until_ns {
+            return (self.leave_open(core, vertex), false);
         }
         self.fresh = 0;
         (self.give_first(taker), false)
     }
 
+    /// Writes down that a core has finished the instance of a vertex.
+    #[inline]
+    fn write_finish(&mut self, core: CoreId, vertex: Vertex, finish_ns: u64) {
+        self.log.here = core;
+        let instance = self.instance_of(vertex);
+        self.log.on_core(core, What::Finish, finish_ns, instance);
+    }
+
     /// Leaves the instant to be begun again, and the core idle.
-    #[inline(never)]
-    fn leave_open(&mut self, core: CoreId, ended: Vertex, observer: &mut impl Observer) -> HandOff {
-        if self.now_ns >= self.quiet_until_ns {
-            self.judge_ended(ended.0, observer);
+    #[inline]
+    fn leave_open(&mut self, core: CoreId, ended: Vertex) -> HandOff {
+        if self.log.now_ns >= self.quiet_until_ns {
+            self.judge_ended(ended.0);
         }
         self.cores.free(core);
         self.fresh |= OWED;
@@ -179,23 +183,12 @@ impl Scheduler {
     /// Gives a core the one instance that has just become ready, without putting it in
     /// line, unless that has a more urgent one.
     #[inline(always)]
-    fn pass(
-        &mut self,
-        number: u32,
-        taker: CoreId,
-        observer: &mut impl Observer,
-    ) -> (HandOff, bool) {
+    fn pass(&mut self, number: u32, taker: CoreId) -> (HandOff, bool) {
         let next = self.vertices.get_mut(number);
         let instance = next.present_instance();
         let key = (self.ready).key(number, next, || {
             self.dags[next.dag.index()].jobs.job(next.progress)
         });
-        if !self.ready.is_empty() {
-            next.phase = Phase::Ready;
-            self.ready.insert(key);
-            observer.ready(instance);
-            return (self.give_first(taker), false);
-        }
         next.phase = Phase::Running(taker);
         self.cores.run(taker, key, next.is_preemptible);
         let core = taker;
@@ -204,12 +197,12 @@ impl Scheduler {
     }
 
     /// Puts all successors of a vertex in line that its end has made ready.
-    #[inline(never)]
-    fn line_up_successors(&mut self, vertex: u32, observer: &mut impl Observer) {
+    #[inline]
+    fn line_up_successors(&mut self, vertex: u32) {
         for place in Vertices::successors(self.vertices.get(vertex)) {
             if let Some((number, next)) = self.vertices.ready_successor(place) {
                 let job = self.dags[next.dag.index()].jobs.job(next.progress);
-                line_up(number, next, job, &mut self.ready, observer);
+                line_up(number, next, job, &mut self.ready, &mut self.log);
                 self.fresh += 1;
             }
         }
@@ -223,15 +216,23 @@ impl Scheduler {
             None => HandOff::Idle,
         }
     }
-}
 
-/// Tells the observer what it has not been told.
-#[inline]
-fn tell(done: HandOff, is_untold: bool, observer: &mut impl Observer) -> HandOff {
-    if let HandOff::To(_, decision) = done
-        && is_untold
-    {
-        observer.ready(decision.instance());
+    /// Writes down what is not written yet.
+    #[inline]
+    fn tell(
+        &mut self,
+        done: HandOff,
+        is_untold: bool,
+        finish_ns: u64,
+        core: CoreId,
+        vertex: Vertex,
+    ) -> HandOff {
+        if let HandOff::To(_, decision) = done
+            && is_untold
+        {
+            self.write_finish(core, vertex, finish_ns);
+            self.log.ready(decision.instance());
+        }
+        done
     }
-    done
 }

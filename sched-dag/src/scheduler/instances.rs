@@ -8,17 +8,18 @@
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
-use super::{OWED, Observer, Scheduler, earliest_ns};
+use super::{Log, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::policy::JobOutcome;
 
 impl Scheduler {
     /// Ends an instance that has started.
-    pub(super) fn finish(&mut self, instance: Instance, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn finish(&mut self, instance: Instance) {
         let vertex = self.take_off(instance, "is completed");
-        self.end(vertex, observer);
-        if self.now_ns >= self.quiet_until_ns {
-            self.judge_ended(vertex, observer);
+        self.end(vertex);
+        if self.log.now_ns >= self.quiet_until_ns {
+            self.judge_ended(vertex);
         }
     }
 
@@ -48,18 +49,15 @@ impl Scheduler {
     }
 
     /// Releases the sources of a DAG in the job with a sequence number.
-    pub(super) fn release_sources(
-        &mut self,
-        dag: DagId,
-        sequence: u64,
-        observer: &mut impl Observer,
-    ) {
+    #[inline]
+    pub(super) fn release_sources(&mut self, dag: DagId, sequence: u64) {
         let Self {
             task_set,
             dags,
             vertices,
             ready,
             fresh,
+            log,
             ..
         } = self;
         let state = &dags[dag.index()];
@@ -68,7 +66,7 @@ impl Scheduler {
         for source in task_set.dag(dag).sources() {
             let number = first_vertex + source.0;
             if let Some(vertex) = vertices.arrive(number, sequence) {
-                line_up(number, vertex, job, ready, observer);
+                line_up(number, vertex, job, ready, log);
                 *fresh += 1;
             }
         }
@@ -77,7 +75,8 @@ impl Scheduler {
     /// Cancels all instances of a DAG that are ready, have not started, and do
     /// the job with a sequence number (all jobs if that is `u64::MAX`), and all
     /// that thereby would become ready.
-    pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
         let state = &self.dags[dag.index()];
         for &subtask in self.task_set.dag(dag).topological_order() {
             let number = self.task_set.first_vertex(dag) + subtask.0;
@@ -87,25 +86,25 @@ impl Scheduler {
             if vertex.phase == Phase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
                 self.ready.remove(self.ready.key(number, vertex, || job));
-                observer.cancelled(vertex.instance(job));
+                self.log.cancelled(vertex.instance(job));
                 vertex.phase = Phase::Absent;
                 self.ending.push(number);
             }
         }
-        self.end_all(observer);
+        self.end_all();
     }
 
     /// Ends the instance that a vertex is doing, and all that are cancelled by
     /// that.
     #[inline]
-    pub(super) fn end(&mut self, vertex: u32, observer: &mut impl Observer) {
-        self.end_one(vertex, observer);
+    pub(super) fn end(&mut self, vertex: u32) {
+        self.end_one(vertex);
         if !self.ending.is_empty() {
             // Its next instance may be among them, and then hide that this one was late.
-            if self.now_ns >= self.quiet_until_ns {
-                self.judge_ended(vertex, observer);
+            if self.log.now_ns >= self.quiet_until_ns {
+                self.judge_ended(vertex);
             }
-            self.end_all(observer);
+            self.end_all();
         }
     }
 
@@ -114,22 +113,24 @@ impl Scheduler {
     /// A vertex is in it at most once at a time: its next instance can only be
     /// ready when this one has been taken out. So each round of the loop ends
     /// another instance in flight.
-    fn end_all(&mut self, observer: &mut impl Observer) {
+    #[inline]
+    fn end_all(&mut self) {
         while let Some(vertex) = self.ending.pop() {
-            self.end_one(vertex, observer);
+            self.end_one(vertex);
         }
     }
 
     /// Tells the successors that the instance has ended, and ends its job if no
     /// instance of that is left.
     #[inline(always)]
-    fn end_one(&mut self, number: u32, observer: &mut impl Observer) {
+    fn end_one(&mut self, number: u32) {
         let Self {
             dags,
             vertices,
             ready,
             ending,
             fresh,
+            log,
             ..
         } = self;
         let ended = vertices.end(number);
@@ -145,33 +146,34 @@ impl Scheduler {
             let next = vertices.successor(place);
             if let Some(successor) = vertices.arrive(next, sequence) {
                 if is_cut {
-                    observer.cancelled(successor.instance(job));
+                    log.cancelled(successor.instance(job));
                     ending.push(next);
                 } else {
-                    line_up(next, successor, job, ready, observer);
+                    line_up(next, successor, job, ready, log);
                     *fresh += 1;
                 }
             }
         }
         if overlaps {
-            self.go_on_to_next_job(number, observer);
+            self.go_on_to_next_job(number);
         }
         if is_last {
-            self.end_job(dag, sequence, number, observer);
+            self.end_job(dag, sequence, number);
         }
     }
 
     /// Lets a vertex whose instance has ended go on with the next job, which is in
     /// flight, if that waits for nothing else.
-    fn go_on_to_next_job(&mut self, number: u32, observer: &mut impl Observer) {
+    #[inline]
+    fn go_on_to_next_job(&mut self, number: u32) {
         if let Some(vertex) = self.vertices.next_is_ready(number) {
             let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
             if job.cut.is_some() {
-                observer.cancelled(vertex.instance(job));
+                self.log.cancelled(vertex.instance(job));
                 self.ending.push(number);
             } else {
-                line_up(number, vertex, job, &mut self.ready, observer);
+                line_up(number, vertex, job, &mut self.ready, &mut self.log);
                 self.fresh += 1;
             }
         }
@@ -179,10 +181,11 @@ impl Scheduler {
 
     /// Ends the oldest job of a DAG, all of whose instances have ended, that of the vertex
     /// `last` at this instant (R4).
-    fn end_job(&mut self, dag: DagId, sequence: u64, last: u32, observer: &mut impl Observer) {
+    #[inline]
+    fn end_job(&mut self, dag: DagId, sequence: u64, last: u32) {
         // Before then no deadline has passed.
-        if self.now_ns >= self.quiet_until_ns {
-            self.judge(dag, Some(last), observer);
+        if self.log.now_ns >= self.quiet_until_ns {
+            self.judge(dag, Some(last));
         }
         let state = &mut self.dags[dag.index()];
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
@@ -203,7 +206,8 @@ impl Scheduler {
             JobOutcome::Met
         };
         state.jobs.end_oldest();
-        observer.job_completed(dag, job.number, outcome);
+        let has_limit = self.task_set.dag(dag).jobs().is_some();
+        self.log.job_completed(dag, job.number, outcome, has_limit);
         self.set_timer(dag);
     }
 
@@ -213,7 +217,7 @@ impl Scheduler {
         let model = self.task_set.dag(dag);
         match self.dags[dag.index()]
             .jobs
-            .next_event_ns(model, self.now_ns)
+            .next_event_ns(model, self.log.now_ns)
         {
             Some(event_ns) => self.timers.set(dag.index(), event_ns),
             None => self.timers.remove(dag.index()),
@@ -229,10 +233,10 @@ pub(super) fn line_up(
     vertex: &mut Vertex,
     job: &Job,
     ready: &mut ReadyQueue,
-    observer: &mut impl Observer,
+    log: &mut Log,
 ) {
     vertex.phase = Phase::Ready;
     vertex.job = job.number;
     ready.insert(ready.key(number, vertex, || job));
-    observer.ready(vertex.instance(job));
+    log.ready(vertex.instance(job));
 }

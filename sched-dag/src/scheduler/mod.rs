@@ -49,8 +49,8 @@ pub(crate) mod heap;
 mod instances;
 mod jobs;
 mod key;
+mod log;
 mod moment;
-mod observer;
 mod overrun;
 mod pausing;
 mod ready_queue;
@@ -65,8 +65,8 @@ use core::hash::{Hash, Hasher};
 
 pub use decision::Decision;
 pub use hand_off::HandOff;
+pub use log::{Log, Notice};
 pub use moment::{Moment, Released};
-pub use observer::Observer;
 pub use statistics::DagStatistics;
 
 use cores::Cores;
@@ -77,8 +77,9 @@ use ready_queue::ReadyQueue;
 use vertices::Vertices;
 
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
+use crate::journal::What;
 use crate::policy::SchedulerOptions;
-use crate::task_set::TaskSet;
+use crate::task_set::{Dag, TaskSet};
 
 /// The state of all jobs in flight.
 ///
@@ -89,7 +90,6 @@ use crate::task_set::TaskSet;
 pub struct Scheduler {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
-    now_ns: u64,
     dags: Box<[DagState]>,
     vertices: Vertices,
     /// The ready instances that do not run.
@@ -107,6 +107,8 @@ pub struct Scheduler {
     /// yet.
     ending: Vec<u32>,
     decisions: Vec<Decision>,
+    /// What is written down of each instant.
+    pub log: Log,
 }
 
 /// Stands next to a count of instances: a dispatch is owed.
@@ -199,7 +201,7 @@ impl Scheduler {
         let mut vertices = Vertices::new(&task_set, options.preemption);
         Self {
             options,
-            now_ns: 0,
+            log: Log::new(),
             dags: states,
             ready: ReadyQueue::new(&task_set, options.policy, &mut vertices),
             fresh: 0,
@@ -218,8 +220,32 @@ impl Scheduler {
     /// that one.
     #[inline]
     pub fn at(&mut self, now_ns: u64) -> Moment<'_> {
-        self.now_ns = self.now_ns.max(now_ns);
-        Moment::new(self)
+        self.log.now_ns = self.log.now_ns.max(now_ns);
+        Moment::new(self, now_ns)
+    }
+
+    /// Has events of these kinds kept as [notices](Log::has_notices), and returns how many there is
+    /// room for.
+    pub fn hear(&mut self, kinds: impl IntoIterator<Item = What>) -> usize {
+        // At one instant a DAG's end may skip and cancel all that it has, and a change of mode
+        // each other DAG's waiting job.
+        let of_dag = |dag: &Dag| dag.slots() * (dag.subtasks().len() + 4);
+        let most = self.task_set.dags().iter().map(of_dag).max();
+        let others = 8 * self.dags.len();
+        self.log.hear(kinds, most.unwrap_or(0) + others)
+    }
+
+    /// Returns what the latest dispatch has decided.
+    #[inline]
+    #[must_use]
+    pub fn decisions(&self) -> &[Decision] {
+        &self.decisions
+    }
+
+    /// Returns what the latest dispatch has decided, and where to write down what comes of it.
+    #[inline]
+    pub fn decided(&mut self) -> (&[Decision], &mut Log) {
+        (&self.decisions, &mut self.log)
     }
 
     /// Returns when the driver has to begin the next instant, if nothing
@@ -332,7 +358,7 @@ impl Scheduler {
     #[must_use]
     #[inline]
     pub const fn now_ns(&self) -> u64 {
-        self.now_ns
+        self.log.now_ns
     }
 
     /// Returns the vertex of an instance's subtask. At most one instance of it is
@@ -363,7 +389,7 @@ impl Scheduler {
 impl Hash for Scheduler {
     fn hash<H: Hasher>(&self, state: &mut H) {
         // The least time is that of the timers, and between instants nothing is ending.
-        (self.now_ns, &self.dags, &self.vertices, &self.ready).hash(state);
+        (self.log.now_ns, &self.dags, &self.vertices, &self.ready).hash(state);
         (self.fresh, &self.cores, &self.timers).hash(state);
     }
 }

@@ -1,13 +1,16 @@
 //! One instant, in the order that its types force.
 
-use super::{Decision, Observer, Scheduler};
-use crate::ids::{CoreId, DagId, Instance, to_u32};
+use super::{Decision, Scheduler};
+use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
+use crate::journal::What;
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]
 #[must_use = "an instant without `release_due` and `dispatch` leaves cores idle"]
 pub struct Moment<'s> {
     scheduler: &'s mut Scheduler,
+    /// When the driver says that it is, which another core may have been later than.
+    told_ns: u64,
 }
 
 /// One instant after its completions and releases.
@@ -19,8 +22,8 @@ pub struct Released<'s> {
 
 impl<'s> Moment<'s> {
     #[inline]
-    pub(super) fn new(scheduler: &'s mut Scheduler) -> Self {
-        Self { scheduler }
+    pub(super) fn new(scheduler: &'s mut Scheduler, told_ns: u64) -> Self {
+        Self { scheduler, told_ns }
     }
 
     /// Takes note that an instance has finished.
@@ -32,8 +35,12 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If the instance has not started or has ended before.
-    pub fn complete(&mut self, instance: Instance, observer: &mut impl Observer) {
-        self.scheduler.finish(instance, observer);
+    #[inline]
+    pub fn complete(&mut self, instance: Instance) {
+        self.scheduler
+            .log
+            .on_this(What::Finish, self.told_ns, instance);
+        self.scheduler.finish(instance);
     }
 
     /// Takes note that an instance has ended by a fault, and ends its DAG.
@@ -49,21 +56,29 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If the instance has not started or has ended before.
-    pub fn fail(&mut self, instance: Instance, observer: &mut impl Observer) {
-        self.scheduler.fail(instance, observer);
+    #[inline]
+    pub fn fail(&mut self, instance: Instance) {
+        self.scheduler
+            .log
+            .on_this(What::Ended, self.told_ns, instance);
+        self.scheduler.fail(instance);
     }
 
     /// Takes note that an instance has ended by a fault, and that the driver has another
     /// function for its subtask. If the DAG [survives](crate::FaultLimit) the fault, only
-    /// the instance's job is cut, and the observer is told that the subtask is
-    /// [restarted](Observer::restarted); else the DAG is ended, as by
+    /// the instance's job is cut, and the subtask is
+    /// [restarted](What::Restarted); else the DAG is ended, as by
     /// [`fail`](Self::fail). (The module `dropping` states the rules.)
     ///
     /// # Panics
     ///
     /// If the instance has not started or has ended before.
-    pub fn fail_replaceable(&mut self, instance: Instance, observer: &mut impl Observer) {
-        self.scheduler.fail_replaceable(instance, observer);
+    #[inline]
+    pub fn fail_replaceable(&mut self, instance: Instance) {
+        self.scheduler
+            .log
+            .on_this(What::Ended, self.told_ns, instance);
+        self.scheduler.fail_replaceable(instance);
     }
 
     /// Ends a DAG as [`fail`](Self::fail) does, without an instance that has
@@ -72,8 +87,9 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If there is no such DAG.
-    pub fn stop(&mut self, dag: DagId, observer: &mut impl Observer) {
-        self.scheduler.stop(dag, observer);
+    #[inline]
+    pub fn stop(&mut self, dag: DagId) {
+        self.scheduler.stop(dag);
     }
 
     /// Pauses a DAG: from now on its due jobs are skipped, and what is in flight
@@ -83,8 +99,9 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If there is no such DAG.
-    pub fn pause(&mut self, dag: DagId, observer: &mut impl Observer) {
-        self.scheduler.pause(dag, observer);
+    #[inline]
+    pub fn pause(&mut self, dag: DagId) {
+        self.scheduler.pause(dag);
     }
 
     /// Returns the number of jobs of a DAG that are in flight.
@@ -105,8 +122,8 @@ impl<'s> Moment<'s> {
     ///
     /// If there is no such DAG.
     #[inline]
-    pub fn resume(&mut self, dag: DagId, observer: &mut impl Observer) {
-        self.scheduler.resume(dag, observer);
+    pub fn resume(&mut self, dag: DagId) {
+        self.scheduler.resume(dag);
     }
 
     /// Closes a DAG: it releases no further job, and is over when what is in flight has
@@ -115,8 +132,9 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If there is no such DAG.
-    pub fn close(&mut self, dag: DagId, observer: &mut impl Observer) {
-        self.scheduler.close(dag, observer);
+    #[inline]
+    pub fn close(&mut self, dag: DagId) {
+        self.scheduler.close(dag);
     }
 
     /// Takes note of an event that a sporadic DAG waits for. Its next job is due
@@ -127,8 +145,15 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If there is no such DAG, or it is not sporadic.
-    pub fn signal(&mut self, dag: DagId, observer: &mut impl Observer) {
-        self.scheduler.signal(dag, observer);
+    #[inline]
+    pub fn signal(&mut self, dag: DagId) {
+        self.scheduler.signal(dag);
+    }
+
+    /// Writes down that the run is in another mode.
+    #[inline]
+    pub fn entered(&mut self, mode: ModeId) {
+        self.scheduler.log.entered(mode);
     }
 
     /// Makes a core, if it is idle, the first that is given an instance, instead of the one that
@@ -137,17 +162,37 @@ impl<'s> Moment<'s> {
         self.scheduler.cores.prefer(core);
     }
 
-    /// Releases the jobs that are due, and notices deadlines that have passed.
-    pub fn release_due(self, observer: &mut impl Observer) -> Released<'s> {
-        let now_ns = self.scheduler.now_ns;
-        while let Some((event_ns, index)) = self.scheduler.timers.peek()
-            && event_ns <= now_ns
-        {
-            self.scheduler.serve(DagId(to_u32(index)), observer);
-        }
+    /// Releases the jobs that are due, and takes note of deadlines that have passed.
+    #[inline]
+    pub fn release_due(mut self) -> Released<'s> {
+        while self.release_next() {}
         Released {
             scheduler: self.scheduler,
         }
+    }
+
+    /// Does so as long as there is room for [notices](super::Log::has_notices), and reports whether
+    /// that is all. A driver that is late finds any number of releases due.
+    #[inline]
+    pub fn release_some(mut self) -> bool {
+        while self.scheduler.log.has_room() {
+            if !self.release_next() {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Releases the job that is due first, or notes the deadline; reports whether one is due.
+    #[inline]
+    fn release_next(&mut self) -> bool {
+        let now_ns = self.scheduler.log.now_ns;
+        let next = self.scheduler.timers.peek();
+        let due = next.filter(|&(event_ns, _)| event_ns <= now_ns);
+        if let Some((_, index)) = due {
+            self.scheduler.serve(DagId(to_u32(index)));
+        }
+        due.is_some()
     }
 }
 

@@ -42,64 +42,59 @@
 use super::Scheduler;
 use crate::ids::DagId;
 use crate::policy::OverrunPolicy;
-use crate::scheduler::Observer;
 
 impl Scheduler {
     /// Releases all jobs of a DAG that are due, and notices deadlines that have
     /// passed.
-    pub(super) fn serve(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn serve(&mut self, dag: DagId) {
         // Mostly what is due is a release, and the job before it has ended.
         if !self.dags[dag.index()].jobs.are_at_rest() {
-            self.judge(dag, None, observer);
-            self.release_waiting(dag, observer);
+            self.judge(dag, None);
+            self.release_waiting(dag);
         }
         while let Some((job, release_ns)) = self.take_due(dag) {
-            self.release_or_overrun(dag, job, release_ns, observer);
+            self.release_or_overrun(dag, job, release_ns);
             let jobs = &mut self.dags[dag.index()].jobs;
             jobs.announce();
             // Only if the driver came late has a deadline passed that was not known of before.
-            if jobs.first_deadline_ns(release_ns) < self.now_ns {
-                self.judge(dag, None, observer);
+            if jobs.first_deadline_ns(release_ns) < self.log.now_ns {
+                self.judge(dag, None);
             }
         }
         self.set_timer(dag);
     }
 
     /// Deals with a job that has just become due.
-    fn release_or_overrun(
-        &mut self,
-        dag: DagId,
-        job: u64,
-        release_ns: u64,
-        observer: &mut impl Observer,
-    ) {
+    #[inline]
+    fn release_or_overrun(&mut self, dag: DagId, job: u64, release_ns: u64) {
         // A driver that comes late may learn of a job of the pause after it.
         if self.is_paused(dag) || release_ns < self.dags[dag.index()].resumed_ns {
-            self.skip_oldest_waiting(dag, observer);
+            self.skip_oldest_waiting(dag);
             return;
         }
-        self.release_waiting(dag, observer);
+        self.release_waiting(dag);
         if !self.is_waiting(dag, job) {
             return;
         }
         match self.task_set.dag(dag).overrun() {
             OverrunPolicy::Queue => {}
-            OverrunPolicy::Skip => self.skip_oldest_waiting(dag, observer),
+            OverrunPolicy::Skip => self.skip_oldest_waiting(dag),
             OverrunPolicy::Abort => {
-                self.make_room(dag, observer);
-                self.release_waiting(dag, observer);
+                self.make_room(dag);
+                self.release_waiting(dag);
             }
         }
         if self.is_waiting(dag, job) {
             self.dags[dag.index()].statistics.queued += 1;
-            observer.queued(dag, job, release_ns);
+            self.log.queued(dag, job, release_ns);
         }
     }
 
     #[inline]
     fn take_due(&mut self, dag: DagId) -> Option<(u64, u64)> {
         let jobs = &mut self.dags[dag.index()].jobs;
-        jobs.take_due(self.task_set.dag(dag), self.now_ns)
+        jobs.take_due(self.task_set.dag(dag), self.log.now_ns)
     }
 
     #[inline]
@@ -108,32 +103,37 @@ impl Scheduler {
     }
 
     /// Releases waiting jobs as long as none is blocked.
-    fn release_waiting(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    fn release_waiting(&mut self, dag: DagId) {
         while let Some(job) = self.dags[dag.index()].jobs.releasable() {
             let model = self.task_set.dag(dag);
+            let is_sporadic = model.is_sporadic();
             let state = &mut self.dags[dag.index()];
             let sequence = state.jobs.release_waiting(model);
             state.statistics.released += 1;
-            observer.released(dag, job, state.jobs.job(sequence).release_ns);
-            self.release_sources(dag, sequence, observer);
+            let release_ns = state.jobs.job(sequence).release_ns;
+            self.log.released(dag, job, release_ns, is_sporadic);
+            self.release_sources(dag, sequence);
         }
     }
 
-    fn make_room(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    fn make_room(&mut self, dag: DagId) {
         let state = &mut self.dags[dag.index()];
         let Some(sequence) = state.jobs.abort_oldest() else {
-            self.skip_oldest_waiting(dag, observer);
+            self.skip_oldest_waiting(dag);
             return;
         };
         state.statistics.aborts += 1;
-        observer.aborted(dag, state.jobs.job(sequence).number);
-        self.cancel_ready(dag, sequence, observer);
+        self.log.aborted(dag, state.jobs.job(sequence).number);
+        self.cancel_ready(dag, sequence);
     }
 
-    pub(super) fn skip_oldest_waiting(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn skip_oldest_waiting(&mut self, dag: DagId) {
         let state = &mut self.dags[dag.index()];
         let (job, release_ns) = state.jobs.skip_waiting(self.task_set.dag(dag));
         state.statistics.skips += 1;
-        observer.skipped(dag, job, release_ns);
+        self.log.skipped(dag, job, release_ns);
     }
 }

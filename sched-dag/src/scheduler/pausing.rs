@@ -21,7 +21,6 @@
 
 use super::Scheduler;
 use crate::ids::DagId;
-use crate::scheduler::Observer;
 
 impl Scheduler {
     /// Reports whether a DAG is paused.
@@ -48,28 +47,29 @@ impl Scheduler {
     }
 
     /// Pauses a DAG (P1, P2).
-    pub(super) fn pause(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn pause(&mut self, dag: DagId) {
         if self.is_closed(dag) {
             return;
         }
         // What was late before the pause is a miss.
-        self.judge(dag, None, observer);
+        self.judge(dag, None);
         if !core::mem::replace(&mut self.dags[dag.index()].is_paused, true) {
-            observer.switched_off(dag);
+            self.log.switched_off(dag);
         }
         while self.waiting(dag) > 0 {
-            self.skip_oldest_waiting(dag, observer);
+            self.skip_oldest_waiting(dag);
         }
         self.set_timer(dag);
     }
 
     /// Ends the pause of a DAG (P4).
     #[inline]
-    pub(super) fn resume(&mut self, dag: DagId, observer: &mut impl Observer) {
+    pub(super) fn resume(&mut self, dag: DagId) {
         let state = &mut self.dags[dag.index()];
         if core::mem::take(&mut state.is_paused) {
-            state.resumed_ns = self.now_ns;
-            observer.switched_on(dag);
+            state.resumed_ns = self.log.now_ns;
+            self.log.switched_on(dag);
         }
     }
 }

@@ -26,29 +26,29 @@
 
 use super::Scheduler;
 use crate::ids::DagId;
-use crate::scheduler::Observer;
 
 impl Scheduler {
     /// Takes a signal to a sporadic DAG.
-    pub(super) fn signal(&mut self, dag: DagId, observer: &mut impl Observer) {
+    #[inline]
+    pub(super) fn signal(&mut self, dag: DagId) {
         assert!(
             self.task_set.dag(dag).is_sporadic(),
             "a signal to dag {}, which is periodic; signal sporadic DAGs only",
             dag.0
         );
         // A driver that comes late: what was due before this signal is not kept any more.
-        if self.dags[dag.index()].jobs.is_overdue(self.now_ns) {
-            self.serve(dag, observer);
+        if self.dags[dag.index()].jobs.is_overdue(self.log.now_ns) {
+            self.serve(dag);
         }
         let model = self.task_set.dag(dag);
         let state = &mut self.dags[dag.index()];
         let job = state.jobs.signal_job();
-        let release_ns = state.jobs.signal(model, self.now_ns);
+        let release_ns = state.jobs.signal(model, self.log.now_ns);
         state.statistics.signals += 1;
         if release_ns.is_none() {
             state.statistics.dropped_signals += 1;
         }
-        observer.signalled(dag, job, release_ns);
+        self.log.signalled(dag, job, release_ns);
         self.set_timer(dag);
     }
 }

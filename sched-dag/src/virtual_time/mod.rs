@@ -47,18 +47,28 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use crate::ids::{CoreId, DagId, Instance};
+use crate::ids::{ClusterId, CoreId, DagId, Instance};
+use crate::journal::{Event, What};
+use crate::kept::Journal;
 use crate::lifecycle::{Lifecycle, Request};
 use crate::policy::SchedulerOptions;
-use crate::scheduler::{HandOff, Moment, Observer, Scheduler};
+use crate::scheduler::{Notice, Scheduler};
 use crate::task_set::TaskSet;
 use cluster::Cluster;
 
 /// What instances do and how long it takes them.
 ///
 /// Besides [`execute`](Self::execute), the methods report what happens in the
-/// order in which it happens, those of [`Observer`] among them.
-pub trait Workload: Observer {
+/// order in which it happens, those of the scheduler among them.
+pub trait Workload {
+    /// The kinds of events that it wants to hear of.
+    const HEARS: &'static [What] = &[];
+
+    /// The scheduler has written this down, of the kinds that are wanted.
+    fn hear(&mut self, notice: &Notice) {
+        let _ = notice;
+    }
+
     /// Returns the execution time of an instance in nanoseconds. Called once
     /// for each instance, at its start; 0 is allowed.
     fn execute(&mut self, instance: Instance, now_ns: u64) -> u64;
@@ -109,6 +119,11 @@ pub trait Workload: Observer {
         false
     }
 
+    /// Reports whether what is left of this instant is not to be written down.
+    fn is_void(&self) -> bool {
+        false
+    }
+
     /// An instant begins, in which all that follows happens until the next one.
     /// There may be several at one time.
     fn instant(&mut self, now_ns: u64) {
@@ -148,8 +163,6 @@ pub struct ExecutionTimes<F>(
     /// Returns the execution time of an instance in nanoseconds.
     pub F,
 );
-
-impl<F> Observer for ExecutionTimes<F> {}
 
 impl<F: FnMut(Instance) -> u64> Workload for ExecutionTimes<F> {
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
@@ -191,7 +204,7 @@ impl VirtualTime {
     /// it will need.
     #[must_use]
     pub fn new(scheduler: Scheduler) -> Self {
-        Self::with(Box::from([Cluster::new(scheduler, 0)]))
+        Self::with(Box::from([Cluster::new(scheduler, ClusterId(0), 0)]))
     }
 
     /// Makes one likewise for the clusters of a task set on the machine that the options
@@ -201,13 +214,15 @@ impl VirtualTime {
         let clusters = task_set.clusters().map(|cluster| {
             let first = task_set.cores_of(cluster, options.cores).start;
             let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
-            Cluster::new(scheduler, first)
+            Cluster::new(scheduler, cluster, first)
         });
         Self::with(clusters.collect())
     }
 
     fn with(clusters: Box<[Cluster]>) -> Self {
-        let cores = clusters.iter().map(|cluster| cluster.cores.executing.len());
+        let cores = clusters
+            .iter()
+            .map(|cluster| cluster.engine.scheduler.options().cores as usize);
         Self {
             failing: Vec::with_capacity(cores.sum()),
             now_ns: 0,
@@ -224,6 +239,29 @@ impl VirtualTime {
         Self { lifecycle, ..self }
     }
 
+    /// Writes all that happens down.
+    #[must_use]
+    pub fn recording(mut self) -> Self {
+        for cluster in &mut self.clusters {
+            cluster.engine.scheduler.log.journal = Journal::growing();
+        }
+        self
+    }
+
+    /// Returns what was written down so far, of all clusters.
+    #[must_use]
+    pub fn events(&self) -> Vec<Event> {
+        let mut clusters = self.clusters.iter();
+        let mut all = clusters.next().map_or_else(Journal::growing, |first| {
+            first.engine.scheduler.log.journal.clone()
+        });
+        for (id, cluster) in (1..).map(ClusterId).zip(clusters) {
+            let first = cluster.first;
+            all.absorb(cluster.engine.scheduler.log.journal.clone(), id, first);
+        }
+        all.events().collect()
+    }
+
     /// Runs until every job has ended.
     ///
     /// With a DAG without a limit of jobs this is the end of time; see
@@ -234,9 +272,10 @@ impl VirtualTime {
 
     /// Runs all events up to and including those at `until_ns`. May be called
     /// again with a later time.
-    pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload) -> End {
+    pub fn run_until<W: Workload>(&mut self, until_ns: u64, workload: &mut W) -> End {
+        self.clusters.iter_mut().for_each(Cluster::hear::<W>);
         while !workload.stops() {
-            let of_scheduler = |cluster: &Cluster| cluster.scheduler.next_event_ns();
+            let of_scheduler = |cluster: &Cluster| cluster.engine.scheduler.next_event_ns();
             let due = self.clusters.iter().filter_map(of_scheduler);
             // The time may have passed the due one already, by another event.
             let interrupts = due
@@ -271,18 +310,18 @@ impl VirtualTime {
     /// If there is no such DAG.
     #[must_use]
     pub fn scheduler_of(&self, dag: DagId) -> &Scheduler {
-        &self.clusters[place(&self.clusters, dag)].scheduler
+        &self.clusters[place(&self.clusters, dag)].engine.scheduler
     }
 
     /// Reports whether every DAG is over.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         let mut clusters = self.clusters.iter();
-        clusters.all(|cluster| cluster.scheduler.is_finished())
+        clusters.all(|cluster| cluster.engine.scheduler.is_finished())
     }
 
     fn next_finish_ns(&self) -> Option<u64> {
-        let of_cores = |cluster: &Cluster| cluster.cores.next_finish_ns();
+        let of_cores = |cluster: &Cluster| cluster.next_finish_ns();
         self.clusters.iter().filter_map(of_cores).min()
     }
 
@@ -296,14 +335,18 @@ impl VirtualTime {
         let clusters = &mut self.clusters;
         self.failing.sort_unstable();
         for (instance, core) in self.failing.drain(..) {
-            workload.failed(instance, core, now_ns);
-            let place = place(clusters, instance.dag);
-            let mut moment = clusters[place].scheduler.at(now_ns);
-            if workload.is_replaceable(instance) {
-                moment.fail_replaceable(instance, workload);
-            } else {
-                moment.fail(instance, workload);
-            }
+            let cluster = &mut clusters[place(clusters, instance.dag)];
+            workload.failed(instance, cluster.number(core), now_ns);
+            let is_replaceable = workload.is_replaceable(instance);
+            cluster.tell(
+                now_ns,
+                Some(core),
+                workload,
+                |moment| match is_replaceable {
+                    true => moment.fail_replaceable(instance),
+                    false => moment.fail(instance),
+                },
+            );
         }
         if !core::mem::replace(&mut self.has_begun, true) {
             self.serve(Request::Begin, workload);
@@ -314,11 +357,11 @@ impl VirtualTime {
         while let Some(request) = workload.take_request(now_ns) {
             self.serve(request, workload);
         }
-        for Cluster { scheduler, cores } in &mut self.clusters {
-            let released = scheduler.at(now_ns).release_due(workload);
-            for &decision in released.dispatch() {
-                cores.carry_out(decision, now_ns, workload)?;
+        for place in 0..self.clusters.len() {
+            if place > 0 && workload.is_void() {
+                self.clusters[place].engine.scheduler.log.journal.close();
             }
+            self.clusters[place].decide(now_ns, workload)?;
         }
         Ok(())
     }
@@ -335,25 +378,27 @@ impl VirtualTime {
             |workload: &mut _| Workload::next_signal_ns(workload).is_none_or(|ns| ns > now_ns);
         let mut finished = 0;
         for place in 0..self.clusters.len() {
-            while let Some((instance, core)) = self.clusters[place].cores.take_finished(now_ns) {
+            while let Some((instance, core)) = self.clusters[place].take_finished(now_ns) {
                 finished += 1;
                 let is_last = self.next_finish_ns().is_none_or(|ns| ns > now_ns);
-                let Cluster { scheduler, cores } = &mut self.clusters[place];
-                let number = cores.number(core);
+                let cluster = &mut self.clusters[place];
                 if workload.fails(instance) {
-                    self.failing.push((instance, number));
+                    cluster.rest(instance, core);
+                    self.failing.push((instance, core));
                     continue;
                 }
-                workload.finished(instance, number, now_ns);
+                workload.finished(instance, cluster.number(core), now_ns);
                 if finished > 1 || !is_last || self.waits || !is_quiet(workload) {
-                    scheduler.at(now_ns).complete(instance, workload);
+                    cluster.rest(instance, core);
+                    cluster.tell(now_ns, Some(core), workload, |moment| {
+                        moment.complete(instance)
+                    });
                     continue;
                 }
-                let vertex = scheduler.vertex(instance);
-                return match scheduler.hand_off(now_ns, core, vertex, workload) {
-                    HandOff::To(_, decision) => Some(cores.carry_out(decision, now_ns, workload)),
-                    HandOff::Idle => Some(Ok(())),
-                    HandOff::Open => None,
+                return match cluster.complete(now_ns, core, instance, workload) {
+                    Ok(true) => Some(Ok(())),
+                    Ok(false) => None,
+                    Err(instance) => Some(Err(instance)),
                 };
             }
         }
@@ -361,16 +406,16 @@ impl VirtualTime {
     }
 }
 
-/// Begins an instant of the cluster that runs a DAG.
-fn at(clusters: &mut [Cluster], now_ns: u64, dag: DagId) -> Moment<'_> {
-    let place = place(clusters, dag);
-    clusters[place].scheduler.at(now_ns)
-}
-
 /// Returns the place of the cluster that runs a DAG.
 fn place(clusters: &[Cluster], dag: DagId) -> usize {
     match clusters {
         [_] => 0,
-        several => several[0].scheduler.task_set().dag(dag).cluster().index(),
+        several => several[0]
+            .engine
+            .scheduler
+            .task_set()
+            .dag(dag)
+            .cluster()
+            .index(),
     }
 }

@@ -124,6 +124,12 @@ impl<F> Observer for Watch<F> {
 }
 
 impl<F: FnMut(Instance) -> u64> Workload for Watch<F> {
+    const WANTED: &'static [sched_dag::journal::What] = sched_dag::told::ALL;
+
+    fn heard(&mut self, news: &sched_dag::News) {
+        sched_dag::told::tell(news, self);
+    }
+
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
         (self.execution_ns)(instance)
     }

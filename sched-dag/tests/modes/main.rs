@@ -108,6 +108,12 @@ impl Observer for Script {
 }
 
 impl Workload for Script {
+    const WANTED: &'static [sched_dag::journal::What] = sched_dag::told::ALL;
+
+    fn heard(&mut self, news: &sched_dag::News) {
+        sched_dag::told::tell(news, self);
+    }
+
     fn execute(&mut self, instance: Instance, _: u64) -> u64 {
         (self.execution_ns)(instance)
     }

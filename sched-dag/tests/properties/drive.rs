@@ -9,6 +9,7 @@
 
 use std::collections::HashMap;
 
+use sched_dag::Told as _;
 use sched_dag::virtual_time::Workload;
 use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Scheduler};
 
@@ -100,7 +101,7 @@ impl Driver<'_> {
         for (core, instance) in ended {
             self.record.finished(instance, core, now_ns);
             self.idle.push(core);
-            let mut moment = self.scheduler.at(now_ns);
+            let mut moment = self.scheduler.told(now_ns);
             moment.complete(instance, &mut self.record);
         }
         if let Some((core, instance)) = last
@@ -111,7 +112,7 @@ impl Driver<'_> {
         for (core, instance) in failed {
             self.record.failed(instance, core, now_ns);
             self.idle.push(core);
-            let mut moment = self.scheduler.at(now_ns);
+            let mut moment = self.scheduler.told(now_ns);
             if self.record.is_replaceable(instance) {
                 moment.fail_replaceable(instance, &mut self.record);
             } else {
@@ -119,7 +120,7 @@ impl Driver<'_> {
             }
         }
         self.command();
-        let decisions = self.scheduler.at(now_ns).release_due(&mut self.record);
+        let decisions = self.scheduler.told(now_ns).release_due(&mut self.record);
         let decisions = decisions.dispatch().to_vec();
         self.carry_out(&decisions)
     }
@@ -143,7 +144,7 @@ impl Driver<'_> {
         let vertex = self.scheduler.vertex(instance);
         let way = self.random.between(0, 4);
         if way == 0 {
-            self.scheduler.at(now_ns).complete(instance, record);
+            self.scheduler.told(now_ns).complete(instance, record);
             self.idle.push(core);
             return Ok(false);
         }
@@ -154,10 +155,10 @@ impl Driver<'_> {
         };
         let taker = other.map_or(core, |place| self.idle[place]);
         let done = if taker == core {
-            self.scheduler.hand_off(now_ns, core, vertex, record)
+            self.scheduler.told_hand_off(now_ns, core, vertex, record)
         } else {
             self.scheduler
-                .hand_over(now_ns, core, vertex, taker, record)
+                .told_hand_over(now_ns, core, vertex, taker, record)
         };
         self.idle.push(core);
         if let HandOff::Open = done {
@@ -187,7 +188,7 @@ impl Driver<'_> {
     /// Stops, pauses, resumes and signals DAGs.
     fn command(&mut self) {
         let (now_ns, record) = (self.now_ns, &mut self.record);
-        let mut moment = self.scheduler.at(now_ns);
+        let mut moment = self.scheduler.told(now_ns);
         for (id, dag) in (0..).map(DagId).zip(&self.set.dags) {
             if dag.stop_ns == Some(now_ns) {
                 moment.stop(id, record);

@@ -7,6 +7,7 @@
 //! instances that have lost their core meanwhile or were moved to another one. After
 //! each step both have to be in the same state, core numbers apart.
 
+use sched_dag::Told as _;
 use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, JobOutcome, Observer, Scheduler};
 
 use crate::random::Random;
@@ -55,7 +56,7 @@ fn walk(set: &Set) -> Result<(), String> {
                 // An instant that is not over: a dispatch is owed.
                 let (_, before) = running[(place + 1) % running.len()];
                 for side in [&mut short, &mut long] {
-                    side.scheduler.at(now_ns).complete(before, &mut side.log);
+                    side.scheduler.told(now_ns).complete(before, &mut side.log);
                 }
             }
             short.complete_shortly(now_ns, core, instance, &mut random);
@@ -71,7 +72,7 @@ fn walk(set: &Set) -> Result<(), String> {
             let failing = running.iter().map(|&(_, instance)| instance).next();
             let is_sporadic = set.dags[dag.index()].signals_ns.is_some();
             for side in [&mut short, &mut long] {
-                let mut moment = side.scheduler.at(now_ns);
+                let mut moment = side.scheduler.told(now_ns);
                 match (kind % 10, failing) {
                     (0, Some(instance)) if step > 20 => {
                         moment.fail_replaceable(instance, &mut side.log);
@@ -109,12 +110,12 @@ impl Side {
     }
 
     fn end_instant(&mut self, now_ns: u64) {
-        let released = self.scheduler.at(now_ns).release_due(&mut self.log);
+        let released = self.scheduler.told(now_ns).release_due(&mut self.log);
         self.decisions.extend_from_slice(released.dispatch());
     }
 
     fn complete(&mut self, now_ns: u64, instance: Instance) {
-        let mut moment = self.scheduler.at(now_ns);
+        let mut moment = self.scheduler.told(now_ns);
         moment.complete(instance, &mut self.log);
         self.end_instant(now_ns);
     }
@@ -137,7 +138,7 @@ impl Side {
             .collect();
         let (scheduler, log) = (&mut self.scheduler, &mut self.log);
         let done = if idle.is_empty() || random.chance(30) {
-            let (done, is_untold) = scheduler.pass_on(now_ns, core, vertex, log);
+            let (done, is_untold) = scheduler.told_pass_on(now_ns, core, vertex, log);
             if is_untold && let HandOff::To(_, decision) = done {
                 log.ready(decision.instance());
             }
@@ -145,7 +146,7 @@ impl Side {
         } else {
             let idle = idle[random.below(idle.len())];
             scheduler.anticipate(core);
-            scheduler.hand_over(now_ns, core, vertex, idle, log)
+            scheduler.told_hand_over(now_ns, core, vertex, idle, log)
         };
         match done {
             HandOff::To(_, decision) => self.decisions.push(decision),

@@ -180,6 +180,12 @@ impl Observer for Record<'_> {
 }
 
 impl Workload for Record<'_> {
+    const WANTED: &'static [sched_dag::journal::What] = sched_dag::told::ALL;
+
+    fn heard(&mut self, news: &sched_dag::News) {
+        sched_dag::told::tell(news, self);
+    }
+
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
         self.set.execution_ns(instance)
     }

@@ -253,6 +253,12 @@ impl<F: FnMut(Instance) -> u64> Observer for Log<F> {
 }
 
 impl<F: FnMut(Instance) -> u64> Workload for Log<F> {
+    const WANTED: &'static [sched_dag::journal::What] = sched_dag::told::ALL;
+
+    fn heard(&mut self, news: &sched_dag::News) {
+        sched_dag::told::tell(news, self);
+    }
+
     fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
         (self.execution_ns)(instance)
     }

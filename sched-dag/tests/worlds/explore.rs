@@ -5,6 +5,7 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
+use sched_dag::Told as _;
 use sched_dag::{
     CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Moment, Observer,
     Scheduler, SubtaskId, verify,
@@ -192,7 +193,7 @@ fn take(node: &mut Node<'_>, time_ns: u64, what: What) -> Result<(), String> {
     let Node {
         scheduler, facts, ..
     } = node;
-    let mut moment: Moment<'_> = scheduler.at(time_ns);
+    let mut moment: sched_dag::told::Moment<'_> = scheduler.told(time_ns);
     facts.now_ns = time_ns;
     facts.said.iter_mut().for_each(Vec::clear);
     let mut heard = Heard(facts.said.clone());

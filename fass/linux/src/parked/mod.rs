@@ -13,8 +13,9 @@
 //!   before, by its own thread, there. For the model it was suspended so long.
 //! - A fault takes an instance away wherever it is: no core is asked for.
 
+use sched_dag::CoreId;
+use sched_dag::desk::Carrier as _;
 use sched_dag::journal::What;
-use sched_dag::{CoreId, Vertex};
 
 use crate::state::{Left, Number, Runner, State};
 use crate::worker::Worker;
@@ -33,10 +34,10 @@ impl State {
             return false;
         }
         let core = self.core_of(worker).index();
-        let occupant = self.placement.current(core);
+        let occupant = self.desk.placement.current(core);
         occupant.is_some_and(|occupant| {
-            let instance = self.scheduler.instance_of(occupant);
-            let dag = self.task_set.dag(instance.dag);
+            let instance = self.desk.scheduler.instance_of(occupant);
+            let dag = self.desk.task_set.dag(instance.dag);
             dag.subtask(instance.subtask).is_non_preemptive()
                 || workers[self.active[core]].has_returned()
         })
@@ -61,46 +62,34 @@ impl State {
             state.seats[worker].is_none() && state.core_of(worker).index() == core.index()
         };
         while let Some(place) = (self.left.iter()).position(|left| is_due(self, left.worker)) {
-            let mut left = self.left.remove(place);
-            let vertex = left.runner.vertex;
-            self.let_effects_happen(&mut left.runner, left.finish_ns);
-            self.note_end_of_parked(left.worker, What::Finish, vertex);
-            self.placement.finish_parked(vertex, left.runner);
+            let left = self.left.remove(place);
+            self.end_parked(left.worker, left.runner, left.finish_ns, workers);
             self.spare.push(left.worker);
-            let instance = self.scheduler.instance_of(vertex);
-            self.step(workers, |moment, mut observer| {
-                moment.complete(instance, &mut observer);
-            });
         }
     }
 
-    /// Has happen what follows from an instance's completion besides what the scheduler does.
-    #[inline]
-    pub(crate) fn let_effects_happen(&mut self, runner: &mut Runner, finish_ns: u64) {
-        if runner.body.has_effects() {
-            let requests = &mut self.requests;
-            let keep = &mut |request| requests.keep(request);
-            runner.body.complete(finish_ns, keep);
-            // Those to other clusters are on their way then.
-            let (office, cluster) = (&self.office, self.cluster);
-            requests.give_away(|request| office.send(cluster, request));
+    /// Tells the scheduler that a parked instance has ended, on the core where it ran. Right now
+    /// that core's processor is with the worker that says so, and what should run there is not.
+    pub(crate) fn end_parked(
+        &mut self,
+        worker: Number,
+        runner: Box<Runner>,
+        finish_ns: u64,
+        workers: &[Worker],
+    ) {
+        let (core, vertex) = (self.core_of(worker), runner.vertex);
+        let occupant = self.desk.placement.current(core.index());
+        if let Some(occupant) = occupant {
+            self.note(What::Suspend, core, occupant);
         }
-    }
-
-    /// Writes down that a parked instance has ended, on the core where it ran. Right now that
-    /// core's processor is with the worker that says so, and what should run there is not.
-    pub(crate) fn note_end_of_parked(&mut self, worker: Number, what: What, vertex: Vertex) {
-        let core = self.core_of(worker);
-        if what == What::Finish {
-            let occupant = self.placement.current(core.index());
-            if let Some(occupant) = occupant {
-                self.note(What::Suspend, core, occupant);
-            }
-            self.note(What::Resume, core, vertex);
-            // It goes on after the step that the end brings about, and within it nothing does.
-            self.interrupted = occupant.map(|occupant| (core, occupant));
-        }
-        self.note(what, core, vertex);
+        self.note(What::Resume, core, vertex);
+        // It goes on after the step that the end brings about, and within it nothing does.
+        self.interrupted = occupant.map(|occupant| (core, occupant));
+        let finish_ns = self.since_epoch(finish_ns);
+        let (desk, mut post) = self.parts(workers);
+        let times_ns = (finish_ns, post.now_ns());
+        desk.complete_parked((core, vertex), runner, times_ns, &mut post);
+        self.carry_out(workers);
     }
 }
 

@@ -71,11 +71,11 @@ impl Stage {
     /// Releases a DAG's job, and has the core that gets it begin with it.
     fn begin(&self, dag: DagId) -> Running {
         let mut state = self.team.lock();
-        state.step(&self.team.workers, |moment, mut observer| {
-            moment.signal(dag, &mut observer);
-        });
+        state.step(&self.team.workers, |moment| moment.signal(dag));
         let mut cores = 0..self.cores as usize;
-        let core = cores.find(|core| state.placement.is_wanted(*core)).unwrap();
+        let core = cores
+            .find(|core| state.desk.placement.is_wanted(*core))
+            .unwrap();
         let worker = state.active[core];
         let runner = state.find_work(worker, &self.team.workers).unwrap();
         Running { worker, runner }
@@ -93,10 +93,11 @@ impl Stage {
     fn story(&self) -> Story {
         let state = self.team.lock();
         assert!(state.left.is_empty());
-        let journal = &state.recorder.events;
-        let mut found: Vec<_> = journal.violations(&state.task_set);
-        let options = state.scheduler.options();
-        let of_dispatch = journal.dispatch_violations(&state.task_set, &options, 1_000_000_000);
+        let journal = &state.desk.scheduler.log.journal;
+        let mut found: Vec<_> = journal.violations(&state.desk.task_set);
+        let options = state.desk.scheduler.options();
+        let of_dispatch =
+            journal.dispatch_violations(&state.desk.task_set, &options, 1_000_000_000);
         found.extend(of_dispatch.unwrap());
         assert!(found.is_empty(), "{found:?}");
         let events = journal.events().filter(|event| event.what.is_of_machine());
@@ -131,7 +132,10 @@ fn one_that_has_returned_ends_before_the_parked_one() {
             "finish low 1",
         ];
         assert_eq!(story, expected, "{keeps_its_core}");
-        assert_eq!(stage.team.lock().scheduler.statistics(LOW).completed, 1);
+        assert_eq!(
+            stage.team.lock().desk.scheduler.statistics(LOW).completed,
+            1
+        );
     }
 }
 
@@ -164,8 +168,8 @@ fn a_parked_one_ends_at_once_while_nothing_has_its_core() {
     let stage = Stage::new(1, true);
     let low = stage.begin(LOW);
     let mut state = stage.team.lock();
-    state.step(&stage.team.workers, |moment, mut observer| {
-        moment.signal(URGENT, &mut observer);
+    state.step(&stage.team.workers, |moment| {
+        moment.signal(URGENT);
     });
     drop(state);
     assert!(stage.end(low, Ok(())).is_none());
@@ -224,7 +228,7 @@ fn what_was_left_to_one_that_is_abandoned_is_reported() {
     assert!(stage.end(low, Ok(())).is_none());
     let mut state = stage.team.lock();
     stage.team.abandon(&mut state, CoreId(0));
-    assert_eq!(state.placement.current(0), None);
+    assert_eq!(state.desk.placement.current(0), None);
     let worker = state.active[0];
     let runner = state.find_work(worker, &stage.team.workers).unwrap();
     drop(state);

@@ -39,6 +39,7 @@
 
 mod step;
 
+use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
@@ -73,7 +74,7 @@ const PAUSE: u32 = 32;
 struct Pair<T>(T);
 
 impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
-    pub(crate) fn new(scheduler: Scheduler, bodies: Vec<B>, watch: W, others: O) -> Self {
+    pub(crate) fn new(mut scheduler: Scheduler, bodies: Vec<B>, others: O) -> Self {
         let cores = scheduler.options().cores as usize;
         let dags = scheduler.task_set().dags().len();
         let bodies = bodies.into_iter().map(|body| Line(Mutex::new(body)));
@@ -81,7 +82,8 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
         Self {
             mailboxes: (0..cores).map(|_| Mailbox::new(dags)).collect(),
             state: Pair(Mutex::new(State {
-                reports: Reports::new(scheduler.task_set(), watch, Arc::clone(&bodies)),
+                reports: Reports::new(&mut scheduler, Arc::clone(&bodies)),
+                watch: PhantomData,
                 scheduler,
                 now_ns: 0,
                 busy: 0,
@@ -97,10 +99,10 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
     }
 
     /// Returns the scheduler and its observer, after all workers have returned.
-    pub(crate) fn into_parts(self) -> (Scheduler, W) {
+    pub(crate) fn into_parts(self) -> Scheduler {
         let state = self.state.0.into_inner();
         let state = state.unwrap_or_else(PoisonError::into_inner);
-        (state.scheduler, state.reports.watch)
+        state.scheduler
     }
 
     /// Works until all jobs have ended. Worker 0 begins.

@@ -5,8 +5,10 @@
 //! what it runs itself is returned. The scheduler's clock goes on to the next release as soon
 //! as nothing runs.
 
+use std::marker::PhantomData;
 use std::sync::atomic::Ordering;
 
+use sched_dag::journal::What;
 use sched_dag::{CoreId, Decision, HandOff, Instance, Scheduler, Vertex};
 
 use super::Team;
@@ -19,7 +21,8 @@ use crate::watch::Watch;
 /// What is under the lock.
 pub(super) struct State<B, W> {
     pub(super) scheduler: Scheduler,
-    pub(super) reports: Reports<W, Shared<B>>,
+    pub(super) reports: Reports<Shared<B>>,
+    pub(super) watch: PhantomData<fn() -> W>,
     pub(super) now_ns: u64,
     /// How many workers have an instance.
     pub(super) busy: u32,
@@ -62,9 +65,6 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
         state.busy -= 1;
         if W::STEP_NS > 0 {
             state.now_ns += W::STEP_NS;
-            state.reports.watch.instant(state.now_ns);
-            let instance = state.scheduler.instance_of(vertex);
-            state.reports.watch.finished(instance, core);
         }
         let State {
             scheduler,
@@ -74,22 +74,24 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
         } = state;
         if has_signals || self.others.have_knocked() {
             let instance = scheduler.instance_of(vertex);
+            scheduler.log.here = core;
             let mut moment = scheduler.at(*now_ns);
-            moment.complete(instance, reports);
+            moment.complete(instance);
             if has_signals {
                 for dag in self.mailboxes[core.index()].signals().drain(..) {
                     if !self.others.send(dag) {
-                        moment.signal(dag, reports);
+                        moment.signal(dag);
                     }
                 }
             }
             return self.proceed(state, here);
         }
         let done = if core == taker {
-            scheduler.hand_off(*now_ns, core, vertex, reports)
+            scheduler.hand_off(*now_ns, core, vertex)
         } else {
-            scheduler.hand_over(*now_ns, core, vertex, taker, reports)
+            scheduler.hand_over(*now_ns, core, vertex, taker)
         };
+        reports.act(scheduler);
         match done {
             HandOff::To(vertex, decision) => {
                 let assignment = state.assign(vertex, decision.instance(), taker);
@@ -110,7 +112,6 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
         // If nobody is busy the run has not begun.
         if state.busy > 0 {
             state.now_ns += W::STEP_NS;
-            state.reports.watch.instant(state.now_ns);
         }
         self.proceed(state, here)
     }
@@ -120,11 +121,11 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
     pub(super) fn proceed(&self, state: &mut State<B, W>, here: CoreId) -> Option<Assignment> {
         loop {
             let mut moment = state.scheduler.at(state.now_ns);
-            self.others
-                .take(|dag| moment.signal(dag, &mut state.reports));
-            let decisions = moment.release_due(&mut state.reports).dispatch();
+            self.others.take(|dag| moment.signal(dag));
+            let decisions = moment.release_due().dispatch();
             state.decisions.clear();
             state.decisions.extend_from_slice(decisions);
+            state.reports.act(&mut state.scheduler);
             if !state.decisions.is_empty() {
                 return self.carry_out(state, here);
             }
@@ -137,7 +138,6 @@ impl<B: Execute, W: Watch, O: Others> Team<B, W, O> {
                 return None;
             };
             state.now_ns = event_ns.max(state.now_ns);
-            state.reports.watch.instant(state.now_ns);
         }
     }
 
@@ -161,7 +161,9 @@ impl<B, W: Watch> State<B, W> {
     #[inline]
     fn assign(&mut self, vertex: Vertex, instance: Instance, core: CoreId) -> Assignment {
         self.busy += 1;
-        self.reports.watch.started(instance, core);
+        if W::STEP_NS > 0 {
+            (self.scheduler.log).on_core(core, What::Start, self.now_ns, instance);
+        }
         Assignment {
             vertex,
             job: instance.job,

@@ -12,7 +12,6 @@ use std::time::Duration;
 
 use fass::edge::Outcome;
 use fass::{Body, Plan};
-use sched_dag::Recorder;
 use sched_dag::virtual_time::{End, VirtualTime as Driver};
 use sched_dag::{Dag, DagId, DagLabel, Instance, SchedulerOptions, SubtaskLabel, TaskSet};
 
@@ -44,11 +43,13 @@ impl Session {
         let task_set = plan.task_set;
         Self {
             may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
-            driver: Driver::of_clusters(&task_set, options).with_lifecycle(plan.lifecycle),
+            driver: Driver::of_clusters(&task_set, options)
+                .with_lifecycle(plan.lifecycle)
+                .recording(),
             options,
             is_late: false,
             recording: Recording {
-                journal: Recorder::new(Arc::clone(&task_set)),
+                now_ns: 0,
                 executed_ns: BTreeMap::new(),
                 panics: Vec::new(),
                 degraded: vec![false; task_set.dags().len()],
@@ -111,12 +112,12 @@ impl Session {
         let end = self.driver.run_until(until_ns, &mut runner);
         let panic = runner.panic;
         self.recording.run_until_ns = match end {
-            End::Stopped => self.recording.journal.now_ns,
+            End::Stopped => self.recording.now_ns,
             _ => until_ns,
         };
         machine.now_ns.set(match end {
             End::TimeReached => until_ns,
-            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recording.journal.now_ns,
+            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recording.now_ns,
         });
         if let Some(PanicRecord { instance, message }) = panic {
             return Err(RunError::Panicked {
@@ -169,7 +170,7 @@ impl Session {
 
     /// Returns the recording of the run so far.
     pub(crate) fn recording(&self, edge: &Edge) -> Vec<u8> {
-        let events = &self.recording.journal.events;
+        let events = &self.driver.events();
         edge.recording(&self.task_set, events, &self.report(edge, false).record())
     }
 
@@ -190,7 +191,7 @@ impl Session {
         let sink_misses = dags.clone().map(sink_misses).collect();
         let statistics = dags.map(|(dag, _)| *self.driver.scheduler_of(dag).statistics(dag));
         let Recording {
-            journal,
+            now_ns,
             panics,
             degraded,
             ..
@@ -200,10 +201,10 @@ impl Session {
             jobs: Vec::new(),
             panics: panics.clone(),
             degraded: degraded.clone(),
-            events: journal.events.clone(),
+            events: self.driver.events(),
             statistics: statistics.collect(),
             sink_misses,
-            end_ns: journal.now_ns,
+            end_ns: *now_ns,
             compared,
             uncompared,
             divergence,

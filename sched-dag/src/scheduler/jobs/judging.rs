@@ -16,8 +16,8 @@ use alloc::boxed::Box;
 use super::Jobs;
 use crate::ids::{DagId, SubtaskId};
 use crate::order::sorted_by_key;
+use crate::scheduler::Scheduler;
 use crate::scheduler::vertices::Vertices;
-use crate::scheduler::{Observer, Scheduler};
 use crate::task_set::Dag;
 
 /// One relative deadline of a DAG, and how far its jobs are judged by it.
@@ -189,25 +189,20 @@ impl Scheduler {
     /// Notices all deadlines of a DAG that have passed. The instance of the vertex
     /// `ended` has ended at this instant, and no other one since the last look.
     #[inline]
-    pub(in crate::scheduler) fn judge(
-        &mut self,
-        dag: DagId,
-        ended: Option<u32>,
-        observer: &mut impl Observer,
-    ) {
+    pub(in crate::scheduler) fn judge(&mut self, dag: DagId, ended: Option<u32>) {
         let late_ns = self.dags[dag.index()].jobs.late_ns(self.task_set.dag(dag));
-        if late_ns.is_some_and(|late_ns| late_ns <= self.now_ns) {
-            self.judge_late(dag, ended, observer);
+        if late_ns.is_some_and(|late_ns| late_ns <= self.log.now_ns) {
+            self.judge_late(dag, ended);
         }
     }
 
-    #[inline(never)]
-    fn judge_late(&mut self, dag: DagId, ended: Option<u32>, observer: &mut impl Observer) {
+    #[inline]
+    fn judge_late(&mut self, dag: DagId, ended: Option<u32>) {
         let model = self.task_set.dag(dag);
         let first = self.task_set.first_vertex(dag);
         let state = &mut self.dags[dag.index()];
         while let Some(unjudged) = state.jobs.first_unjudged(model)
-            && unjudged.deadline_ns < self.now_ns
+            && unjudged.deadline_ns < self.log.now_ns
         {
             let vertices = &self.vertices;
             let is_late = |sink: SubtaskId| match unjudged.sequence {
@@ -216,19 +211,20 @@ impl Scheduler {
             };
             if state.jobs.count_late(&unjudged, is_late) && state.jobs.note_miss(&unjudged) {
                 state.statistics.count_miss();
-                observer.deadline_missed(dag, unjudged.number, unjudged.deadline_ns);
+                self.log
+                    .deadline_missed(dag, unjudged.number, unjudged.deadline_ns);
             }
         }
     }
 
     /// Judges the DAG of a vertex whose instance has just ended, if that is one of several sinks.
-    #[inline(never)]
-    pub(in crate::scheduler) fn judge_ended(&mut self, vertex: u32, observer: &mut impl Observer) {
+    #[inline]
+    pub(in crate::scheduler) fn judge_ended(&mut self, vertex: u32) {
         let ended = self.vertices.get(vertex);
         let (dag, subtask) = (ended.dag, ended.subtask);
         let sinks = self.task_set.dag(dag).sinks();
         if sinks.len() > 1 && sinks.binary_search(&subtask).is_ok() {
-            self.judge(dag, Some(vertex), observer);
+            self.judge(dag, Some(vertex));
         }
     }
 }

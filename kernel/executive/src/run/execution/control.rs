@@ -5,10 +5,10 @@
 
 use alloc::sync::Arc;
 
-use sched_dag::{Dag, DagId, DagStatistics, Moment, Observer, Scheduler, TaskSet};
+use sched_dag::{Dag, DagId, DagStatistics, Moment, Scheduler, TaskSet};
 
 use super::core_set::CoreSet;
-use super::{Occasion, cluster, divided};
+use super::{cluster, divided};
 use crate::machine::clock;
 use crate::machine::timer::{self, Alarm};
 
@@ -31,11 +31,11 @@ impl Control {
     }
 
     /// Tells the scheduler.
-    pub(super) fn apply(self, moment: &mut Moment<'_>, observer: &mut impl Observer) {
+    pub(super) fn apply(self, moment: &mut Moment<'_>) {
         match self {
-            Self::Pause(dag) => moment.pause(dag, observer),
-            Self::Resume(dag) => moment.resume(dag, observer),
-            Self::Close(dag) => moment.close(dag, observer),
+            Self::Pause(dag) => moment.pause(dag),
+            Self::Resume(dag) => moment.resume(dag),
+            Self::Close(dag) => moment.close(dag),
         }
     }
 }
@@ -75,7 +75,7 @@ pub fn task_set() -> Option<Arc<TaskSet>> {
 /// Returns how a DAG does, if a run goes on that has it.
 pub fn snapshot(dag: DagId) -> Option<Snapshot> {
     let place = divided::of_dag(dag).execution.lock();
-    let scheduler = &place.as_ref()?.scheduler;
+    let scheduler = &place.as_ref()?.desk.scheduler;
     scheduler.task_set().dags().get(dag.index())?;
     Some(Snapshot::of(scheduler, dag))
 }
@@ -127,10 +127,9 @@ pub fn control(control: Control) {
     let Some(execution) = place.as_mut() else {
         return;
     };
-    let occasion = Occasion::Control(control);
     let mut woken = CoreSet::default();
     cluster::among(cluster, || {
-        execution.step(clock::now_ns(), occasion, &mut woken)
+        execution.step(clock::now_ns(), &mut woken, |moment| control.apply(moment))
     });
     drop(place);
     woken.wake();

@@ -7,7 +7,7 @@ use core::sync::atomic::Ordering;
 
 use fass::LaunchError;
 use sched_dag::lifecycle::{self, Lifecycle, Parts};
-use sched_dag::{ClusterId, Clusters, DagId, TaskSet};
+use sched_dag::{ClusterId, Clusters, DagId, Journal, TaskSet};
 
 use super::cluster::{BESIDES, Cluster, MAY_DIVIDE, OTHERS, nth};
 use super::letters::Letters;
@@ -102,7 +102,9 @@ fn rest(place: usize) -> bool {
     }
     let cluster = nth(place);
     let execution = cluster.execution.lock();
-    let scheduler = execution.as_ref().map(|execution| &execution.scheduler);
+    let scheduler = execution
+        .as_ref()
+        .map(|execution| &execution.desk.scheduler);
     scheduler.is_none_or(|scheduler| scheduler.is_finished())
         && !cluster.has_letters.load(Ordering::Acquire)
         && rest(place + 1)
@@ -111,8 +113,13 @@ fn rest(place: usize) -> bool {
 /// Has the first journal take over what the others hold.
 pub(super) fn merge(first: &mut Execution, others: &mut [Execution]) {
     for (id, other) in (1..).map(ClusterId).zip(others) {
-        let journal = other.watcher.take_journal();
+        let journal = core::mem::replace(&mut other.desk.scheduler.log.journal, Journal::none());
         let first_core = cluster::first_core(id.index());
-        first.watcher.journal.absorb(journal, id, first_core);
+        first
+            .desk
+            .scheduler
+            .log
+            .journal
+            .absorb(journal, id, first_core);
     }
 }

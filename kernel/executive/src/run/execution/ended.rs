@@ -71,7 +71,9 @@ impl Ended {
     /// If there is no such DAG.
     #[must_use]
     pub fn scheduler(&self, dag: DagId) -> &Scheduler {
-        &self.parts[self.task_set().dag(dag).cluster().index()].scheduler
+        &self.parts[self.task_set().dag(dag).cluster().index()]
+            .desk
+            .scheduler
     }
 
     /// Returns how all cores were told to work.
@@ -79,7 +81,7 @@ impl Ended {
     pub fn options(&self) -> SchedulerOptions {
         SchedulerOptions {
             cores: u32::try_from(this_core::all().len()).unwrap_or(u32::MAX),
-            ..self.parts[0].scheduler.options()
+            ..self.parts[0].desk.scheduler.options()
         }
     }
 
@@ -100,7 +102,7 @@ impl Ended {
     /// Returns what has happened.
     #[must_use]
     pub fn journal(&self) -> &Journal {
-        &self.parts[0].watcher.journal
+        &self.parts[0].desk.scheduler.log.journal
     }
 
     /// Returns the model.

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use sched_dag::analysis::Overheads;
 use sched_dag::{
-    DagId, Decision, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions, TaskSet,
+    DagId, Decision, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions, TaskSet, Told,
 };
 
 use crate::random::Random;
@@ -120,10 +120,10 @@ impl Machine<'_> {
             watch.now_ns = now_ns;
             for core in &mut self.cores {
                 if let Some((instance, _)) = core.take_if(|(_, finish_ns)| *finish_ns <= now_ns) {
-                    self.scheduler.at(now_ns).complete(instance, watch);
+                    self.scheduler.told(now_ns).complete(instance, watch);
                 }
             }
-            let released = self.scheduler.at(now_ns).release_due(watch);
+            let released = self.scheduler.told(now_ns).release_due(watch);
             let decisions = released.dispatch().to_vec();
             for decision in decisions {
                 self.carry_out(decision, now_ns);

@@ -1,0 +1,356 @@
+//! The engine of one cluster: its scheduler, the bodies that it decides about, and what is asked
+//! of them, in the steps that every platform takes.
+//!
+//! A platform holds the engine under one lock, or alone. It says when it is, starts a body on a
+//! core, and reaches other clusters, by its [`Port`]; what runs the instances of a subtask is a
+//! [`Body`]. An event is one call: [`complete`](Engine::complete), [`fail`](Engine::fail), or
+//! [`step`](Engine::step) for all else. Then the platform brings the cores that the step
+//! [concerns](Port::retarget) to what they should run: [`next`](Engine::next) gives a core its next
+//! instance, [`suspend`](Engine::suspend) takes one away.
+//!
+//! # What is guaranteed
+//!
+//! - What a fault costs, what requests come to and who runs next is decided here, for all
+//!   platforms alike.
+//! - The journal is in the order in which things were decided. A [start](Port::start) is written
+//!   before the function begins.
+//! - After [`Engine::new`] nothing is allocated here, and no step is unbounded but by the releases
+//!   and deadlines that have passed since the last one.
+
+mod port;
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+pub use port::{Alternate, Body, Continuation, Cost, Port};
+
+use crate::ids::{ClusterId, CoreId, DagId, Vertex};
+use crate::journal::What;
+use crate::kept::Journal;
+use crate::lifecycle::{Request, Requests};
+use crate::placement::{Next, Placement};
+use crate::scheduler::{Decision, HandOff, Moment, Notice, Scheduler};
+use crate::task_set::TaskSet;
+
+/// A cluster's scheduler, its bodies, and what is asked of it. `P` is what a platform keeps of an
+/// instance that is suspended.
+#[derive(Debug)]
+pub struct Engine<B: Body, P> {
+    /// The scheduler, with its journal.
+    pub scheduler: Scheduler,
+    /// Which core has which body.
+    pub placement: Placement<B, P>,
+    /// The cluster.
+    pub cluster: ClusterId,
+    /// The model.
+    pub task_set: Arc<TaskSet>,
+    /// What is asked of the run, on its way to the scheduler.
+    pub requests: Requests,
+    /// The bodies whose functions faults have ended for good.
+    pub lost: Vec<B>,
+    /// By vertex.
+    alternates: Box<[Option<B::Alternate>]>,
+    /// By DAG, the one that gets a signal when a fault ends it.
+    after_fault: Vec<Option<DagId>>,
+    /// Room to look at notices in.
+    notices: Vec<Notice>,
+}
+
+impl<B: Body, P> Engine<B, P> {
+    /// Makes one without bodies, and takes all memory that it will need.
+    pub fn new<C: Port<B>>(
+        cluster: ClusterId,
+        mut scheduler: Scheduler,
+        journal: Journal,
+        requests: Requests,
+        after_fault: Vec<Option<DagId>>,
+    ) -> Self {
+        let task_set = Arc::clone(scheduler.task_set());
+        let (vertices, cores) = (task_set.vertices(), scheduler.options().cores as usize);
+        let room = scheduler.hear(C::HEARS.iter().copied().chain([What::Cancelled]));
+        scheduler.log.journal = journal;
+        Self {
+            placement: Placement::empty(vertices, cores),
+            cluster,
+            requests,
+            lost: Vec::with_capacity(vertices),
+            alternates: (0..vertices).map(|_| None).collect(),
+            after_fault,
+            notices: Vec::with_capacity(room),
+            scheduler,
+            task_set,
+        }
+    }
+
+    /// Takes the body of a subtask, before the run.
+    pub fn put(&mut self, vertex: Vertex, body: B) {
+        self.alternates[vertex.index()] = body.alternate();
+        self.placement.replace(vertex, body);
+    }
+
+    /// Writes down what a core does with the instance of a vertex.
+    pub fn note(&mut self, what: What, core: CoreId, vertex: Vertex, time_ns: u64) {
+        let instance = self.scheduler.instance_of(vertex);
+        self.scheduler.log.on_core(core, what, time_ns, instance);
+    }
+
+    /// Takes a step at an instant, on a core: what has `happened`, requests, releases, a
+    /// dispatch.
+    #[inline]
+    pub fn step(
+        &mut self,
+        instant: (u64, CoreId),
+        port: &mut impl Port<B>,
+        happened: impl FnOnce(&mut Moment<'_>),
+    ) {
+        self.tell(instant, port, happened);
+        self.decide(instant.0, port);
+    }
+
+    /// Tells the scheduler what has happened and what is asked for. The instant stays open.
+    #[inline]
+    pub fn tell(
+        &mut self,
+        (now_ns, here): (u64, CoreId),
+        port: &mut impl Port<B>,
+        happened: impl FnOnce(&mut Moment<'_>),
+    ) {
+        self.scheduler.log.here = here;
+        let mut moment = self.scheduler.at(now_ns);
+        happened(&mut moment);
+        if !self.requests.are_none() {
+            self.requests.give_away(|request| port.forward(request));
+        }
+        match port.letters() {
+            Some(letters) => (self.requests).serve_letters(letters, self.cluster, &mut moment),
+            None => self.requests.serve(&mut moment),
+        }
+        self.act(port);
+    }
+
+    /// Ends the instant: what is due is released, and the cores are given what they should run.
+    #[inline]
+    pub fn decide(&mut self, now_ns: u64, port: &mut impl Port<B>) {
+        while !self.scheduler.at(now_ns).release_some() {
+            self.act(port);
+        }
+        let _ = self.scheduler.at(now_ns).release_due().dispatch();
+        self.act(port);
+        self.set_targets(port);
+        // It is about the step, and whoever takes one looks at the next event anyway.
+        self.scheduler.log.take_job_event();
+    }
+
+    /// Returns what the latest step has decided. A core is named at most twice.
+    pub fn decisions(&self) -> &[Decision] {
+        self.scheduler.decisions()
+    }
+
+    /// Takes note that a core has finished an instance. Where `is_alone`, that may be all of the
+    /// instant, and the core may go on without a step.
+    #[inline]
+    pub fn complete<C: Port<B>>(
+        &mut self,
+        (core, vertex): (CoreId, Vertex),
+        mut body: B,
+        finish_ns: u64,
+        is_alone: bool,
+        port: &mut C,
+    ) -> Continuation<B> {
+        if body.has_effects() {
+            self.publish(&mut body, port.on_clock(finish_ns));
+        }
+        if !is_alone || !self.requests.are_none() {
+            let instance = self.scheduler.instance_of(vertex);
+            self.placement.finish(core.index(), vertex, body);
+            return Continuation::Step(Some(instance));
+        }
+        let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
+        if let HandOff::To(next, decision) = done {
+            let from = body.subject();
+            let exchanged = self.placement.exchange(core, vertex, body, next);
+            if !is_unwritten {
+                // Jobs may have been cut on this way, too, and their inputs are given up before
+                // the next function begins.
+                self.act(port);
+            }
+            let Some(mut body) = exchanged else {
+                // It is suspended, so it has been ready before.
+                return Continuation::Look {
+                    is_rescheduled: false,
+                };
+            };
+            body.set_job(decision.instance().job);
+            if C::HEARS_OF_HAND_OFFS && is_unwritten {
+                self.scheduler.log.notify_ready(decision.instance());
+                self.act(port);
+            }
+            let log = &mut self.scheduler.log;
+            let to = body.subject();
+            let start = (What::Start, port.start(core, &mut body), to);
+            if is_unwritten {
+                let finish = (What::Finish, finish_ns, from);
+                let ready = (What::Ready, log.now_ns(), to);
+                log.journal.write_all(core, [finish, ready, start]);
+            } else {
+                log.journal.write_all(core, [start]);
+            }
+            return Continuation::Run(body);
+        }
+        self.placement.finish(core.index(), vertex, body);
+        self.act(port);
+        if let HandOff::Open = done {
+            return Continuation::Step(None);
+        }
+        let is_rescheduled = self.scheduler.log.take_job_event();
+        Continuation::Look { is_rescheduled }
+    }
+
+    /// Takes note that an instance has finished that no core has any more; it ran last on `core`.
+    /// It finished at the first time, and the instant is the second.
+    pub fn complete_parked(
+        &mut self,
+        (core, vertex): (CoreId, Vertex),
+        mut body: B,
+        (finish_ns, now_ns): (u64, u64),
+        port: &mut impl Port<B>,
+    ) {
+        self.publish(&mut body, port.on_clock(finish_ns));
+        self.placement.finish_parked(vertex, body);
+        let instance = self.scheduler.instance_of(vertex);
+        self.step((now_ns, core), port, |moment| moment.complete(instance));
+    }
+
+    /// Returns what a fault of the vertex' instance costs if it comes now.
+    #[must_use]
+    pub fn cost_of_fault(&self, vertex: Vertex) -> Cost {
+        let instance = self.scheduler.instance_of(vertex);
+        let alternate = self.alternates[vertex.index()].as_ref();
+        let is_survived = self.scheduler.survives(instance.dag, instance.job);
+        match alternate.filter(|next| is_survived && next.is_there()) {
+            None => Cost::Dag,
+            Some(next) if next.is_fallback() => Cost::Degraded,
+            Some(_) => Cost::Job,
+        }
+    }
+
+    /// Ends an instance by a fault on a core, and with it its job or its DAG. The platform has
+    /// taken the body back, unless nothing can: then the fault costs the DAG.
+    #[inline]
+    pub fn fail(
+        &mut self,
+        instant: (u64, CoreId),
+        vertex: Vertex,
+        body: Option<B>,
+        port: &mut impl Port<B>,
+    ) -> Cost {
+        let cost = self.tell_fault(instant, vertex, body, port);
+        self.decide(instant.0, port);
+        cost
+    }
+
+    /// Does the same, and leaves the instant open.
+    pub fn tell_fault(
+        &mut self,
+        instant: (u64, CoreId),
+        vertex: Vertex,
+        body: Option<B>,
+        port: &mut impl Port<B>,
+    ) -> Cost {
+        let instance = self.scheduler.instance_of(vertex);
+        let cost = match &body {
+            Some(_) => self.cost_of_fault(vertex),
+            None => Cost::Dag,
+        };
+        if cost != Cost::Dag {
+            self.tell(instant, port, |moment| moment.fail_replaceable(instance));
+            if let Some(mut body) = body {
+                body.replace();
+                self.placement.replace(vertex, body);
+            }
+            return cost;
+        }
+        let handler = self.after_fault.get(instance.dag.index()).copied();
+        let handler = handler.flatten();
+        let handler = handler.filter(|&dag| !port.forward(Request::Signal(dag)));
+        self.tell(instant, port, |moment| {
+            moment.fail(instance);
+            handler.into_iter().for_each(|dag| moment.signal(dag));
+        });
+        self.lost.extend(body);
+        cost
+    }
+
+    /// Finds what a core without an instance does next. What it is to start has started; that it
+    /// resumes an instance is [written down](Self::note) by whoever knows when.
+    #[inline]
+    pub fn next(&mut self, core: CoreId, port: &mut impl Port<B>) -> Next<B, P> {
+        let mut next = self.placement.next(core.index());
+        if let Next::Start(vertex, body) = &mut next {
+            let instance = self.scheduler.instance_of(*vertex);
+            body.set_job(instance.job);
+            let subject = body.subject();
+            let start_ns = port.start(core, body);
+            (self.scheduler.log.journal).write(core, What::Start, start_ns, subject);
+        }
+        next
+    }
+
+    /// Takes a core's instance away, if it has one, and returns the core that has been waiting for
+    /// it.
+    pub fn suspend(&mut self, core: CoreId, now_ns: u64, parked: P) -> Option<CoreId> {
+        let vertex = self.placement.detach(core.index())?;
+        self.note(What::Suspend, core, vertex, now_ns);
+        self.placement.suspend(vertex, parked)
+    }
+
+    /// Apart, as most bodies have no effects.
+    #[inline(never)]
+    fn publish(&mut self, body: &mut B, finish_ns: u64) {
+        let requests = &mut self.requests;
+        body.complete(finish_ns, &mut |request| requests.keep(request));
+    }
+
+    #[inline]
+    fn act(&mut self, port: &mut impl Port<B>) {
+        if self.scheduler.log.has_notices() {
+            self.act_on_notices(port);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn act_on_notices(&mut self, port: &mut impl Port<B>) {
+        self.scheduler.log.exchange_notices(&mut self.notices);
+        for notice in &self.notices {
+            port.hear(notice);
+            if notice.event.what == What::Cancelled
+                && let Some(instance) = notice.event.instance()
+                && let Some(body) = (self.placement).resting(self.task_set.vertex(instance))
+            {
+                body.discard(instance.job);
+            }
+        }
+    }
+
+    #[inline]
+    fn set_targets<C: Port<B>>(&mut self, port: &mut C) {
+        let mut preempted = None;
+        let (decisions, log) = self.scheduler.decided();
+        for decision in decisions {
+            let (core, instance) = (decision.core(), decision.instance());
+            if let Decision::Preempt { .. } = decision {
+                self.placement.set_target(core, None);
+                preempted = Some(core);
+            } else {
+                let vertex = self.task_set.vertex(instance);
+                self.placement.set_target(core, Some(vertex));
+                if C::SUSPENDS_LATER && preempted == Some(core) {
+                    log.on_core(core, What::Request, port.now_ns(), instance);
+                }
+            }
+            port.retarget(core);
+        }
+    }
+}

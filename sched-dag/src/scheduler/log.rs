@@ -1,0 +1,260 @@
+//! The scheduler's own record of each instant: the journal, and notices for its driver.
+//!
+//! The journal may have no room, or make way for newer events; so what a driver has to act on,
+//! such as the inputs of an instance that is cancelled, does not hang on it. A *notice* is an event
+//! of one of the few kinds that the driver wants to hear of, kept until it looks.
+
+use alloc::vec::Vec;
+
+use crate::ids::{CoreId, DagId, Instance, ModeId};
+use crate::journal::{Event, Subject, What};
+use crate::kept::Journal;
+use crate::policy::JobOutcome;
+
+/// An event that a driver acts on, with what the journal has no room for: the nominal release, the
+/// deadline or the outcome.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Notice {
+    /// The event.
+    pub event: Event,
+    /// When the job was to be released, or its deadline was; `u64::MAX` if there is none.
+    pub at_ns: u64,
+    /// What became of a completed job.
+    pub outcome: Option<JobOutcome>,
+}
+
+/// The journal with what the next events of it have in common.
+#[derive(Clone, Debug)]
+pub struct Log {
+    /// The instant.
+    pub(super) now_ns: u64,
+    /// The core that makes the scheduler's step.
+    pub here: CoreId,
+    /// Whether anything has happened to a job as a whole.
+    has_job_event: bool,
+    /// Jobs of DAGs with a limit that have ended.
+    pub jobs_ended: u64,
+    /// By bits of [`What`], which events are kept as notices.
+    heard: u32,
+    /// How many notices one event may come to; there is room for twice as many.
+    most_at_once: usize,
+    notices: Vec<Notice>,
+    /// What has happened so far.
+    pub journal: Journal,
+}
+
+impl Log {
+    /// Begins without room for events.
+    #[inline]
+    pub(super) const fn new() -> Self {
+        Self {
+            now_ns: 0,
+            here: CoreId(0),
+            has_job_event: false,
+            jobs_ended: 0,
+            heard: 0,
+            most_at_once: 0,
+            notices: Vec::new(),
+            journal: Journal::none(),
+        }
+    }
+
+    /// Keeps events of these kinds as notices from now on, of which one change of the scheduler
+    /// brings about so many at most. Returns how many there is room for.
+    pub(super) fn hear(
+        &mut self,
+        kinds: impl IntoIterator<Item = What>,
+        most_at_once: usize,
+    ) -> usize {
+        self.heard = kinds.into_iter().fold(0, |heard, what| heard | bit(what));
+        self.most_at_once = most_at_once;
+        self.notices.reserve_exact(2 * most_at_once);
+        2 * most_at_once
+    }
+
+    /// Reports whether there is room for the notices of one more change.
+    #[inline]
+    pub(super) const fn has_room(&self) -> bool {
+        self.notices.len() <= self.most_at_once
+    }
+
+    /// Returns the latest instant.
+    #[inline]
+    #[must_use]
+    pub const fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Reports whether there are notices.
+    #[inline]
+    #[must_use]
+    pub const fn has_notices(&self) -> bool {
+        !self.notices.is_empty()
+    }
+
+    /// Takes the notices out, in exchange for a list whose room is used next.
+    #[inline]
+    pub fn exchange_notices(&mut self, room: &mut Vec<Notice>) {
+        room.clear();
+        core::mem::swap(&mut self.notices, room);
+    }
+
+    /// Reports whether anything has happened to a job as a whole since it was last asked.
+    #[inline]
+    pub const fn take_job_event(&mut self) -> bool {
+        core::mem::replace(&mut self.has_job_event, false)
+    }
+
+    /// Keeps a notice of an instance that has become ready, which the driver writes down.
+    pub fn notify_ready(&mut self, instance: Instance) {
+        self.notify(What::Ready, Subject::of(instance), u64::MAX, None);
+    }
+
+    /// Writes down what a core does with an instance.
+    #[inline]
+    pub fn on_core(&mut self, core: CoreId, what: What, time_ns: u64, instance: Instance) {
+        (self.journal).write(core, what, time_ns, Subject::of(instance));
+    }
+
+    /// Writes down what the core that makes this step has done with an instance.
+    #[inline]
+    pub(super) fn on_this(&mut self, what: What, time_ns: u64, instance: Instance) {
+        self.on_core(self.here, what, time_ns, instance);
+    }
+
+    /// Writes down that the run is in another mode, which the scheduler does not know.
+    #[inline]
+    pub fn entered(&mut self, mode: ModeId) {
+        self.of_job(What::Entered, DagId(0), mode.0.into(), u64::MAX);
+    }
+
+    #[inline]
+    fn of_job(&mut self, what: What, dag: DagId, job: u64, at_ns: u64) {
+        self.has_job_event = true;
+        self.write(what, self.now_ns, Subject::of_job(dag, job));
+        self.notify(what, Subject::of_job(dag, job), at_ns, None);
+    }
+
+    #[inline]
+    fn of(&mut self, what: What, instance: Instance) {
+        self.write(what, self.now_ns, Subject::of(instance));
+        self.notify(what, Subject::of(instance), u64::MAX, None);
+    }
+
+    #[inline]
+    fn write(&mut self, what: What, time_ns: u64, subject: Subject) {
+        self.journal.write(self.here, what, time_ns, subject);
+    }
+
+    #[inline]
+    fn notify(&mut self, what: What, subject: Subject, at_ns: u64, outcome: Option<JobOutcome>) {
+        if self.heard & bit(what) != 0 {
+            self.keep(what, subject, at_ns, outcome);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn keep(&mut self, what: What, subject: Subject, at_ns: u64, outcome: Option<JobOutcome>) {
+        let words = Event::words(self.now_ns, what, self.here, subject);
+        self.notices
+            .extend(Event::unpack(words).map(|event| Notice {
+                event,
+                at_ns,
+                outcome,
+            }));
+    }
+
+    #[inline]
+    pub(super) fn released(&mut self, dag: DagId, job: u64, release_ns: u64, is_sporadic: bool) {
+        if is_sporadic {
+            self.write(What::Due, release_ns, Subject::of_job(dag, job));
+            self.notify(What::Due, Subject::of_job(dag, job), release_ns, None);
+        }
+        self.of_job(What::Released, dag, job, release_ns);
+    }
+
+    #[inline]
+    pub(super) fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.of_job(What::Queued, dag, job, release_ns);
+    }
+
+    #[inline]
+    pub(super) fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.of_job(What::Skipped, dag, job, release_ns);
+    }
+
+    #[inline]
+    pub(super) fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
+        let what = match release_ns {
+            Some(_) => What::Signalled,
+            None => What::Dropped,
+        };
+        self.of_job(what, dag, job, release_ns.unwrap_or(u64::MAX));
+    }
+
+    #[inline]
+    pub(super) fn ready(&mut self, instance: Instance) {
+        self.of(What::Ready, instance);
+    }
+
+    #[inline]
+    pub(super) fn cancelled(&mut self, instance: Instance) {
+        self.of(What::Cancelled, instance);
+    }
+
+    #[inline]
+    pub(super) fn aborted(&mut self, dag: DagId, job: u64) {
+        self.of_job(What::Aborted, dag, job, u64::MAX);
+    }
+
+    #[inline]
+    pub(super) fn restarted(&mut self, instance: Instance) {
+        self.of(What::Restarted, instance);
+    }
+
+    #[inline]
+    pub(super) fn ended(&mut self, dag: DagId) {
+        self.of_job(What::Stopped, dag, 0, u64::MAX);
+    }
+
+    #[inline]
+    pub(super) fn switched_off(&mut self, dag: DagId) {
+        self.of_job(What::Off, dag, 0, u64::MAX);
+    }
+
+    #[inline]
+    pub(super) fn switched_on(&mut self, dag: DagId) {
+        self.of_job(What::On, dag, 0, u64::MAX);
+    }
+
+    #[inline]
+    pub(super) fn closed(&mut self, dag: DagId) {
+        self.of_job(What::Closed, dag, 0, u64::MAX);
+    }
+
+    #[inline]
+    pub(super) fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
+        self.of_job(What::Missed, dag, job, deadline_ns);
+    }
+
+    #[inline]
+    pub(super) fn job_completed(
+        &mut self,
+        dag: DagId,
+        job: u64,
+        outcome: JobOutcome,
+        has_limit: bool,
+    ) {
+        self.has_job_event = true;
+        self.jobs_ended += u64::from(has_limit);
+        let subject = Subject::of_job(dag, job);
+        self.write(What::Completed, self.now_ns, subject);
+        self.notify(What::Completed, subject, u64::MAX, Some(outcome));
+    }
+}
+
+#[inline]
+const fn bit(what: What) -> u32 {
+    1 << what as u32
+}
