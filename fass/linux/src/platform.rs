@@ -8,7 +8,7 @@ use fass::{
     Body, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
 };
 use sched_dag::lifecycle::{self, Parts, Requests};
-use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, SubtaskId, TaskSet};
+use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions, TaskSet, Vertex};
 
 use crate::level::Levels;
 use crate::office::Office;
@@ -207,17 +207,16 @@ fn teams(
 ) -> Vec<Arc<Team>> {
     let task_set = &plan.task_set;
     let dags = task_set.dags().len();
-    let mut bodies: Vec<Vec<(Instance, Body, Vec<Body>)>> =
-        task_set.clusters().map(|_| Vec::new()).collect();
-    let of_dags = plan.bodies.into_iter().zip(plan.others);
-    for (dag, (of_dag, others)) in task_set.ids().zip(of_dags) {
-        let subtasks = (0..).map(SubtaskId);
-        let all = of_dag.into_iter().zip(others).zip(subtasks);
-        let own = &mut bodies[task_set.dag(dag).cluster().index()];
-        own.extend(all.map(|((body, others), subtask)| {
-            let job = 0;
-            (Instance { dag, job, subtask }, body, others)
-        }));
+    let mut bodies: Vec<Vec<(Vertex, Body)>> = task_set.clusters().map(|_| Vec::new()).collect();
+    let mut vertices = (0..).map(Vertex);
+    for (dag, of_dag) in task_set.dags().iter().zip(plan.bodies) {
+        let vertices = vertices.by_ref();
+        bodies[dag.cluster().index()].extend(
+            of_dag
+                .into_iter()
+                .zip(vertices)
+                .map(|(body, vertex)| (vertex, body)),
+        );
     }
     let share = JOURNAL_BYTES / bodies.len();
     let clusters = task_set.clusters().zip(bodies).zip(parts);

@@ -19,7 +19,7 @@ use std::sync::atomic::Ordering;
 use sched_dag::{CoreId, Vertex};
 
 use crate::level::Role;
-use crate::state::{Fault, State};
+use crate::state::State;
 use crate::sys;
 use crate::team::Team;
 
@@ -43,7 +43,7 @@ pub(crate) struct Budgets {
 impl Budgets {
     /// Takes each subtask's budget, or so many of its WCETs; 0: then it has none.
     pub(crate) fn new(state: &State, wcets: u64) -> Self {
-        let dags = state.desk.task_set.dags().iter();
+        let dags = state.engine.task_set.dags().iter();
         let subtasks = dags.flat_map(|dag| dag.subtasks());
         let by_vertex: Box<[u64]> = subtasks.map(|s| s.most_execution_ns(wcets)).collect();
         Self {
@@ -61,7 +61,7 @@ impl Budgets {
         }
         let mut next_ns = now_ns.saturating_add(self.shortest_ns);
         for (core, seen) in (0..).map(CoreId).zip(&mut self.seen) {
-            let Some(vertex) = state.desk.placement.current(core.index()) else {
+            let Some(vertex) = state.engine.placement.current(core.index()) else {
                 continue;
             };
             let budget_ns = self.by_vertex[vertex.index()];
@@ -70,7 +70,7 @@ impl Budgets {
             let (Some(processor_ns), true) = (processor_ns, budget_ns < u64::MAX) else {
                 continue;
             };
-            let what = Some((vertex, state.desk.scheduler.instance_of(vertex).job));
+            let what = Some((vertex, state.engine.scheduler.instance_of(vertex).job));
             if seen.what != what {
                 *seen = Seen { what, processor_ns };
             }
@@ -97,7 +97,7 @@ impl Team {
     /// Makes the scheduler's steps until all jobs have ended.
     pub(crate) fn release(&self, mut budgets: Budgets) {
         sys::make_timers_exact();
-        if self.lock().desk.task_set.is_divided() {
+        if self.lock().engine.task_set.is_divided() {
             // Were it woken on another cluster's processor, that would wait for it.
             let _ = sys::confine(sys::thread(), &self.lock().processors);
         }
@@ -175,7 +175,7 @@ impl Team {
             }
         };
         self.announce(state);
-        let is_finished = state.desk.scheduler.is_finished();
+        let is_finished = state.engine.scheduler.is_finished();
         let opened = std::mem::take(&mut state.opened);
         if !self.office.settle(rests, is_finished, opened) {
             if is_finished {
@@ -188,27 +188,23 @@ impl Team {
         None
     }
 
-    /// Ends a core's instance, which has exceeded its budget, and with it its DAG.
+    /// Ends a core's instance, which has exceeded its budget, and with it its DAG: its function
+    /// cannot be taken back.
     pub(crate) fn abandon(&self, state: &mut State, core: CoreId) {
         let number = state.active[core.index()];
-        let Some(vertex) = state.desk.placement.current(core.index()) else {
+        let Some(vertex) = state.engine.placement.current(core.index()) else {
             return;
         };
         // If it has just ended, it was in time after all.
         if !self.workers[number].demote(self.levels, Role::Abandoned) {
             return;
         }
-        state.desk.placement.lose(core.index());
+        state.engine.placement.lose(core.index());
         state.seats[number] = None;
         state.abandoned.push(number);
         state.replace(core, &self.workers);
-        let instance = state.desk.scheduler.instance_of(vertex);
-        let fault = Fault {
-            instance,
-            cause: "its budget was exceeded".to_owned(),
-            is_overrun: true,
-        };
-        state.fail(&self.workers, core, vertex, fault);
+        let cause = "its budget was exceeded".to_owned();
+        state.fail(&self.workers, (core, vertex), None, (cause, true));
         state.report_left(core, &self.workers);
     }
 }

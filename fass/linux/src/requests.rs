@@ -73,7 +73,7 @@ impl Requests {
                 moment.stop(dag);
             }
             if bits & CLOSE != 0 {
-                moment.close(dag, observer);
+                moment.close(dag);
             }
         }
     }

@@ -90,9 +90,9 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     releases.into_iter().for_each(join);
     let mut states: Vec<_> = teams.iter().map(|team| team.lock()).collect();
     let abandoned: Vec<Vec<Number>> = states.iter().map(|state| state.abandoned.clone()).collect();
-    let task_set = Arc::clone(&states[0].desk.task_set);
+    let task_set = Arc::clone(&states[0].engine.task_set);
     let journal = journal(&mut states, &task_set, launched.options.cores);
-    let scheduler_of = |dag| &states[task_set.dag(dag).cluster().index()].desk.scheduler;
+    let scheduler_of = |dag| &states[task_set.dag(dag).cluster().index()].engine.scheduler;
     let ids = (0..).map(DagId).zip(task_set.dags());
     let statistics = |(dag, _)| *scheduler_of(dag).statistics(dag);
     let statistics = ids.clone().map(statistics).collect();
@@ -141,7 +141,7 @@ fn journal(states: &mut [MutexGuard<'_, State>], task_set: &Arc<TaskSet>, cores:
     let mut merged: Option<Journal> = None;
     for (cluster, state) in task_set.clusters().zip(states) {
         let empty = Journal::new(task_set, 0, 0);
-        let its = std::mem::replace(&mut state.desk.scheduler.log.journal, empty);
+        let its = std::mem::replace(&mut state.engine.scheduler.log.journal, empty);
         match &mut merged {
             None => merged = Some(its),
             Some(merged) => {

@@ -7,8 +7,8 @@
 
 use std::sync::Arc;
 
-use fass::Body;
-use sched_dag::desk::{self, Carrier, Desk};
+use fass::{Body, Replacement};
+use sched_dag::engine::{self, Cost, Engine, Port};
 use sched_dag::journal::{Subject, What};
 use sched_dag::lifecycle::{Letters, Request, Requests};
 use sched_dag::placement::Next;
@@ -40,21 +40,24 @@ pub(crate) struct Left {
 /// The number of a worker.
 pub(crate) type Number = usize;
 
-/// A fault that ended a DAG.
+/// A fault of an instance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// The instance that failed.
     pub instance: Instance,
-    /// Why: a panic's message, or that the budget was exceeded.
+    /// Why.
     pub cause: String,
-    /// Whether it is the latter.
+    /// Whether it has exceeded its budget. Its function runs on then, in nobody's way, so that
+    /// nothing can take over: the cost is the DAG.
     pub is_overrun: bool,
+    /// The cost.
+    pub cost: Cost,
 }
 
 /// The scheduler of a cluster, its bodies, and which worker runs what.
 pub(crate) struct State {
     pub(crate) office: Arc<Office>,
-    pub(crate) desk: Desk<Box<Runner>, Number>,
+    pub(crate) engine: Engine<Box<Runner>, Number>,
     /// By core, the worker that runs what the core should.
     pub(crate) active: Box<[Number]>,
     /// By worker, the core of which it is the active one.
@@ -83,8 +86,8 @@ pub(crate) struct State {
     pub(crate) preemptions: u64,
 }
 
-/// What Linux adds to a cluster's desk.
-pub(crate) struct Post<'s> {
+/// Linux below a cluster's engine: its clock, its threads, and the office.
+pub(crate) struct ThreadPort<'s> {
     office: &'s Office,
     cluster: ClusterId,
     epoch_ns: u64,
@@ -93,7 +96,7 @@ pub(crate) struct Post<'s> {
     opened: &'s mut u64,
 }
 
-impl Carrier<Box<Runner>> for Post<'_> {
+impl Port<Box<Runner>> for ThreadPort<'_> {
     fn now_ns(&self) -> u64 {
         sys::now_ns().saturating_sub(self.epoch_ns)
     }
@@ -103,23 +106,25 @@ impl Carrier<Box<Runner>> for Post<'_> {
     }
 
     #[inline]
-    fn begin(&mut self, core: CoreId, _: &mut Box<Runner>) -> u64 {
+    fn start(&mut self, core: CoreId, _: &mut Box<Runner>) -> u64 {
         self.workers[self.active[core.index()]].run();
         self.now_ns()
     }
 
-    fn send(&mut self, request: Request) -> bool {
+    fn forward(&mut self, request: Request) -> bool {
         self.office.send(self.cluster, request)
     }
 
-    fn open(&mut self) -> Option<&Letters> {
+    fn letters(&mut self) -> Option<&Letters> {
         let has_letters = self.office.open(self.cluster);
         *self.opened += u64::from(has_letters);
         has_letters.then_some(&self.office.letters)
     }
 }
 
-impl desk::Body for Box<Runner> {
+impl engine::Body for Box<Runner> {
+    type Alternate = Replacement;
+
     fn set_job(&mut self, job: u64) {
         self.job = job;
     }
@@ -142,12 +147,12 @@ impl desk::Body for Box<Runner> {
         self.body.complete(finish_ns, keep);
     }
 
-    fn can_take_over(&self) -> bool {
-        self.body.can_take_over()
+    fn alternate(&self) -> Option<Replacement> {
+        self.body.replacement()
     }
 
-    fn take_over(&mut self) {
-        self.body.take_over();
+    fn replace(&mut self) {
+        self.body.replace();
     }
 }
 
@@ -156,7 +161,7 @@ impl State {
     pub(crate) fn new(
         (cluster, office): (ClusterId, &Arc<Office>),
         scheduler: Scheduler,
-        bodies: Vec<(Instance, Body, Vec<Body>)>,
+        bodies: Vec<(Vertex, Body)>,
         (requests, after_fault): (Requests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
@@ -165,24 +170,17 @@ impl State {
         let dags = scheduler.task_set().dags().len();
         let cores = processors.len();
         let workers = cores + bodies.len();
-        let mut desk = Desk::new::<Post<'_>>(cluster, scheduler, journal, requests, after_fault);
-        for (any, body, others) in bodies {
-            let vertex = desk.task_set.vertex(any);
-            let runner = |body| {
-                let job = 0;
-                let ids = Subject::of(any).ids;
-                Box::new(Runner {
-                    body,
-                    vertex,
-                    ids,
-                    job,
-                })
-            };
-            desk.put(
+        let mut engine =
+            Engine::new::<ThreadPort<'_>>(cluster, scheduler, journal, requests, after_fault);
+        for (vertex, body) in bodies {
+            let any = engine.scheduler.instance_of(vertex);
+            let runner = Runner {
+                body,
                 vertex,
-                runner(body),
-                others.into_iter().map(runner).collect(),
-            );
+                ids: Subject::of(any).ids,
+                job: 0,
+            };
+            engine.put(vertex, Box::new(runner));
         }
         let mut seats = vec![None; workers].into_boxed_slice();
         for (core, seat) in (0..).map(CoreId).zip(&mut seats[..cores]) {
@@ -190,7 +188,7 @@ impl State {
         }
         Self {
             office: Arc::clone(office),
-            desk,
+            engine,
             active: (0..cores).collect(),
             seats,
             pinned: vec![None; workers].into_boxed_slice(),
@@ -222,40 +220,53 @@ impl State {
     /// Writes down what happened to an instance at a time on the clock.
     pub(crate) fn note_at(&mut self, time_ns: u64, what: What, core: CoreId, vertex: Vertex) {
         let time_ns = self.since_epoch(time_ns);
-        self.desk.note(what, core, vertex, time_ns);
+        self.engine.note(what, core, vertex, time_ns);
     }
 
-    /// Returns the desk, and what Linux adds to it.
+    /// Returns the engine, and the port for a step of it.
     #[inline]
     pub(crate) fn parts<'s>(
         &'s mut self,
         workers: &'s [Worker],
-    ) -> (&'s mut Desk<Box<Runner>, Number>, Post<'s>) {
-        let post = Post {
+    ) -> (&'s mut Engine<Box<Runner>, Number>, ThreadPort<'s>) {
+        let port = ThreadPort {
             office: &self.office,
-            cluster: self.desk.cluster,
+            cluster: self.engine.cluster,
             epoch_ns: self.epoch_ns,
             active: &self.active,
             workers,
             opened: &mut self.opened,
         };
-        (&mut self.desk, post)
+        (&mut self.engine, port)
     }
 
     /// Lets the scheduler see what happens now, and decide.
     pub(crate) fn step(&mut self, workers: &[Worker], event: impl FnOnce(&mut Moment<'_>)) {
-        let (desk, mut post) = self.parts(workers);
-        let (now_ns, here) = (post.now_ns(), desk.scheduler.log.here);
-        desk.step((now_ns, here), &mut post, event);
+        let (engine, mut port) = self.parts(workers);
+        let (now_ns, here) = (port.now_ns(), engine.scheduler.log.here);
+        engine.step((now_ns, here), &mut port, event);
         self.carry_out(workers);
     }
 
-    /// Ends an instance's DAG, or its job, because of a fault.
-    pub(crate) fn fail(&mut self, workers: &[Worker], core: CoreId, vertex: Vertex, fault: Fault) {
-        let (desk, mut post) = self.parts(workers);
-        let now_ns = post.now_ns();
-        desk.fail((now_ns, core), vertex, &mut post);
-        self.faults.push(fault);
+    /// Ends an instance because of a fault, and with it its job, or its DAG. The latter if the
+    /// worker that ran it has not given its runner back.
+    pub(crate) fn fail(
+        &mut self,
+        workers: &[Worker],
+        (core, vertex): (CoreId, Vertex),
+        runner: Option<Box<Runner>>,
+        (cause, is_overrun): (String, bool),
+    ) {
+        let instance = self.engine.scheduler.instance_of(vertex);
+        let (engine, mut port) = self.parts(workers);
+        let now_ns = port.now_ns();
+        let cost = engine.fail((now_ns, core), vertex, runner, &mut port);
+        self.faults.push(Fault {
+            instance,
+            cause,
+            is_overrun,
+            cost,
+        });
         self.carry_out(workers);
     }
 
@@ -266,14 +277,14 @@ impl State {
             self.resumed_ns[self.active[core.index()]] = now_ns;
             self.note_at(now_ns, What::Resume, core, occupant);
         }
-        for place in 0..self.desk.decisions().len() {
-            let core = self.desk.decisions()[place].core();
-            if self.desk.placement.must_suspend(core.index()) {
+        for place in 0..self.engine.decisions().len() {
+            let core = self.engine.decisions()[place].core();
+            if self.engine.placement.must_suspend(core.index()) {
                 self.suspend(core, workers);
             }
         }
-        for place in 0..self.desk.decisions().len() {
-            self.call_if_wanted(self.desk.decisions()[place].core());
+        for place in 0..self.engine.decisions().len() {
+            self.call_if_wanted(self.engine.decisions()[place].core());
         }
     }
 
@@ -283,12 +294,12 @@ impl State {
         if !workers[demoted].demote(self.levels, Role::Demoted) {
             return;
         }
-        if self.desk.placement.current(core.index()).is_none() {
+        if self.engine.placement.current(core.index()).is_none() {
             return;
         }
         self.preemptions += 1;
         let now_ns = self.since_epoch(sys::now_ns());
-        let waiting = self.desk.suspend(core, now_ns, demoted);
+        let waiting = self.engine.suspend(core, now_ns, demoted);
         self.seats[demoted] = None;
         self.replace(core, workers);
         if let Some(waiting) = waiting {
@@ -323,14 +334,14 @@ impl State {
     }
 
     pub(crate) fn call_if_wanted(&mut self, core: CoreId) {
-        if self.desk.placement.is_wanted(core.index()) && !self.called.contains(&core) {
+        if self.engine.placement.is_wanted(core.index()) && !self.called.contains(&core) {
             self.called.push(core);
         }
     }
 
     /// Returns workers that are to look for work, `most` at a time, and forgets them.
     pub(crate) fn take_called(&mut self, most: usize) -> impl Iterator<Item = Number> + '_ {
-        let (active, placement) = (&self.active, &self.desk.placement);
+        let (active, placement) = (&self.active, &self.engine.placement);
         let left = self.called.len().saturating_sub(most);
         let called = self.called.drain(left..);
         // The one that makes the step has looked already.
@@ -349,8 +360,8 @@ impl State {
             self.spare.push(me);
             return None;
         };
-        let (desk, mut post) = self.parts(workers);
-        match desk.next(core, &mut post) {
+        let (engine, mut port) = self.parts(workers);
+        match engine.next(core, &mut port) {
             Next::Start(_, runner) => Some(runner),
             Next::Continue(parked) => {
                 self.seats[me] = None;
@@ -360,7 +371,7 @@ impl State {
                 if self.has_left(parked) {
                     workers[parked].call();
                 }
-                if let Some(vertex) = self.desk.placement.current(core.index()) {
+                if let Some(vertex) = self.engine.placement.current(core.index()) {
                     self.resumed_ns[parked] = sys::now_ns();
                     self.note_at(self.resumed_ns[parked], What::Resume, core, vertex);
                 }

@@ -9,13 +9,13 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use sched_dag::ClusterId;
-use sched_dag::desk::{After, Carrier as _};
+use sched_dag::engine::{Continuation, Port as _};
 
 use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
 use crate::office::Office;
-use crate::state::{Fault, Left, Number, Runner, State};
+use crate::state::{Left, Number, Runner, State};
 use crate::sys;
 use crate::worker::Worker;
 
@@ -52,7 +52,7 @@ impl Team {
         Self {
             workers: state.seats.iter().map(|_| Worker::default()).collect(),
             levels: state.levels,
-            cluster: state.desk.cluster,
+            cluster: state.engine.cluster,
             office: Arc::clone(office),
             look_out: LookOut::new(),
             looks_at_ns: AtomicU64::new(u64::MAX),
@@ -220,18 +220,18 @@ impl Team {
             (Ok(()), Some(core)) => {
                 let end_ns = state_now.since_epoch(state_now.end_of(me, finish_ns));
                 let is_alone = state_now.left.is_empty();
-                let (desk, mut post) = state_now.parts(workers);
+                let (engine, mut port) = state_now.parts(workers);
                 let ended = (core, vertex);
-                match desk.complete(ended, runner, end_ns, is_alone, &mut post) {
-                    After::Run(runner) => {
+                match engine.complete(ended, runner, end_ns, is_alone, &mut port) {
+                    Continuation::Run(runner) => {
                         self.hand_offs.fetch_add(1, Ordering::Relaxed);
                         self.announce(&state);
                         return Some(runner);
                     }
-                    After::Look { .. } => {}
-                    After::Step(ended) => {
-                        let now_ns = post.now_ns();
-                        desk.step((now_ns, core), &mut post, |moment| {
+                    Continuation::Look { .. } => {}
+                    Continuation::Step(ended) => {
+                        let now_ns = port.now_ns();
+                        engine.step((now_ns, core), &mut port, |moment| {
                             ended.into_iter().for_each(|ended| moment.complete(ended));
                         });
                         state_now.carry_out(workers);
@@ -243,15 +243,11 @@ impl Team {
                 let core = seat.unwrap_or_else(|| state_now.core_of(me));
                 runner.body.failed(finish_ns);
                 match seat {
-                    Some(core) => (state_now.desk.placement).finish(core.index(), vertex, runner),
-                    None => state_now.desk.placement.finish_parked(vertex, runner),
+                    Some(core) => (state_now.engine.placement).finish(core.index(), vertex, runner),
+                    None => state_now.engine.placement.finish_parked(vertex, runner),
                 }
-                let fault = Fault {
-                    instance: state_now.desk.scheduler.instance_of(vertex),
-                    cause,
-                    is_overrun: false,
-                };
-                state_now.fail(workers, core, vertex, fault);
+                let runner = state_now.engine.placement.take(vertex);
+                state_now.fail(workers, (core, vertex), runner, (cause, false));
             }
         }
         if let Some(core) = seat {
@@ -302,9 +298,9 @@ impl Team {
     /// Sees to it that the release thread looks in time.
     #[inline]
     pub(crate) fn announce(&self, state: &State) {
-        let next_ns = match state.desk.scheduler.next_event_ns() {
+        let next_ns = match state.engine.scheduler.next_event_ns() {
             Some(next_ns) => next_ns.saturating_add(state.epoch_ns),
-            None if state.desk.scheduler.is_finished() => 0,
+            None if state.engine.scheduler.is_finished() => 0,
             None => u64::MAX,
         };
         self.look_out.announce(next_ns);

@@ -20,15 +20,15 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use sched_dag::journal::What;
-use sched_dag::{News, Scheduler};
+use sched_dag::{Notice, Scheduler};
 
 use crate::execute::Execute;
 
 /// Has bodies discard what cancelled instances got.
 pub(crate) struct Reports<B> {
     pub(crate) bodies: B,
-    /// Room for news.
-    news: Vec<News>,
+    /// Room for notices.
+    notices: Vec<Notice>,
 }
 
 /// Bodies at rest can be found among them, by vertex.
@@ -61,17 +61,17 @@ impl<B: Execute> Bodies for Shared<B> {
 
 impl<B: Bodies> Reports<B> {
     pub(crate) fn new(scheduler: &mut Scheduler, bodies: B) -> Self {
-        scheduler.log.want([What::Cancelled], 64);
+        let room = scheduler.hear([What::Cancelled]);
         Self {
             bodies,
-            news: Vec::with_capacity(64),
+            notices: Vec::with_capacity(room),
         }
     }
 
     /// Has bodies discard what cancelled instances got.
     #[inline]
     pub(crate) fn act(&mut self, scheduler: &mut Scheduler) {
-        if scheduler.log.has_news() {
+        if scheduler.log.has_notices() {
             self.discard(scheduler);
         }
     }
@@ -80,8 +80,12 @@ impl<B: Bodies> Reports<B> {
     #[cold]
     #[inline(never)]
     fn discard(&mut self, scheduler: &mut Scheduler) {
-        scheduler.log.exchange_news(&mut self.news);
-        for instance in self.news.iter().filter_map(|news| news.event.instance()) {
+        scheduler.log.exchange_notices(&mut self.notices);
+        for instance in self
+            .notices
+            .iter()
+            .filter_map(|notice| notice.event.instance())
+        {
             let vertex = scheduler.vertex(instance);
             self.bodies.discard(vertex.index(), instance.job);
         }

@@ -6,6 +6,7 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use sched_dag::engine::Alternate;
 use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, TaskSet};
 
@@ -112,10 +113,11 @@ pub(crate) trait Subtask: Send {
 /// also while the body runs.
 ///
 /// ```
-/// use fass::{Body, Replacement};
+/// use fass::Body;
+/// use sched_dag::engine::Alternate;
 ///
 /// fn is_survived(body: &Body) -> bool {
-///     body.replacement().is_some_and(|next: Replacement| next.is_there())
+///     body.replacement().is_some_and(|next: fass::Replacement| next.is_there())
 /// }
 /// ```
 #[derive(Clone)]
@@ -127,25 +129,13 @@ pub(crate) trait Next: Send + Sync {
     fn is_fallback(&self) -> bool;
 }
 
-impl Replacement {
-    /// Reports whether another function could go on if a fault ended the present one now: there
-    /// is one, and values are not just being handed over.
-    ///
-    /// See [`Replacement`].
-    #[must_use]
-    pub fn is_there(&self) -> bool {
+/// One is there while it may be made, and no values are just being handed over.
+impl Alternate for Replacement {
+    fn is_there(&self) -> bool {
         self.0.is_there()
     }
 
-    /// Reports whether it is the one that the subtask falls back on: then its DAG is degraded.
-    ///
-    /// ```
-    /// fn is_degrading(next: &fass::Replacement) -> bool {
-    ///     next.is_there() && next.is_fallback()
-    /// }
-    /// ```
-    #[must_use]
-    pub fn is_fallback(&self) -> bool {
+    fn is_fallback(&self) -> bool {
         self.0.is_fallback()
     }
 }

@@ -1,6 +1,6 @@
 //! The two traits between the engine and a platform: what it runs, and what it runs on.
 
-use crate::ids::CoreId;
+use crate::ids::{CoreId, Instance};
 use crate::journal::{Subject, What};
 use crate::lifecycle::{Letters, Request};
 use crate::scheduler::Notice;
@@ -115,7 +115,7 @@ pub enum Continuation<B> {
     },
     /// A step has to be taken first: one in which this instance completes, or else one that goes
     /// on with the instant in hand.
-    Step(Option<crate::ids::Instance>),
+    Step(Option<Instance>),
 }
 
 /// The cost of a fault.
@@ -127,4 +127,26 @@ pub enum Cost {
     Job,
     /// The job is lost, and the subtask goes on with the function to fall back on.
     Degraded,
+}
+
+impl Cost {
+    /// Returns its word in machine lines.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Dag => "dag",
+            Self::Job => "job",
+            Self::Degraded => "degraded",
+        }
+    }
+
+    /// Returns the consequence, for people.
+    #[must_use]
+    pub const fn consequence(self) -> &'static str {
+        match self {
+            Self::Dag => "the DAG is ended",
+            Self::Job => "the job is lost, and the subtask is made anew",
+            Self::Degraded => "the job is lost, and the subtask falls back",
+        }
+    }
 }

@@ -14,7 +14,7 @@
 //! - A fault takes an instance away wherever it is: no core is asked for.
 
 use sched_dag::CoreId;
-use sched_dag::desk::Carrier as _;
+use sched_dag::engine::Port as _;
 use sched_dag::journal::What;
 
 use crate::state::{Left, Number, Runner, State};
@@ -34,10 +34,10 @@ impl State {
             return false;
         }
         let core = self.core_of(worker).index();
-        let occupant = self.desk.placement.current(core);
+        let occupant = self.engine.placement.current(core);
         occupant.is_some_and(|occupant| {
-            let instance = self.desk.scheduler.instance_of(occupant);
-            let dag = self.desk.task_set.dag(instance.dag);
+            let instance = self.engine.scheduler.instance_of(occupant);
+            let dag = self.engine.task_set.dag(instance.dag);
             dag.subtask(instance.subtask).is_non_preemptive()
                 || workers[self.active[core]].has_returned()
         })
@@ -78,7 +78,7 @@ impl State {
         workers: &[Worker],
     ) {
         let (core, vertex) = (self.core_of(worker), runner.vertex);
-        let occupant = self.desk.placement.current(core.index());
+        let occupant = self.engine.placement.current(core.index());
         if let Some(occupant) = occupant {
             self.note(What::Suspend, core, occupant);
         }
@@ -86,9 +86,9 @@ impl State {
         // It goes on after the step that the end brings about, and within it nothing does.
         self.interrupted = occupant.map(|occupant| (core, occupant));
         let finish_ns = self.since_epoch(finish_ns);
-        let (desk, mut post) = self.parts(workers);
-        let times_ns = (finish_ns, post.now_ns());
-        desk.complete_parked((core, vertex), runner, times_ns, &mut post);
+        let (engine, mut port) = self.parts(workers);
+        let times_ns = (finish_ns, port.now_ns());
+        engine.complete_parked((core, vertex), runner, times_ns, &mut port);
         self.carry_out(workers);
     }
 }

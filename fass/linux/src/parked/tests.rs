@@ -74,7 +74,7 @@ impl Stage {
         state.step(&self.team.workers, |moment| moment.signal(dag));
         let mut cores = 0..self.cores as usize;
         let core = cores
-            .find(|core| state.desk.placement.is_wanted(*core))
+            .find(|core| state.engine.placement.is_wanted(*core))
             .unwrap();
         let worker = state.active[core];
         let runner = state.find_work(worker, &self.team.workers).unwrap();
@@ -93,11 +93,11 @@ impl Stage {
     fn story(&self) -> Story {
         let state = self.team.lock();
         assert!(state.left.is_empty());
-        let journal = &state.desk.scheduler.log.journal;
-        let mut found: Vec<_> = journal.violations(&state.desk.task_set);
-        let options = state.desk.scheduler.options();
+        let journal = &state.engine.scheduler.log.journal;
+        let mut found: Vec<_> = journal.violations(&state.engine.task_set);
+        let options = state.engine.scheduler.options();
         let of_dispatch =
-            journal.dispatch_violations(&state.desk.task_set, &options, 1_000_000_000);
+            journal.dispatch_violations(&state.engine.task_set, &options, 1_000_000_000);
         found.extend(of_dispatch.unwrap());
         assert!(found.is_empty(), "{found:?}");
         let events = journal.events().filter(|event| event.what.is_of_machine());
@@ -133,7 +133,7 @@ fn one_that_has_returned_ends_before_the_parked_one() {
         ];
         assert_eq!(story, expected, "{keeps_its_core}");
         assert_eq!(
-            stage.team.lock().desk.scheduler.statistics(LOW).completed,
+            stage.team.lock().engine.scheduler.statistics(LOW).completed,
             1
         );
     }
@@ -228,7 +228,7 @@ fn what_was_left_to_one_that_is_abandoned_is_reported() {
     assert!(stage.end(low, Ok(())).is_none());
     let mut state = stage.team.lock();
     stage.team.abandon(&mut state, CoreId(0));
-    assert_eq!(state.desk.placement.current(0), None);
+    assert_eq!(state.engine.placement.current(0), None);
     let worker = state.active[0];
     let runner = state.find_work(worker, &stage.team.workers).unwrap();
     drop(state);

@@ -20,7 +20,6 @@ use core::time::Duration;
 
 use sched_dag::Instance;
 
-use super::execution::Cost;
 use super::{contexts, execution};
 use crate::machine::fault::Exception;
 use crate::machine::interrupt::Interrupted;
@@ -174,11 +173,8 @@ fn report(instance: Instance, fault: &Fault<'_>) {
     let subtask = dag.map(|dag| dag.subtask(instance.subtask));
     let dag = Excerpt::<NAME_BYTES>::of(dag.map_or("", |dag| dag.name()));
     let subtask = Excerpt::<NAME_BYTES>::of(subtask.map_or("", |subtask| subtask.name()));
-    let (cost, consequence) = match execution::cost_of_fault(instance) {
-        Cost::Dag => ("dag", "the DAG is ended"),
-        Cost::Job => ("job", "the job is lost, and the subtask is made anew"),
-        Cost::Degraded => ("degraded", "the job is lost, and the subtask falls back"),
-    };
+    let cost = execution::cost_of_fault(instance);
+    let consequence = cost.consequence();
     crate::println!(
         "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \
          at {place}; {consequence}",
@@ -193,7 +189,7 @@ fn report(instance: Instance, fault: &Fault<'_>) {
             .number("subtask", instance.subtask.0)
             .text("subtask_name", &subtask)
             .number("job", instance.job)
-            .text("cost", cost)
+            .text("cost", cost.word())
             .number("cpu", core)
             .text("place", place)
             .text("message", message)

@@ -265,7 +265,7 @@ fn shutdown(run: &Run) -> Ending {
     Ending::after_shutdown(run.violations().count())
 }
 
-/// Says which faults have ended DAGs, as the kernel does at once.
+/// Says which faults there were, as the kernel does at once.
 fn tell_faults(run: &linux::Run) {
     for fault in run.faults() {
         let instance = fault.instance;
@@ -277,10 +277,11 @@ fn tell_faults(run: &linux::Run) {
         let dag = run.task_set().dag(instance.dag);
         let subtask = dag.subtask(instance.subtask).name();
         crate::println!(
-            "fault: {cause} in subtask `{subtask}` of dag `{}`, job {}: {}; the DAG is ended",
+            "fault: {cause} in subtask `{subtask}` of dag `{}`, job {}: {}; {}",
             dag.name(),
             instance.job,
-            fault.cause
+            fault.cause,
+            fault.cost.consequence()
         );
         json::report("fault", |line| {
             line.text("cause", cause)
@@ -289,7 +290,7 @@ fn tell_faults(run: &linux::Run) {
                 .number("subtask", instance.subtask.0)
                 .text("subtask_name", subtask)
                 .number("job", instance.job)
-                .text("cost", "dag")
+                .text("cost", fault.cost.word())
                 .number("cpu", 0_u32)
                 .text("place", "unknown")
                 .text("message", &fault.cause);

@@ -75,7 +75,7 @@ pub fn task_set() -> Option<Arc<TaskSet>> {
 /// Returns how a DAG does, if a run goes on that has it.
 pub fn snapshot(dag: DagId) -> Option<Snapshot> {
     let place = divided::of_dag(dag).execution.lock();
-    let scheduler = &place.as_ref()?.desk.scheduler;
+    let scheduler = &place.as_ref()?.engine.scheduler;
     scheduler.task_set().dags().get(dag.index())?;
     Some(Snapshot::of(scheduler, dag))
 }

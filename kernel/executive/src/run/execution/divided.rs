@@ -104,7 +104,7 @@ fn rest(place: usize) -> bool {
     let execution = cluster.execution.lock();
     let scheduler = execution
         .as_ref()
-        .map(|execution| &execution.desk.scheduler);
+        .map(|execution| &execution.engine.scheduler);
     scheduler.is_none_or(|scheduler| scheduler.is_finished())
         && !cluster.has_letters.load(Ordering::Acquire)
         && rest(place + 1)
@@ -113,10 +113,10 @@ fn rest(place: usize) -> bool {
 /// Has the first journal take over what the others hold.
 pub(super) fn merge(first: &mut Execution, others: &mut [Execution]) {
     for (id, other) in (1..).map(ClusterId).zip(others) {
-        let journal = core::mem::replace(&mut other.desk.scheduler.log.journal, Journal::none());
+        let journal = core::mem::replace(&mut other.engine.scheduler.log.journal, Journal::none());
         let first_core = cluster::first_core(id.index());
         first
-            .desk
+            .engine
             .scheduler
             .log
             .journal

@@ -9,7 +9,6 @@ use alloc::vec::Vec;
 
 use sched_dag::{DagId, Instance, Journal, Scheduler, SchedulerOptions, SubtaskId, TaskSet};
 
-use super::watcher::Watcher;
 use super::{Execution, Loan, cluster, divided};
 use crate::machine::spinlock::SpinLock;
 use crate::machine::{clock, this_core};
@@ -45,12 +44,10 @@ impl Ended {
     pub(super) fn clear(&mut self) {
         let task_set = Arc::clone(self.task_set());
         for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
-            let Watcher {
-                placement, lost, ..
-            } = &mut self.parts[dag.cluster().index()].watcher;
+            let engine = &mut self.parts[dag.cluster().index()].engine;
             *CLEARING.lock() = Some((Arc::clone(&task_set), id, clock::now_ns()));
             let of_dag = |lost: &mut Loan| lost.instance.dag == id;
-            let lost = lost.extract_if(.., of_dag);
+            let lost = engine.lost.extract_if(.., of_dag);
             lost.for_each(|lost| lost.give_back().body.forget());
             for subtask in (0..).map(SubtaskId).take(dag.subtasks().len()) {
                 let any = Instance {
@@ -58,7 +55,12 @@ impl Ended {
                     job: 0,
                     subtask,
                 };
-                drop(placement.take(task_set.vertex(any)).map(Loan::give_back));
+                drop(
+                    engine
+                        .placement
+                        .take(task_set.vertex(any))
+                        .map(Loan::give_back),
+                );
             }
             drop(CLEARING.lock().take());
         }
@@ -72,7 +74,7 @@ impl Ended {
     #[must_use]
     pub fn scheduler(&self, dag: DagId) -> &Scheduler {
         &self.parts[self.task_set().dag(dag).cluster().index()]
-            .desk
+            .engine
             .scheduler
     }
 
@@ -81,7 +83,7 @@ impl Ended {
     pub fn options(&self) -> SchedulerOptions {
         SchedulerOptions {
             cores: u32::try_from(this_core::all().len()).unwrap_or(u32::MAX),
-            ..self.parts[0].desk.scheduler.options()
+            ..self.parts[0].engine.scheduler.options()
         }
     }
 
@@ -102,7 +104,7 @@ impl Ended {
     /// Returns what has happened.
     #[must_use]
     pub fn journal(&self) -> &Journal {
-        &self.parts[0].desk.scheduler.log.journal
+        &self.parts[0].engine.scheduler.log.journal
     }
 
     /// Returns the model.

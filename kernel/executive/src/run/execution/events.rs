@@ -5,14 +5,13 @@
 //! there is something to decide, and wakes the other cores after the lock is
 //! free again.
 
-use sched_dag::journal::{Subject, What};
+use sched_dag::engine::Continuation;
 
 use super::core_set::CoreSet;
 use super::loans::Loan;
 use super::status::note_running;
-use super::step::Ended;
 use super::time::{instance_time_ns, seat, since_epoch};
-use super::{Occasion, Work, cluster};
+use super::{Work, cluster};
 use crate::machine::abandoned::Abandoned;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::Core;
@@ -43,7 +42,7 @@ fn take_turns(core: &Core, work: Work) -> Work {
 
 /// Reports that this core has run its instance, and finds what it is to do
 /// next. Interrupts are disabled.
-pub fn complete(mut finished: Loan, finish_ns: u64) -> Work {
+pub fn complete(finished: Loan, finish_ns: u64) -> Work {
     let core = this_core::get();
     let here = seat(core);
     let mut place = finished.cluster().execution.lock_uninterrupted();
@@ -51,34 +50,25 @@ pub fn complete(mut finished: Loan, finish_ns: u64) -> Work {
         return Work::Rest;
     };
     let vertex = finished.vertex;
-    if finished.body.has_effects() {
-        execution.signals.take(&mut finished.body, finish_ns);
-    }
-    execution
-        .watcher
-        .note_finish(finished, instance_time_ns(finish_ns));
-    let mut woken = None;
-    if execution.may_hand_off && execution.signals.are_none() {
-        match execution.hand_off(core, vertex) {
-            Ended::HandedOff(successor) => return Work::Run(successor),
-            Ended::Open => {
-                let woken = woken.insert(CoreSet::default());
-                execution.step(finish_ns, Occasion::Time, woken);
-            }
-            Ended::WithNews => execution.announce(woken.insert(CoreSet::default())),
-            Ended::Quiet => {}
-        }
-    } else {
-        execution.watcher.settle(here);
-        let instance = execution.scheduler.instance_of(vertex);
-        let woken = woken.insert(CoreSet::default());
-        execution.step(finish_ns, Occasion::Completed(instance), woken);
+    let run_ns = instance_time_ns(finish_ns);
+    let is_alone = execution.may_hand_off;
+    let mut woken = CoreSet::default();
+    let (engine, mut port) = execution.parts(&mut woken);
+    match engine.complete((here, vertex), finished, run_ns, is_alone, &mut port) {
+        Continuation::Run(successor) => return Work::Run(successor),
+        Continuation::Look {
+            is_rescheduled: false,
+        } => {}
+        Continuation::Look {
+            is_rescheduled: true,
+        } => execution.announce(&mut woken),
+        Continuation::Step(ended) => execution.step(finish_ns, &mut woken, |moment| {
+            ended.into_iter().for_each(|ended| moment.complete(ended));
+        }),
     }
     let work = execution.find_work(core);
     drop(place);
-    if let Some(woken) = woken {
-        woken.wake();
-    }
+    woken.wake();
     take_turns(core, work)
 }
 
@@ -91,22 +81,20 @@ pub fn fail(left: &Abandoned) {
         return;
     };
     let here = seat(core);
-    let Some(vertex) = execution.watcher.recover(here, left) else {
+    let Some(lost) = (execution.loans).recover(&mut execution.engine.placement, here.index(), left)
+    else {
         return;
     };
-    let instance = execution.scheduler.instance_of(vertex);
     // Not when the interrupt came: a step may have left events since then. Nor may what follows
     // stand before this event.
     let clock_ns = clock::now_ns();
     let ended_ns = since_epoch(clock_ns);
-    execution
-        .watcher
-        .journal
-        .write(here, What::Ended, ended_ns, Subject::of(instance));
     note_running(core, None);
-    edge::failed(instance, ended_ns, clock_ns);
+    edge::failed(lost.instance, ended_ns, clock_ns);
     let mut woken = CoreSet::default();
-    execution.step(clock_ns, Occasion::Failed(instance), &mut woken);
+    let (engine, mut port) = execution.parts(&mut woken);
+    engine.tell_fault((ended_ns, here), lost.vertex, Some(lost), &mut port);
+    execution.end_step(clock_ns, &mut woken);
     drop(place);
     woken.wake();
 }
@@ -122,7 +110,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     };
     let mut woken = CoreSet::default();
     if is_event || cluster.may_have_letters() {
-        execution.step(now_ns, Occasion::Time, &mut woken);
+        execution.step(now_ns, &mut woken, |_| ());
     }
     if !section::puts_off(core, now_ns)
         && let Some(waiting) = execution.follow(interrupted, now_ns)

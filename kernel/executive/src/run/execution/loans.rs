@@ -26,14 +26,9 @@ pub struct Loan(NonNull<Runner>);
 unsafe impl Send for Loan where Runner: Send {}
 
 impl Loan {
-    /// Lends a runner.
-    pub(super) fn of(runner: Runner) -> Self {
-        Self(NonNull::from(Box::leak(Box::new(runner))))
-    }
-
     /// Returns the runner itself.
     pub(super) fn give_back(self) -> Runner {
-        // SAFETY: `of` has leaked a box, and by the loan invariant this ends its one loan.
+        // SAFETY: `lend` has leaked a box, and by the loan invariant this ends its one loan.
         *unsafe { Box::from_raw(self.0.as_ptr()) }
     }
 }
@@ -68,9 +63,12 @@ impl Loans {
         Self((0..vertices).map(|_| None).collect())
     }
 
-    /// Notes where a runner is.
-    pub(super) fn note(&mut self, loan: &Loan) {
-        self.0[loan.vertex.index()] = Some(loan.0);
+    /// Lends a runner, and notes where it is.
+    pub(super) fn lend(&mut self, runner: Runner) -> Loan {
+        let vertex = runner.vertex.index();
+        let place = NonNull::from(Box::leak(Box::new(runner)));
+        self.0[vertex] = Some(place);
+        Loan(place)
     }
 
     /// Takes the runner of a core's current instance back, whose context was `_left` there.

@@ -19,13 +19,13 @@ mod events;
 mod letters;
 #[allow(unsafe_code, reason = "what a fault has left on a stack is taken back")]
 mod loans;
+mod port;
 mod runner;
 mod signals;
 mod stacks;
 mod status;
 mod step;
 mod time;
-mod watcher;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -34,8 +34,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
-use sched_dag::{DagId, Instance, Journal, Scheduler};
-use sched_dag::{SchedulerOptions, TaskSet};
+use sched_dag::engine::Engine;
+use sched_dag::lifecycle::Requests;
+use sched_dag::{Journal, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
 pub use cluster::{count as clusters, first_core};
@@ -44,15 +45,16 @@ pub use divided::{Division, division, is_finished, set_division};
 pub use ended::{Ended, look_at_clearing};
 pub use events::{complete, fail, find_work, interrupt};
 pub use loans::Loan;
+use loans::Loans;
+use port::SmpPort;
 use runner::Runner;
 use signals::Signals;
 pub use signals::{raise, raise_in_interrupt};
 pub use status::{
-    Cost, budget_ns, cost_of_fault, jobs_ended, lock_acquisitions, next_event_ns, running,
-    try_journal, try_names, with_journal,
+    budget_ns, cost_of_fault, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
+    try_names, with_journal,
 };
 pub use time::{arm_all, arm_next_event, keeps_time, since_epoch};
-use watcher::Watcher;
 
 /// What a core is to do next.
 pub enum Work {
@@ -64,25 +66,11 @@ pub enum Work {
     Rest,
 }
 
-/// What a step of the scheduler is about, besides the time.
-enum Occasion {
-    /// A release or a deadline is due.
-    Time,
-    /// The instance has finished.
-    Completed(Instance),
-    /// The instance was ended by a fault.
-    Failed(Instance),
-    /// A sporadic DAG gets a signal from outside.
-    Signalled(DagId),
-    /// A person wants a change.
-    Control(Control),
-}
-
 /// A run as one cluster has it, from its launch until it is taken out.
 struct Execution {
-    scheduler: Scheduler,
-    /// What the scheduler's reports change.
-    watcher: Watcher,
+    engine: Engine<Loan, Parked>,
+    loans: Loans,
+    cluster: &'static cluster::Cluster,
     /// What core 0 does when nothing is assigned to it, while something is.
     background: Option<Parked>,
     /// When the next dispatch is due, on the clock, if it waits for further events
@@ -146,25 +134,29 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
     let mut executions: Vec<Execution> = task_set
         .clusters()
         .map(|id| Execution {
-            scheduler: Scheduler::of_cluster(Arc::clone(task_set), options, id),
-            watcher: Watcher::new(
+            engine: Engine::new::<SmpPort<'_>>(
                 id,
-                task_set,
+                Scheduler::of_cluster(Arc::clone(task_set), options, id),
                 Journal::of_cluster(task_set, id, free_bytes, most_events),
+                Requests::new(plan.bodies.len(), lifecycles.next().flatten()),
+                plan.after_fault.clone(),
             ),
+            loans: Loans::new(task_set.vertices()),
+            cluster: cluster::nth(id.index()),
             background: None,
             dispatch_due_ns: None,
             coincidence_ns: terms.coincidence_ns,
             budget_factor: terms.budget_factor,
             may_hand_off: terms.coincidence_ns == 0,
-            signals: Signals::new(&plan, id, &letters, lifecycles.next().flatten()),
+            signals: Signals::new(&plan, &letters),
             proven: Arc::clone(&proven),
         })
         .collect();
     for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
         let cluster = task_set.dag(runner.instance.dag).cluster();
-        let watcher = &mut executions[cluster.index()].watcher;
-        watcher.begin(runner);
+        let Execution { engine, loans, .. } = &mut executions[cluster.index()];
+        let loan = loans.lend(runner);
+        engine.put(loan.vertex, loan);
     }
     for (number, execution) in executions.into_iter().enumerate() {
         *cluster::nth(number).execution.lock() = Some(execution);
@@ -198,6 +190,6 @@ pub fn end() -> Option<Ended> {
 
 impl Execution {
     const fn task_set(&self) -> &Arc<TaskSet> {
-        &self.watcher.task_set
+        &self.engine.task_set
     }
 }

@@ -2,10 +2,12 @@
 
 use alloc::vec::Vec;
 
-use fass::Body;
+use fass::{Body, Replacement, Request};
+use sched_dag::engine;
 use sched_dag::journal::Subject;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex};
 
+use super::Loan;
 use super::cluster::{self, Cluster};
 
 /// A subtask's body, and what running an instance of it takes.
@@ -80,4 +82,40 @@ pub(super) fn runners(
             Runner::new(body, task_set, any, budget_factor)
         })
     })
+}
+
+impl engine::Body for Loan {
+    type Alternate = Replacement;
+
+    #[inline]
+    fn set_job(&mut self, job: u64) {
+        self.instance.job = job;
+    }
+
+    #[inline]
+    fn subject(&self) -> Subject {
+        Runner::subject(self)
+    }
+
+    fn discard(&mut self, job: u64) {
+        self.body.discard(job);
+    }
+
+    #[inline]
+    fn has_effects(&self) -> bool {
+        self.body.has_effects()
+    }
+
+    #[inline]
+    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) {
+        self.body.complete(finish_ns, ask);
+    }
+
+    fn alternate(&self) -> Option<Replacement> {
+        self.body.replacement()
+    }
+
+    fn replace(&mut self) {
+        self.body.replace();
+    }
 }

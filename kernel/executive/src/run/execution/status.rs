@@ -2,6 +2,7 @@
 
 use core::sync::atomic::Ordering;
 
+use sched_dag::engine::Cost;
 use sched_dag::journal::Subject;
 use sched_dag::{DagId, Instance, Journal, SubtaskId};
 
@@ -78,31 +79,14 @@ pub fn budget_ns(instance: Instance) -> u64 {
     })
 }
 
-/// What a fault costs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cost {
-    /// The DAG is ended.
-    Dag,
-    /// The job is lost, and the subtask goes on with a function that was made anew.
-    Job,
-    /// The job is lost, and the subtask goes on with the function to fall back on.
-    Degraded,
-}
-
 /// Returns what a fault of an instance that runs here costs if it comes now. Of two faults of a DAG at
 /// one moment, either may take what is left to be survived; the journal tells.
 pub fn cost_of_fault(instance: Instance) -> Cost {
     let place = cluster::of(this_core::get()).execution.lock();
-    let Some(execution) = place.as_ref() else {
-        return Cost::Dag;
-    };
-    let vertex = execution.task_set().vertex(instance);
-    let is_survived = execution.scheduler.survives(instance.dag, instance.job);
-    match execution.watcher.next(vertex).filter(|_| is_survived) {
-        None => Cost::Dag,
-        Some(next) if next.is_fallback() => Cost::Degraded,
-        Some(_) => Cost::Job,
-    }
+    place.as_ref().map_or(Cost::Dag, |execution| {
+        let vertex = execution.task_set().vertex(instance);
+        execution.engine.cost_of_fault(vertex)
+    })
 }
 
 /// Looks at the journal of a cluster, by its number, or changes what it records, if a run goes
@@ -112,7 +96,7 @@ pub fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> 
     let mut place = cluster::nth(cluster).execution.lock();
     place
         .as_mut()
-        .map(|execution| look(&mut execution.watcher.journal))
+        .map(|execution| look(&mut execution.engine.scheduler.log.journal))
 }
 
 /// Looks at the journal of this core's cluster, if there is one and nobody is at work on it.
@@ -123,7 +107,10 @@ pub fn try_journal<R>(look: impl FnOnce(&Journal, u32) -> R) -> Option<R> {
         false => cluster::nth(0),
     };
     let place = cluster.execution.try_lock()?;
-    place
-        .as_ref()
-        .map(|execution| look(&execution.watcher.journal, cluster.core(FIRST_SEAT)))
+    place.as_ref().map(|execution| {
+        look(
+            &execution.engine.scheduler.log.journal,
+            cluster.core(FIRST_SEAT),
+        )
+    })
 }
