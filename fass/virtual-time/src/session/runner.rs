@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use fass::{Body, Replacement};
-use sched_dag::Recorder;
+use sched_dag::engine::Alternate;
 use sched_dag::journal::What;
 use sched_dag::lifecycle::Request;
 use sched_dag::virtual_time::Workload;
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, ModeId, Observer, TaskSet};
+use sched_dag::{CoreId, DagId, Instance, Notice, TaskSet};
 
 use crate::disturbed;
 use crate::record::PanicRecord;
@@ -20,7 +20,8 @@ const FAULT: &str = "a fault that was asked for";
 /// What is written down of a run.
 #[derive(Debug)]
 pub(super) struct Recording {
-    pub(super) journal: Recorder,
+    /// The present instant, or that of the panic that stops the run.
+    pub(super) now_ns: u64,
     /// How long each instance executes in all.
     pub(super) executed_ns: BTreeMap<Instance, u64>,
     /// The contained panics.
@@ -59,7 +60,7 @@ impl Runner<'_> {
     fn signal_next(&self, dag: DagId) {
         let machine = self.machine;
         if let Some(time_ns) = machine.edge.next_signal_ns(dag) {
-            let time_ns = time_ns.max(self.recording.journal.now_ns);
+            let time_ns = time_ns.max(self.recording.now_ns);
             machine.signal_of_replay_at(time_ns, dag);
         }
     }
@@ -79,6 +80,41 @@ impl Runner<'_> {
 }
 
 impl Workload for Runner<'_> {
+    const HEARS: &'static [What] = &[
+        What::Released,
+        What::Skipped,
+        What::Cancelled,
+        What::Restarted,
+        What::Stopped,
+        What::Completed,
+    ];
+
+    fn hear(&mut self, notice: &Notice) {
+        let (dag, job) = (notice.event.dag, notice.event.job);
+        match (notice.event.what, notice.event.instance()) {
+            (What::Released, _) => self.signal_next(dag),
+            (What::Skipped, _) => {
+                self.arrive_at(dag, job);
+                self.signal_next(dag);
+            }
+            // Functions run at the start of their instances, so whatever the predecessors will
+            // ever send has been sent.
+            (What::Cancelled, Some(instance)) if self.panic.is_none() => {
+                self.body(instance).discard(instance.job);
+            }
+            (What::Restarted, Some(instance)) => self.replace(instance),
+            (What::Stopped, _) => {
+                self.arrive_at(dag, u64::MAX);
+                // Nothing but a fault ends a DAG here.
+                if let Some(handler) = self.after_fault[dag.index()] {
+                    self.machine.signal_at(self.recording.now_ns, handler);
+                }
+            }
+            (What::Completed, _) => self.arrive_at(dag, job),
+            _ => {}
+        }
+    }
+
     fn execute(&mut self, instance: Instance, now_ns: u64) -> u64 {
         if self.panic.is_some() {
             return 0;
@@ -117,7 +153,6 @@ impl Workload for Runner<'_> {
             if !machine.contains_panics.get() {
                 self.body(instance).failed(now_ns);
                 self.panic = Some(panic);
-                self.recording.journal.close();
                 return 0;
             }
             self.recording.panics.push(panic);
@@ -142,20 +177,6 @@ impl Workload for Runner<'_> {
         self.next(instance).is_some()
     }
 
-    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.recording.journal.on_core(What::Start, instance, core);
-    }
-
-    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.recording
-            .journal
-            .on_core(What::Suspend, instance, core);
-    }
-
-    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.recording.journal.on_core(What::Resume, instance, core);
-    }
-
     fn late_ns(&self, due_ns: u64) -> u64 {
         self.machine.late.get().of_interrupt_ns(due_ns)
     }
@@ -166,7 +187,7 @@ impl Workload for Runner<'_> {
 
     fn instant(&mut self, now_ns: u64) {
         if self.panic.is_none() {
-            self.recording.journal.now_ns = now_ns;
+            self.recording.now_ns = now_ns;
         }
     }
 
@@ -178,96 +199,16 @@ impl Workload for Runner<'_> {
         self.machine.take_request(now_ns)
     }
 
-    fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
+    fn finished(&mut self, instance: Instance, _core: CoreId, now_ns: u64) {
         if self.panic.is_none() {
             let machine = self.machine;
             let ask = &mut |request| machine.request_at(now_ns, request);
             self.body(instance).complete(now_ns, ask);
             machine.wires.collect();
         }
-        self.recording.journal.on_core(What::Finish, instance, core);
     }
 
-    fn failed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.recording.journal.on_core(What::Ended, instance, core);
-    }
-}
-
-impl Observer for Runner<'_> {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.recording.journal.released(dag, job, release_ns);
-        self.signal_next(dag);
-    }
-
-    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.recording.journal.queued(dag, job, release_ns);
-    }
-
-    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.recording.journal.skipped(dag, job, release_ns);
-        self.arrive_at(dag, job);
-        self.signal_next(dag);
-    }
-
-    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
-        self.recording.journal.signalled(dag, job, release_ns);
-    }
-
-    fn ready(&mut self, instance: Instance) {
-        self.recording.journal.ready(instance);
-    }
-
-    fn cancelled(&mut self, instance: Instance) {
-        self.recording.journal.cancelled(instance);
-        if self.panic.is_none() {
-            // Functions run at the start of their instances, so whatever the
-            // predecessors will ever send has been sent.
-            self.body(instance).discard(instance.job);
-        }
-    }
-
-    fn restarted(&mut self, instance: Instance) {
-        self.recording.journal.restarted(instance);
-        self.replace(instance);
-    }
-
-    fn ended(&mut self, dag: DagId) {
-        self.recording.journal.ended(dag);
-        self.arrive_at(dag, u64::MAX);
-        // Nothing but a fault ends a DAG here.
-        if let Some(handler) = self.after_fault[dag.index()] {
-            self.machine
-                .signal_at(self.recording.journal.now_ns, handler);
-        }
-    }
-
-    fn switched_off(&mut self, dag: DagId) {
-        self.recording.journal.switched_off(dag);
-    }
-
-    fn switched_on(&mut self, dag: DagId) {
-        self.recording.journal.switched_on(dag);
-    }
-
-    fn closed(&mut self, dag: DagId) {
-        self.recording.journal.closed(dag);
-    }
-
-    fn entered(&mut self, mode: ModeId) {
-        self.recording.journal.entered(mode);
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        self.recording.journal.aborted(dag, job);
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        let journal = &mut self.recording.journal;
-        journal.deadline_missed(dag, job, deadline_ns);
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.recording.journal.job_completed(dag, job, outcome);
-        self.arrive_at(dag, job);
+    fn is_void(&self) -> bool {
+        self.panic.is_some()
     }
 }

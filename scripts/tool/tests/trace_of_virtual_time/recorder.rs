@@ -2,21 +2,24 @@
 //!
 //! The requests that a kernel makes of cores are imitated.
 
-use sched_dag::TaskSet;
+use std::sync::Arc;
+
 use sched_dag::journal::{Event, What};
+use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
+use sched_dag::{Scheduler, TaskSet};
 use tool::trace::commit::Committed;
 use tool::trace::model::Run;
 
 use crate::random::Random;
 use crate::set::Set;
 use crate::support::commit;
-use crate::support::written::Written;
 
 /// Runs a set to its end, and returns what a trace tells of that.
 pub(crate) fn record(set: &Set) -> Run {
     let task_set = commit(&set.specs(), set.options);
-    let mut written = Written::new(&task_set, |instance| set.execution_ns(instance));
-    let _ = written.run(set.options);
+    let scheduler = Scheduler::new(Arc::clone(&task_set), set.options);
+    let mut run = VirtualTime::new(scheduler).recording();
+    let _ = run.run(&mut ExecutionTimes(|instance| set.execution_ns(instance)));
     Run {
         number: 0,
         line: 1,
@@ -24,7 +27,7 @@ pub(crate) fn record(set: &Set) -> Run {
         usual_bound_ns: 0,
         task_set: TaskSet::clone(&task_set),
         committed: Committed::default(),
-        events: with_requests(&written.journal.events),
+        events: with_requests(&run.events()),
         lost: 0,
         complete: true,
     }

@@ -14,9 +14,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use sched_dag::analysis::Overheads;
-use sched_dag::{
-    DagId, Decision, Instance, JobOutcome, Observer, Scheduler, SchedulerOptions, TaskSet, Told,
-};
+use sched_dag::journal::What;
+use sched_dag::{Decision, Instance, Notice, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::random::Random;
 
@@ -101,6 +100,8 @@ struct Machine<'r> {
 
 impl Machine<'_> {
     fn run(&mut self, until_ns: u64, watch: &mut Watch<'_>) {
+        let mut notices = Vec::new();
+        self.scheduler.hear([What::Released, What::Completed]);
         // The scheduler's next event, and when its interrupt comes.
         let mut alarm: Option<(u64, u64)> = None;
         // When the last step is over.
@@ -120,11 +121,12 @@ impl Machine<'_> {
             watch.now_ns = now_ns;
             for core in &mut self.cores {
                 if let Some((instance, _)) = core.take_if(|(_, finish_ns)| *finish_ns <= now_ns) {
-                    self.scheduler.told(now_ns).complete(instance, watch);
+                    self.scheduler.at(now_ns).complete(instance);
                 }
             }
-            let released = self.scheduler.told(now_ns).release_due(watch);
-            let decisions = released.dispatch().to_vec();
+            let decisions = self.scheduler.at(now_ns).release_due().dispatch().to_vec();
+            self.scheduler.log.exchange_notices(&mut notices);
+            notices.iter().for_each(|notice| watch.hear(notice));
             for decision in decisions {
                 self.carry_out(decision, now_ns);
             }
@@ -177,15 +179,14 @@ struct Watch<'t> {
     longest_ns: Vec<u64>,
 }
 
-impl Observer for Watch<'_> {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.ready += self.task_set.dag(dag).sources().len() as u64;
-        self.flying[dag.index()].push((job, release_ns));
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, _: JobOutcome) {
+impl Watch<'_> {
+    fn hear(&mut self, notice: &Notice) {
+        let (dag, job) = (notice.event.dag, notice.event.job);
         let flying = &mut self.flying[dag.index()];
-        if let Some(place) = flying.iter().position(|(other, _)| *other == job) {
+        if notice.event.what == What::Released {
+            self.ready += self.task_set.dag(dag).sources().len() as u64;
+            flying.push((job, notice.at_ns));
+        } else if let Some(place) = flying.iter().position(|(other, _)| *other == job) {
             let (_, release_ns) = flying.swap_remove(place);
             let longest_ns = &mut self.longest_ns[dag.index()];
             *longest_ns = (*longest_ns).max(self.now_ns - release_ns);

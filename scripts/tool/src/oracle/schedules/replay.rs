@@ -1,9 +1,10 @@
 //! Replaying a case through the real scheduler, and comparing.
 
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
-use sched_dag::{CoreId, DagId, Instance, JobOutcome, Observer, SchedulerOptions};
+use sched_dag::law::Record;
+use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions};
 
-use ::replay::{Case, CaseDag, InstanceTimes, JobTimes};
+use ::replay::{Case, InstanceTimes, JobTimes};
 
 /// More cores than these are only simulated if there are as many subtasks: of
 /// each subtask at most one instance runs at a time.
@@ -15,12 +16,12 @@ const ALWAYS_SIMULATED: usize = 1024;
 ///
 /// The first difference in the order of DAGs, jobs and subtasks, in one line.
 pub fn check(case: &Case) -> Result<(), String> {
-    let record = replay(case)?;
+    let (instances, jobs) = replay(case)?;
     for (index, dag) in case.dags.iter().enumerate() {
         for job in 0..dag.jobs {
             for subtask in 0..dag.subtasks {
                 let position = dag.position(job, subtask);
-                let (expected, replayed) = (case.instances[position], record.instances[position]);
+                let (expected, replayed) = (case.instances[position], instances[position]);
                 let place = format!("dag {index} job {job} subtask {subtask}");
                 compare(&place, "start", expected.start_ns, replayed.start_ns)?;
                 compare(&place, "finish", expected.finish_ns, replayed.finish_ns)?;
@@ -31,7 +32,7 @@ pub fn check(case: &Case) -> Result<(), String> {
                     replayed.preemptions,
                 )?;
             }
-            let (expected, replayed) = (case.jobs[index][job], record.jobs[index][job]);
+            let (expected, replayed) = (case.jobs[index][job], jobs[index][job]);
             let place = format!("dag {index} job {job}");
             compare(&place, "release", expected.release_ns, replayed.release_ns)?;
             compare(&place, "finish", expected.finish_ns, replayed.finish_ns)?;
@@ -62,7 +63,10 @@ fn compare(place: &str, what: &str, expected: u64, replayed: u64) -> Result<(), 
     }
 }
 
-fn replay(case: &Case) -> Result<Record<'_>, String> {
+type Times = (Vec<InstanceTimes>, Vec<Vec<JobTimes>>);
+
+/// Returns the times of all instances and of all jobs, in the order of the case's.
+fn replay(case: &Case) -> Result<Times, String> {
     let subtasks: usize = case.dags.iter().map(|dag| dag.subtasks).sum();
     let useful = u32::try_from(subtasks.max(ALWAYS_SIMULATED)).unwrap_or(u32::MAX);
     let options = SchedulerOptions {
@@ -70,87 +74,43 @@ fn replay(case: &Case) -> Result<Record<'_>, String> {
         preemption: case.preemption,
         cores: case.cores.min(useful),
     };
-    let mut record = Record {
-        dags: &case.dags,
-        now_ns: 0,
-        instances: vec![InstanceTimes::default(); case.instances.len()],
-        jobs: case
-            .dags
-            .iter()
-            .map(|dag| vec![JobTimes::default(); dag.jobs])
-            .collect(),
-        ended: 0,
-    };
-    let mut run = VirtualTime::of_clusters(&case.task_set, options);
-    match run.run(&mut record) {
+    let mut run = VirtualTime::of_clusters(&case.task_set, options).recording();
+    let end = run.run(&mut ExecutionTimes(|instance: Instance| {
+        let times = &case.dags[instance.dag.index()].executions_ns;
+        times[instance.subtask.index()][usize::try_from(instance.job).expect("few jobs")]
+    }));
+    match end {
         End::Finished => {}
         End::TimeReached | End::Stopped => return Err("the replay stopped early".to_owned()),
         End::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
     }
-    let jobs: usize = case.dags.iter().map(|dag| dag.jobs).sum();
-    if record.ended == jobs && run.is_finished() {
-        Ok(record)
-    } else {
-        Err(format!("{} of {jobs} jobs ended", record.ended))
-    }
+    let events = run.events().into_iter();
+    let record = Record::of_events(&case.task_set, true, events).ok_or("too many jobs")?;
+    let dags = (0..).map(DagId).take(case.dags.len());
+    let jobs = dags.map(|dag| record.jobs(dag).iter().map(job_times).collect());
+    let jobs: Option<Vec<Vec<JobTimes>>> = jobs.collect();
+    let instances = record.all_instances(&case.task_set);
+    let instances = instances.map(|(_, times)| {
+        Some(InstanceTimes {
+            start_ns: times.start_ns?,
+            finish_ns: times.finish_ns?,
+            preemptions: times.preemptions.into(),
+        })
+    });
+    let instances: Option<Vec<InstanceTimes>> = instances.collect();
+    let all = instances.zip(jobs).filter(|(_, jobs)| {
+        let ended = jobs.iter().map(Vec::len);
+        run.is_finished() && ended.eq(case.dags.iter().map(|dag| dag.jobs))
+    });
+    all.ok_or_else(|| "some jobs have not ended".to_owned())
 }
 
-/// What a replay has done so far.
-struct Record<'a> {
-    dags: &'a [CaseDag],
-    now_ns: u64,
-    instances: Vec<InstanceTimes>,
-    jobs: Vec<Vec<JobTimes>>,
-    ended: usize,
-}
-
-impl Record<'_> {
-    fn times(&mut self, instance: Instance) -> &mut InstanceTimes {
-        let dag = &self.dags[instance.dag.index()];
-        &mut self.instances[dag.position(index(instance.job), instance.subtask.index())]
-    }
-}
-
-impl Observer for Record<'_> {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.jobs[dag.index()][index(job)].release_ns = release_ns;
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        let times = &mut self.jobs[dag.index()][index(job)];
-        times.finish_ns = self.now_ns;
-        times.response_ns = self.now_ns - times.release_ns;
-        times.missed = outcome != JobOutcome::Met;
-        self.ended += 1;
-    }
-}
-
-impl Workload for Record<'_> {
-    const WANTED: &'static [sched_dag::journal::What] = sched_dag::told::ALL;
-
-    fn heard(&mut self, news: &sched_dag::News) {
-        sched_dag::told::tell(news, self);
-    }
-
-    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
-        let dag = &self.dags[instance.dag.index()];
-        dag.executions_ns[instance.subtask.index()][index(instance.job)]
-    }
-
-    fn started(&mut self, instance: Instance, _core: CoreId, now_ns: u64) {
-        self.times(instance).start_ns = now_ns;
-    }
-
-    fn preempted(&mut self, instance: Instance, _core: CoreId, _now_ns: u64) {
-        self.times(instance).preemptions += 1;
-    }
-
-    fn finished(&mut self, instance: Instance, _core: CoreId, now_ns: u64) {
-        self.now_ns = now_ns;
-        self.times(instance).finish_ns = now_ns;
-    }
-}
-
-fn index(job: u64) -> usize {
-    usize::try_from(job).expect("the file's jobs were counted in memory")
+fn job_times(job: &sched_dag::law::JobRecord) -> Option<JobTimes> {
+    let (release_ns, finish_ns) = (job.release_ns?, job.ended_ns?);
+    Some(JobTimes {
+        release_ns,
+        finish_ns,
+        response_ns: finish_ns - release_ns,
+        missed: job.outcome? != JobOutcome::Met,
+    })
 }
