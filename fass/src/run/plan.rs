@@ -206,6 +206,12 @@ impl Body {
         if let [only] = &mut *self.effects {
             return only.happen(completed_ns, ask);
         }
+        self.have_all_happen(completed_ns, ask);
+    }
+
+    /// Apart, so that the way of one effect saves no registers for a loop.
+    #[inline(never)]
+    fn have_all_happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
         for effect in &mut self.effects {
             effect.happen(completed_ns, ask);
         }

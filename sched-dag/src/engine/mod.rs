@@ -159,7 +159,7 @@ impl<B: Body, P> Engine<B, P> {
         port: &mut C,
     ) -> Continuation<B> {
         if body.has_effects() {
-            self.publish(&mut body, port.on_clock(finish_ns));
+            body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         }
         if !is_alone || !self.requests.are_none() {
             let instance = self.scheduler.instance_of(vertex);
@@ -212,11 +212,11 @@ impl<B: Body, P> Engine<B, P> {
     pub fn complete_parked(
         &mut self,
         (core, vertex): (CoreId, Vertex),
-        mut body: B,
+        body: B,
         (finish_ns, now_ns): (u64, u64),
         port: &mut impl Port<B>,
     ) {
-        self.publish(&mut body, port.on_clock(finish_ns));
+        let body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         self.placement.finish_parked(vertex, body);
         let instance = self.scheduler.instance_of(vertex);
         self.step((now_ns, core), port, |moment| moment.complete(instance));
@@ -305,11 +305,11 @@ impl<B: Body, P> Engine<B, P> {
         self.placement.suspend(vertex, parked)
     }
 
-    /// Apart, as most bodies have no effects.
+    /// Apart, as most bodies have no effects; a body that goes and comes stays in a register.
     #[inline(never)]
-    fn publish(&mut self, body: &mut B, finish_ns: u64) {
-        let requests = &mut self.requests;
+    fn publish(requests: &mut Requests, mut body: B, finish_ns: u64) -> B {
         body.complete(finish_ns, &mut |request| requests.keep(request));
+        body
     }
 
     #[inline]
