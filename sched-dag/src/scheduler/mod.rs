@@ -237,7 +237,6 @@ impl Scheduler {
 
     /// Returns what the latest dispatch has decided.
     #[inline]
-    #[must_use]
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions
     }
