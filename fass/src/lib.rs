@@ -137,6 +137,7 @@ pub use run::crossing::Recorded;
 pub use run::latest_jobs::LatestJobs;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan, Replacement};
+pub use run::runner::Runner;
 pub use run::staleness::Staleness;
 pub use run::topic::{Ports, Publisher, Subscriber};
 

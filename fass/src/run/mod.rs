@@ -21,6 +21,7 @@ pub(crate) mod record;
 pub(crate) mod replaceable;
 pub(crate) mod request;
 pub(crate) mod reset;
+pub(crate) mod runner;
 pub(crate) mod sample;
 mod sampling;
 pub(crate) mod signal;

@@ -1,5 +1,7 @@
 //! The two traits between the engine and a platform: what it runs, and what it runs on.
 
+use core::ops::DerefMut;
+
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Subject, What};
 use crate::lifecycle::{Letters, Request};
@@ -32,6 +34,43 @@ pub trait Body {
 
     /// Makes it go on with that, after a fault.
     fn replace(&mut self);
+}
+
+/// A way to a body, such as a box, is one.
+impl<D: DerefMut<Target: Body>> Body for D {
+    type Alternate = <D::Target as Body>::Alternate;
+
+    #[inline]
+    fn set_job(&mut self, job: u64) {
+        (**self).set_job(job);
+    }
+
+    #[inline]
+    fn subject(&self) -> Subject {
+        (**self).subject()
+    }
+
+    fn discard(&mut self, job: u64) {
+        (**self).discard(job);
+    }
+
+    #[inline]
+    fn has_effects(&self) -> bool {
+        (**self).has_effects()
+    }
+
+    #[inline]
+    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) {
+        (**self).complete(finish_ns, ask);
+    }
+
+    fn alternate(&self) -> Option<Self::Alternate> {
+        (**self).alternate()
+    }
+
+    fn replace(&mut self) {
+        (**self).replace();
+    }
 }
 
 /// Which function takes over after a fault; it can be asked while the body runs.
