@@ -126,7 +126,9 @@ pub use policy::{
     Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,
     Priority, SchedulerOptions,
 };
-pub use scheduler::{DagStatistics, Decision, HandOff, Log, Moment, Notice, Released, Scheduler};
+pub use scheduler::{
+    DagPhase, DagStatistics, Decision, HandOff, Log, Moment, Notice, Released, Scheduler, Snapshot,
+};
 pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;

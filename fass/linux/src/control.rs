@@ -5,11 +5,11 @@ use std::sync::{Arc, Barrier};
 use std::thread;
 
 use sched_dag::DagId;
+use sched_dag::lifecycle::Request;
 
 use crate::end_signals::{self, EndSignals};
 use crate::level::Role;
 use crate::office::Office;
-use crate::requests::Request;
 use crate::sys;
 
 /// The handle of a committed run. What it asks for is done by the release thread of the DAG's
@@ -55,7 +55,7 @@ impl Control {
     ///
     /// If there is no such DAG.
     pub fn pause(&self, dag: DagId) {
-        self.0.request(dag, Request::Pause);
+        self.0.send(None, Request::Pause(dag));
     }
 
     /// Has a paused DAG's jobs released again.
@@ -64,7 +64,7 @@ impl Control {
     ///
     /// If there is no such DAG.
     pub fn resume(&self, dag: DagId) {
-        self.0.request(dag, Request::Resume);
+        self.0.send(None, Request::Resume(dag));
     }
 
     /// Ends a DAG for good: it starts no further instance.
@@ -73,7 +73,7 @@ impl Control {
     ///
     /// If there is no such DAG.
     pub fn stop(&self, dag: DagId) {
-        self.0.request(dag, Request::Stop);
+        self.0.send(None, Request::Stop(dag));
     }
 
     /// Has the run end in order when a signal that is caught asks for it, or has: nothing more is
@@ -88,7 +88,7 @@ impl Control {
         self.watch("fass-ends", |office| {
             let has_come = end_signals::wait(sys::now_ns() + MOST_NS);
             if has_come {
-                office.request_of_all(Request::Close);
+                office.send_of_all(Request::Close);
             }
             !has_come
         })
@@ -99,7 +99,7 @@ impl Control {
         const MOST_MS: i32 = 200;
         self.watch("fass-input", move |office| {
             if arrivals.wait(MOST_MS) {
-                office.request(dag, Request::Signal);
+                office.send(None, Request::Signal(dag));
             }
             true
         })

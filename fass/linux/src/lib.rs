@@ -46,7 +46,6 @@ mod office;
 mod parked;
 mod platform;
 mod release;
-mod requests;
 mod run;
 mod seats;
 mod state;

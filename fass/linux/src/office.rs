@@ -15,11 +15,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-use sched_dag::lifecycle::{self, Letters};
-use sched_dag::{ClusterId, DagId, Moment, TaskSet};
+use sched_dag::lifecycle::{Letters, Request};
+use sched_dag::{ClusterId, DagId, TaskSet};
 
 use crate::level::Levels;
-use crate::requests::{Request, Requests};
 use crate::sys;
 
 /// What all threads of a run share, of whatever cluster.
@@ -29,7 +28,6 @@ pub(crate) struct Office {
     pub(crate) plan: u64,
     pub(crate) levels: Option<Levels>,
     task_set: Arc<TaskSet>,
-    requests: Requests,
     pub(crate) letters: Letters,
     doors: Box<[Door]>,
     /// How many clusters do not rest, and how many have letters.
@@ -62,7 +60,6 @@ impl Office {
             plan,
             levels,
             task_set: Arc::clone(task_set),
-            requests: Requests::new(task_set.dags().len()),
             letters,
             reasons: AtomicU64::new(doors.len() as u64),
             doors,
@@ -82,21 +79,17 @@ impl Office {
         sys::wake(alarm, 1);
     }
 
-    /// Leaves a request from outside to the release thread of the DAG's cluster.
-    pub(crate) fn request(&self, dag: DagId, request: Request) {
-        self.requests.leave(dag, request);
-        self.ring(self.task_set.dag(dag).cluster());
+    /// Leaves a request about each DAG, from outside.
+    pub(crate) fn send_of_all(&self, request: fn(DagId) -> Request) {
+        for dag in (0..).map(DagId).take(self.task_set.dags().len()) {
+            self.send(None, request(dag));
+        }
     }
 
-    /// Leaves a request for each DAG.
-    pub(crate) fn request_of_all(&self, request: Request) {
-        let dags = (0..).map(DagId).take(self.task_set.dags().len());
-        dags.for_each(|dag| self.request(dag, request));
-    }
-
-    /// Sends a request of one cluster's functions to the others that it concerns, and reports
-    /// whether it does not concern the cluster itself.
-    pub(crate) fn send(&self, from: ClusterId, request: lifecycle::Request) -> bool {
+    /// Sends a request to the clusters that it concerns, other than the one whose functions ask, if
+    /// any do, and reports whether it does not concern that one. A thread from outside may be of
+    /// any level, so it must not take a scheduler's lock: it would lose its core with it.
+    pub(crate) fn send(&self, from: Option<ClusterId>, request: Request) -> bool {
         self.letters.send(from, request, |cluster| {
             let has_letters = &self.doors[cluster.index()].has_letters;
             if !has_letters.swap(true, Ordering::AcqRel) {
@@ -111,12 +104,6 @@ impl Office {
     pub(crate) fn open(&self, cluster: ClusterId) -> bool {
         let has_letters = &self.doors[cluster.index()].has_letters;
         has_letters.load(Ordering::Relaxed) && has_letters.swap(false, Ordering::AcqRel)
-    }
-
-    /// Tells a cluster's scheduler all that was asked for from outside.
-    pub(crate) fn serve(&self, cluster: ClusterId, moment: &mut Moment<'_>) {
-        let is_here = |dag| self.task_set.dag(dag).cluster() == cluster;
-        self.requests.serve(is_here, moment);
     }
 
     /// Takes note, after a step of a cluster's release thread, of how often letters were taken, and
@@ -175,7 +162,7 @@ mod tests {
         let (letters, _) = divide(&task_set, None).expect("there are no modes");
         let office = Office::new(0, &task_set, letters, None);
         let [here, there] = [0, 1].map(ClusterId);
-        let signal = |dag| office.send(here, Request::Signal(DagId(dag)));
+        let signal = |dag| office.send(Some(here), Request::Signal(DagId(dag)));
         let (mut first, mut second) = (false, false);
         assert!(!office.settle(&mut second, true, 0));
         assert!(!signal(0), "it is its own");

@@ -7,12 +7,11 @@ use std::time::Duration;
 use fass::{
     Body, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
 };
-use sched_dag::lifecycle::{self, Parts, Requests};
+use sched_dag::lifecycle::{self, Parts, Request, Requests};
 use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions, TaskSet, Vertex};
 
 use crate::level::Levels;
 use crate::office::Office;
-use crate::requests::Request;
 use crate::run::Launched;
 use crate::state::State;
 use crate::sys;
@@ -155,7 +154,7 @@ impl Platform for Host {
              `dag.using(signal.raising())`"
         );
         if let Some(office) = self.office().filter(|office| office.plan == plan) {
-            office.request(dag, Request::Signal);
+            office.send(None, Request::Signal(dag));
         }
     }
 

@@ -112,7 +112,7 @@ impl Port<Box<Runner>> for ThreadPort<'_> {
     }
 
     fn forward(&mut self, request: Request) -> bool {
-        self.office.send(self.cluster, request)
+        self.office.send(Some(self.cluster), request)
     }
 
     fn letters(&mut self) -> Option<&Letters> {

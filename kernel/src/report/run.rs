@@ -5,9 +5,9 @@ use core::cell::OnceCell;
 
 use sched_dag::chains::{Chain, Latencies};
 use sched_dag::law::{Record, Tally, Violation};
-use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
+use sched_dag::{DagId, DagStatistics, Journal, SchedulerOptions, Snapshot, SubtaskId, TaskSet};
 
-use executive::run::execution::{Ended, Snapshot};
+use executive::run::execution::Ended;
 
 /// A run that has ended: its model, its times and its counts.
 ///
@@ -181,7 +181,7 @@ impl Run {
 
     /// Returns how a DAG has ended.
     pub(crate) fn snapshot(&self, dag: DagId) -> Snapshot {
-        Snapshot::of(self.ended.scheduler(dag), dag)
+        self.ended.scheduler(dag).snapshot(dag)
     }
 
     /// Returns every breach of the model's rules R1 to R4, and whether each instance had

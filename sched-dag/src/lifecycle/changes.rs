@@ -67,7 +67,12 @@ impl Lifecycle for Changes {
                 self.modes = Modes::default();
                 changes.extend(self.dags.drain(..).map(Change::Close));
             }
-            Request::Signal(_) | Request::Pause(_) | Request::Resume(_) => {}
+            // Of one DAG, and touching none of its own.
+            Request::Pause(_)
+            | Request::Resume(_)
+            | Request::Signal(_)
+            | Request::Close(_)
+            | Request::Stop(_) => {}
         }
     }
 

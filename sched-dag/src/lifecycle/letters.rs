@@ -1,4 +1,4 @@
-//! Requests to other clusters, on their way.
+//! Requests to other clusters, and from outside of all, on their way.
 //!
 //! Each cluster serves the requests that concern its DAGs, with its own part of what the app has
 //! stated. A request of a completion goes where it concerns something: a signal, a pause and a
@@ -7,7 +7,8 @@
 //! takes it, before its releases. Leaving one never waits, and the room is taken at commit:
 //!
 //! - Signals are counted, so each is one.
-//! - Of a pause and a resumption of one DAG that wait, the later one counts, and so it is of modes.
+//! - Of a pause and a resumption of one DAG that wait, the later one counts, and so it is of modes;
+//!   a stop counts more than a closing.
 //! - What is taken in one step is served in this order: DAG by DAG, the mode, the end.
 
 use alloc::boxed::Box;
@@ -34,6 +35,8 @@ struct ToDag {
     signals: AtomicU32,
     /// [`NOTHING`], [`PAUSE`] or [`RESUME`].
     change: AtomicU32,
+    /// [`NOTHING`], [`CLOSE`] or [`STOP`].
+    end: AtomicU32,
 }
 
 /// What waits for a cluster about its whole.
@@ -47,6 +50,8 @@ struct ToCluster {
 const NOTHING: u32 = 0;
 const PAUSE: u32 = 1;
 const RESUME: u32 = 2;
+const CLOSE: u32 = 1;
+const STOP: u32 = 2;
 
 /// What serves the requests of each cluster.
 pub type Parts = Vec<Option<Box<dyn Lifecycle>>>;
@@ -80,6 +85,7 @@ pub fn divide(
                 cluster: dag.cluster(),
                 signals: AtomicU32::new(0),
                 change: AtomicU32::new(NOTHING),
+                end: AtomicU32::new(NOTHING),
             })
             .collect(),
         clusters: task_set.clusters().map(|_| ToCluster::default()).collect(),
@@ -89,17 +95,24 @@ pub fn divide(
 }
 
 impl Letters {
-    /// Leaves a request of one cluster for the others that it concerns, calls `sent` for each of
-    /// them, and reports whether it does not concern the cluster itself.
-    pub fn send(&self, from: ClusterId, request: Request, mut sent: impl FnMut(ClusterId)) -> bool {
+    /// Leaves a request for the clusters that it concerns, other than the one that it comes `from`,
+    /// if any; calls `sent` for each of them, and reports whether it does not concern that one.
+    pub fn send(
+        &self,
+        from: Option<ClusterId>,
+        request: Request,
+        mut sent: impl FnMut(ClusterId),
+    ) -> bool {
         let to = match request {
-            Request::Signal(dag) | Request::Pause(dag) | Request::Resume(dag) => {
-                self.dags[dag.index()].cluster
-            }
+            Request::Signal(dag)
+            | Request::Pause(dag)
+            | Request::Resume(dag)
+            | Request::Close(dag)
+            | Request::Stop(dag) => self.dags[dag.index()].cluster,
             Request::Enter(..) => self.of_modes,
             Request::ShutDown => {
                 for (cluster, to) in (0..).map(ClusterId).zip(&self.clusters) {
-                    if cluster != from {
+                    if Some(cluster) != from {
                         to.ends.store(true, Ordering::Release);
                         sent(cluster);
                     }
@@ -108,17 +121,17 @@ impl Letters {
             }
             Request::Begin | Request::GoOn => return false,
         };
-        if to == from {
+        if Some(to) == from {
             return false;
         }
+        let of = |dag: DagId| &self.dags[dag.index()];
         // Release: for the latest values that were shown before.
         match request {
-            Request::Signal(dag) => {
-                let signals = &self.dags[dag.index()].signals;
-                signals.fetch_add(1, Ordering::Release);
-            }
-            Request::Pause(dag) => self.change(dag, PAUSE),
-            Request::Resume(dag) => self.change(dag, RESUME),
+            Request::Signal(dag) => _ = of(dag).signals.fetch_add(1, Ordering::Release),
+            Request::Pause(dag) => of(dag).change.store(PAUSE, Ordering::Release),
+            Request::Resume(dag) => of(dag).change.store(RESUME, Ordering::Release),
+            Request::Close(dag) => _ = of(dag).end.fetch_max(CLOSE, Ordering::Release),
+            Request::Stop(dag) => of(dag).end.store(STOP, Ordering::Release),
             Request::Enter(mode, entry) => {
                 let place = &self.clusters[to.index()].mode;
                 place.store(packed(mode, entry), Ordering::Release);
@@ -127,11 +140,6 @@ impl Letters {
         }
         sent(to);
         true
-    }
-
-    fn change(&self, dag: DagId, change: u32) {
-        let place = &self.dags[dag.index()].change;
-        place.store(change, Ordering::Release);
     }
 
     /// Takes all that waits for a cluster.
@@ -147,6 +155,11 @@ impl Letters {
             }
             let signals = to.signals.swap(0, Ordering::Acquire);
             (0..signals).for_each(|_| take(Request::Signal(dag)));
+            match to.end.swap(NOTHING, Ordering::Acquire) {
+                CLOSE => take(Request::Close(dag)),
+                STOP => take(Request::Stop(dag)),
+                _ => {}
+            }
         }
         let to = &self.clusters[cluster.index()];
         if let Some((mode, entry)) = unpacked(to.mode.swap(NOTHING, Ordering::Acquire)) {
@@ -216,10 +229,13 @@ mod tests {
             (Request::Begin, false),
         ] {
             let mut sent = Vec::new();
-            let away = letters.send(here, request, |cluster| sent.push(cluster));
+            let away = letters.send(Some(here), request, |cluster| sent.push(cluster));
             assert_eq!(away, is_away, "{request:?}");
             let leaves = is_away || request == Request::ShutDown;
             assert_eq!(sent, vec![there; usize::from(leaves)], "{request:?}");
+        }
+        for request in [Request::Stop(DagId(2)), Request::Close(DagId(2))] {
+            assert!(letters.send(None, request, |cluster| assert_eq!(cluster, there)));
         }
         let mut taken = Vec::new();
         letters.take(there, |request| taken.push(request));
@@ -227,6 +243,7 @@ mod tests {
             Request::Signal(DagId(1)),
             Request::Signal(DagId(1)),
             Request::Resume(DagId(2)),
+            Request::Stop(DagId(2)),
             modes[1],
             Request::ShutDown,
         ];

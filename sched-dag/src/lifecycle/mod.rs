@@ -38,7 +38,8 @@ use crate::scheduler::Moment;
 pub use changes::Changes;
 pub use letters::{Letters, Parts, divide};
 
-/// What takes effect with a completion, besides values.
+/// A change that is asked of a run: by a function, with effect from its completion on, by another
+/// cluster, or from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// A sporadic DAG gets a signal.
@@ -47,6 +48,10 @@ pub enum Request {
     Pause(DagId),
     /// A paused DAG releases jobs again.
     Resume(DagId),
+    /// A DAG releases no further job, and what is in flight goes on. Asked from outside only.
+    Close(DagId),
+    /// A DAG is ended: nothing of it starts any more. Asked from outside only.
+    Stop(DagId),
     /// Another set of DAGs runs.
     Enter(ModeId, Entry),
     /// The run ends: no DAG releases a further job.
@@ -56,6 +61,14 @@ pub enum Request {
     /// What waits may come about. A driver asks for that in each step until it has, before all
     /// else.
     GoOn,
+}
+
+impl Request {
+    /// Reports whether what it comes to is for a [`Lifecycle`] to say, where there is one.
+    #[must_use]
+    pub const fn is_of_lifecycle(self) -> bool {
+        !matches!(self, Self::Signal(_) | Self::Close(_) | Self::Stop(_))
+    }
 }
 
 /// When a mode is entered.
@@ -157,9 +170,13 @@ impl Requests {
         cluster: ClusterId,
         moment: &mut Moment<'_>,
     ) {
-        letters.take(cluster, |request| match request {
-            Request::Signal(dag) => moment.signal(dag),
-            other => self.keep(other),
+        letters.take(cluster, |request| {
+            let is_served = self.lifecycle.is_some();
+            if !(is_served && request.is_of_lifecycle()) {
+                moment.serve(request);
+            } else {
+                self.keep(request);
+            }
         });
         self.serve(moment);
     }
@@ -172,11 +189,11 @@ impl Requests {
     pub fn serve(&mut self, moment: &mut Moment<'_>) {
         let mut waits = false;
         for request in self.kept.drain(..) {
-            match (request, &mut self.lifecycle) {
-                (Request::Signal(dag), _) => moment.signal(dag),
-                (_, Some(lifecycle)) => lifecycle.serve(request, &mut self.changes),
-                // Without it nothing is asked for.
-                (_, None) => {}
+            match &mut self.lifecycle {
+                Some(lifecycle) if request.is_of_lifecycle() => {
+                    lifecycle.serve(request, &mut self.changes);
+                }
+                _ => moment.serve(request),
             }
             for change in self.changes.drain(..) {
                 match change {

@@ -16,7 +16,7 @@
 //!
 //! To the other rules a closing is nothing new: it is a limit of jobs that is there already.
 
-use super::Scheduler;
+use super::{DagPhase, Scheduler};
 use crate::ids::DagId;
 
 impl Scheduler {
@@ -27,9 +27,7 @@ impl Scheduler {
             return;
         }
         self.judge(dag, None);
-        let state = &mut self.dags[dag.index()];
-        state.jobs.close();
-        state.is_paused = false;
+        self.dags[dag.index()].jobs.close(DagPhase::Closed);
         self.log.closed(dag);
         while self.waiting(dag) > 0 {
             self.skip_oldest_waiting(dag);

@@ -8,7 +8,7 @@
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
-use super::{Log, OWED, Scheduler, earliest_ns};
+use super::{DagPhase, Log, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::policy::JobOutcome;
 
@@ -191,7 +191,7 @@ impl Scheduler {
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);
         let outcome = if let Some(cut) = job.cut {
-            if !state.jobs.is_ended() {
+            if state.jobs.phase != DagPhase::Ended {
                 let first = self.task_set.first_vertex(dag) as usize;
                 let subtasks = self.task_set.dag(dag).subtasks().len();
                 self.vertices.allow_passing_on(first..first + subtasks);

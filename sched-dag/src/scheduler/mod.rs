@@ -53,6 +53,7 @@ mod log;
 mod moment;
 mod overrun;
 mod pausing;
+mod phase;
 mod ready_queue;
 mod signals;
 mod statistics;
@@ -67,6 +68,7 @@ pub use decision::Decision;
 pub use hand_off::HandOff;
 pub use log::{Log, Notice};
 pub use moment::{Moment, Released};
+pub use phase::{DagPhase, Snapshot};
 pub use statistics::DagStatistics;
 
 use cores::Cores;
@@ -120,7 +122,6 @@ struct DagState {
     jobs: Jobs,
     statistics: DagStatistics,
     survived: Survived,
-    is_paused: bool,
     /// When the latest pause has ended; what was due before is skipped.
     resumed_ns: u64,
 }
@@ -187,7 +188,6 @@ impl Scheduler {
                     jobs,
                     statistics: DagStatistics::default(),
                     survived: Survived::new(dag.on_fault()),
-                    is_paused: false,
                     resumed_ns: 0,
                 }
             })
@@ -313,7 +313,7 @@ impl Scheduler {
     #[must_use]
     #[inline]
     pub fn is_ended(&self, dag: DagId) -> bool {
-        self.dags[dag.index()].jobs.is_ended()
+        self.phase(dag) == DagPhase::Ended
     }
 
     /// Returns a DAG's counters.

@@ -3,6 +3,7 @@
 use super::{Decision, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
 use crate::journal::What;
+use crate::lifecycle::Request;
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]
@@ -148,6 +149,23 @@ impl<'s> Moment<'s> {
     #[inline]
     pub fn signal(&mut self, dag: DagId) {
         self.scheduler.signal(dag);
+    }
+
+    /// Does what is asked of one DAG; nothing at other requests.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG, or a signal is to one that is not sporadic.
+    #[inline]
+    pub fn serve(&mut self, request: Request) {
+        match request {
+            Request::Signal(dag) => self.signal(dag),
+            Request::Pause(dag) => self.pause(dag),
+            Request::Resume(dag) => self.resume(dag),
+            Request::Close(dag) => self.close(dag),
+            Request::Stop(dag) => self.stop(dag),
+            Request::Enter(..) | Request::ShutDown | Request::Begin | Request::GoOn => {}
+        }
     }
 
     /// Writes down that the run is in another mode.

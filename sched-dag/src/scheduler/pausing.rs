@@ -19,7 +19,7 @@
 //! To the other rules a pause is nothing new: a job is skipped as with
 //! [`OverrunPolicy::Skip`](crate::OverrunPolicy::Skip).
 
-use super::Scheduler;
+use super::{DagPhase, Scheduler};
 use crate::ids::DagId;
 
 impl Scheduler {
@@ -31,7 +31,7 @@ impl Scheduler {
     #[must_use]
     #[inline]
     pub fn is_paused(&self, dag: DagId) -> bool {
-        self.dags[dag.index()].is_paused
+        self.phase(dag) == DagPhase::Paused
     }
 
     /// Returns the number of jobs of a DAG that are in flight.
@@ -54,7 +54,8 @@ impl Scheduler {
         }
         // What was late before the pause is a miss.
         self.judge(dag, None);
-        if !core::mem::replace(&mut self.dags[dag.index()].is_paused, true) {
+        let phase = &mut self.dags[dag.index()].jobs.phase;
+        if core::mem::replace(phase, DagPhase::Paused) != DagPhase::Paused {
             self.log.switched_off(dag);
         }
         while self.waiting(dag) > 0 {
@@ -67,7 +68,8 @@ impl Scheduler {
     #[inline]
     pub(super) fn resume(&mut self, dag: DagId) {
         let state = &mut self.dags[dag.index()];
-        if core::mem::take(&mut state.is_paused) {
+        if state.jobs.phase == DagPhase::Paused {
+            state.jobs.phase = DagPhase::Running;
             state.resumed_ns = self.log.now_ns;
             self.log.switched_on(dag);
         }

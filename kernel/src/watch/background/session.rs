@@ -10,7 +10,8 @@
 
 use core::fmt::Display;
 
-use sched_dag::{Dag, DagId, TaskSet};
+use sched_dag::lifecycle::Request;
+use sched_dag::{Dag, DagId, Snapshot, TaskSet};
 
 use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
@@ -19,7 +20,7 @@ use crate::options::whole_number;
 use crate::println;
 use crate::report::counts::Counts;
 use executive::machine::serial;
-use executive::run::execution::{self, Control, Snapshot, State};
+use executive::run::execution;
 use executive::text::json;
 
 /// How often core 0 looks for bytes, at least.
@@ -164,11 +165,11 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
                 line,
                 task_set,
                 name,
-                Control::Pause,
+                Request::Pause,
                 "releases no more jobs",
             );
         }
-        Command::Start(name) => change(line, task_set, name, Control::Resume, "releases jobs"),
+        Command::Start(name) => change(line, task_set, name, Request::Resume, "releases jobs"),
         Command::Shutdown => {
             stop::shut_down();
             accept(line);
@@ -210,33 +211,23 @@ fn describe(counts: &Counts, dag: &Dag) {
 /// Returns what is told of a DAG that does so.
 pub(crate) const fn counts(snapshot: &Snapshot) -> Counts {
     Counts {
-        state: word(snapshot.state),
+        state: snapshot.word(),
         statistics: snapshot.statistics,
         in_flight: snapshot.in_flight,
         waiting: snapshot.waiting,
     }
 }
 
-const fn word(state: State) -> &'static str {
-    match state {
-        State::Running => "running",
-        State::Paused => "stopped",
-        State::Ended => "ended",
-        State::Over => "over",
-    }
-}
-
 /// Makes a change to the DAG that is named.
-fn change(line: &str, task_set: &TaskSet, name: &str, how: fn(DagId) -> Control, what: &str) {
+fn change(line: &str, task_set: &TaskSet, name: &str, how: fn(DagId) -> Request, what: &str) {
     let Some(dag) = find(task_set, name) else {
         return unknown(line, name);
     };
-    let state = execution::snapshot(dag).map(|snapshot| snapshot.state);
-    if let Some(State::Ended | State::Over) = state {
+    if execution::snapshot(dag).is_some_and(|snapshot| snapshot.is_final()) {
         let of = task_set.dag(dag).name();
         return refuse(line, &format_args!("dag `{of}` has ended and stays so"));
     }
-    execution::control(how(dag));
+    execution::control(dag, how);
     println!("dag `{}` {what}", task_set.dag(dag).name());
     accept(line);
 }

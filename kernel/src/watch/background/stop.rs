@@ -7,8 +7,9 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use executive::machine::serial;
-use executive::run::execution::{self, Control};
+use executive::run::execution;
 use sched_dag::DagId;
+use sched_dag::lifecycle::Request;
 
 use crate::println;
 
@@ -51,6 +52,6 @@ pub(super) fn shut_down() {
     };
     println!("shutting down: nothing more is released; what is in flight goes on");
     let dags = (0..).map(DagId).take(task_set.dags().len());
-    dags.for_each(|dag| execution::control(Control::Close(dag)));
+    dags.for_each(|dag| execution::control(dag, Request::Close));
     IS_ASKED.store(true, Ordering::Relaxed);
 }

@@ -23,6 +23,7 @@ mod judging;
 
 use alloc::boxed::Box;
 
+use super::phase::DagPhase;
 use crate::ids::to_u32;
 use crate::policy::JobOutcome;
 use crate::task_set::Dag;
@@ -41,11 +42,8 @@ pub(super) struct Jobs {
     pub(super) oldest: u64,
     /// The sequence number of the next job to be released.
     pub(super) next: u64,
-    /// Whether the DAG is ended: no job is released, and none in flight starts
-    /// a further instance.
-    ended: bool,
-    /// Whether no further job is due, because the DAG is closed or ended.
-    closed: bool,
+    /// How far the DAG's life has come.
+    pub(super) phase: DagPhase,
     /// The first job that is not due yet.
     pub(super) next_due: u64,
     /// Its nominal release time; `None`: there is no further job, or, of a
@@ -98,8 +96,7 @@ impl Jobs {
             ends: to_u32(ends.count()),
             oldest: 0,
             next: 0,
-            ended: false,
-            closed: false,
+            phase: DagPhase::Running,
             next_due: 0,
             next_due_ns: due_ns(dag, 0),
             last_due_ns: 0,
@@ -142,7 +139,7 @@ impl Jobs {
             Some(jobs) => self.next_due >= jobs,
             None => dag.is_sporadic() && self.next_due_ns.is_none(),
         };
-        self.oldest == self.next && self.waiting() == 0 && (self.closed || none_ahead)
+        self.oldest == self.next && self.waiting() == 0 && (self.is_closed() || none_ahead)
     }
 
     /// Returns the job that a signal is for, or that one is kept for.
@@ -157,7 +154,7 @@ impl Jobs {
     #[inline]
     pub(super) fn signal(&mut self, dag: &Dag, now_ns: u64) -> Option<u64> {
         let limit_reached = dag.jobs().is_some_and(|jobs| self.next_due >= jobs);
-        if self.closed || limit_reached || self.waiting() > 0 || self.next_due_ns.is_some() {
+        if self.is_closed() || limit_reached || self.waiting() > 0 || self.next_due_ns.is_some() {
             return None;
         }
         let earliest_ns = match self.next_due {
@@ -288,21 +285,16 @@ impl Jobs {
         is_first
     }
 
-    #[inline]
-    pub(super) fn is_ended(&self) -> bool {
-        self.ended
-    }
-
     /// Reports whether no further job will be due.
     #[inline]
     pub(super) fn is_closed(&self) -> bool {
-        self.closed
+        self.phase >= DagPhase::Closed
     }
 
-    /// Drops all that is ahead.
+    /// Drops all that is ahead, for good.
     #[inline]
-    pub(super) fn close(&mut self) {
-        self.closed = true;
+    pub(super) fn close(&mut self, phase: DagPhase) {
+        self.phase = phase;
         self.next_due_ns = None;
     }
 
@@ -316,8 +308,7 @@ impl Jobs {
             cut_short += u64::from(self.cut(sequence, JobOutcome::DagEnded));
         }
         let dropped = self.waiting();
-        self.ended = true;
-        self.close();
+        self.close(DagPhase::Ended);
         self.first_waiting = self.next_due;
         (cut_short, dropped)
     }

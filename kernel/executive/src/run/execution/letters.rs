@@ -24,7 +24,7 @@ pub(super) fn send(
     woken: &mut CoreSet,
 ) -> bool {
     letters.as_ref().is_some_and(|letters| {
-        letters.send(from, request, |cluster| {
+        letters.send(Some(from), request, |cluster| {
             let there = nth(cluster.index());
             // What was left before is seen by the core that takes the letters.
             there.has_letters.store(true, Ordering::Release);

@@ -40,7 +40,7 @@ use sched_dag::{Journal, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
 pub use cluster::{count as clusters, first_core};
-pub use control::{Control, Snapshot, State, control, nominal_end_ns, snapshot, task_set};
+pub use control::{control, nominal_end_ns, snapshot, task_set};
 pub use divided::{Division, division, is_finished, set_division};
 pub use ended::{Ended, look_at_clearing};
 pub use events::{complete, fail, find_work, interrupt};
