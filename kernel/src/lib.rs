@@ -67,7 +67,8 @@ pub use app::machine_handle::Machine;
 pub use app::resources::Resources;
 pub use executive::memory::heap::KernelHeap;
 pub use executive::{print, println};
-pub use report::run::Run;
+#[doc(inline)]
+pub use sched_dag::engine::Run;
 pub use start::CLOCK;
 
 /// Text on the serial line, which [`print!`] and [`println!`] write.

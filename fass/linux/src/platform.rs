@@ -182,8 +182,7 @@ impl Platform for Host {
             *place = Some(Arc::clone(&office));
         }
         let launched = Launched {
-            bounds_ns: plan.bounds_ns.clone(),
-            sink_bounds_ns: plan.sink_bounds_ns.clone(),
+            proven: plan.proven.clone(),
             options,
             budget_factor: terms.budget_factor,
             allocations: terms.allocations,

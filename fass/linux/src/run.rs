@@ -1,15 +1,16 @@
 //! A run: its threads while it goes on, and what it leaves behind.
 
+use std::ops::Deref;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, MutexGuard};
 use std::thread::{self, JoinHandle};
 
-use sched_dag::law::{Record, Violation};
-use sched_dag::{Dag, DagId, DagStatistics, Journal, SchedulerOptions, SubtaskId, TaskSet};
+use sched_dag::SchedulerOptions;
+use sched_dag::engine::{self, Proven};
 
 use crate::office::Office;
 use crate::release::Budgets;
-use crate::state::{Fault, Number, State};
+use crate::state::{Fault, Number};
 use crate::sys;
 use crate::team::Team;
 
@@ -25,8 +26,7 @@ pub(crate) struct Launched {
     /// By cluster.
     pub(crate) teams: Vec<Arc<Team>>,
     pub(crate) options: SchedulerOptions,
-    pub(crate) bounds_ns: Vec<Option<u64>>,
-    pub(crate) sink_bounds_ns: Vec<Vec<Option<u64>>>,
+    pub(crate) proven: Proven,
     pub(crate) budget_factor: u64,
     /// Counts what the program has allocated so far.
     pub(crate) allocations: fn() -> u64,
@@ -43,23 +43,23 @@ pub struct Counts {
     pub preemptions: u64,
 }
 
-/// A run that has ended: its model, its times and its counts.
+/// A run that has ended: what [every platform](engine::Run) tells of it, its faults, and the counts
+/// of its threads.
 ///
 /// See [`Linux`](crate::Linux).
 #[derive(Debug)]
 pub struct Run {
-    task_set: Arc<TaskSet>,
-    options: SchedulerOptions,
-    statistics: Vec<DagStatistics>,
-    journal: Journal,
-    record: Record,
+    run: engine::Run,
     faults: Vec<Fault>,
     counts: Counts,
-    epoch_ns: u64,
-    bounds_ns: Vec<Option<u64>>,
-    sink_bounds_ns: Vec<Vec<Option<u64>>>,
-    sink_misses: Vec<Vec<u64>>,
-    allocations: u64,
+}
+
+impl Deref for Run {
+    type Target = engine::Run;
+
+    fn deref(&self) -> &engine::Run {
+        &self.run
+    }
 }
 
 /// Starts the threads of a committed plan, waits for the end of all its jobs, and
@@ -90,19 +90,12 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     releases.into_iter().for_each(join);
     let mut states: Vec<_> = teams.iter().map(|team| team.lock()).collect();
     let abandoned: Vec<Vec<Number>> = states.iter().map(|state| state.abandoned.clone()).collect();
-    let task_set = Arc::clone(&states[0].engine.task_set);
-    let journal = journal(&mut states, &task_set, launched.options.cores);
-    let scheduler_of = |dag| &states[task_set.dag(dag).cluster().index()].engine.scheduler;
-    let ids = (0..).map(DagId).zip(task_set.dags());
-    let statistics = |(dag, _)| *scheduler_of(dag).statistics(dag);
-    let statistics = ids.clone().map(statistics).collect();
-    let sink_misses = |(dag, model): (DagId, &Dag)| {
-        let sinks = model.sinks().iter();
-        sinks
-            .map(|sink| scheduler_of(dag).sink_misses(dag, *sink))
-            .collect()
-    };
-    let sink_misses = ids.map(sink_misses).collect();
+    let cores = launched.options.cores;
+    let mut parts = states.iter_mut().map(|state| &mut state.engine);
+    let first = parts.next().expect("there is a cluster at least");
+    let mut run = engine::Run::of(first, launched.proven, cores);
+    // Nobody writes any more: those that were abandoned see that they were.
+    parts.for_each(|other| run.absorb(other));
     let mut counts = Counts::default();
     let mut faults = Vec::new();
     for (team, state) in teams.iter().zip(&mut states) {
@@ -119,38 +112,16 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
             }
         }
     }
+    let run = run.with_counts(engine::Counts {
+        epoch_ns,
+        allocations,
+        ..engine::Counts::default()
+    });
     Run {
-        record: journal.record(&task_set),
-        task_set,
-        options: launched.options,
-        statistics,
-        journal,
+        run,
         faults,
         counts,
-        epoch_ns,
-        bounds_ns: launched.bounds_ns,
-        sink_bounds_ns: launched.sink_bounds_ns,
-        sink_misses,
-        allocations,
     }
-}
-
-/// Takes the journals out, as one. Nobody writes any more: those that were abandoned see that
-/// they were.
-fn journal(states: &mut [MutexGuard<'_, State>], task_set: &Arc<TaskSet>, cores: u32) -> Journal {
-    let mut merged: Option<Journal> = None;
-    for (cluster, state) in task_set.clusters().zip(states) {
-        let empty = Journal::new(task_set, 0, 0);
-        let its = std::mem::replace(&mut state.engine.scheduler.log.journal, empty);
-        match &mut merged {
-            None => merged = Some(its),
-            Some(merged) => {
-                let first_core = task_set.cores_of(cluster, cores).start;
-                merged.absorb(its, cluster, first_core);
-            }
-        }
-    }
-    merged.expect("there is a cluster at least")
 }
 
 fn release(team: &Arc<Team>, budget_factor: u64) -> JoinHandle<()> {
@@ -178,104 +149,21 @@ fn join(thread: JoinHandle<()>) {
 }
 
 impl Run {
-    /// Returns the model that was run.
-    #[must_use]
-    pub const fn task_set(&self) -> &Arc<TaskSet> {
-        &self.task_set
-    }
-
-    /// Returns the times of all jobs and instances, in nanoseconds from the instant from
-    /// which releases count; of the latest whole jobs if there were too many.
-    #[must_use]
-    pub const fn record(&self) -> &Record {
-        &self.record
-    }
-
-    /// Returns the journal: what has happened, in its order.
-    #[must_use]
-    pub const fn journal(&self) -> &Journal {
-        &self.journal
-    }
-
-    /// Returns a DAG's counters.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such DAG.
-    #[must_use]
-    pub fn statistics(&self, dag: DagId) -> &DagStatistics {
-        &self.statistics[dag.index()]
-    }
-
-    /// Returns the response time that the commit has proven of a DAG, if it has.
-    #[must_use]
-    pub fn bound_ns(&self, dag: DagId) -> Option<u64> {
-        self.bounds_ns.get(dag.index()).copied().flatten()
-    }
-
-    /// Returns the response time that the commit has proven of a sink, if it has.
-    #[must_use]
-    pub fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
-        let place = self.place_of(dag, sink)?;
-        let of_dag = self.sink_bounds_ns.get(dag.index())?;
-        of_dag.get(place).copied().flatten()
-    }
-
-    /// Returns how many jobs a sink has missed its deadline in; 0 of what is no sink.
-    #[must_use]
-    pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
-        let place = self.place_of(dag, sink);
-        place.map_or(0, |place| self.sink_misses[dag.index()][place])
-    }
-
-    fn place_of(&self, dag: DagId, sink: SubtaskId) -> Option<usize> {
-        let sinks = self.task_set.dag(dag).sinks();
-        sinks.iter().position(|other| *other == sink)
-    }
-
-    /// Returns how the scheduler was told to work.
-    #[must_use]
-    pub const fn options(&self) -> SchedulerOptions {
-        self.options
-    }
-
-    /// Returns how often anything in the program allocated memory between the start of the
-    /// releases and the last completion; 0 if nobody has said how to count that
-    /// ([`Linux::allocations`](crate::Linux::allocations)).
-    #[must_use]
-    pub const fn allocations(&self) -> u64 {
-        self.allocations
-    }
-
-    /// Returns the faults that have ended DAGs, of each cluster in their order.
+    /// Returns the faults, of each cluster in their order.
     #[must_use]
     pub fn faults(&self) -> &[Fault] {
         &self.faults
+    }
+
+    /// Returns what every platform tells of it.
+    #[must_use]
+    pub fn into_run(self) -> engine::Run {
+        self.run
     }
 
     /// Returns how often the threads did what.
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
-    }
-
-    /// Returns the instant from which releases count, on the clock of [`fass::now_ns`].
-    #[must_use]
-    pub const fn epoch_ns(&self) -> u64 {
-        self.epoch_ns
-    }
-
-    /// Returns every breach of rules R1 to R4, and whether each instance had one life and
-    /// each core one instance at a time. However long something takes is right.
-    pub fn violations(&self) -> impl Iterator<Item = Violation> {
-        self.journal.violations(&self.task_set).into_iter()
-    }
-
-    /// Returns every breach of R5 that lasts for longer than `bound_ns`: a decision takes
-    /// effect when Linux has switched threads. `None` if events are lost.
-    #[must_use]
-    pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
-        self.journal
-            .dispatch_violations(&self.task_set, &self.options, bound_ns)
     }
 }

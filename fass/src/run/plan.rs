@@ -6,7 +6,7 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use sched_dag::engine::Alternate;
+use sched_dag::engine::{Alternate, Proven};
 use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, TaskSet};
 
@@ -39,11 +39,8 @@ pub struct Plan {
     pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<Body>>,
-    /// The response time of each DAG that the commit has proven, if it has
-    /// ([`Commit::answers`](crate::Commit::answers)).
-    pub bounds_ns: Vec<Option<u64>>,
-    /// The same of each sink, in the order of [`Dag::sinks`](sched_dag::Dag::sinks).
-    pub sink_bounds_ns: Vec<Vec<Option<u64>>>,
+    /// The response times that the commit has proven ([`Commit::answers`](crate::Commit::answers)).
+    pub proven: Proven,
     /// By DAG, the one that gets a signal when a fault ends it
     /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
     /// scheduler.
@@ -114,7 +111,7 @@ pub(crate) trait Subtask: Send {
 ///
 /// ```
 /// use fass::Body;
-/// use sched_dag::engine::Alternate;
+/// use sched_dag::engine::{Alternate, Proven};
 ///
 /// fn is_survived(body: &Body) -> bool {
 ///     body.replacement().is_some_and(|next: fass::Replacement| next.is_there())

@@ -53,7 +53,8 @@ pub use app::lock::Lock;
 pub use app::machine_handle::{Machine, Resources};
 #[doc(hidden)]
 pub use heap::Heap;
-pub use report::run::Run;
+#[doc(inline)]
+pub use sched_dag::engine::Run;
 
 /// Text on the standard output.
 pub mod console {

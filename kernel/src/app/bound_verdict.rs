@@ -19,8 +19,8 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use super::ending::Ending;
 use crate::report::Ns;
-use crate::report::run::Run;
 use executive::text::json;
+use sched_dag::engine::Run;
 
 /// Whether the app was compiled without optimization, as its entry says.
 pub(crate) static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);

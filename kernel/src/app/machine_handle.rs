@@ -13,7 +13,6 @@ use super::ending::Ending;
 use super::fault_verdict::FaultVerdict;
 use super::wcet_notes;
 use crate::options::Options;
-use crate::report::run::Run;
 use crate::report::{self, Ns};
 use crate::watch::background::{Background, LINE, Wishes, session};
 use executive::machine;
@@ -22,6 +21,7 @@ use executive::memory::heap;
 use executive::run::platform::KERNEL;
 use executive::run::{edge, execution, heartbeat, worker};
 use executive::text::{console, json};
+use sched_dag::engine::{Counts, Run};
 
 /// The machine, lent to the app's function for the time of the run.
 ///
@@ -236,9 +236,13 @@ impl Machine {
             // What was cut off has most likely lost the end of its line.
             crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
-        let ended = execution::end().ok_or_else(nothing)?;
+        let run = execution::end().ok_or_else(nothing)?;
         edge::end(outgoing, !shuts_down);
-        let run = Run::new(ended, allocations, locks, epoch_ns);
+        let run = run.with_counts(Counts {
+            epoch_ns,
+            allocations,
+            lock_acquisitions: locks,
+        });
         report::left::dump(&run);
         let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
@@ -314,7 +318,7 @@ impl Machine {
 /// Reports a run that a person has ended, and returns how its app ends.
 fn shutdown(run: &Run) -> Ending {
     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-        session::counts(&run.snapshot(dag)).show(dag, model);
+        session::counts(run.snapshot(dag)).show(dag, model);
     }
     Ending::after_shutdown(run.violations().count())
 }

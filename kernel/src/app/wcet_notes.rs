@@ -9,8 +9,8 @@ use fass::Overheads;
 use sched_dag::{DagId, Instance, SubtaskId};
 
 use crate::report::Ns;
-use crate::report::run::Run;
 use executive::text::json;
+use sched_dag::engine::Run;
 
 /// Names the subtasks of a run that took longer than their WCET and these overheads, which are
 /// those of the commit.
@@ -21,7 +21,7 @@ pub(crate) fn note(run: &Run, overheads: Overheads) {
         return;
     }
     let charged_ns = overheads.of_an_instance_ns(run.options().preemption);
-    let (Some(charged_ns), Some(counts)) = (charged_ns, run.counts()) else {
+    let (Some(charged_ns), Some(counts)) = (charged_ns, run.coarse_times()) else {
         return;
     };
     for (dag, model) in (0..).map(DagId).zip(set.dags()) {

@@ -10,7 +10,7 @@ use sched_dag::DagId;
 use executive::memory::heap;
 use executive::text::json;
 
-use super::run::Run;
+use sched_dag::engine::Run;
 
 /// Prints a line for each DAG that had faults and has left something.
 pub(crate) fn dump(run: &Run) {

@@ -9,7 +9,6 @@ pub(crate) mod counts;
 mod distribution;
 pub(crate) mod latest;
 pub(crate) mod left;
-pub(crate) mod run;
 pub(crate) mod stacks;
 mod time;
 pub(crate) mod times;

@@ -5,7 +5,7 @@ use core::sync::atomic::Ordering;
 use executive::run::{contexts, stacks};
 use executive::text::json;
 
-use super::run::Run;
+use sched_dag::engine::Run;
 
 /// Prints a line for each subtask, if that was measured.
 pub(crate) fn dump(run: &Run) {

@@ -5,8 +5,8 @@ use core::fmt;
 use sched_dag::law::Histogram;
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use super::run::Run;
 use executive::text::json::{self, Object};
+use sched_dag::engine::Run;
 
 /// Prints the statistics of a run: a line for each DAG, for each subtask, and for each of
 /// several sinks.

@@ -5,8 +5,8 @@ use core::fmt;
 use sched_dag::journal::Event;
 use sched_dag::{Dag, SubtaskId};
 
-use super::run::Run;
 use executive::text::{graph, json};
+use sched_dag::engine::Run;
 
 /// The most events on one line.
 const EVENTS_A_LINE: usize = 32;

@@ -18,12 +18,14 @@
 //!   and deadlines that have passed since the last one.
 
 mod port;
+mod run;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 pub use port::{Alternate, Body, Continuation, Cost, Port};
+pub use run::{Counts, Proven, Run};
 
 use crate::ids::{ClusterId, CoreId, DagId, Vertex};
 use crate::journal::What;

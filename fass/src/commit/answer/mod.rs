@@ -29,6 +29,7 @@ use core::ops::Range;
 use core::time::Duration;
 
 use sched_dag::analysis::{self, OverheadSource, Reason, Settings, TaskError, Test};
+use sched_dag::engine::Proven;
 use sched_dag::wcets::WcetSource;
 use sched_dag::{ClusterId, DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet, Why};
 
@@ -325,15 +326,13 @@ impl Answers {
     }
 
     /// Returns the bounds, for the platform.
-    pub(crate) fn bounds_ns(&self) -> Vec<Option<u64>> {
-        let bounds = self.of_dags.iter().map(|answer| answer.verdict.bound());
-        bounds.map(in_ns).collect()
-    }
-
-    /// Returns the bounds of sinks, for the platform.
-    pub(crate) fn sink_bounds_ns(&self) -> Vec<Vec<Option<u64>>> {
-        let of_dag = |answer: &Answer| answer.sinks.iter().map(|sink| in_ns(sink.bound)).collect();
-        self.of_dags.iter().map(of_dag).collect()
+    pub(crate) fn proven(&self) -> Proven {
+        let bound = |answer: &Answer| in_ns(answer.verdict.bound());
+        let sinks = |answer: &Answer| answer.sinks.iter().map(|sink| in_ns(sink.bound)).collect();
+        Proven {
+            bounds_ns: self.of_dags.iter().map(bound).collect(),
+            sink_bounds_ns: self.of_dags.iter().map(sinks).collect(),
+        }
     }
 
     /// Returns the warnings that follow: DAG and reason of what is certain.

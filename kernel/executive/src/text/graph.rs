@@ -29,7 +29,7 @@ pub fn dump(plan: &Plan, options: SchedulerOptions, overheads: Overheads) {
         return;
     }
     let commit = COMMITS.fetch_add(1, Ordering::Relaxed);
-    let dags = plan.task_set.dags().iter().zip(&plan.bounds_ns);
+    let dags = plan.task_set.dags().iter().zip(&plan.proven.bounds_ns);
     let charge_ns = overheads.of_an_instance_ns(options.preemption);
     let ready_ns = Some(overheads.ready_ns).filter(|&ready_ns| ready_ns > 0);
     let overhead_ns = || charge_ns.into_iter().chain(ready_ns);

@@ -19,8 +19,8 @@ use crate::heap;
 use crate::options::{Options, UsageError};
 use crate::report;
 use crate::report::counts::Counts;
-use crate::report::run::Run;
 use crate::text::json;
+use sched_dag::engine::Run;
 
 /// The machine, lent to the app's function for the time of the run.
 #[derive(Debug)]
@@ -188,7 +188,7 @@ impl Machine {
         let run = run(&self.linux).map_err(|why| failure(why.to_string()))?;
         drop(connection);
         tell_faults(&run);
-        let run = Run::new(run);
+        let run = run.into_run();
         let faults = |dag: DagId| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);

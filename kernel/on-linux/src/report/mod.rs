@@ -5,7 +5,6 @@
 pub(crate) mod counts;
 #[path = "../../../src/report/distribution.rs"]
 mod distribution;
-pub(crate) mod run;
 #[path = "../../../src/report/time.rs"]
 mod time;
 #[path = "../../../src/report/times.rs"]

@@ -7,7 +7,7 @@ use core::sync::atomic::Ordering;
 
 use fass::LaunchError;
 use sched_dag::lifecycle::{self, Lifecycle, Parts};
-use sched_dag::{ClusterId, Clusters, DagId, Journal, TaskSet};
+use sched_dag::{Clusters, DagId, TaskSet};
 
 use super::cluster::{BESIDES, Cluster, MAY_DIVIDE, OTHERS, nth};
 use super::letters::Letters;
@@ -108,18 +108,4 @@ fn rest(place: usize) -> bool {
     scheduler.is_none_or(|scheduler| scheduler.is_finished())
         && !cluster.has_letters.load(Ordering::Acquire)
         && rest(place + 1)
-}
-
-/// Has the first journal take over what the others hold.
-pub(super) fn merge(first: &mut Execution, others: &mut [Execution]) {
-    for (id, other) in (1..).map(ClusterId).zip(others) {
-        let journal = core::mem::replace(&mut other.engine.scheduler.log.journal, Journal::none());
-        let first_core = cluster::first_core(id.index());
-        first
-            .engine
-            .scheduler
-            .log
-            .journal
-            .absorb(journal, id, first_core);
-    }
 }

@@ -34,15 +34,16 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan};
-use sched_dag::engine::Engine;
+use sched_dag::engine::{Engine, Proven, Run};
 use sched_dag::lifecycle::Requests;
 use sched_dag::{Journal, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::machine::context::Parked;
+use crate::machine::this_core;
 pub use cluster::{count as clusters, first_core};
 pub use control::{control, nominal_end_ns, snapshot, task_set};
 pub use divided::{Division, division, is_finished, set_division};
-pub use ended::{Ended, look_at_clearing};
+pub use ended::look_at_clearing;
 pub use events::{complete, fail, find_work, interrupt};
 pub use loans::Loan;
 use loans::Loans;
@@ -84,13 +85,8 @@ struct Execution {
     /// waits.
     may_hand_off: bool,
     signals: Signals,
-    proven: Arc<Proven>,
-}
-
-/// What the commit has proven of each DAG, and of each sink.
-struct Proven {
-    bounds_ns: Vec<Option<u64>>,
-    sink_bounds_ns: Vec<Vec<Option<u64>>>,
+    /// In the first cluster.
+    proven: Proven,
 }
 
 /// Time 0 of the run, on the clock.
@@ -122,10 +118,6 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
         false => (None, vec![lifecycle]),
     };
     let mut lifecycles = lifecycles.into_iter();
-    let proven = Arc::new(Proven {
-        bounds_ns: plan.bounds_ns.clone(),
-        sink_bounds_ns: plan.sink_bounds_ns.clone(),
-    });
     let heap = crate::memory::heap::usage();
     // Each cluster's journal gets its share of what is free now.
     let share = task_set.clusters().count();
@@ -149,9 +141,10 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
             budget_factor: terms.budget_factor,
             may_hand_off: terms.coincidence_ns == 0,
             signals: Signals::new(&plan, &letters),
-            proven: Arc::clone(&proven),
+            proven: Proven::default(),
         })
         .collect();
+    executions[0].proven = plan.proven;
     for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
         let cluster = task_set.dag(runner.instance.dag).cluster();
         let Execution { engine, loans, .. } = &mut executions[cluster.index()];
@@ -181,11 +174,18 @@ pub fn begin(epoch_ns: u64) -> Option<u64> {
 }
 
 /// Takes the run out when it has ended, and drops what it has left behind.
-pub fn end() -> Option<Ended> {
+pub fn end() -> Option<Run> {
     let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
-    let mut ended = Ended::of(parts.collect())?;
-    ended.clear();
-    Some(ended)
+    let mut parts: Vec<Execution> = parts.collect();
+    let (first, others) = parts.split_first_mut()?;
+    let cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
+    let proven = core::mem::take(&mut first.proven);
+    let mut run = Run::of(&mut first.engine, proven, cores);
+    if cluster::MAY_DIVIDE {
+        (others.iter_mut()).for_each(|other| run.absorb(&mut other.engine));
+    }
+    ended::clear(&mut parts);
+    Some(run)
 }
 
 impl Execution {

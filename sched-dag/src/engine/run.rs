@@ -1,0 +1,274 @@
+//! A run that has ended: its model, its times, its counts, on whatever platform.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::cell::OnceCell;
+
+use super::{Body, Engine};
+use crate::chains::{Chain, Latencies};
+use crate::ids::{DagId, SubtaskId};
+use crate::kept::Journal;
+use crate::law::{Record, Tally, Violation};
+use crate::policy::SchedulerOptions;
+use crate::scheduler::{DagStatistics, Scheduler, Snapshot};
+use crate::task_set::TaskSet;
+
+/// A run that has ended: its model, its times and its counts.
+///
+/// ```no_run
+/// use sched_dag::DagId;
+/// use sched_dag::engine::Run;
+///
+/// fn report(run: &Run) {
+///     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
+///         let jobs = run.record().numbered(dag);
+///         let response_times = jobs.filter_map(|(job, times)| {
+///             Some(run.record().completion_ns(dag, job)? - times.release_ns?)
+///         });
+///         let misses = run.statistics(dag).misses;
+///         println!("{}: at most {:?} ns, {misses} misses", model.name(), response_times.max());
+///     }
+///     for violation in run.violations() {
+///         println!("{violation}");
+///     }
+///     println!("{} allocations", run.allocations());
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Run {
+    task_set: Arc<TaskSet>,
+    options: SchedulerOptions,
+    proven: Proven,
+    dags: Vec<OfDag>,
+    journal: Journal,
+    record: OnceCell<Record>,
+    times: OnceCell<Option<Tally>>,
+    counts: Counts,
+}
+
+/// The response times that a commit has proven.
+#[derive(Clone, Debug, Default)]
+pub struct Proven {
+    /// By DAG.
+    pub bounds_ns: Vec<Option<u64>>,
+    /// By DAG, of its sinks, in the order of [`Dag::sinks`](crate::Dag::sinks).
+    pub sink_bounds_ns: Vec<Vec<Option<u64>>>,
+}
+
+/// The numbers of a run that its platform knows.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
+    /// The instant from which releases count, on the clock that functions read.
+    pub epoch_ns: u64,
+    /// How often anything allocated memory between the start of the run and its last completion.
+    pub allocations: u64,
+    /// How often the schedulers' locks were taken meanwhile, modulo 2^32; 0 where nobody counts.
+    pub lock_acquisitions: u32,
+}
+
+#[derive(Debug)]
+struct OfDag {
+    snapshot: Snapshot,
+    /// By sink.
+    misses: Vec<u64>,
+}
+
+impl OfDag {
+    fn new(scheduler: &Scheduler, dag: DagId) -> Self {
+        let sinks = scheduler.task_set().dag(dag).sinks().iter();
+        Self {
+            snapshot: scheduler.snapshot(dag),
+            misses: (sinks.map(|sink| scheduler.sink_misses(dag, *sink))).collect(),
+        }
+    }
+}
+
+impl Run {
+    /// Takes it out of an engine that has come to its end, on so many cores in all.
+    #[must_use]
+    pub fn of<B: Body, P>(engine: &mut Engine<B, P>, proven: Proven, cores: u32) -> Self {
+        let scheduler = &mut engine.scheduler;
+        let journal = core::mem::replace(&mut scheduler.log.journal, Journal::none());
+        let ids = (0..).map(DagId).take(engine.task_set.dags().len());
+        Self {
+            task_set: Arc::clone(&engine.task_set),
+            options: SchedulerOptions {
+                cores,
+                ..scheduler.options()
+            },
+            proven,
+            dags: ids.map(|dag| OfDag::new(scheduler, dag)).collect(),
+            journal,
+            record: OnceCell::new(),
+            times: OnceCell::new(),
+            counts: Counts::default(),
+        }
+    }
+
+    /// Takes over what the engine of another cluster has of the same run.
+    pub fn absorb<B: Body, P>(&mut self, other: &mut Engine<B, P>) {
+        let (task_set, cluster) = (&self.task_set, other.cluster);
+        let ids = (0..).map(DagId).zip(&mut self.dags);
+        for (dag, of_dag) in ids.filter(|(dag, _)| task_set.dag(*dag).cluster() == cluster) {
+            *of_dag = OfDag::new(&other.scheduler, dag);
+        }
+        let first_core = task_set.cores_of(cluster, self.options.cores).start;
+        let journal = core::mem::replace(&mut other.scheduler.log.journal, Journal::none());
+        self.journal.absorb(journal, cluster, first_core);
+    }
+
+    /// Adds what the platform has counted.
+    #[must_use]
+    pub fn with_counts(self, counts: Counts) -> Self {
+        Self { counts, ..self }
+    }
+
+    /// Returns the model that was run.
+    #[must_use]
+    pub const fn task_set(&self) -> &Arc<TaskSet> {
+        &self.task_set
+    }
+
+    /// Returns the times of all jobs and instances, in nanoseconds from the instant from which
+    /// releases count; of the latest whole jobs if there was no memory for all events.
+    ///
+    /// Computed from the journal when it is asked for first.
+    ///
+    /// # Panics
+    ///
+    /// If there is no memory for it.
+    #[must_use]
+    pub fn record(&self) -> &Record {
+        self.record
+            .get_or_init(|| self.journal.record(&self.task_set))
+    }
+
+    /// Returns the statistics of all jobs and instances, those included whose events made way for
+    /// later ones; `None` if some were not recorded, because of `trace_events=0` or the console's
+    /// `trace off`.
+    ///
+    /// ```no_run
+    /// use sched_dag::DagId;
+    ///
+    /// /// The response time that one job in a thousand exceeds.
+    /// fn tail_ns(run: &sched_dag::engine::Run, dag: DagId) -> Option<u64> {
+    ///     Some(run.times()?.dag(dag).response_time.per_mille(999))
+    /// }
+    /// ```
+    #[must_use]
+    pub fn times(&self) -> Option<&Tally> {
+        let tally = || self.journal.statistics(&self.task_set);
+        self.times.get_or_init(tally).as_ref()
+    }
+
+    /// Returns counts and maxima of all times, as [`times`](Self::times) does, in less memory.
+    #[must_use]
+    pub fn coarse_times(&self) -> Option<Tally> {
+        self.journal.coarse_statistics(&self.task_set)
+    }
+
+    /// Returns the journal: what has happened, in its order.
+    #[must_use]
+    pub const fn journal(&self) -> &Journal {
+        &self.journal
+    }
+
+    /// Returns the instant from which releases count, in nanoseconds on the clock that functions
+    /// read.
+    #[must_use]
+    pub const fn epoch_ns(&self) -> u64 {
+        self.counts.epoch_ns
+    }
+
+    /// Returns a DAG's counters.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn statistics(&self, dag: DagId) -> &DagStatistics {
+        &self.dags[dag.index()].snapshot.statistics
+    }
+
+    /// Returns how a DAG has ended.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn snapshot(&self, dag: DagId) -> &Snapshot {
+        &self.dags[dag.index()].snapshot
+    }
+
+    /// Returns how many jobs a sink has missed its deadline in, those included that were not
+    /// released in time.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG, or the subtask is no sink of it.
+    #[must_use]
+    pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
+        let place = self.place_of(dag, sink);
+        let place = place.expect("misses are asked for of a subtask that is no sink");
+        self.dags[dag.index()].misses[place]
+    }
+
+    /// Returns how the scheduler was told to work.
+    #[must_use]
+    pub const fn options(&self) -> SchedulerOptions {
+        self.options
+    }
+
+    /// Returns the response time that the commit has proven of a DAG, if it has.
+    #[must_use]
+    pub fn bound_ns(&self, dag: DagId) -> Option<u64> {
+        *self.proven.bounds_ns.get(dag.index())?
+    }
+
+    /// Returns the response time that the commit has proven of a sink, if it has.
+    #[must_use]
+    pub fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
+        let place = self.place_of(dag, sink)?;
+        *self.proven.sink_bounds_ns.get(dag.index())?.get(place)?
+    }
+
+    fn place_of(&self, dag: DagId, sink: SubtaskId) -> Option<usize> {
+        self.task_set.dag(dag).sinks().binary_search(&sink).ok()
+    }
+
+    /// Returns every breach of the model's rules R1 to R4, and whether each instance had one life
+    /// and each core one instance at a time. However long something takes is right, for that is
+    /// the machine's affair.
+    pub fn violations(&self) -> impl Iterator<Item = Violation> {
+        self.journal.violations(&self.task_set).into_iter()
+    }
+
+    /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
+    /// `bound_ns`: a decision takes effect when a core has changed over. `None` if events are lost.
+    #[must_use]
+    pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
+        self.journal
+            .dispatch_violations(&self.task_set, &self.options, bound_ns)
+    }
+
+    /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,
+    /// and how long it takes to react; of the latest jobs if events are lost.
+    #[must_use]
+    pub fn latencies(&self, chain: &Chain) -> Latencies {
+        chain.latencies(&self.task_set, self.journal.events())
+    }
+
+    /// Returns how often anything allocated memory between the start of the run and its last
+    /// completion.
+    #[must_use]
+    pub const fn allocations(&self) -> u64 {
+        self.counts.allocations
+    }
+
+    /// Returns how often the schedulers' locks were taken between the start of the run and its
+    /// last completion, modulo 2^32; 0 where nobody counts.
+    #[must_use]
+    pub const fn lock_acquisitions(&self) -> u32 {
+        self.counts.lock_acquisitions
+    }
+}
