@@ -184,10 +184,6 @@ impl<B: Body, P> Engine<B, P> {
                 };
             };
             body.set_job(decision.instance().job);
-            if C::HEARS_OF_HAND_OFFS && is_unwritten {
-                self.scheduler.log.notify_ready(decision.instance());
-                self.act(port);
-            }
             let log = &mut self.scheduler.log;
             let to = body.subject();
             let start = (What::Start, port.start(core, &mut body), to);

@@ -100,9 +100,6 @@ pub trait Port<B> {
     /// The kinds of events that the platform acts on itself.
     const HEARS: &'static [What] = &[];
 
-    /// Whether it is to hear as well of instances that become ready and start at once.
-    const HEARS_OF_HAND_OFFS: bool = false;
-
     /// Whether a core gives up what it runs some time after it was asked to.
     const SUSPENDS_LATER: bool = true;
 

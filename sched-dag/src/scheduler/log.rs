@@ -105,11 +105,6 @@ impl Log {
         core::mem::replace(&mut self.has_job_event, false)
     }
 
-    /// Keeps a notice of an instance that has become ready, which the driver writes down.
-    pub fn notify_ready(&mut self, instance: Instance) {
-        self.notify(What::Ready, Subject::of(instance), u64::MAX, None);
-    }
-
     /// Writes down what a core does with an instance.
     #[inline]
     pub fn on_core(&mut self, core: CoreId, what: What, time_ns: u64, instance: Instance) {

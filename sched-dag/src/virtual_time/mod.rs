@@ -2,7 +2,7 @@
 //!
 //! Time jumps from event to event. What the cores do comes from a
 //! [`Workload`], which is asked once for each instance, at its start, how long
-//! it executes; it may run the instance's real function to find out.
+//! it executes; it may run the function of the instance's [body](Body) to find out.
 //!
 //! An instance that executes for no time finishes at the instant of its start,
 //! after the dispatch that started it; another dispatch at the same instant
@@ -46,9 +46,11 @@ mod serving;
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::fmt;
 
-use crate::ids::{ClusterId, CoreId, DagId, Instance};
-use crate::journal::{Event, What};
+use crate::engine::{Alternate, Body, Cost};
+use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
+use crate::journal::{Event, Subject};
 use crate::kept::Journal;
 use crate::lifecycle::{Lifecycle, Request};
 use crate::policy::SchedulerOptions;
@@ -57,21 +59,10 @@ use crate::task_set::TaskSet;
 use cluster::Cluster;
 
 /// What instances do and how long it takes them.
-///
-/// Besides [`execute`](Self::execute), the methods report what happens in the
-/// order in which it happens, those of the scheduler among them.
-pub trait Workload {
-    /// The kinds of events that it wants to hear of.
-    const HEARS: &'static [What] = &[];
-
-    /// The scheduler has written this down, of the kinds that are wanted.
-    fn hear(&mut self, notice: &Notice) {
-        let _ = notice;
-    }
-
-    /// Returns the execution time of an instance in nanoseconds. Called once
-    /// for each instance, at its start; 0 is allowed.
-    fn execute(&mut self, instance: Instance, now_ns: u64) -> u64;
+pub trait Workload<B = Stub> {
+    /// Returns the execution time of an instance in nanoseconds; 0 is allowed. Called once for
+    /// each instance, at its start. `None`: the run is [stopped](End::Stopped) at once.
+    fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
 
     /// Reports whether an instance fails, instead of finishing, when its
     /// execution time is over: then its DAG is ended, or its job dropped. Called once for each
@@ -81,29 +72,37 @@ pub trait Workload {
         false
     }
 
-    /// Reports whether there is another function for the subtask of an instance that
-    /// fails. Called once for each, right before the scheduler is told.
+    /// Reports whether the function of an instance that fails could be replaced, if its body says
+    /// so as well. Called once for each, right before the scheduler is told.
     fn is_replaceable(&mut self, instance: Instance) -> bool {
         let _ = instance;
-        false
+        true
     }
 
-    /// Returns when the next signal to a sporadic DAG comes. Asked again at every
-    /// instant; what has finished may send one, too.
-    fn next_signal_ns(&self) -> Option<u64> {
+    /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
+    fn ended(&mut self, instance: Instance, fault: Option<Cost>) {
+        let _ = (instance, fault);
+    }
+
+    /// A job is released, skipped or completed, or a DAG stopped.
+    fn hear(&mut self, notice: &Notice) {
+        let _ = notice;
+    }
+
+    /// Takes a request that has come now, by a completion or a fault.
+    fn request(&mut self, request: Request, now_ns: u64) {
+        let _ = (request, now_ns);
+    }
+
+    /// Returns when the next request comes. Asked again at every instant.
+    fn next_request_ns(&self) -> Option<u64> {
         None
     }
 
-    /// Returns the DAG of the next signal that has come by now, and forgets that.
-    fn take_signal(&mut self, now_ns: u64) -> Option<DagId> {
+    /// Returns the next request that has come by now, and forgets it.
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
         let _ = now_ns;
         None
-    }
-
-    /// Returns the next request that has come by now, and forgets it: a signal, unless a
-    /// workload has others. What has finished may make one.
-    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
-        self.take_signal(now_ns).map(Request::Signal)
     }
 
     /// Returns how late the timer's interrupt is that is due then; what comes before it at the
@@ -118,43 +117,6 @@ pub trait Workload {
     fn stops(&self) -> bool {
         false
     }
-
-    /// Reports whether what is left of this instant is not to be written down.
-    fn is_void(&self) -> bool {
-        false
-    }
-
-    /// An instant begins, in which all that follows happens until the next one.
-    /// There may be several at one time.
-    fn instant(&mut self, now_ns: u64) {
-        let _ = now_ns;
-    }
-
-    /// The core begins the instance; called before [`execute`](Self::execute).
-    fn started(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let _ = (instance, core, now_ns);
-    }
-
-    /// The core gives up the instance, which is not finished.
-    fn preempted(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let _ = (instance, core, now_ns);
-    }
-
-    /// The core continues the instance.
-    fn resumed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let _ = (instance, core, now_ns);
-    }
-
-    /// The instance has finished on the core; called before its successors
-    /// become ready.
-    fn finished(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let _ = (instance, core, now_ns);
-    }
-
-    /// The instance has failed on the core; called before what follows from that.
-    fn failed(&mut self, instance: Instance, core: CoreId, now_ns: u64) {
-        let _ = (instance, core, now_ns);
-    }
 }
 
 /// A workload of which only the execution times matter.
@@ -164,16 +126,58 @@ pub struct ExecutionTimes<F>(
     pub F,
 );
 
-impl<F: FnMut(Instance) -> u64> Workload for ExecutionTimes<F> {
-    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
-        (self.0)(instance)
+impl<B: Body, F: FnMut(Instance) -> u64> Workload<B> for ExecutionTimes<F> {
+    fn execute(&mut self, body: &mut B, _now_ns: u64) -> Option<u64> {
+        Some((self.0)(body.subject().instance()))
     }
 }
 
-/// A scheduler in virtual time, or those of all clusters.
-#[derive(Debug)]
-pub struct VirtualTime {
-    clusters: Box<[Cluster]>,
+/// A body without a function, which can always be replaced.
+#[derive(Clone, Copy, Debug)]
+pub struct Stub {
+    /// The instance that it stands for, or did last.
+    pub instance: Instance,
+}
+
+impl Body for Stub {
+    type Alternate = Stub;
+
+    fn set_job(&mut self, job: u64) {
+        self.instance.job = job;
+    }
+
+    fn subject(&self) -> Subject {
+        Subject::of(self.instance)
+    }
+
+    fn discard(&mut self, _: u64) {}
+
+    fn has_effects(&self) -> bool {
+        false
+    }
+
+    fn complete(&mut self, _: u64, _: &mut dyn FnMut(Request)) {}
+
+    fn alternate(&self) -> Option<Stub> {
+        Some(*self)
+    }
+
+    fn replace(&mut self) {}
+}
+
+impl Alternate for Stub {
+    fn is_there(&self) -> bool {
+        true
+    }
+
+    fn is_fallback(&self) -> bool {
+        false
+    }
+}
+
+/// A scheduler in virtual time with its bodies, or those of all clusters.
+pub struct VirtualTime<B: Body = Stub> {
+    clusters: Box<[Cluster<B>]>,
     now_ns: u64,
     /// What fails at the present instant.
     failing: Vec<(Instance, CoreId)>,
@@ -204,22 +208,56 @@ impl VirtualTime {
     /// it will need.
     #[must_use]
     pub fn new(scheduler: Scheduler) -> Self {
-        Self::with(Box::from([Cluster::new(scheduler, ClusterId(0), 0)]))
+        let task_set = Arc::clone(scheduler.task_set());
+        let cluster = Cluster::new(scheduler, (ClusterId(0), 0), Vec::new());
+        Self::with(Box::from([cluster]), stubs(&task_set))
     }
 
     /// Makes one likewise for the clusters of a task set on the machine that the options
     /// describe; if its cores are not divided, for one scheduler of all.
     #[must_use]
     pub fn of_clusters(task_set: &Arc<TaskSet>, options: SchedulerOptions) -> Self {
+        Self::of_bodies(task_set, options, stubs(task_set), &[])
+    }
+}
+
+fn stubs(task_set: &TaskSet) -> impl Iterator<Item = Stub> {
+    let dags = (0..).map(DagId).zip(task_set.dags());
+    dags.flat_map(|(dag, model)| {
+        let subtasks = (0..).map(SubtaskId).take(model.subtasks().len());
+        subtasks.map(move |subtask| Stub {
+            instance: Instance {
+                dag,
+                subtask,
+                job: 0,
+            },
+        })
+    })
+}
+
+impl<B: Body> VirtualTime<B> {
+    /// Makes one for a body of each subtask. By DAG, `after_fault` is the one that gets a signal
+    /// when a fault ends it.
+    pub fn of_bodies(
+        task_set: &Arc<TaskSet>,
+        options: SchedulerOptions,
+        bodies: impl IntoIterator<Item = B>,
+        after_fault: &[Option<DagId>],
+    ) -> Self {
         let clusters = task_set.clusters().map(|cluster| {
             let first = task_set.cores_of(cluster, options.cores).start;
             let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
-            Cluster::new(scheduler, cluster, first)
+            Cluster::new(scheduler, (cluster, first), after_fault.to_vec())
         });
-        Self::with(clusters.collect())
+        Self::with(clusters.collect(), bodies)
     }
 
-    fn with(clusters: Box<[Cluster]>) -> Self {
+    fn with(mut clusters: Box<[Cluster<B>]>, bodies: impl IntoIterator<Item = B>) -> Self {
+        for body in bodies {
+            let instance = body.subject().instance();
+            let engine = &mut clusters[place(&clusters, instance.dag)].engine;
+            engine.put(engine.task_set.vertex(instance), body);
+        }
         let cores = clusters
             .iter()
             .map(|cluster| cluster.engine.scheduler.options().cores as usize);
@@ -266,32 +304,31 @@ impl VirtualTime {
     ///
     /// With a DAG without a limit of jobs this is the end of time; see
     /// [`run_until`](Self::run_until).
-    pub fn run(&mut self, workload: &mut impl Workload) -> End {
+    pub fn run(&mut self, workload: &mut impl Workload<B>) -> End {
         self.run_until(u64::MAX, workload)
     }
 
     /// Runs all events up to and including those at `until_ns`. May be called
     /// again with a later time.
-    pub fn run_until<W: Workload>(&mut self, until_ns: u64, workload: &mut W) -> End {
-        self.clusters.iter_mut().for_each(Cluster::hear::<W>);
+    pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload<B>) -> End {
         while !workload.stops() {
-            let of_scheduler = |cluster: &Cluster| cluster.engine.scheduler.next_event_ns();
+            let of_scheduler = |cluster: &Cluster<B>| cluster.engine.scheduler.next_event_ns();
             let due = self.clusters.iter().filter_map(of_scheduler);
             // The time may have passed the due one already, by another event.
             let interrupts = due
                 .map(|due_ns| (due_ns.saturating_add(workload.late_ns(due_ns))).max(self.now_ns));
             let scheduler_ns = interrupts.min();
-            let signal_ns = workload.next_signal_ns();
-            let signal_ns = signal_ns.map(|signal_ns| signal_ns.max(self.now_ns));
-            let events = [self.next_finish_ns(), scheduler_ns, signal_ns];
+            let request_ns = workload.next_request_ns();
+            let request_ns = request_ns.map(|request_ns| request_ns.max(self.now_ns));
+            let events = [self.next_finish_ns(), scheduler_ns, request_ns];
             let Some(event_ns) = events.into_iter().flatten().min() else {
                 return End::Finished;
             };
             if event_ns > until_ns {
                 return End::TimeReached;
             }
-            if let Err(instance) = self.step(event_ns, workload) {
-                return End::TimeOverflow(instance);
+            if let Err(end) = self.step(event_ns, workload) {
+                return end;
             }
         }
         End::Stopped
@@ -321,32 +358,20 @@ impl VirtualTime {
     }
 
     fn next_finish_ns(&self) -> Option<u64> {
-        let of_cores = |cluster: &Cluster| cluster.next_finish_ns();
+        let of_cores = |cluster: &Cluster<B>| cluster.next_finish_ns();
         self.clusters.iter().filter_map(of_cores).min()
     }
 
-    /// Goes through one instant. An instance that cannot finish is the error.
-    fn step(&mut self, now_ns: u64, workload: &mut impl Workload) -> Result<(), Instance> {
+    /// Goes through one instant. That the run cannot go on is the error.
+    fn step(&mut self, now_ns: u64, workload: &mut impl Workload<B>) -> Result<(), End> {
         self.now_ns = now_ns;
-        workload.instant(now_ns);
-        if let Some(done) = self.finish(now_ns, workload) {
-            return done;
+        if self.finish(now_ns, workload)? {
+            return Ok(());
         }
-        let clusters = &mut self.clusters;
         self.failing.sort_unstable();
         for (instance, core) in self.failing.drain(..) {
-            let cluster = &mut clusters[place(clusters, instance.dag)];
-            workload.failed(instance, cluster.number(core), now_ns);
-            let is_replaceable = workload.is_replaceable(instance);
-            cluster.tell(
-                now_ns,
-                Some(core),
-                workload,
-                |moment| match is_replaceable {
-                    true => moment.fail_replaceable(instance),
-                    false => moment.fail(instance),
-                },
-            );
+            let place = place(&self.clusters, instance.dag);
+            self.clusters[place].fail(now_ns, core, workload);
         }
         if !core::mem::replace(&mut self.has_begun, true) {
             self.serve(Request::Begin, workload);
@@ -357,57 +382,42 @@ impl VirtualTime {
         while let Some(request) = workload.take_request(now_ns) {
             self.serve(request, workload);
         }
-        for place in 0..self.clusters.len() {
-            if place > 0 && workload.is_void() {
-                self.clusters[place].engine.scheduler.log.journal.close();
-            }
-            self.clusters[place].decide(now_ns, workload)?;
-        }
-        Ok(())
+        let mut clusters = self.clusters.iter_mut();
+        clusters.try_for_each(|cluster| cluster.decide(now_ns, workload))
     }
 
     /// Completes what finishes at `now_ns`, and notes what fails instead.
     /// If it is one instance and nothing else happens, that may be the whole
-    /// instant: then the result is the instant's.
-    fn finish(
-        &mut self,
-        now_ns: u64,
-        workload: &mut impl Workload,
-    ) -> Option<Result<(), Instance>> {
-        let is_quiet =
-            |workload: &mut _| Workload::next_signal_ns(workload).is_none_or(|ns| ns > now_ns);
-        let mut finished = 0;
+    /// instant, which is the result.
+    fn finish(&mut self, now_ns: u64, workload: &mut impl Workload<B>) -> Result<bool, End> {
+        let mut is_first = true;
         for place in 0..self.clusters.len() {
-            while let Some((instance, core)) = self.clusters[place].take_finished(now_ns) {
-                finished += 1;
-                let is_last = self.next_finish_ns().is_none_or(|ns| ns > now_ns);
+            while let Some((core, instance)) = self.clusters[place].take_finished(now_ns) {
+                let mut others_ns = [self.next_finish_ns(), workload.next_request_ns()].into_iter();
+                let is_last = others_ns.all(|ns| ns.is_none_or(|ns| ns > now_ns));
+                let is_alone = core::mem::take(&mut is_first) && is_last && !self.waits;
                 let cluster = &mut self.clusters[place];
                 if workload.fails(instance) {
-                    cluster.rest(instance, core);
+                    cluster.lose(core);
                     self.failing.push((instance, core));
-                    continue;
+                } else if cluster.complete(now_ns, core, is_alone, workload)? {
+                    return Ok(true);
                 }
-                workload.finished(instance, cluster.number(core), now_ns);
-                if finished > 1 || !is_last || self.waits || !is_quiet(workload) {
-                    cluster.rest(instance, core);
-                    cluster.tell(now_ns, Some(core), workload, |moment| {
-                        moment.complete(instance)
-                    });
-                    continue;
-                }
-                return match cluster.complete(now_ns, core, instance, workload) {
-                    Ok(true) => Some(Ok(())),
-                    Ok(false) => None,
-                    Err(instance) => Some(Err(instance)),
-                };
             }
         }
-        None
+        Ok(false)
+    }
+}
+
+impl<B: Body> fmt::Debug for VirtualTime<B> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut shown = f.debug_struct("VirtualTime");
+        shown.field("now_ns", &self.now_ns).finish_non_exhaustive()
     }
 }
 
 /// Returns the place of the cluster that runs a DAG.
-fn place(clusters: &[Cluster], dag: DagId) -> usize {
+fn place<B: Body>(clusters: &[Cluster<B>], dag: DagId) -> usize {
     match clusters {
         [_] => 0,
         several => several[0]

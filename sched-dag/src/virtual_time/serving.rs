@@ -4,13 +4,14 @@ use alloc::vec::Vec;
 
 use super::cluster::Cluster;
 use super::{VirtualTime, Workload, place};
+use crate::engine::Body;
 use crate::ids::DagId;
 use crate::lifecycle::{Change, Request};
 use crate::scheduler::Moment;
 
-impl VirtualTime {
+impl<B: Body> VirtualTime<B> {
     /// Serves a request at this instant.
-    pub(super) fn serve(&mut self, request: Request, workload: &mut impl Workload) {
+    pub(super) fn serve(&mut self, request: Request, workload: &mut impl Workload<B>) {
         let (clusters, now_ns) = (&mut self.clusters[..], self.now_ns);
         let mut changes = Vec::new();
         // Between clusters the journals know no order within an instant; what is entered comes
@@ -45,7 +46,7 @@ impl VirtualTime {
                 Change::Enter(mode) => {
                     self.waits = false;
                     let first = &mut clusters[latest];
-                    first.tell(now_ns, None, workload, |moment| moment.entered(mode));
+                    first.tell(now_ns, workload, |moment| moment.entered(mode));
                 }
             }
             let mut pairs = clusters.iter().zip(&before);
@@ -55,17 +56,17 @@ impl VirtualTime {
 }
 
 /// Makes a change at an instant of the cluster that runs a DAG.
-pub(super) fn each(
-    clusters: &mut [Cluster],
+fn each<B: Body>(
+    clusters: &mut [Cluster<B>],
     now_ns: u64,
     dag: DagId,
-    workload: &mut impl Workload,
+    workload: &mut impl Workload<B>,
     change: impl FnOnce(&mut Moment<'_>),
 ) {
     let cluster = &mut clusters[place(clusters, dag)];
-    cluster.tell(now_ns, None, workload, change);
+    cluster.tell(now_ns, workload, change);
 }
 
-fn written(cluster: &Cluster) -> u64 {
+fn written<B: Body>(cluster: &Cluster<B>) -> u64 {
     cluster.engine.scheduler.log.journal.written()
 }

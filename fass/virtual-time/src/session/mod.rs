@@ -1,62 +1,59 @@
-//! A plan while it runs: the scheduler's driver, the bodies and the journal.
+//! A plan while it runs.
 //!
-//! The driver is `sched_dag::virtual_time`, the one loop in virtual time; it
-//! asks for the execution time of each instance at its start. [`Runner`] answers
-//! by running the instance's real body and adding up what it executed.
+//! The driver is `sched_dag::virtual_time`, the one loop in virtual time, which has the engine
+//! with the bodies and the journal; it asks for the execution time of each instance at its start.
+//! [`Calls`] answers by running the instance's real body and adding up what it executed.
 
-mod runner;
+mod calls;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use fass::edge::Outcome;
-use fass::{Body, Plan};
+use fass::{Plan, Runner};
 use sched_dag::virtual_time::{End, VirtualTime as Driver};
 use sched_dag::{Dag, DagId, DagLabel, Instance, SchedulerOptions, SubtaskLabel, TaskSet};
+
+use calls::{Called, Calls};
 
 use crate::edge::Edge;
 use crate::error::RunError;
 use crate::record::{JobRecord, PanicRecord};
 use crate::report::Report;
 use crate::surroundings::Surroundings;
-use runner::{Recording, Runner};
 
 /// A plan that runs, or can go on running.
 #[derive(Debug)]
 pub(crate) struct Session {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
-    driver: Driver,
+    driver: Driver<Runner>,
     /// Whether a function may end the run.
     may_shut_down: bool,
-    bodies: Vec<Vec<Body>>,
-    /// By DAG, the one that gets a signal when a fault ends it.
-    after_fault: Vec<Option<DagId>>,
     /// Whether interrupts may be late.
     is_late: bool,
-    recording: Recording,
+    called: Called,
+    /// Up to when it has run.
+    until_ns: u64,
 }
 
 impl Session {
     pub(crate) fn new(plan: Plan, options: SchedulerOptions) -> Self {
         let task_set = plan.task_set;
+        let bodies = Runner::all(&task_set, plan.bodies);
+        let driver = Driver::of_bodies(&task_set, options, bodies, &plan.after_fault);
         Self {
             may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
-            driver: Driver::of_clusters(&task_set, options)
-                .with_lifecycle(plan.lifecycle)
-                .recording(),
+            driver: driver.with_lifecycle(plan.lifecycle).recording(),
             options,
             is_late: false,
-            recording: Recording {
-                now_ns: 0,
+            called: Called {
                 executed_ns: BTreeMap::new(),
                 panics: Vec::new(),
                 degraded: vec![false; task_set.dags().len()],
-                run_until_ns: 0,
             },
-            bodies: plan.bodies,
-            after_fault: plan.after_fault,
+            until_ns: 0,
             task_set,
         }
     }
@@ -86,7 +83,7 @@ impl Session {
         let until_ns = match duration {
             Some(duration) => {
                 let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
-                self.recording.run_until_ns.saturating_add(ns)
+                self.until_ns.saturating_add(ns)
             }
             None => {
                 if until.is_none() {
@@ -100,24 +97,22 @@ impl Session {
             let is_behind = |job: &JobRecord| job.dag == dag && job.job >= last;
             (report().jobs.iter()).any(|job| is_behind(job) && job.finish_ns.is_some())
         });
-        let mut runner = Runner {
+        let mut calls = Calls {
             task_set: &self.task_set,
             machine,
-            bodies: &mut self.bodies,
-            after_fault: &self.after_fault,
-            recording: &mut self.recording,
+            called: &mut self.called,
             panic: None,
             has_arrived,
         };
-        let end = self.driver.run_until(until_ns, &mut runner);
-        let panic = runner.panic;
-        self.recording.run_until_ns = match end {
-            End::Stopped => self.recording.now_ns,
+        let end = self.driver.run_until(until_ns, &mut calls);
+        let panic = calls.panic;
+        self.until_ns = match end {
+            End::Stopped => self.driver.now_ns(),
             _ => until_ns,
         };
         machine.now_ns.set(match end {
             End::TimeReached => until_ns,
-            End::Finished | End::TimeOverflow(_) | End::Stopped => self.recording.now_ns,
+            End::Finished | End::TimeOverflow(_) | End::Stopped => self.driver.now_ns(),
         });
         if let Some(PanicRecord { instance, message }) = panic {
             return Err(RunError::Panicked {
@@ -190,21 +185,15 @@ impl Session {
         };
         let sink_misses = dags.clone().map(sink_misses).collect();
         let statistics = dags.map(|(dag, _)| *self.driver.scheduler_of(dag).statistics(dag));
-        let Recording {
-            now_ns,
-            panics,
-            degraded,
-            ..
-        } = &self.recording;
         let mut report = Report {
             instances: Vec::new(),
             jobs: Vec::new(),
-            panics: panics.clone(),
-            degraded: degraded.clone(),
+            panics: self.called.panics.clone(),
+            degraded: self.called.degraded.clone(),
             events: self.driver.events(),
             statistics: statistics.collect(),
             sink_misses,
-            end_ns: *now_ns,
+            end_ns: self.driver.now_ns(),
             compared,
             uncompared,
             divergence,
@@ -213,7 +202,7 @@ impl Session {
             options: self.options,
             is_late: self.is_late,
         };
-        report.look_at_events(&self.recording.executed_ns);
+        report.look_at_events(&self.called.executed_ns);
         report
     }
 }
