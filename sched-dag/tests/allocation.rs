@@ -8,10 +8,10 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use random::Random;
-use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime, Workload};
+use sched_dag::virtual_time::{End, ExecutionTimes, Stub, VirtualTime, Workload};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Observer, OverrunPolicy, Policy,
-    Preemption, Scheduler, SchedulerOptions, SubtaskSpec, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, OverrunPolicy, Policy, Preemption,
+    Scheduler, SchedulerOptions, SubtaskSpec, verify,
 };
 
 thread_local! {
@@ -107,11 +107,9 @@ fn nothing_is_allocated_from_first_release_to_last_completion() {
 /// Random execution times, and a fault now and then.
 struct Failing(Random);
 
-impl Observer for Failing {}
-
 impl Workload for Failing {
-    fn execute(&mut self, _instance: Instance, _now_ns: u64) -> u64 {
-        self.0.between(0, 50)
+    fn execute(&mut self, _body: &mut Stub, _now_ns: u64) -> Option<u64> {
+        Some(self.0.between(0, 50))
     }
 
     fn fails(&mut self, _instance: Instance) -> bool {

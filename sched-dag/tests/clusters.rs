@@ -14,18 +14,14 @@ use std::sync::Arc;
 
 use random::Random;
 use sched_dag::analysis::{self, Overheads, Reason, Settings};
-use sched_dag::virtual_time::{End, VirtualTime};
+use sched_dag::journal::Event;
+use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
-    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy,
-    Preemption, SchedulerOptions, SubtaskId, TaskSet, verify,
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, Instance,
+    Policy, Preemption, SchedulerOptions, SubtaskId, TaskSet, verify,
 };
 use set::Set;
-use support::{Log, instance};
-
-fn number(variable: &str, default: u64) -> u64 {
-    let given = std::env::var(variable).ok();
-    given.map_or(default, |text| text.parse().expect("a whole number"))
-}
+use support::{Script, Spec, number};
 
 fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> Arc<TaskSet> {
     let options = CommitOptions::new(options.policy, options.cores)
@@ -34,45 +30,26 @@ fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> A
     Arc::new(verify(specs, &options).expect("sets are right").task_set)
 }
 
-/// Runs a set, of which DAG k is that of the original with the number `originals[k]`.
-fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[usize]) -> Vec<String> {
-    let mut log = Log::new(|of| {
-        let dag = DagId(u32::try_from(originals[of.dag.index()]).expect("few DAGs"));
-        set.execution_ns(Instance { dag, ..of })
-    });
-    for (dag, &original) in (0..).zip(originals) {
-        let subtasks = (0..).zip(&set.dags[original].subtasks);
-        let failing = subtasks.filter_map(|(id, subtask)| Some((id, subtask.fails_in?)));
-        let failing = failing.map(|(id, job)| instance(dag, job, id));
-        log.failing.extend(failing);
-    }
+/// Runs a set, of which DAG k is that of the original with the number `originals[k]`, and returns
+/// what happens, by the original's numbers.
+fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[u32]) -> Vec<Event> {
+    let original = |dag: DagId| DagId(originals[dag.index()]);
+    let of = |it: Instance| Instance {
+        dag: original(it.dag),
+        ..it
+    };
     let options = SchedulerOptions {
         cores,
         ..set.options
     };
-    let mut run = VirtualTime::of_clusters(task_set, options);
-    assert_eq!(run.run(&mut log), End::Finished);
-    assert!(run.is_finished());
-    log.lines
-}
-
-/// Returns an event with the DAG's number in the original, and the core's in its cluster,
-/// which has to be one of these; and the DAG.
-fn named(line: &str, originals: &[usize], first: u32, cores: u32) -> (usize, String) {
-    let mut words: Vec<String> = line.split(' ').map(str::to_owned).collect();
-    let (dag, rest) = match words[2].split_once('.') {
-        Some((dag, rest)) => (dag, format!(".{rest}")),
-        None => (words[2].as_str(), String::new()),
+    let script = Script::new(|it| set.execution_ns(of(it))).failing(|it| set.fails(of(it)));
+    let run = script.run(VirtualTime::of_clusters(task_set, options));
+    assert!(run.driver.is_finished());
+    let named = |event: &Event| Event {
+        dag: original(event.dag),
+        ..*event
     };
-    let dag = originals[dag.parse::<usize>().expect("a DAG's number")];
-    words[2] = format!("{dag}{rest}");
-    if words.get(3).is_some_and(|word| word == "on") {
-        let core: u32 = words[4].parse().expect("a core's number");
-        assert!((first..first + cores).contains(&core), "{line}");
-        // Which of them it is may depend on the driver's calls.
-        words.truncate(3);
-    }
-    (dag, words.join(" "))
+    run.events.iter().map(named).collect()
 }
 
 #[test]
@@ -87,47 +64,37 @@ fn a_cluster_runs_as_if_it_were_alone() {
             .collect();
         set.options.cores = sizes.iter().sum();
         let mut specs = set.specs();
-        let mut of_dags = Vec::new();
         for spec in &mut specs {
-            let cluster = random.below(sizes.len());
-            of_dags.push(cluster);
-            spec.cluster = Some(ClusterId(u32::try_from(cluster).expect("few clusters")));
+            let cluster = u32::try_from(random.below(sizes.len())).expect("few clusters");
+            spec.cluster = Some(ClusterId(cluster));
         }
-        let all: Vec<usize> = (0..specs.len()).collect();
+        let all: Vec<u32> = (0..).take(specs.len()).collect();
         let divided = commit(&specs, set.options, Clusters::Of(sizes.clone()));
         let together = events(&set, &divided, set.options.cores, &all);
         let mut first = 0;
-        for (cluster, &cores) in sizes.iter().enumerate() {
-            let in_it = |dag: &usize| of_dags[*dag] == cluster;
-            let originals: Vec<usize> = all.iter().copied().filter(in_it).collect();
-            let named_together = together.iter().map(|line| {
-                let dag = line.split([' ', '.']).nth(2).expect("a DAG");
-                (dag.parse::<usize>().expect("a DAG's number"), line)
-            });
-            let here: Vec<String> = named_together
-                .filter(|(dag, _)| in_it(dag))
-                .map(|(_, line)| named(line, &all, first, cores).1)
-                .collect();
-            let alone = match originals.is_empty() {
-                true => Vec::new(),
-                false => {
-                    let specs: Vec<DagSpec> = originals
-                        .iter()
-                        .map(|&dag| DagSpec {
-                            cluster: None,
-                            ..specs[dag].clone()
-                        })
-                        .collect();
+        for (cluster, &cores) in (0..).map(ClusterId).zip(&sizes) {
+            let is_here = |dag: &u32| specs[*dag as usize].cluster == Some(cluster);
+            let here: Vec<u32> = all.iter().copied().filter(is_here).collect();
+            let alone = match &here[..] {
+                [] => Vec::new(),
+                _ => {
+                    let spec = |dag: &u32| specs[*dag as usize].clone();
+                    let apart = |spec: DagSpec| spec.with(|spec| spec.cluster = None);
+                    let specs: Vec<DagSpec> = here.iter().map(spec).map(apart).collect();
                     let task_set = commit(&specs, set.options, Clusters::Undivided);
-                    events(&set, &task_set, cores, &originals)
+                    events(&set, &task_set, cores, &here)
                 }
             };
-            let alone = alone.iter().map(|line| named(line, &originals, 0, cores).1);
-            assert_eq!(
-                here,
-                alone.collect::<Vec<_>>(),
-                "seed {seed}, cluster {cluster}"
-            );
+            let same = |event: Event, first: u32| {
+                assert!((first..first + cores).contains(&event.core.0), "{event:?}");
+                // Which of them it is may depend on the driver's calls.
+                let core = CoreId(0);
+                Event { core, ..event }
+            };
+            let events = together.iter().filter(|event| is_here(&event.dag.0));
+            let events: Vec<Event> = events.map(|event| same(*event, first)).collect();
+            let alone: Vec<Event> = alone.iter().map(|event| same(*event, 0)).collect();
+            assert_eq!(events, alone, "seed {seed}, {cluster:?}");
             first += cores;
         }
     }

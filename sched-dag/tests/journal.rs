@@ -11,26 +11,13 @@ mod support;
 
 pub(crate) use support::random;
 
-use std::sync::Arc;
-
 use random::Random;
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{Record, Tally, Terms, Violation, dispatch_violations, violations};
-use sched_dag::{DagId, Instance, JobOutcome, TaskSet};
+use sched_dag::virtual_time::VirtualTime;
+use sched_dag::{DagId, Instance, JobOutcome};
 use set::{Overruns, Set};
-use support::commit;
-use support::written::Written;
-
-/// A run of a set: its model, and its journal.
-struct Run {
-    task_set: Arc<TaskSet>,
-    events: Vec<Event>,
-}
-
-fn number(variable: &str, default: u64) -> u64 {
-    let given = std::env::var(variable).ok();
-    given.map_or(default, |text| text.parse().expect("a whole number"))
-}
+use support::{Run, Script, number, scheduler};
 
 fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
     let (count, first_seed) = (number("JOURNALS", 500), number("JOURNAL_SEED", 1));
@@ -42,11 +29,9 @@ fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
             false => Overruns::Never,
         };
         let set = set::draw(&mut random, overruns);
-        let task_set = commit(&set.specs(), set.options);
-        let mut written = Written::new(&task_set, |instance| set.execution_ns(instance));
-        let _ = written.run(set.options);
-        let events = written.journal.events;
-        with(seed, &mut random, &set, &Run { task_set, events });
+        let driver = VirtualTime::new(scheduler(&set.specs(), set.options));
+        let run = Script::new(|instance| set.execution_ns(instance)).run(driver);
+        with(seed, &mut random, &set, &run);
     }
 }
 

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
+use sched_dag::law::Record;
+use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, JobOutcome, Observer, Policy,
-    Preemption, Priority, SchedulerOptions, SubtaskSpec, TaskSet, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, Preemption, Priority,
+    SchedulerOptions, SubtaskSpec, TaskSet, verify,
 };
 
 /// Returns the spec of a DAG whose subtasks all have one priority.
@@ -77,71 +78,30 @@ pub(crate) fn observe(
         preemption,
         cores,
     };
-    let mut driver = VirtualTime::of_clusters(&Arc::new(task_set.clone()), options);
-    let mut watch = Watch {
-        execution_ns,
-        now_ns: 0,
-        releases: vec![Vec::new(); task_set.dags().len()],
-        largest: vec![0; task_set.dags().len()],
-        of_subtasks: (task_set.dags().iter())
-            .map(|dag| vec![0; dag.subtasks().len()])
-            .collect(),
-    };
-    let end = driver.run_until(until_ns, &mut watch);
+    let driver = VirtualTime::of_clusters(&Arc::new(task_set.clone()), options);
+    let mut driver = driver.recording();
+    let end = driver.run_until(until_ns, &mut ExecutionTimes(execution_ns));
     assert!(!matches!(end, End::TimeOverflow(_)), "{end:?}");
-    for (largest, releases) in watch.largest.iter_mut().zip(&watch.releases) {
-        for &(_, release_ns) in releases {
-            *largest = (*largest).max(until_ns - release_ns);
+    let events = driver.events().into_iter();
+    let record = Record::of_events(task_set, true, events).expect("it fits");
+    let (mut dags, mut subtasks) = (Vec::new(), Vec::new());
+    for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
+        let (mut largest, mut of_subtasks) = (0, vec![0; dag.subtasks().len()]);
+        for (number, job) in record.numbered(id) {
+            let Some(release_ns) = job.release_ns else {
+                continue;
+            };
+            largest = largest.max(job.ended_ns.unwrap_or(until_ns) - release_ns);
+            for (of_subtask, times) in of_subtasks.iter_mut().zip(record.instances(id, number)) {
+                *of_subtask = times
+                    .finish_ns
+                    .unwrap_or(release_ns)
+                    .max(*of_subtask + release_ns)
+                    - release_ns;
+            }
         }
+        dags.push(largest);
+        subtasks.push(of_subtasks);
     }
-    Observed {
-        dags: watch.largest,
-        subtasks: watch.of_subtasks,
-    }
-}
-
-struct Watch<F> {
-    execution_ns: F,
-    now_ns: u64,
-    /// The jobs in flight of each DAG: number and nominal release.
-    releases: Vec<Vec<(u64, u64)>>,
-    largest: Vec<u64>,
-    of_subtasks: Vec<Vec<u64>>,
-}
-
-impl<F> Observer for Watch<F> {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.releases[dag.index()].push((job, release_ns));
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, _outcome: JobOutcome) {
-        let flying = &mut self.releases[dag.index()];
-        let place = flying.iter().position(|&(other, _)| other == job);
-        let (_, release_ns) = flying.swap_remove(place.expect("released before it ends"));
-        let largest = &mut self.largest[dag.index()];
-        *largest = (*largest).max(self.now_ns - release_ns);
-    }
-}
-
-impl<F: FnMut(Instance) -> u64> Workload for Watch<F> {
-    const WANTED: &'static [sched_dag::journal::What] = sched_dag::told::ALL;
-
-    fn heard(&mut self, news: &sched_dag::News) {
-        sched_dag::told::tell(news, self);
-    }
-
-    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
-        (self.execution_ns)(instance)
-    }
-
-    fn finished(&mut self, instance: Instance, _: sched_dag::CoreId, now_ns: u64) {
-        let mut flying = self.releases[instance.dag.index()].iter();
-        let (_, release_ns) = flying
-            .find(|(job, _)| *job == instance.job)
-            .expect("released");
-        let largest = &mut self.of_subtasks[instance.dag.index()][instance.subtask.index()];
-        *largest = (*largest).max(now_ns - release_ns);
-        // A job completes right after its last instance, at the same instant.
-        self.now_ns = now_ns;
-    }
+    Observed { dags, subtasks }
 }

@@ -3,12 +3,16 @@
 
 use std::collections::VecDeque;
 
+use sched_dag::journal::What;
 use sched_dag::lifecycle::{Changes, Entry, Request};
 use sched_dag::{DagId, DagSpec};
 
-use super::support::dag;
 use super::support::random::Random;
-use super::{Said, Script, enter};
+use super::support::{dag, number};
+use super::{Run, Script, enter, run};
+
+/// A change, and of which DAG or to which mode.
+type Change = (What, u32);
 
 struct Rules {
     modes: Vec<u32>,
@@ -22,31 +26,31 @@ impl Rules {
         self.modes.iter().fold(0, |all, mode| all | mode)
     }
 
-    fn off(&mut self, dags: u32, said: &mut Vec<Said>) {
+    fn off(&mut self, dags: u32, said: &mut Vec<Change>) {
         let news = (0..8).filter(|dag| dags & !self.is_off & (1 << dag) != 0);
-        said.extend(news.map(Said::Off));
+        said.extend(news.map(|dag| (What::Off, dag)));
         self.is_off |= dags;
     }
 
-    fn on(&mut self, dags: u32, said: &mut Vec<Said>) {
+    fn on(&mut self, dags: u32, said: &mut Vec<Change>) {
         let news = (0..8).filter(|dag| dags & self.is_off & (1 << dag) != 0);
-        said.extend(news.map(Said::On));
+        said.extend(news.map(|dag| (What::On, dag)));
         self.is_off &= !dags;
     }
 
-    fn look(&mut self, at_once: bool, said: &mut Vec<Said>) {
+    fn look(&mut self, at_once: bool, said: &mut Vec<Change>) {
         let Some(mode) = self.pending else { return };
         let leaving = self.all() & !self.modes[mode];
         let is_idle = (0..8).all(|dag| leaving & (1 << dag) == 0 || self.in_flight[dag] == 0);
         if at_once || is_idle {
             self.off(leaving, said);
             self.on(self.modes[mode], said);
-            said.push(Said::Entered(u32::try_from(mode).expect("few modes")));
+            said.push((What::Entered, u32::try_from(mode).expect("few modes")));
             self.pending = None;
         }
     }
 
-    fn ask(&mut self, request: Request, said: &mut Vec<Said>) {
+    fn ask(&mut self, request: Request, said: &mut Vec<Change>) {
         match request {
             Request::Enter(mode, entry) => {
                 self.pending = Some(mode.index());
@@ -60,35 +64,67 @@ impl Rules {
     }
 }
 
-/// Holds what was said against the rules.
-fn compare(said: &[(u64, Said)], mut rules: Rules) {
-    let mut expected: VecDeque<Said> = VecDeque::new();
-    let mut is_first = true;
-    for &(time_ns, said) in said {
-        let mut news = Vec::new();
-        match said {
-            Said::Off(_) | Said::On(_) | Said::Entered(_) => {
-                if std::mem::take(&mut is_first) {
-                    rules.ask(enter(0, Entry::AtOnce), &mut news);
-                    expected.extend(news.drain(..));
-                }
-                assert_eq!(expected.pop_front(), Some(said), "at {time_ns}");
-                continue;
+/// Something in a run that the rules are about: it is completed, it is asked for, or the rest.
+enum Step {
+    Completed(u32),
+    Asked(Request),
+    Said(What, u32),
+}
+
+/// Returns what happens in a run, with what is asked there: at each instant that is after all that
+/// completes.
+fn steps(run: &Run, requests: &[(u64, Request)]) -> Vec<(u64, Step)> {
+    let mut steps: Vec<(u64, Step)> = Vec::new();
+    let asked = requests
+        .iter()
+        .map(|(at_ns, request)| (*at_ns, Step::Asked(*request)));
+    for event in &run.events {
+        let step = match event.what {
+            What::Completed => Step::Completed(event.dag.0),
+            What::Entered => Step::Said(event.what, u32::try_from(event.job).expect("few modes")),
+            What::Off | What::On | What::Released | What::Skipped => {
+                Step::Said(event.what, event.dag.0)
             }
-            Said::Asked(request) => rules.ask(request, &mut news),
-            Said::Completed(dag) => {
+            _ => continue,
+        };
+        steps.push((event.time_ns, step));
+    }
+    steps.extend(asked);
+    steps.sort_by_key(|(time_ns, step)| {
+        let rank = match step {
+            Step::Completed(_) => 0,
+            Step::Asked(_) => 1,
+            Step::Said(..) => 2,
+        };
+        (*time_ns, rank)
+    });
+    steps
+}
+
+/// Holds what happened against the rules.
+fn compare(steps: Vec<(u64, Step)>, mut rules: Rules) {
+    let (mut news, mut expected) = (Vec::new(), VecDeque::new());
+    rules.ask(enter(0, Entry::AtOnce), &mut news);
+    for (time_ns, step) in steps {
+        expected.extend(news.drain(..));
+        match step {
+            Step::Asked(request) => rules.ask(request, &mut news),
+            Step::Completed(dag) => {
                 rules.in_flight[dag as usize] -= 1;
                 rules.look(false, &mut news);
             }
-            Said::Released(dag) | Said::Skipped(dag) => {
+            Step::Said(what @ (What::Off | What::On | What::Entered), whom) => {
+                assert_eq!(expected.pop_front(), Some((what, whom)), "at {time_ns}");
+            }
+            Step::Said(what, dag) => {
                 assert_eq!(expected, [], "before the releases at {time_ns}");
                 let is_off = rules.is_off & (1 << dag) != 0;
-                assert_eq!(is_off, said == Said::Skipped(dag), "{said:?} at {time_ns}");
+                assert_eq!(is_off, what == What::Skipped, "DAG {dag} at {time_ns}");
                 rules.in_flight[dag as usize] += u32::from(!is_off);
             }
         }
-        expected.extend(news);
     }
+    expected.extend(news);
     assert_eq!(expected, []);
 }
 
@@ -118,8 +154,7 @@ fn requests(random: &mut Random, dags: u32, modes: usize) -> Vec<(u64, Request)>
 
 #[test]
 fn random_modes_are_entered_as_the_rules_say() {
-    let sets = std::env::var("SCHED_DAG_SETS").map_or(400, |sets| sets.parse().expect("a number"));
-    let first = std::env::var("SCHED_DAG_SEED").map_or(1, |seed| seed.parse().expect("a number"));
+    let (sets, first) = (number("SCHED_DAG_SETS", 400), number("SCHED_DAG_SEED", 1));
     let mut entered = 0;
     for seed in first..first + sets {
         println!("SCHED_DAG_SEED={seed}");
@@ -141,13 +176,14 @@ fn random_modes_are_entered_as_the_rules_say() {
             .map(|_| u32::try_from(random.between(1, (1 << dags) - 1)).expect("few"))
             .collect();
         let requests = requests(&mut random, dags, modes.len());
-        let mut script = Script::new(&requests, move |_| random.between(1, 70));
         let lists = modes.iter().copied().map(listed).collect();
-        script.run(&specs, Changes::new(dags, false).with_modes(lists));
-        let of_modes = script
-            .said
+        let lifecycle = Changes::new(dags, false).with_modes(lists);
+        let script = Script::new(|_| random.between(1, 70)).asking(requests.iter().copied());
+        let run = run(&specs, lifecycle, script);
+        let of_modes = run
+            .events
             .iter()
-            .filter(|(_, said)| matches!(said, Said::Entered(_)));
+            .filter(|event| event.what == What::Entered);
         entered += of_modes.count();
         let rules = Rules {
             modes,
@@ -155,7 +191,7 @@ fn random_modes_are_entered_as_the_rules_say() {
             in_flight: [0; 8],
             pending: None,
         };
-        compare(&script.said, rules);
+        compare(steps(&run, &requests), rules);
     }
     assert!(
         entered > 2 * usize::try_from(sets).expect("few"),

@@ -7,27 +7,28 @@
 //! has happened, and whether it anticipates. What comes of it, core numbers apart, has
 //! to be the same; and the core numbers have to be those that the docs state.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 
-use sched_dag::Told as _;
-use sched_dag::virtual_time::Workload;
-use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Scheduler};
+use sched_dag::journal::{Event, What};
+use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Journal, Scheduler};
 
 use crate::Outcome;
 use crate::random::Random;
-use crate::record::Record;
-use crate::replay::scheduler;
+use crate::record::outcome;
 use crate::set::Set;
+use crate::support::scheduler;
 
 /// Runs a set and returns what happened, or why that contradicts itself.
 pub(crate) fn drive(set: &Set) -> Result<Outcome, String> {
-    let scheduler = scheduler(set)?;
+    let mut scheduler = scheduler(&set.specs(), set.options);
+    scheduler.log.journal = Journal::growing();
+    scheduler.hear([What::Released, What::Skipped, What::Completed]);
     let cores = scheduler.options().cores;
     let mut driver = Driver {
         set,
         scheduler,
         random: Random::new(set.choices),
-        record: Record::new(set),
+        signals: set.signals(),
         cores: vec![None; cores as usize],
         idle: (0..cores).rev().map(CoreId).collect(),
         left_ns: HashMap::new(),
@@ -48,14 +49,18 @@ pub(crate) fn drive(set: &Set) -> Result<Outcome, String> {
             ));
         }
     }
-    driver.record.finish(&driver.scheduler)
+    let events: Vec<Event> = driver.scheduler.log.journal.events().collect();
+    let mut notices = Vec::new();
+    driver.scheduler.log.exchange_notices(&mut notices);
+    outcome(set, &driver.scheduler, &events, &notices)
 }
 
 struct Driver<'a> {
     set: &'a Set,
     scheduler: Scheduler,
     random: Random,
-    record: Record<'a>,
+    /// The signals that are to come, with their DAGs, in order.
+    signals: VecDeque<(u64, DagId)>,
     /// What each core executes, and when that ends.
     cores: Vec<Option<(Instance, u64)>>,
     /// The idle cores; the last one has to be taken first.
@@ -75,34 +80,33 @@ impl Driver<'_> {
         let commands = commands.filter(|&at_ns| at_ns > self.now_ns);
         ends.chain(commands)
             .chain(self.scheduler.next_event_ns())
-            .chain(self.record.next_signal_ns())
+            .chain(self.next_signal_ns())
             .min()
+    }
+
+    fn next_signal_ns(&self) -> Option<u64> {
+        self.signals.front().map(|&(at_ns, _)| at_ns)
     }
 
     fn instant(&mut self, now_ns: u64) -> Result<(), String> {
         self.now_ns = now_ns;
-        self.record.instant(now_ns);
         if self.random.chance(20) {
             let core = self.random.below(self.cores.len());
             self.scheduler.anticipate(core_id(core));
         }
         let mut ended = self.take_ended();
         let mut failed: Vec<_> = ended
-            .extract_if(.., |&mut (_, instance)| self.record.fails(instance))
+            .extract_if(.., |&mut (_, instance)| self.set.fails(instance))
             .collect();
         failed.sort_unstable_by_key(|&(_, instance)| instance);
         let is_quiet = failed.is_empty()
             && !self.has_commands()
-            && self
-                .record
-                .next_signal_ns()
-                .is_none_or(|at_ns| at_ns > now_ns);
+            && self.next_signal_ns().is_none_or(|at_ns| at_ns > now_ns);
         let last = if is_quiet { ended.pop() } else { None };
         for (core, instance) in ended {
-            self.record.finished(instance, core, now_ns);
             self.idle.push(core);
-            let mut moment = self.scheduler.told(now_ns);
-            moment.complete(instance, &mut self.record);
+            let mut moment = self.scheduler.at(now_ns);
+            moment.complete(instance);
         }
         if let Some((core, instance)) = last
             && self.complete_last(core, instance)?
@@ -110,17 +114,16 @@ impl Driver<'_> {
             return Ok(());
         }
         for (core, instance) in failed {
-            self.record.failed(instance, core, now_ns);
             self.idle.push(core);
-            let mut moment = self.scheduler.told(now_ns);
-            if self.record.is_replaceable(instance) {
-                moment.fail_replaceable(instance, &mut self.record);
+            let mut moment = self.scheduler.at(now_ns);
+            if self.set.is_replaceable(instance) {
+                moment.fail_replaceable(instance);
             } else {
-                moment.fail(instance, &mut self.record);
+                moment.fail(instance);
             }
         }
         self.command();
-        let decisions = self.scheduler.told(now_ns).release_due(&mut self.record);
+        let decisions = self.scheduler.at(now_ns).release_due();
         let decisions = decisions.dispatch().to_vec();
         self.carry_out(&decisions)
     }
@@ -139,12 +142,11 @@ impl Driver<'_> {
     /// Tells that the last instance of this instant has finished, in one of the ways
     /// that there are. Reports whether that was the whole instant.
     fn complete_last(&mut self, core: CoreId, instance: Instance) -> Result<bool, String> {
-        let (now_ns, record) = (self.now_ns, &mut self.record);
-        record.finished(instance, core, now_ns);
+        let now_ns = self.now_ns;
         let vertex = self.scheduler.vertex(instance);
         let way = self.random.between(0, 4);
         if way == 0 {
-            self.scheduler.told(now_ns).complete(instance, record);
+            self.scheduler.at(now_ns).complete(instance);
             self.idle.push(core);
             return Ok(false);
         }
@@ -155,10 +157,9 @@ impl Driver<'_> {
         };
         let taker = other.map_or(core, |place| self.idle[place]);
         let done = if taker == core {
-            self.scheduler.told_hand_off(now_ns, core, vertex, record)
+            self.scheduler.hand_off(now_ns, core, vertex)
         } else {
-            self.scheduler
-                .told_hand_over(now_ns, core, vertex, taker, record)
+            self.scheduler.hand_over(now_ns, core, vertex, taker)
         };
         self.idle.push(core);
         if let HandOff::Open = done {
@@ -187,23 +188,23 @@ impl Driver<'_> {
 
     /// Stops, pauses, resumes and signals DAGs.
     fn command(&mut self) {
-        let (now_ns, record) = (self.now_ns, &mut self.record);
-        let mut moment = self.scheduler.told(now_ns);
+        let now_ns = self.now_ns;
+        let mut moment = self.scheduler.at(now_ns);
         for (id, dag) in (0..).map(DagId).zip(&self.set.dags) {
             if dag.stop_ns == Some(now_ns) {
-                moment.stop(id, record);
+                moment.stop(id);
             }
             for &(from_ns, to_ns) in &dag.pauses_ns {
                 if from_ns == now_ns {
-                    moment.pause(id, record);
+                    moment.pause(id);
                 }
                 if to_ns == now_ns {
-                    moment.resume(id, record);
+                    moment.resume(id);
                 }
             }
         }
-        while let Some(dag) = record.take_signal(now_ns) {
-            moment.signal(dag, record);
+        while let Some((_, dag)) = self.signals.pop_front_if(|(at_ns, _)| *at_ns <= now_ns) {
+            moment.signal(dag);
         }
     }
 
@@ -218,7 +219,8 @@ impl Driver<'_> {
                     return Err(format!("at {now_ns} {decision:?} and it does not run"));
                 };
                 self.left_ns.insert(instance, end_ns - now_ns);
-                self.record.preempted(instance, core, now_ns);
+                let log = &mut self.scheduler.log;
+                log.on_core(core, What::Suspend, now_ns, instance);
                 preempted = Some(core);
                 continue;
             }
@@ -229,17 +231,12 @@ impl Driver<'_> {
                 ));
             }
             let left_ns = self.left_ns.remove(&instance);
-            let left_ns = match (decision, left_ns) {
-                (Decision::Resume { .. }, Some(left_ns)) => {
-                    self.record.resumed(instance, core, now_ns);
-                    left_ns
-                }
-                (Decision::Start { .. }, None) => {
-                    self.record.started(instance, core, now_ns);
-                    self.record.execute(instance, now_ns)
-                }
+            let (what, left_ns) = match (decision, left_ns) {
+                (Decision::Resume { .. }, Some(left_ns)) => (What::Resume, left_ns),
+                (Decision::Start { .. }, None) => (What::Start, self.set.execution_ns(instance)),
                 _ => return Err(format!("at {now_ns} {decision:?}, {left_ns:?} ns are left")),
             };
+            (self.scheduler.log).on_core(core, what, now_ns, instance);
             *place = Some((instance, now_ns + left_ns));
         }
         Ok(())

@@ -7,12 +7,12 @@
 //! instances that have lost their core meanwhile or were moved to another one. After
 //! each step both have to be in the same state, core numbers apart.
 
-use sched_dag::Told as _;
-use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, JobOutcome, Observer, Scheduler};
+use sched_dag::journal::{Event, What};
+use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Journal, Scheduler};
 
 use crate::random::Random;
-use crate::replay::scheduler;
 use crate::set::Set;
+use crate::support::scheduler;
 
 /// Returns the first difference between the short ways and the long one.
 pub(crate) fn difference(set: &Set) -> Option<String> {
@@ -22,20 +22,28 @@ pub(crate) fn difference(set: &Set) -> Option<String> {
 /// One scheduler, and what came of the present step.
 struct Side {
     scheduler: Scheduler,
-    log: Log,
     decisions: Vec<Decision>,
+    /// How many events of its journal were compared.
+    compared: usize,
 }
 
 fn walk(set: &Set) -> Result<(), String> {
     let mut random = Random::new(set.choices);
     let side = || {
-        scheduler(set).map(|scheduler| Side {
+        let mut scheduler = scheduler(&set.specs(), set.options);
+        // Of the short way a driver writes this itself.
+        let kinds = (0..)
+            .map_while(What::from_number)
+            .filter(|what| *what != What::Ready);
+        scheduler.hear(kinds);
+        scheduler.log.journal = Journal::growing();
+        Side {
             scheduler,
-            log: Log::default(),
             decisions: Vec::new(),
-        })
+            compared: 0,
+        }
     };
-    let (mut short, mut long) = (side()?, side()?);
+    let (mut short, mut long) = (side(), side());
     let mut preempted: Vec<Instance> = Vec::new();
     let mut now_ns = 0;
     for step in 0..80 {
@@ -56,7 +64,7 @@ fn walk(set: &Set) -> Result<(), String> {
                 // An instant that is not over: a dispatch is owed.
                 let (_, before) = running[(place + 1) % running.len()];
                 for side in [&mut short, &mut long] {
-                    side.scheduler.told(now_ns).complete(before, &mut side.log);
+                    side.scheduler.at(now_ns).complete(before);
                 }
             }
             short.complete_shortly(now_ns, core, instance, &mut random);
@@ -72,16 +80,16 @@ fn walk(set: &Set) -> Result<(), String> {
             let failing = running.iter().map(|&(_, instance)| instance).next();
             let is_sporadic = set.dags[dag.index()].signals_ns.is_some();
             for side in [&mut short, &mut long] {
-                let mut moment = side.scheduler.told(now_ns);
+                let mut moment = side.scheduler.at(now_ns);
                 match (kind % 10, failing) {
                     (0, Some(instance)) if step > 20 => {
-                        moment.fail_replaceable(instance, &mut side.log);
+                        moment.fail_replaceable(instance);
                     }
-                    (1, _) if step > 60 => moment.stop(dag, &mut side.log),
-                    (2, _) => moment.pause(dag, &mut side.log),
-                    (3 | 4, _) => moment.resume(dag, &mut side.log),
-                    (9, _) if step > 60 => moment.close(dag, &mut side.log),
-                    (5..9, _) if is_sporadic => moment.signal(dag, &mut side.log),
+                    (1, _) if step > 60 => moment.stop(dag),
+                    (2, _) => moment.pause(dag),
+                    (3 | 4, _) => moment.resume(dag),
+                    (9, _) if step > 60 => moment.close(dag),
+                    (5..9, _) if is_sporadic => moment.signal(dag),
                     _ => {}
                 }
                 side.end_instant(now_ns);
@@ -110,13 +118,13 @@ impl Side {
     }
 
     fn end_instant(&mut self, now_ns: u64) {
-        let released = self.scheduler.told(now_ns).release_due(&mut self.log);
+        let released = self.scheduler.at(now_ns).release_due();
         self.decisions.extend_from_slice(released.dispatch());
     }
 
     fn complete(&mut self, now_ns: u64, instance: Instance) {
-        let mut moment = self.scheduler.told(now_ns);
-        moment.complete(instance, &mut self.log);
+        let mut moment = self.scheduler.at(now_ns);
+        moment.complete(instance);
         self.end_instant(now_ns);
     }
 
@@ -136,17 +144,20 @@ impl Side {
         let idle: Vec<_> = cores
             .filter(|&other| other != core && self.scheduler.running(other).is_none())
             .collect();
-        let (scheduler, log) = (&mut self.scheduler, &mut self.log);
+        let scheduler = &mut self.scheduler;
         let done = if idle.is_empty() || random.chance(30) {
-            let (done, is_untold) = scheduler.told_pass_on(now_ns, core, vertex, log);
+            let (done, is_untold) = scheduler.pass_on(now_ns, core, vertex);
             if is_untold && let HandOff::To(_, decision) = done {
-                log.ready(decision.instance());
+                let ready_ns = scheduler.now_ns();
+                let log = &mut scheduler.log;
+                log.on_core(core, What::Finish, now_ns, instance);
+                log.on_core(core, What::Ready, ready_ns, decision.instance());
             }
             done
         } else {
             let idle = idle[random.below(idle.len())];
             scheduler.anticipate(core);
-            scheduler.told_hand_over(now_ns, core, vertex, idle, log)
+            scheduler.hand_over(now_ns, core, vertex, idle)
         };
         match done {
             HandOff::To(_, decision) => self.decisions.push(decision),
@@ -162,6 +173,15 @@ fn compare(short: &mut Side, long: &mut Side, dags: usize) -> Result<(), String>
         let decisions: Vec<_> = kinds.collect();
         let mut running: Vec<_> = side.running().map(|(_, instance)| instance).collect();
         running.sort_by_key(|instance| (instance.dag, instance.subtask));
+        let events = side.scheduler.log.journal.events().skip(side.compared);
+        let subject = |event: Event| (event.dag, event.job, event.subtask);
+        let events = events.map(|event| (event.time_ns, event.what, subject(event)));
+        let events: Vec<_> = events.collect();
+        side.compared += events.len();
+        let mut notices = Vec::new();
+        side.scheduler.log.exchange_notices(&mut notices);
+        let notices = notices.iter();
+        let notices = notices.map(|told| (told.event.what, told.at_ns, told.outcome));
         let scheduler = &side.scheduler;
         let per_dag = (0..).map(DagId).take(dags).map(|dag| {
             let statistics = scheduler.statistics(dag);
@@ -170,7 +190,7 @@ fn compare(short: &mut Side, long: &mut Side, dags: usize) -> Result<(), String>
         });
         format!(
             "{:?}\n{decisions:?}\n{running:?}\n{:?}\n{:?}",
-            std::mem::take(&mut side.log.0),
+            (events, notices.collect::<Vec<_>>()),
             scheduler.next_event_ns(),
             per_dag.collect::<Vec<_>>()
         )
@@ -189,61 +209,5 @@ fn without_core(decision: Decision) -> (&'static str, Instance) {
         Decision::Start { instance, .. } => ("start", instance),
         Decision::Resume { instance, .. } => ("resume", instance),
         Decision::Preempt { instance, .. } => ("preempt", instance),
-    }
-}
-
-/// All reports since the last step, in order.
-#[derive(Default)]
-struct Log(Vec<String>);
-
-impl Log {
-    fn note(&mut self, what: &str, dag: DagId, rest: impl std::fmt::Debug) {
-        self.0.push(format!("{what} {} {rest:?}", dag.0));
-    }
-}
-
-impl Observer for Log {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.note("released", dag, (job, release_ns));
-    }
-
-    fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.note("queued", dag, (job, release_ns));
-    }
-
-    fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.note("skipped", dag, (job, release_ns));
-    }
-
-    fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
-        self.note("signalled", dag, (job, release_ns));
-    }
-
-    fn ready(&mut self, instance: Instance) {
-        self.note("ready", instance.dag, instance);
-    }
-
-    fn cancelled(&mut self, instance: Instance) {
-        self.note("cancelled", instance.dag, instance);
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        self.note("aborted", dag, job);
-    }
-
-    fn restarted(&mut self, instance: Instance) {
-        self.note("restarted", instance.dag, instance);
-    }
-
-    fn ended(&mut self, dag: DagId) {
-        self.note("ended", dag, ());
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        self.note("missed", dag, (job, deadline_ns));
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.note("completed", dag, (job, outcome));
     }
 }

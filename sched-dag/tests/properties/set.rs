@@ -1,9 +1,10 @@
 //! Random sets of DAGs, in a form that is easy to shrink and to print.
 
+use std::collections::VecDeque;
 use std::fmt;
 
 use sched_dag::{
-    Activation, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
+    Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
     Priority, SchedulerOptions, SubtaskSpec,
 };
 
@@ -235,9 +236,33 @@ impl Set {
         self.dags.iter().map(Dag::spec).collect()
     }
 
+    fn subtask(&self, instance: Instance) -> &Subtask {
+        &self.dags[instance.dag.index()].subtasks[instance.subtask.index()]
+    }
+
     pub(crate) fn execution_ns(&self, instance: Instance) -> u64 {
-        let subtask = &self.dags[instance.dag.index()].subtasks[instance.subtask.index()];
-        subtask.executions_ns[usize::try_from(instance.job).expect("few jobs")]
+        let job = usize::try_from(instance.job).expect("few jobs");
+        self.subtask(instance).executions_ns[job]
+    }
+
+    pub(crate) fn fails(&self, instance: Instance) -> bool {
+        self.subtask(instance).fails_in == Some(instance.job)
+    }
+
+    pub(crate) fn is_replaceable(&self, instance: Instance) -> bool {
+        self.subtask(instance).is_replaceable
+    }
+
+    /// Returns all signals, in order.
+    pub(crate) fn signals(&self) -> VecDeque<(u64, DagId)> {
+        let of_dag = |(id, dag): (DagId, &Dag)| {
+            let signals_ns = dag.signals_ns.clone().unwrap_or_default();
+            signals_ns.into_iter().map(move |at_ns| (at_ns, id))
+        };
+        let dags = (0..).map(DagId).zip(&self.dags);
+        let mut signals: Vec<_> = dags.flat_map(of_dag).collect();
+        signals.sort_by_key(|&(at_ns, _)| at_ns);
+        signals.into()
     }
 }
 

@@ -1,20 +1,28 @@
-//! What the tests share: building DAGs in a line, and a log of all events.
+//! What the tests share: sets of DAGs, runs of them, and timelines to hold their journals against.
+//!
+//! A timeline is text, an instant a line: the time, and the events that are written down, by the
+//! journal's words. Only events of the kinds that the text has are compared. Cores are named by
+//! `on`, DAGs, jobs and instances as `dag`, `dag.job` and `dag.job.subtask`; a completed job has
+//! its outcome. What has a `=` is asked of the scheduler: a counter of DAG 0, of DAG 1 as in
+//! `misses@1=2`, or what [`ask`] knows; a line of such at the end needs no time.
 
 #![allow(dead_code, reason = "each test uses a part of this")]
 
-pub(crate) mod bench;
+pub(crate) mod hand;
 pub(crate) mod random;
-pub(crate) mod written;
+pub(crate) mod script;
 
-use std::fmt::Write;
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
+use sched_dag::journal::{Event, What};
+use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, DagStatistics, Decision, Instance,
-    JobOutcome, Observer, OverrunPolicy, Policy, Preemption, Priority, Scheduler, SchedulerOptions,
+    Activation, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, FaultLimit, Instance,
+    JobOutcome, OnFault, OverrunPolicy, Policy, Preemption, Priority, Scheduler, SchedulerOptions,
     SubtaskId, SubtaskSpec, TaskSet, verify,
 };
+pub(crate) use script::{Run, Script};
 
 /// Options for static priority with preemption.
 pub(crate) const PREEMPTIVE: SchedulerOptions = SchedulerOptions {
@@ -64,12 +72,59 @@ pub(crate) fn dag(
     }
 }
 
-/// Returns a DAG of one subtask, with room for few jobs in flight.
-pub(crate) fn overrunning(dag: DagSpec, in_flight: u32, overrun: OverrunPolicy) -> DagSpec {
-    DagSpec {
-        in_flight: Some(in_flight),
-        overrun,
-        ..dag
+/// A DAG with something else.
+pub(crate) trait Spec: Sized {
+    /// Changes it.
+    fn with(self, change: impl FnOnce(&mut DagSpec)) -> DagSpec;
+
+    fn offset(self, offset_ns: u64) -> DagSpec {
+        self.with(|dag| dag.offset_ns = offset_ns)
+    }
+
+    /// Room for few jobs in flight.
+    fn overrunning(self, in_flight: u32, overrun: OverrunPolicy) -> DagSpec {
+        self.with(|dag| (dag.in_flight, dag.overrun) = (Some(in_flight), overrun))
+    }
+
+    fn sporadic(self) -> DagSpec {
+        self.with(|dag| dag.activation = Activation::Sporadic)
+    }
+
+    fn endless(self) -> DagSpec {
+        self.with(|dag| dag.jobs = None)
+    }
+
+    fn wcets(self, wcets_ns: &[u64]) -> DagSpec {
+        self.with(|dag| {
+            let subtasks = dag.subtasks.iter_mut().zip(wcets_ns);
+            subtasks.for_each(|(subtask, wcet_ns)| subtask.wcet_ns = Some(*wcet_ns));
+        })
+    }
+
+    /// Survives `faults` within `window` jobs, `in_all` in all.
+    fn surviving(self, faults: u32, window: u64, in_all: u32) -> DagSpec {
+        let limit = FaultLimit {
+            faults,
+            window,
+            in_all,
+        };
+        self.with(|dag| dag.on_fault = OnFault::DropJob(limit))
+    }
+
+    fn non_preemptive(self, subtask: usize) -> DagSpec {
+        self.with(|dag| dag.subtasks[subtask].non_preemptive = true)
+    }
+
+    /// A deadline of one sink.
+    fn due(self, subtask: usize, deadline_ns: u64) -> DagSpec {
+        self.with(|dag| dag.subtasks[subtask].relative_deadline_ns = Some(deadline_ns))
+    }
+}
+
+impl Spec for DagSpec {
+    fn with(mut self, change: impl FnOnce(&mut DagSpec)) -> DagSpec {
+        change(&mut self);
+        self
     }
 }
 
@@ -77,36 +132,13 @@ pub(crate) fn overrunning(dag: DagSpec, in_flight: u32, overrun: OverrunPolicy) 
 pub(crate) fn commit(specs: &[DagSpec], options: SchedulerOptions) -> Arc<TaskSet> {
     let options = CommitOptions::new(options.policy, options.cores)
         .with_construction(ConstructionPolicy::any_graph());
-    Arc::new(
-        verify(specs, &options)
-            .expect("the test's DAGs are right")
-            .task_set,
-    )
+    let verified = verify(specs, &options).expect("the test's DAGs are right");
+    Arc::new(verified.task_set)
 }
 
 /// Makes a scheduler for DAGs of any shape.
 pub(crate) fn scheduler(specs: &[DagSpec], options: SchedulerOptions) -> Scheduler {
     Scheduler::new(commit(specs, options), options)
-}
-
-/// Completes instances at one instant, and returns the decisions.
-pub(crate) fn step(
-    scheduler: &mut Scheduler,
-    now_ns: u64,
-    completed: &[Instance],
-) -> Vec<Decision> {
-    let mut moment = scheduler.at(now_ns);
-    for &instance in completed {
-        moment.complete(instance, &mut ());
-    }
-    moment.release_due(&mut ()).dispatch().to_vec()
-}
-
-pub(crate) fn start(core: u32, instance: Instance) -> Decision {
-    Decision::Start {
-        core: CoreId(core),
-        instance,
-    }
 }
 
 pub(crate) fn instance(dag: u32, job: u64, subtask: u32) -> Instance {
@@ -117,181 +149,169 @@ pub(crate) fn instance(dag: u32, job: u64, subtask: u32) -> Instance {
     }
 }
 
-/// Everything that happened, one event a line: time, event, instance as
-/// `dag.job.subtask` or job as `dag.job`.
-pub(crate) struct Log<F> {
-    pub(crate) lines: Vec<String>,
-    now_ns: u64,
-    execution_ns: F,
-    /// The instances that fail at the end of their execution.
-    pub(crate) failing: Vec<Instance>,
-    /// Whether there are other functions for their subtasks.
-    pub(crate) is_replaceable: bool,
+/// Returns an instance by its name.
+pub(crate) fn named(name: &str) -> Instance {
+    let parts: Vec<u32> = name.split('.').filter_map(|it| it.parse().ok()).collect();
+    let [dag, job, subtask] = parts[..] else {
+        panic!("`{name}` is no instance")
+    };
+    instance(dag, job.into(), subtask)
 }
 
-impl<F: FnMut(Instance) -> u64> Log<F> {
-    pub(crate) fn new(execution_ns: F) -> Self {
-        Self {
-            lines: Vec::new(),
-            now_ns: 0,
-            execution_ns,
-            failing: Vec::new(),
-            is_replaceable: true,
-        }
-    }
-
-    fn note(&mut self, event: std::fmt::Arguments<'_>) {
-        let mut line = self.now_ns.to_string();
-        write!(line, " {event}").expect("a string takes all");
-        self.lines.push(line);
-    }
+/// Returns a variable's number.
+pub(crate) fn number(variable: &str, default: u64) -> u64 {
+    let given = std::env::var(variable).ok();
+    given.map_or(default, |text| text.parse().expect("a whole number"))
 }
 
-/// Runs DAGs to the end and returns all events and each DAG's counters.
-pub(crate) fn run(
-    specs: &[DagSpec],
-    options: SchedulerOptions,
-    execution_ns: impl FnMut(Instance) -> u64,
-) -> (Vec<String>, Vec<DagStatistics>) {
-    run_failing(specs, options, &[], execution_ns)
+/// Runs DAGs to the end.
+pub(crate) fn run(specs: &[DagSpec], options: SchedulerOptions, takes: impl Takes) -> Run {
+    run_failing(specs, options, &[], takes)
 }
 
 /// Runs DAGs to the end as [`run`] does, while some instances fail.
 pub(crate) fn run_failing(
     specs: &[DagSpec],
     options: SchedulerOptions,
-    failing: &[Instance],
-    execution_ns: impl FnMut(Instance) -> u64,
-) -> (Vec<String>, Vec<DagStatistics>) {
-    let mut log = Log::new(execution_ns);
-    log.failing = failing.to_vec();
-    let mut run = VirtualTime::new(scheduler(specs, options));
-    assert_eq!(run.run(&mut log), End::Finished);
-    assert!(run.is_finished());
-    let dags = 0..u32::try_from(specs.len()).expect("few DAGs");
-    let statistics = dags
-        .map(|dag| *run.scheduler_of(DagId(dag)).statistics(DagId(dag)))
-        .collect();
-    (log.lines, statistics)
+    failing: &[&str],
+    takes: impl Takes,
+) -> Run {
+    let failing: Vec<Instance> = failing.iter().map(|name| named(name)).collect();
+    let run = Script::new(takes)
+        .failing(move |instance| failing.contains(&instance))
+        .run(VirtualTime::new(scheduler(specs, options)));
+    assert!(run.driver.is_finished());
+    run
 }
 
-/// Events as lines, to be compared with what is expected.
-pub(crate) trait Timeline {
-    /// Fails unless they are as the text says, which has those of an instant on a line or
-    /// several. Only those of the kinds that the text has are compared.
-    fn must_be(&self, expected: &str);
+/// How long instances execute.
+pub(crate) trait Takes {
+    fn takes_ns(&mut self, instance: Instance) -> u64;
 }
 
-impl Timeline for [String] {
-    #[track_caller]
-    fn must_be(&self, expected: &str) {
-        let at_one_time = |line: &str| {
-            let (time, events) = line.trim().split_once(' ').unwrap_or_default();
-            let timed = |event: &str| format!("{time} {event}");
-            events.split(", ").map(timed).collect::<Vec<_>>()
+/// All as long.
+impl Takes for u64 {
+    fn takes_ns(&mut self, _: Instance) -> u64 {
+        *self
+    }
+}
+
+/// Each subtask as long, in every job.
+impl<const SUBTASKS: usize> Takes for [u64; SUBTASKS] {
+    fn takes_ns(&mut self, instance: Instance) -> u64 {
+        self[instance.subtask.index()]
+    }
+}
+
+/// Likewise, by DAG and subtask.
+impl<const DAGS: usize, const SUBTASKS: usize> Takes for [[u64; SUBTASKS]; DAGS] {
+    fn takes_ns(&mut self, instance: Instance) -> u64 {
+        self[instance.dag.index()][instance.subtask.index()]
+    }
+}
+
+/// Each DAG's instances as long.
+pub(crate) struct ByDag<const DAGS: usize>(pub(crate) [u64; DAGS]);
+
+impl<const DAGS: usize> Takes for ByDag<DAGS> {
+    fn takes_ns(&mut self, instance: Instance) -> u64 {
+        self.0[instance.dag.index()]
+    }
+}
+
+impl<F: FnMut(Instance) -> u64> Takes for F {
+    fn takes_ns(&mut self, instance: Instance) -> u64 {
+        self(instance)
+    }
+}
+
+/// Returns events in words, each with its time.
+pub(crate) fn told<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<(u64, String)> {
+    let mut outcomes: HashMap<(DagId, u64), JobOutcome> = HashMap::new();
+    let mut stopped = Vec::new();
+    let tell = |event: &Event| {
+        let Event { dag, job, what, .. } = *event;
+        let outcome = match what {
+            What::Aborted => Some(JobOutcome::Aborted),
+            What::Restarted => Some(JobOutcome::Failed),
+            _ => None,
         };
-        let lines = expected.lines().filter(|line| !line.trim().is_empty());
-        let expected: Vec<String> = lines.flat_map(at_one_time).collect();
-        let kind = |line: &str| line.split(' ').nth(1).map(str::to_owned);
-        let events: Vec<&str> = self
-            .iter()
-            .map(String::as_str)
-            .filter(|event| expected.iter().any(|line| kind(line) == kind(event)))
-            .collect();
-        assert_eq!(events, expected, "\nhappened:\n{}\n", events.join("\n"));
-    }
+        let known = outcomes.get(&(dag, job)).copied();
+        if let Some(outcome) = outcome
+            && known.is_none_or(|known| known == JobOutcome::Missed)
+        {
+            outcomes.insert((dag, job), outcome);
+        }
+        if what == What::Missed {
+            outcomes.entry((dag, job)).or_insert(JobOutcome::Missed);
+        }
+        if what == What::Stopped {
+            stopped.push(dag);
+        }
+        let cut = known.filter(|known| *known != JobOutcome::Missed);
+        let ended = stopped.contains(&dag).then_some(JobOutcome::DagEnded);
+        let outcome = cut.or(ended).or(known).unwrap_or(JobOutcome::Met);
+        let subject = match event.subtask {
+            Some(subtask) => format!("{}.{job}.{}", dag.0, subtask.0),
+            None if what == What::Entered => job.to_string(),
+            None if what.is_of_dag() => dag.0.to_string(),
+            None => format!("{}.{job}", dag.0),
+        };
+        let rest = match what {
+            What::Start | What::Suspend | What::Resume => format!(" on {}", event.core.0),
+            What::Completed => format!(" {outcome:?}"),
+            _ => String::new(),
+        };
+        (event.time_ns, format!("{what} {subject}{rest}"))
+    };
+    events.into_iter().map(tell).collect()
 }
 
-struct Short(Instance);
-
-impl std::fmt::Display for Short {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}.{}.{}", self.0.dag.0, self.0.job, self.0.subtask.0)
-    }
+/// Asks a scheduler, and fails if it does not say what is expected: `key=value`.
+#[track_caller]
+pub(crate) fn ask(scheduler: &Scheduler, question: &str) {
+    let (key, expected) = question.split_once('=').expect("a question");
+    let (key, dag) = key.split_once('@').unwrap_or((key, "0"));
+    let dag = DagId(dag.parse().expect("a DAG's number"));
+    let said = match key {
+        "now" => scheduler.now_ns().to_string(),
+        "next" => (scheduler.next_event_ns()).map_or("never".into(), |ns| ns.to_string()),
+        "runs" => {
+            let cores = (0..scheduler.options().cores).map(CoreId);
+            let running = cores.map(|core| match scheduler.running(core) {
+                Some(Instance { dag, job, subtask }) => format!("{}.{job}.{}", dag.0, subtask.0),
+                None => "-".to_owned(),
+            });
+            running.collect::<Vec<_>>().join("+")
+        }
+        "finished" => scheduler.is_finished().to_string(),
+        "over" => scheduler.is_over(dag).to_string(),
+        "ended" => scheduler.is_ended(dag).to_string(),
+        "paused" => scheduler.is_paused(dag).to_string(),
+        "waiting" => scheduler.waiting(dag).to_string(),
+        "in_flight" => scheduler.in_flight(dag).to_string(),
+        counter => {
+            let all = format!("{:?}", scheduler.statistics(dag));
+            let (_, rest) = (all.split_once(&format!(" {counter}: "))).expect("a counter");
+            rest.split([',', ' ']).next().unwrap_or_default().to_owned()
+        }
+    };
+    assert_eq!(said, expected, "{question}");
 }
 
-impl<F: FnMut(Instance) -> u64> Observer for Log<F> {
-    fn released(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.note(format_args!("released {}.{job} of {release_ns}", dag.0));
-    }
+/// Returns the lines of a text, each with its parts: (time, (questions, events)).
+pub(crate) type Line<'t> = (Option<u64>, Vec<&'t str>, Vec<&'t str>);
 
-    fn queued(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.note(format_args!("queued {}.{job}", dag.0));
-    }
-
-    fn skipped(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.note(format_args!("skipped {}.{job}", dag.0));
-    }
-
-    fn ready(&mut self, instance: Instance) {
-        self.note(format_args!("ready {}", Short(instance)));
-    }
-
-    fn cancelled(&mut self, instance: Instance) {
-        self.note(format_args!("cancelled {}", Short(instance)));
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        self.note(format_args!("aborted {}.{job}", dag.0));
-    }
-
-    fn restarted(&mut self, instance: Instance) {
-        self.note(format_args!("restarted {}", Short(instance)));
-    }
-
-    fn ended(&mut self, dag: DagId) {
-        self.note(format_args!("end {}", dag.0));
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        self.note(format_args!("missed {}.{job} of {deadline_ns}", dag.0));
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.note(format_args!("ended {}.{job} {outcome:?}", dag.0));
-    }
+pub(crate) fn line(text: &str) -> Line<'_> {
+    let text = text.trim();
+    let (first, rest) = text.split_once(' ').unwrap_or((text, ""));
+    let time_ns = first.parse().ok();
+    let parts = if time_ns.is_some() { rest } else { text };
+    let parts = parts.split(", ").filter(|part| !part.is_empty());
+    let (questions, events) = parts.partition(|part| part.contains('='));
+    (time_ns, questions, events)
 }
 
-impl<F: FnMut(Instance) -> u64> Workload for Log<F> {
-    const WANTED: &'static [sched_dag::journal::What] = sched_dag::told::ALL;
-
-    fn heard(&mut self, news: &sched_dag::News) {
-        sched_dag::told::tell(news, self);
-    }
-
-    fn execute(&mut self, instance: Instance, _now_ns: u64) -> u64 {
-        (self.execution_ns)(instance)
-    }
-
-    fn fails(&mut self, instance: Instance) -> bool {
-        self.failing.contains(&instance)
-    }
-
-    fn is_replaceable(&mut self, _instance: Instance) -> bool {
-        self.is_replaceable
-    }
-
-    fn instant(&mut self, now_ns: u64) {
-        self.now_ns = now_ns;
-    }
-
-    fn started(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.note(format_args!("start {} on {}", Short(instance), core.0));
-    }
-
-    fn preempted(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.note(format_args!("preempt {} on {}", Short(instance), core.0));
-    }
-
-    fn resumed(&mut self, instance: Instance, core: CoreId, _now_ns: u64) {
-        self.note(format_args!("resume {} on {}", Short(instance), core.0));
-    }
-
-    fn finished(&mut self, instance: Instance, _core: CoreId, _now_ns: u64) {
-        self.note(format_args!("finish {}", Short(instance)));
-    }
-
-    fn failed(&mut self, instance: Instance, _core: CoreId, _now_ns: u64) {
-        self.note(format_args!("fail {}", Short(instance)));
-    }
+pub(crate) fn kind(event: &str) -> &str {
+    event.split(' ').next().unwrap_or_default()
 }

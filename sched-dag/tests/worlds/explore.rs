@@ -5,13 +5,12 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use sched_dag::Told as _;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, JobOutcome, Moment, Observer,
-    Scheduler, SubtaskId, verify,
+    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, Notice, Scheduler, SubtaskId,
+    verify,
 };
 
-use crate::rules::{Facts, Place, Said};
+use crate::rules::{Facts, Place, SAID};
 use crate::world::World;
 
 /// By so much a late driver comes later: a release and its deadline may both have passed.
@@ -43,7 +42,7 @@ impl fmt::Display for Counts {
 
 /// What happens at an instant before its releases.
 #[derive(Clone, Copy, Debug)]
-enum What {
+enum Step {
     Nothing,
     Complete(Place),
     Both(Place, Place),
@@ -57,7 +56,7 @@ enum What {
     Signal(usize),
 }
 
-impl What {
+impl Step {
     const fn kind(self) -> &'static str {
         match self {
             Self::Nothing => "time",
@@ -86,16 +85,18 @@ struct Node<'w> {
 }
 
 /// The steps that led to new states: when, what, and the number of the step before.
-type Ways = Vec<(u64, What, Option<usize>)>;
+type Ways = Vec<(u64, Step, Option<usize>)>;
 
 /// Explores a world; the error is the way to the first difference.
 pub(crate) fn explore(world: &World, counts: &mut Counts) -> Result<(), String> {
     let options = CommitOptions::new(world.options.policy, world.options.cores)
         .with_construction(ConstructionPolicy::any_graph());
     let verified = verify(&world.specs(), &options).expect("the world is right");
+    let mut scheduler = Scheduler::new(Arc::new(verified.task_set), world.options);
+    scheduler.hear(SAID);
     let mut known = HashSet::new();
     let mut open = vec![Node {
-        scheduler: Scheduler::new(Arc::new(verified.task_set), world.options),
+        scheduler,
         facts: Facts::new(world),
         disturbances: 0,
         step: None,
@@ -132,7 +133,7 @@ pub(crate) fn explore(world: &World, counts: &mut Counts) -> Result<(), String> 
 }
 
 /// Returns the steps up to one, the first one first.
-fn way(ways: &Ways, mut step: Option<usize>) -> Vec<(u64, What)> {
+fn way(ways: &Ways, mut step: Option<usize>) -> Vec<(u64, Step)> {
     let mut way = Vec::new();
     while let Some(number) = step {
         let (time_ns, what, before) = ways[number];
@@ -144,30 +145,30 @@ fn way(ways: &Ways, mut step: Option<usize>) -> Vec<(u64, What)> {
 }
 
 /// Returns every step of a driver: at this instant, at the next, or one later still.
-fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, What)> {
+fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, Step)> {
     let started = node.facts.started();
-    let mut whats = vec![What::Nothing];
+    let mut whats = vec![Step::Nothing];
     for &one in &started {
-        whats.push(What::Complete(one));
+        whats.push(Step::Complete(one));
         let others = started.iter().filter(|&&other| other != one);
-        whats.extend(others.map(|&other| What::Both(one, other)));
+        whats.extend(others.map(|&other| Step::Both(one, other)));
     }
     if node.disturbances < world.disturbances() {
-        whats.extend(started.iter().map(|&place| What::Fail(place)));
+        whats.extend(started.iter().map(|&place| Step::Fail(place)));
         let may_survive = |place: &&Place| world.dags[place.0].survives.is_some();
         whats.extend(
             started
                 .iter()
                 .filter(may_survive)
-                .map(|&place| What::Drop(place)),
+                .map(|&place| Step::Drop(place)),
         );
         for (dag, model) in world.dags.iter().enumerate() {
-            whats.extend([What::Stop(dag), What::Close(dag)]);
+            whats.extend([Step::Stop(dag), Step::Close(dag)]);
             whats.push(match node.facts.dags[dag].is_paused {
-                true => What::Resume(dag),
-                false => What::Pause(dag),
+                true => Step::Resume(dag),
+                false => Step::Pause(dag),
             });
-            whats.extend(model.is_sporadic.then_some(What::Signal(dag)));
+            whats.extend(model.is_sporadic.then_some(Step::Signal(dag)));
         }
     }
     let now_ns = node.facts.now_ns;
@@ -177,8 +178,8 @@ fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, What)> {
     let steps = times_ns.flat_map(|time_ns| whats.iter().map(move |&what| (time_ns, what)));
     // The first instant is one without anything.
     let is_first = node.step.is_none();
-    let is_step = |&(time_ns, what): &(u64, What)| {
-        let is_nothing = matches!(what, What::Nothing);
+    let is_step = |&(time_ns, what): &(u64, Step)| {
+        let is_nothing = matches!(what, Step::Nothing);
         if is_first {
             is_nothing
         } else {
@@ -189,58 +190,64 @@ fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, What)> {
 }
 
 /// Tells both what happens, and compares what both say of jobs.
-fn take(node: &mut Node<'_>, time_ns: u64, what: What) -> Result<(), String> {
+fn take(node: &mut Node<'_>, time_ns: u64, what: Step) -> Result<(), String> {
     let Node {
         scheduler, facts, ..
     } = node;
-    let mut moment: sched_dag::told::Moment<'_> = scheduler.told(time_ns);
+    let mut moment = scheduler.at(time_ns);
     facts.now_ns = time_ns;
     facts.said.iter_mut().for_each(Vec::clear);
-    let mut heard = Heard(facts.said.clone());
     match what {
-        What::Nothing => {}
-        What::Complete(place) => {
-            moment.complete(instance(place), &mut heard);
+        Step::Nothing => {}
+        Step::Complete(place) => {
+            moment.complete(instance(place));
             facts.complete(place);
         }
-        What::Both(one, other) => {
+        Step::Both(one, other) => {
             for place in [one, other] {
-                moment.complete(instance(place), &mut heard);
+                moment.complete(instance(place));
                 facts.complete(place);
             }
         }
-        What::Fail(place) => {
-            moment.fail(instance(place), &mut heard);
+        Step::Fail(place) => {
+            moment.fail(instance(place));
             facts.fail(place);
         }
-        What::Drop(place) => {
-            moment.fail_replaceable(instance(place), &mut heard);
+        Step::Drop(place) => {
+            moment.fail_replaceable(instance(place));
             facts.fail_replaceable(place);
         }
-        What::Stop(dag) => {
-            moment.stop(id(dag), &mut heard);
+        Step::Stop(dag) => {
+            moment.stop(id(dag));
             facts.stop(dag);
         }
-        What::Pause(dag) => {
-            moment.pause(id(dag), &mut heard);
+        Step::Pause(dag) => {
+            moment.pause(id(dag));
             facts.pause(dag);
         }
-        What::Resume(dag) => {
-            moment.resume(id(dag), &mut heard);
+        Step::Resume(dag) => {
+            moment.resume(id(dag));
             facts.resume(dag);
         }
-        What::Close(dag) => {
-            moment.close(id(dag), &mut heard);
+        Step::Close(dag) => {
+            moment.close(id(dag));
             facts.close(dag);
         }
-        What::Signal(dag) => {
-            moment.signal(id(dag), &mut heard);
+        Step::Signal(dag) => {
+            moment.signal(id(dag));
             facts.signal(dag);
         }
     }
-    let _decisions = moment.release_due(&mut heard).dispatch();
+    let _decisions = moment.release_due().dispatch();
     facts.end_instant();
-    same("reports", &facts.said, &heard.0)
+    let mut said = vec![Vec::new(); facts.said.len()];
+    let mut notices = Vec::new();
+    scheduler.log.exchange_notices(&mut notices);
+    for Notice { event, outcome, .. } in notices {
+        let job = usize::try_from(event.job).expect("few jobs");
+        said[event.dag.index()].push((event.what, job, outcome));
+    }
+    same("reports", &facts.said, &said)
 }
 
 /// Returns what the scheduler has that the rules have not.
@@ -269,61 +276,6 @@ fn compare(node: &Node<'_>) -> Result<(), String> {
         same("waiting", &waiting, &scheduler.waiting(id(dag)))?;
     }
     Ok(())
-}
-
-/// What the scheduler reports of each DAG's jobs.
-struct Heard(Vec<Vec<Said>>);
-
-impl Heard {
-    fn hear(&mut self, dag: DagId, said: impl Fn(usize) -> Said, job: u64) {
-        self.0[dag.index()].push(said(usize::try_from(job).expect("few jobs")));
-    }
-}
-
-impl Observer for Heard {
-    fn released(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.hear(dag, Said::Released, job);
-    }
-
-    fn queued(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.hear(dag, Said::Queued, job);
-    }
-
-    fn skipped(&mut self, dag: DagId, job: u64, _release_ns: u64) {
-        self.hear(dag, Said::Skipped, job);
-    }
-
-    fn aborted(&mut self, dag: DagId, job: u64) {
-        self.hear(dag, Said::Aborted, job);
-    }
-
-    fn deadline_missed(&mut self, dag: DagId, job: u64, _deadline_ns: u64) {
-        self.hear(dag, Said::Missed, job);
-    }
-
-    fn job_completed(&mut self, dag: DagId, job: u64, outcome: JobOutcome) {
-        self.hear(dag, |job| Said::Completed(job, outcome), job);
-    }
-
-    fn restarted(&mut self, failed: Instance) {
-        self.hear(failed.dag, Said::Restarted, failed.job);
-    }
-
-    fn ended(&mut self, dag: DagId) {
-        self.0[dag.index()].push(Said::Ended);
-    }
-
-    fn switched_off(&mut self, dag: DagId) {
-        self.0[dag.index()].push(Said::Off);
-    }
-
-    fn switched_on(&mut self, dag: DagId) {
-        self.0[dag.index()].push(Said::On);
-    }
-
-    fn closed(&mut self, dag: DagId) {
-        self.0[dag.index()].push(Said::Closed);
-    }
 }
 
 fn same<T: PartialEq + fmt::Debug>(what: &str, expected: &T, happened: &T) -> Result<(), String> {

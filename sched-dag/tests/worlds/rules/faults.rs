@@ -1,6 +1,8 @@
 //! What a fault costs, the DAG (E1 to E8) or the job (D1 to D7), and stops.
 
-use super::{Facts, OfDag, Part, Place, Said, State};
+use sched_dag::journal::What;
+
+use super::{Facts, OfDag, Part, Place, State};
 
 impl Facts<'_> {
     pub(crate) fn fail(&mut self, place: Place) {
@@ -28,7 +30,7 @@ impl Facts<'_> {
         survived.push(number);
         statistics.faults += 1;
         statistics.restarts += 1;
-        self.said[dag].push(Said::Restarted(number));
+        self.said[dag].push((What::Restarted, number, None));
         let job = &mut jobs[number];
         if !job.starts_nothing() {
             job.has_failed = true;
@@ -63,7 +65,7 @@ impl Facts<'_> {
             ..
         } = &mut self.dags[dag];
         (*is_ended, *is_closed) = (true, true);
-        self.said[dag].push(Said::Ended);
+        self.said[dag].push((What::Stopped, 0, None));
         for job in jobs {
             match job.state {
                 State::InFlight if !job.starts_nothing() => {

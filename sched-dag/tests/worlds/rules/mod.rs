@@ -8,25 +8,28 @@ mod releases;
 
 use std::collections::BTreeSet;
 
+use sched_dag::journal::What;
 use sched_dag::{DagStatistics, JobOutcome, Policy, Preemption};
 
 use crate::world::{Dag, JOBS, MOST_SUBTASKS, World};
 
-/// What is reported of a DAG's jobs, in order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Said {
-    Released(usize),
-    Queued(usize),
-    Skipped(usize),
-    Aborted(usize),
-    Missed(usize),
-    Completed(usize, JobOutcome),
-    Ended,
-    Off,
-    On,
-    Closed,
-    Restarted(usize),
-}
+/// What is reported of a DAG's jobs, in order: the job, if it is about one, and its outcome.
+pub(crate) type Said = (What, usize, Option<JobOutcome>);
+
+/// The kinds of reports that are compared.
+pub(crate) const SAID: [What; 11] = [
+    What::Released,
+    What::Queued,
+    What::Skipped,
+    What::Aborted,
+    What::Missed,
+    What::Completed,
+    What::Stopped,
+    What::Off,
+    What::On,
+    What::Closed,
+    What::Restarted,
+];
 
 /// An instance as DAG, job and subtask.
 pub(crate) type Place = (usize, usize, usize);
@@ -182,7 +185,7 @@ impl<'w> Facts<'w> {
             };
             if (0..model.subtasks()).any(is_late) {
                 job.is_missed = true;
-                self.said[dag].push(Said::Missed(number));
+                self.said[dag].push((What::Missed, number, None));
                 statistics.misses += 1;
                 statistics.consecutive_misses += 1;
                 statistics.most_consecutive_misses = statistics
@@ -243,7 +246,7 @@ impl<'w> Facts<'w> {
         if outcome == JobOutcome::Met {
             statistics.consecutive_misses = 0;
         }
-        self.said[dag].push(Said::Completed(number, outcome));
+        self.said[dag].push((What::Completed, number, Some(outcome)));
     }
 
     /// R2: nothing but cores holds it back.
