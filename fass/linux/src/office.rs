@@ -106,6 +106,12 @@ impl Office {
         has_letters.load(Ordering::Relaxed) && has_letters.swap(false, Ordering::AcqRel)
     }
 
+    /// Reports whether there may be letters for a cluster.
+    pub(crate) fn has_letters(&self, cluster: ClusterId) -> bool {
+        let has_letters = &self.doors[cluster.index()].has_letters;
+        has_letters.load(Ordering::Relaxed)
+    }
+
     /// Takes note, after a step of a cluster's release thread, of how often letters were taken, and
     /// of whether all its DAGs are over. Reports whether the run is.
     pub(crate) fn settle(&self, rests: &mut bool, is_finished: bool, opened: u64) -> bool {

@@ -115,7 +115,12 @@ impl Port<Box<Runner>> for ThreadPort<'_> {
         self.office.send(Some(self.cluster), request)
     }
 
-    fn letters(&mut self) -> Option<&Letters> {
+    #[inline]
+    fn has_letters(&self) -> bool {
+        self.office.has_letters(self.cluster)
+    }
+
+    fn take_letters(&mut self) -> Option<&Letters> {
         let has_letters = self.office.open(self.cluster);
         *self.opened += u64::from(has_letters);
         has_letters.then_some(&self.office.letters)

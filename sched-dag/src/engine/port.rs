@@ -121,9 +121,13 @@ pub trait Port<B> {
         false
     }
 
-    /// Returns the letters of other clusters, if there may be any, and takes note that they are
-    /// read.
-    fn letters(&mut self) -> Option<&Letters> {
+    /// Reports whether there may be letters of other clusters, or from outside.
+    fn has_letters(&self) -> bool {
+        false
+    }
+
+    /// Returns them, if there may be any, and takes note that they are read.
+    fn take_letters(&mut self) -> Option<&Letters> {
         None
     }
 

@@ -77,10 +77,16 @@ pub(super) fn divide(
 }
 
 /// Returns the cluster of a DAG; cluster 0 if there is no run that has it.
+#[inline]
 pub(super) fn of_dag(dag: DagId) -> &'static Cluster {
-    if !cluster::are_divided() {
-        return nth(0);
+    match MAY_DIVIDE && cluster::are_divided() {
+        true => among_several(dag),
+        // Known by its address wherever cores cannot be divided.
+        false => &cluster::FIRST,
     }
+}
+
+fn among_several(dag: DagId) -> &'static Cluster {
     let place = nth(0).execution.lock();
     let task_set = place.as_ref().map(Execution::task_set);
     let dag = task_set.and_then(|task_set| task_set.dags().get(dag.index()));

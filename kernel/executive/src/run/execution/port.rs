@@ -66,8 +66,12 @@ impl Port<Loan> for SmpPort<'_> {
     }
 
     #[inline]
-    fn letters(&mut self) -> Option<&lifecycle::Letters> {
-        if !self.cluster.may_have_letters() {
+    fn has_letters(&self) -> bool {
+        self.cluster.may_have_letters()
+    }
+
+    fn take_letters(&mut self) -> Option<&lifecycle::Letters> {
+        if !MAY_DIVIDE {
             return None;
         }
         self.cluster.has_letters.swap(false, Ordering::AcqRel);
