@@ -109,6 +109,7 @@ mod order;
 pub mod placement;
 mod policy;
 mod priorities;
+mod request;
 mod scheduler;
 mod spec;
 mod task_set;

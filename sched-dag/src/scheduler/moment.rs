@@ -3,7 +3,7 @@
 use super::{Decision, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
 use crate::journal::What;
-use crate::lifecycle::Request;
+use crate::request::Request;
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]

@@ -80,6 +80,9 @@ impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
     }
 }
 
+/// An engine, what runs by core, and the instant.
+type Parts<'s, B, W> = (&'s mut Engine<B, (B, u64)>, &'s mut [Option<B>], Now<'s, W>);
+
 impl<B: Body> Cluster<B> {
     pub(super) fn new(
         scheduler: Scheduler,
@@ -220,7 +223,7 @@ impl<B: Body> Cluster<B> {
         &'s mut self,
         now_ns: u64,
         workload: &'s mut W,
-    ) -> (&'s mut Engine<B, (B, u64)>, &'s mut [Option<B>], Now<'s, W>) {
+    ) -> Parts<'s, B, W> {
         let now = Now {
             now_ns,
             finish_times: &mut self.finish_times,

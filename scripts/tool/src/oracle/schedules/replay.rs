@@ -18,7 +18,8 @@ const ALWAYS_SIMULATED: usize = 1024;
 pub fn check(case: &Case) -> Result<(), String> {
     let (instances, jobs) = replay(case)?;
     for (index, dag) in case.dags.iter().enumerate() {
-        for job in 0..dag.jobs {
+        let of_dag = case.jobs[index].iter().zip(&jobs[index]);
+        for (job, (expected_job, replayed_job)) in of_dag.enumerate() {
             for subtask in 0..dag.subtasks {
                 let position = dag.position(job, subtask);
                 let (expected, replayed) = (case.instances[position], instances[position]);
@@ -32,7 +33,7 @@ pub fn check(case: &Case) -> Result<(), String> {
                     replayed.preemptions,
                 )?;
             }
-            let (expected, replayed) = (case.jobs[index][job], jobs[index][job]);
+            let (expected, replayed) = (expected_job, replayed_job);
             let place = format!("dag {index} job {job}");
             compare(&place, "release", expected.release_ns, replayed.release_ns)?;
             compare(&place, "finish", expected.finish_ns, replayed.finish_ns)?;

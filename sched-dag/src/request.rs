@@ -1,0 +1,45 @@
+//! The changes that can be asked of a run. [`lifecycle`](crate::lifecycle) has the rules.
+
+use crate::ids::{DagId, ModeId};
+
+/// A change that is asked of a run: by a function, with effect from its completion on, by another
+/// cluster, or from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// A sporadic DAG gets a signal.
+    Signal(DagId),
+    /// A DAG releases no jobs until it is resumed.
+    Pause(DagId),
+    /// A paused DAG releases jobs again.
+    Resume(DagId),
+    /// A DAG releases no further job, and what is in flight goes on. Asked from outside only.
+    Close(DagId),
+    /// A DAG is ended: nothing of it starts any more. Asked from outside only.
+    Stop(DagId),
+    /// Another set of DAGs runs.
+    Enter(ModeId, Entry),
+    /// The run ends: no DAG releases a further job.
+    ShutDown,
+    /// The run begins. No function asks for that, but a driver, before all else.
+    Begin,
+    /// What waits may come about. A driver asks for that in each step until it has, before all
+    /// else.
+    GoOn,
+}
+
+impl Request {
+    /// Reports whether what it comes to is for a [`Lifecycle`](crate::lifecycle::Lifecycle) to say, where there is one.
+    #[must_use]
+    pub const fn is_of_lifecycle(self) -> bool {
+        !matches!(self, Self::Signal(_) | Self::Close(_) | Self::Stop(_))
+    }
+}
+
+/// When a mode is entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// At the instant of the request (M2).
+    AtOnce,
+    /// When nothing is in flight of the DAGs that leave (M3).
+    WhenIdle,
+}
