@@ -314,8 +314,8 @@ impl<B: Body, P> Engine<B, P> {
         self.placement.suspend(vertex, parked)
     }
 
-    /// Apart, as most bodies have no effects; a body that goes and comes stays in a register.
-    #[inline(never)]
+    /// A body that goes and comes stays in a register.
+    #[inline]
     fn publish(requests: &mut Requests, mut body: B, finish_ns: u64) -> B {
         body.complete(finish_ns, &mut |request| requests.keep(request));
         body

@@ -43,16 +43,29 @@ pub fn nominal_end_ns() -> Option<u64> {
 
 /// Makes a change to a DAG, in a step of its scheduler.
 pub fn control(dag: DagId, change: fn(DagId) -> Request) {
+    serve(None, dag, change(dag));
+}
+
+/// Serves a request to a DAG in a step of its scheduler; one to the DAG of the plan with a number
+/// only if that is the one which runs, and as of time 0 if it has not begun.
+///
+/// This is the only such step, so that the scheduler is known by its address in it, too.
+pub(super) fn serve(plan: Option<u64>, dag: DagId, request: Request) {
     let cluster = divided::of_dag(dag);
     let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {
         return;
     };
+    match plan {
+        Some(plan) if plan != execution.signals.plan => return,
+        Some(_) if !execution.signals.has_begun => {
+            return execution.engine.requests.keep(request);
+        }
+        _ => {}
+    }
     let mut woken = CoreSet::default();
     cluster::among(cluster, || {
-        execution.step(clock::now_ns(), &mut woken, |moment| {
-            moment.serve(change(dag))
-        })
+        execution.step(clock::now_ns(), &mut woken, |moment| moment.serve(request))
     });
     drop(place);
     woken.wake();

@@ -11,16 +11,15 @@ use sched_dag::DagId;
 use super::core_set::CoreSet;
 use super::letters::Letters;
 use super::time::here;
-use super::{Execution, cluster, divided, status};
-use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, interrupt_flag, this_core};
+use super::{Execution, control, status};
+use crate::machine::{interrupt_flag, this_core};
 
 /// The requests of a run that are on their way to its scheduler.
 pub(super) struct Signals {
     /// The number of the plan that runs.
-    plan: u64,
+    pub(super) plan: u64,
     /// Whether the run has begun, so that there is time.
-    has_begun: bool,
+    pub(super) has_begun: bool,
     pub(super) letters: Letters,
 }
 
@@ -71,24 +70,5 @@ pub fn raise(plan: u64, dag: DagId) {
 /// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
 /// are disabled.
 pub fn raise_in_interrupt(plan: u64, dag: DagId) {
-    let cluster = divided::of_dag(dag);
-    let mut place = cluster.execution.lock();
-    let Some(execution) = place.as_mut() else {
-        return;
-    };
-    if execution.signals.plan != plan {
-        return;
-    }
-    if !execution.signals.has_begun {
-        execution.engine.requests.keep(Request::Signal(dag));
-        return;
-    }
-    let mut woken = CoreSet::default();
-    cluster::among(cluster, || {
-        execution.step(clock::now_ns(), &mut woken, |moment| moment.signal(dag))
-    });
-    drop(place);
-    woken.wake();
-    // The step may want this core, too, which follows at its next interrupt.
-    timer::set(Alarm::Schedule, clock::now_ns());
+    control::serve(Some(plan), dag, Request::Signal(dag));
 }
