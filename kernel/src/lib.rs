@@ -52,7 +52,6 @@ mod app;
 #[allow(unsafe_code, reason = "the symbols that an image must define")]
 #[doc(hidden)]
 pub mod entry;
-pub mod options;
 pub mod report;
 mod start;
 mod watch;
@@ -60,13 +59,13 @@ mod watch;
 #[doc(hidden)]
 pub use boot::memory_functions;
 
-pub use app::ending::Ending;
 pub use app::event::Event;
 pub use app::lock::Lock;
 pub use app::machine_handle::Machine;
 pub use app::resources::Resources;
 pub use executive::memory::heap::KernelHeap;
-pub use executive::{print, println};
+pub use front::app::ending::Ending;
+pub use front::{print, println};
 #[doc(inline)]
 pub use sched_dag::engine::Run;
 pub use start::CLOCK;
@@ -74,13 +73,19 @@ pub use start::CLOCK;
 /// Text on the serial line, which [`print!`] and [`println!`] write.
 pub mod console {
     #[doc(inline)]
-    pub use executive::console::write;
+    pub use front::console::write;
+}
+
+/// The words of the command line.
+pub mod options {
+    #[doc(inline)]
+    pub use front::options::{Options, UsageError};
 }
 
 /// Machine lines: lines of JSON on the serial line, for programs that read it.
 pub mod json {
     #[doc(inline)]
-    pub use executive::text::json::{Object, emit, line, quoted};
+    pub use front::json::{Object, emit, line, quoted};
 }
 
 /// Returns the number of timer interrupts that all cores have taken since boot.

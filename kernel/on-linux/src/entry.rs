@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use linux::EndSignals;
 
-use crate::app::ending::{self, Ending, Told};
 use crate::app::machine_handle::{Machine, memory_kib};
 use crate::app::words;
 use crate::options::Options;
-use crate::text::json;
+use front::app::ending::{self, Ending, Told};
+use front::json;
 
 /// Makes an app's function the one that the program runs: the function `program`, for the file
 /// that has the app's `main.rs` as its module.

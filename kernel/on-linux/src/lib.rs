@@ -15,10 +15,7 @@
 //! }
 //! ```
 //!
-//! What the kernel has above its executive knows of neither interrupts nor threads: how a line
-//! is written, how words are read, how a run is told of and judged. Those files are compiled a
-//! second time here (`text`, `report`, `app`), so that both say the same by the same lines. The
-//! crate is its own `executive` for them.
+//! Lines, words, reports and verdicts are `front`'s, as the kernel's are.
 //!
 //! # What is guaranteed
 //!
@@ -33,24 +30,19 @@
 
 #![deny(unsafe_code)]
 
-extern crate alloc;
-extern crate self as executive;
-
 mod app;
 #[doc(hidden)]
 pub mod entry;
 #[allow(unsafe_code, reason = "an allocator that counts")]
 mod heap;
-#[path = "../../src/options.rs"]
-pub mod options;
-pub mod report;
-#[doc(hidden)]
-pub mod text;
+mod output;
 
-pub use app::ending::Ending;
 pub use app::event::Event;
 pub use app::lock::Lock;
 pub use app::machine_handle::{Machine, Resources};
+pub use front::app::ending::Ending;
+pub use front::report;
+pub use front::{print, println};
 #[doc(hidden)]
 pub use heap::Heap;
 #[doc(inline)]
@@ -59,13 +51,19 @@ pub use sched_dag::engine::Run;
 /// Text on the standard output.
 pub mod console {
     #[doc(inline)]
-    pub use crate::text::console::write;
+    pub use front::console::write;
+}
+
+/// The words of the command line.
+pub mod options {
+    #[doc(inline)]
+    pub use front::options::{Options, UsageError};
 }
 
 /// Machine lines: lines of JSON on the standard output, for programs that read it.
 pub mod json {
     #[doc(inline)]
-    pub use crate::text::json::{Object, emit, line, quoted};
+    pub use front::json::{Object, emit, line, quoted};
 }
 
 /// Reports whether functions may use AVX: the processor has it.

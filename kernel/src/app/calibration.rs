@@ -20,10 +20,10 @@ use fass::{
 };
 use sched_dag::law::Costs;
 
-use super::ending::Ending;
 use executive::machine::clock;
 use executive::run::platform::KERNEL;
 use executive::run::{execution, worker};
+use front::app::ending::Ending;
 
 const PERIOD: Duration = Duration::from_millis(1);
 const JOBS: u64 = 20;

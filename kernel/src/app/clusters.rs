@@ -8,8 +8,8 @@ use executive::run::execution::{Division, set_division};
 use executive::run::platform::KERNEL;
 use fass::{Clusters, Platform};
 
-use super::division;
 use super::machine_handle::Machine;
+use front::app::division;
 
 impl Machine {
     /// Divides the cores, from core 0 on, into clusters of so many each in the commits to come;

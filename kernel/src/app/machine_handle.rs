@@ -8,10 +8,6 @@ use core::time::Duration;
 use fass::{Platform, Policy, Preemption, Signal};
 use sched_dag::DagId;
 
-use super::bound_verdict::BoundVerdict;
-use super::ending::Ending;
-use super::fault_verdict::FaultVerdict;
-use super::wcet_notes;
 use crate::options::Options;
 use crate::report::{self, Ns};
 use crate::watch::background::{Background, LINE, Wishes, session};
@@ -20,7 +16,12 @@ use executive::machine::interrupts_off;
 use executive::memory::heap;
 use executive::run::platform::KERNEL;
 use executive::run::{edge, execution, heartbeat, worker};
-use executive::text::{console, json};
+use executive::text::console;
+use front::app::bound_verdict::BoundVerdict;
+use front::app::ending::Ending;
+use front::app::fault_verdict::FaultVerdict;
+use front::app::wcet_notes;
+use front::json;
 use sched_dag::engine::{Counts, Run};
 
 /// The machine, lent to the app's function for the time of the run.

@@ -5,20 +5,14 @@
 //! what it says is verified before it goes on to `run`. Text, reports and figures that an app
 //! gets back are made below, in `report` and `text`.
 
-pub(crate) mod bound_verdict;
 mod calibration;
 #[cfg(feature = "clusters")]
 mod clusters;
-#[cfg(feature = "clusters")]
-mod division;
-pub(crate) mod ending;
 pub(crate) mod event;
-pub(crate) mod fault_verdict;
 pub(crate) mod lock;
 pub(crate) mod machine_handle;
 mod overheads;
 mod parameters;
 pub(crate) mod resources;
 mod topics;
-mod wcet_notes;
 mod wires;

@@ -5,11 +5,11 @@
 use fass::Overheads;
 
 use super::calibration;
-use super::ending::Ending;
 use super::machine_handle::Machine;
 use crate::options::UsageError;
 use executive::run::platform::KERNEL;
-use executive::text::json;
+use front::app::ending::Ending;
+use front::json;
 
 /// The margin if nobody states one, in hundredths.
 const MARGIN_PERCENT: u64 = 20;

@@ -4,10 +4,10 @@ use alloc::boxed::Box;
 
 use fass::Tunable;
 
-use super::ending::Ending;
 use super::machine_handle::Machine;
 use crate::watch::background::more::PARAMETERS;
-use crate::watch::background::offered::Parameters;
+use front::app::ending::Ending;
+use front::app::offered::Parameters;
 
 impl Machine {
     /// Lets people set parameters: at the console by `set NAME VALUE`, before the first run by the

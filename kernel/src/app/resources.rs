@@ -3,7 +3,7 @@
 use executive::machine::this_core;
 use executive::memory::heap;
 use executive::run::contexts;
-use executive::text::json;
+use front::json;
 
 use super::machine_handle::Machine;
 

@@ -4,10 +4,10 @@ use alloc::format;
 
 use fass::Wire;
 
-use super::ending::Ending;
 use super::machine_handle::Machine;
 use crate::options::UsageError;
 use crate::watch::background::wire::{self, Refusal};
+use front::app::ending::Ending;
 
 impl Machine {
     /// Connects a wire to the second serial port (COM2, at I/O port 0x2f8): what is sent goes

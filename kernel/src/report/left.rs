@@ -8,7 +8,7 @@ use alloc::vec;
 use sched_dag::DagId;
 
 use executive::memory::heap;
-use executive::text::json;
+use front::json;
 
 use sched_dag::engine::Run;
 

@@ -2,18 +2,11 @@
 //! its statistics, and figures over many samples.
 //!
 //! All of it is computed from the journal, with the words of `text`. Nothing here is called
-//! while a run goes on, but `latest` by a panic. `kernel/on-linux` compiles the files that know
-//! no machine a second time.
+//! while a run goes on, but `latest` by a panic. What knows no machine is the front's.
 
-pub(crate) mod counts;
-mod distribution;
 pub(crate) mod latest;
 pub(crate) mod left;
 pub(crate) mod stacks;
-mod time;
-pub(crate) mod times;
-pub(crate) mod trace;
-pub(crate) mod wire;
 
-pub use distribution::Distribution;
-pub use time::Ns;
+pub use front::report::{Distribution, Ns};
+pub(crate) use front::report::{counts, times, trace, wire};

@@ -3,7 +3,7 @@
 use core::sync::atomic::Ordering;
 
 use executive::run::{contexts, stacks};
-use executive::text::json;
+use front::json;
 
 use sched_dag::engine::Run;
 

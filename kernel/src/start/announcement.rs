@@ -13,7 +13,7 @@ use crate::println;
 use executive::machine::calibration::Rate;
 use executive::machine::this_core::{self, Core};
 use executive::machine::{agreement, avx, clock, cpu, interrupt_flag, local_apic, topology};
-use executive::text::json;
+use front::json;
 
 /// Says what machine this is, and of what an app has to beware.
 pub(super) fn announce(info: &BootInfo, app: &str, memory_bytes: u64, rate: &Rate) {

@@ -11,9 +11,6 @@ use boot::{BootInfo, Framebuffer, List, MAX_PROCESSORS, MAX_REGIONS, Module};
 
 use super::announcement::announce;
 use super::{probe, selection, settings};
-use crate::app::bound_verdict::BoundVerdict;
-use crate::app::ending::{self, Ending, Told};
-use crate::app::fault_verdict::FaultVerdict;
 use crate::app::machine_handle::Machine;
 use crate::options::Options;
 use crate::println;
@@ -31,6 +28,9 @@ use executive::memory::{self, OutOfMemory};
 use executive::run::platform::KERNEL;
 use executive::run::{containment, contexts, edge, heartbeat, worker};
 use executive::text::console;
+use front::app::bound_verdict::BoundVerdict;
+use front::app::ending::{self, Ending, Told};
+use front::app::fault_verdict::FaultVerdict;
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;

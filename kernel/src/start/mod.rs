@@ -11,7 +11,6 @@ mod handover;
 mod probe;
 mod selection;
 mod settings;
-mod terms;
 
 pub use handover::CLOCK;
 pub(crate) use handover::start;

@@ -14,14 +14,14 @@
 use alloc::format;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use crate::app::ending::Ending;
 use crate::watch::panic;
 use executive::machine::context::Parked;
 use executive::machine::interrupt::{Handlers, Interrupted};
 use executive::machine::timer::{self, Alarm};
 use executive::machine::{clock, cpu, interrupt_flag, local_apic, this_core, vector};
 use executive::run::contexts;
-use executive::text::json;
+use front::app::ending::Ending;
+use front::json;
 
 /// What the machine layer calls in place of the scheduler's handlers.
 pub(crate) const HANDLERS: Handlers = Handlers {

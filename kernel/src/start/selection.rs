@@ -6,7 +6,7 @@
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
-use crate::options::{UsageError, whole_number};
+use front::options::{UsageError, whole_number};
 
 /// Returns the APIC ids of those that become cores, of all processors by their numbers. Siblings
 /// have ids that differ in the lowest `sibling_bits` only; none are, if that is 0.

@@ -30,13 +30,13 @@
 use fass::edge::Wish;
 
 use super::selection;
-use super::terms::Terms;
 use crate::options::{Options, UsageError};
 use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
 use executive::run::{edge, stacks, worker};
-use executive::text::graph;
+use front::app::terms::Terms;
+use front::graph;
 
 /// The values of `times`: whether statistics are printed, and whether bounds are judged.
 const TIMES: [(&str, (bool, bool)); 3] = [

@@ -20,7 +20,7 @@ use executive::run::execution;
 use executive::text::backtrace::Spot;
 use executive::text::console::{write_in_emergency, write_line_in_emergency};
 use executive::text::excerpt::Excerpt;
-use executive::text::json;
+use front::json;
 
 /// The most recent events of this core that a report shows.
 const EVENTS_SHOWN: usize = 16;

@@ -27,7 +27,7 @@ use crate::machine::timer::{self, Alarm};
 use crate::machine::{cpu, interrupt_flag, this_core};
 use crate::text::backtrace::Spot;
 use crate::text::excerpt::Excerpt;
-use crate::text::json;
+use front::json;
 
 /// How much of a panic's message is shown, and of a name, in bytes. With these a
 /// report's machine line stays together, see `console`.
@@ -175,7 +175,7 @@ fn report(instance: Instance, fault: &Fault<'_>) {
     let subtask = Excerpt::<NAME_BYTES>::of(subtask.map_or("", |subtask| subtask.name()));
     let cost = execution::cost_of_fault(instance);
     let consequence = cost.consequence();
-    crate::println!(
+    front::println!(
         "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \
          at {place}; {consequence}",
         instance.job

@@ -17,7 +17,7 @@ use sched_dag::{DagId, Instance};
 use crate::machine::debug_port;
 use crate::machine::once::Once;
 use crate::machine::spinlock::SpinLock;
-use crate::text::json;
+use front::json;
 
 /// What the command line says.
 static WISH: Once<Wish> = Once::new();
@@ -263,11 +263,11 @@ fn outcome(is_over: bool) -> Option<Outcome> {
 
 fn report(outcome: &Outcome) {
     let (compared, uncompared) = (outcome.compared, outcome.uncompared);
-    crate::println!(
+    front::println!(
         "replay: {compared} values were compared, {uncompared} recorded ones were not computed"
     );
     if let Some((dag, first)) = &outcome.lacking {
-        crate::println!(
+        front::println!(
             "replay: what functions of dag `{dag}` remember of jobs before {first} is not recorded"
         );
     }

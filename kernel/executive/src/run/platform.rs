@@ -16,7 +16,7 @@ use super::execution::{self, Division, Terms};
 use super::{edge, occupation, stacks};
 use crate::machine::once::Once;
 use crate::machine::{clock, this_core};
-use crate::text::graph;
+use front::graph;
 
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use super::json::Object;
 use crate::machine::backtrace::{self, Call};
+use front::json::Object;
 
 /// The most calls that a line has, so that it stays together (`console`).
 const MOST: usize = 24;

@@ -1,11 +1,8 @@
 //! What goes in and out as text: the serial line, and machine lines.
 //!
-//! `console` takes text without disturbing what is measured; `json` prints the lines that
-//! programs read, `graph` a DAG as one of them; `excerpt` keeps a text that may not fit. Of the
-//! run, nothing is known here.
+//! `console` takes text without disturbing what is measured; `excerpt` keeps a text that may not
+//! fit. Of the run, nothing is known here.
 
 pub mod backtrace;
 pub mod console;
 pub mod excerpt;
-pub mod graph;
-pub mod json;

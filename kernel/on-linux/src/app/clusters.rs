@@ -2,9 +2,9 @@
 
 use fass::Clusters;
 
-use super::division;
 use super::machine_handle::Machine;
 use crate::options::UsageError;
+use front::app::division;
 
 impl Machine {
     /// Divides the cores into clusters of so many each in the commits to come; no number: they

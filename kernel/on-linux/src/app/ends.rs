@@ -6,8 +6,8 @@ use std::io::{self, Read, Write};
 use fass::Wire;
 use linux::{Connection, Linux};
 
-use super::ending::Ending;
 use crate::options::UsageError;
+use front::app::ending::Ending;
 
 /// The ends of an app's wire: where bytes come from, and where they go.
 #[derive(Clone, Debug)]

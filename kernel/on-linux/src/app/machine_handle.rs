@@ -9,17 +9,17 @@ use fass::{Overheads, Policy, Preemption, Signal};
 use linux::{EndSignals, Linux};
 use sched_dag::DagId;
 
-use super::bound_verdict::BoundVerdict;
-use super::ending::Ending;
 use super::ends::Ends;
-use super::fault_verdict::FaultVerdict;
-use super::wcet_notes;
 use super::words::Words;
 use crate::heap;
-use crate::options::{Options, UsageError};
-use crate::report;
-use crate::report::counts::Counts;
-use crate::text::json;
+use front::app::bound_verdict::BoundVerdict;
+use front::app::ending::Ending;
+use front::app::fault_verdict::FaultVerdict;
+use front::app::wcet_notes;
+use front::json;
+use front::options::{Options, UsageError};
+use front::report;
+use front::report::counts::Counts;
 use sched_dag::engine::Run;
 
 /// The machine, lent to the app's function for the time of the run.

@@ -1,8 +1,8 @@
 //! Overheads, which are not measured on Linux: it states no worst case for what it does itself.
 
-use super::ending::Ending;
 use super::machine_handle::Machine;
 use crate::options::UsageError;
+use front::app::ending::Ending;
 
 impl Machine {
     /// Refuses the words `overheads` and `overheads_margin`.

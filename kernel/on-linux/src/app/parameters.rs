@@ -2,9 +2,9 @@
 
 use fass::Tunable;
 
-use super::ending::Ending;
 use super::machine_handle::Machine;
-use super::offered::Parameters;
+use front::app::ending::Ending;
+use front::app::offered::Parameters;
 
 impl Machine {
     /// Lets people set parameters before the run by the word `set=NAME=VALUE,...`, which

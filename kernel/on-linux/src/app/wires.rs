@@ -2,10 +2,10 @@
 
 use fass::Wire;
 
-use super::ending::Ending;
 use super::ends::Ends;
 use super::machine_handle::Machine;
 use crate::options::UsageError;
+use front::app::ending::Ending;
 
 impl Machine {
     /// Connects a wire: what comes on standard input arrives in the next run, with the word

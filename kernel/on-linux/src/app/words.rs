@@ -19,10 +19,10 @@ use std::time::Duration;
 
 use linux::{Linux, Mechanism};
 
-use super::ending::Ending;
-use super::terms::Terms;
-use crate::options::{Options, UsageError};
-use crate::text::graph;
+use front::app::ending::Ending;
+use front::app::terms::Terms;
+use front::graph;
+use front::options::{Options, UsageError};
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
 const FOREIGN: [(&str, &str); 15] = [

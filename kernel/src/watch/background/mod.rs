@@ -19,7 +19,6 @@ mod input;
 mod listener;
 mod load;
 pub(crate) mod more;
-pub(crate) mod offered;
 mod parameters;
 mod patience;
 mod progress;

@@ -5,8 +5,8 @@ use core::fmt::Display;
 use fass::Tunable;
 
 use super::more::Commands;
-use super::offered::Parameters;
 use crate::println;
+use front::app::offered::Parameters;
 
 impl Commands for Parameters {
     fn help(&self) -> &'static [(&'static str, &'static str)] {

@@ -2,7 +2,7 @@
 
 use super::patience::Patience;
 use executive::run::execution;
-use executive::text::json;
+use front::json;
 
 /// How far a run has come.
 #[derive(Debug)]

@@ -16,12 +16,12 @@ use sched_dag::{Dag, DagId, Snapshot, TaskSet};
 use super::command::{Command, HELP, parse};
 use super::input::{Input, Typed};
 use super::{more, stop};
-use crate::options::whole_number;
 use crate::println;
 use crate::report::counts::Counts;
 use executive::machine::serial;
 use executive::run::execution;
-use executive::text::json;
+use front::json;
+use front::options::whole_number;
 
 /// How often core 0 looks for bytes, at least.
 pub(crate) const PERIOD_NS: u64 = 20_000_000;

@@ -16,7 +16,8 @@ use executive::machine::clock;
 use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core;
 use executive::run::execution;
-use executive::text::{console, json};
+use executive::text::console;
+use front::json;
 
 /// The time between two looks. Heartbeats may come more often.
 pub(super) const LOOK_NS: u64 = 250_000_000;

@@ -11,7 +11,7 @@ use super::load;
 use super::patience::Patience;
 use executive::machine::clock;
 use executive::run::execution;
-use executive::text::json;
+use front::json;
 
 /// How many events are read where time is short.
 const FEW_EVENTS: u64 = 128;

@@ -15,7 +15,7 @@ use crate::println;
 use executive::machine::clock;
 use executive::run::{edge, execution};
 use executive::text::excerpt::Excerpt;
-use executive::text::json;
+use front::json;
 
 /// The least time between two values that are shown.
 const BETWEEN_NS: u64 = 100_000_000;

@@ -9,7 +9,7 @@
 //! - *Text* never has a `{` in column 0; it gets a blank before it. So no text can be
 //!   taken for a machine line.
 
-use super::piece::Kind;
+use front::console::Kind;
 
 /// How many bytes are kept from apps' output, for what the kernel itself has to say.
 const RESERVE: usize = 4096;

@@ -6,8 +6,9 @@
 
 use core::fmt::{self, Display, Write};
 
+use front::console::{Kind, Pieces};
+
 use super::BUFFER;
-use super::piece::{Kind, Pieces};
 use crate::machine::{screen, serial};
 
 /// The most bytes of one text.

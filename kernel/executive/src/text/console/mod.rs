@@ -1,14 +1,14 @@
 //! Text on the serial line, without disturbing what is being measured.
 //!
 //! What is printed is made into text by the context that prints it, outside every
-//! lock (`piece`), and goes into a bounded buffer in pieces (`buffer`); the lock is
+//! lock (`Pieces`), and goes into a bounded buffer in pieces (`buffer`); the lock is
 //! held for the copy of one piece. Outside a run it is sent at once. During a run it
 //! stays in the buffer until an idle core sends it, byte by byte, so that no subtask
 //! ever waits for a serial port; what no longer fits is dropped and counted, never
 //! silently. A part of the buffer is left to the kernel's own machine lines, so that
 //! an app that floods the port cannot hide a fault.
 //!
-//! Text and machine lines are told apart: only [`json`](super::json) can print a line
+//! Text and machine lines are told apart: only [`front::json`] can print a line
 //! that begins with `{`.
 //!
 //! With `console=on` on the command line a person can talk to the kernel during a
@@ -16,7 +16,6 @@
 
 mod buffer;
 mod emergency;
-mod piece;
 
 use core::fmt::{self, Write};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -26,7 +25,7 @@ use crate::machine::serial;
 use crate::machine::spinlock::SpinLock;
 use buffer::Buffer;
 pub use emergency::{write_in_emergency, write_line_in_emergency};
-use piece::{Kind, Pieces};
+use front::console::{Kind, Pieces};
 
 static BUFFER: SpinLock<Buffer<{ 16 * 1024 }>> = SpinLock::new(Buffer::new());
 
@@ -35,25 +34,7 @@ static DEFERRED: AtomicBool = AtomicBool::new(false);
 /// Whether the buffer holds anything, readable without the lock.
 static PENDING: AtomicBool = AtomicBool::new(false);
 
-/// Writes text. What one call writes stays together, up to 1 KiB of it. A line that
-/// begins with `{` gets a blank before it. For [`print!`](crate::print).
-///
-/// ```no_run
-/// kernel::println!("{} jobs", 3); // calls it
-/// ```
-pub fn write(text: fmt::Arguments<'_>) {
-    write_as(Kind::Text, text);
-}
-
-/// Writes a machine line and its end, on a line of its own.
-pub fn write_line(is_kernels: bool, line: &dyn fmt::Display) {
-    let kind = if is_kernels {
-        Kind::KernelLine
-    } else {
-        Kind::Line
-    };
-    write_as(kind, format_args!("{line}"));
-}
+front::output!(write_as);
 
 #[inline(never)]
 fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
@@ -148,20 +129,4 @@ pub fn resume() -> u64 {
     DEFERRED.store(false, Ordering::Relaxed);
     while send_pending_byte() {}
     core::mem::take(&mut BUFFER.lock().dropped)
-}
-
-/// Prints text on the serial line.
-///
-/// What is printed is made into text by the caller's context, so a `Display` that
-/// panics or takes long is the caller's own affair.
-#[macro_export]
-macro_rules! print {
-    ($($text:tt)*) => { $crate::console::write(format_args!($($text)*)) };
-}
-
-/// Prints a line of text on the serial line, as [`print!`](crate::print) does.
-#[macro_export]
-macro_rules! println {
-    () => { $crate::print!("\n") };
-    ($($text:tt)*) => { $crate::console::write(format_args!("{}\n", format_args!($($text)*))) };
 }

@@ -14,17 +14,20 @@ const PREEMPTIONS: [(&str, Preemption); 2] =
 
 /// What these words say.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Terms {
-    pub(crate) policy: Policy,
-    pub(crate) preemption: Preemption,
+pub struct Terms {
+    /// How ready instances are ordered.
+    pub policy: Policy,
+    /// Whether a started instance may lose its core.
+    pub preemption: Preemption,
     /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
-    pub(crate) budget_factor: u64,
-    pub(crate) overheads: Overheads,
+    pub budget_factor: u64,
+    /// What a commit charges.
+    pub overheads: Overheads,
 }
 
 impl Terms {
     /// Takes the words.
-    pub(crate) fn read(options: &Options<'_>) -> Result<Self, UsageError> {
+    pub fn read(options: &Options<'_>) -> Result<Self, UsageError> {
         Ok(Self {
             policy: options.choice("policy", &POLICIES)?,
             preemption: options.choice("preemption", &PREEMPTIONS)?,

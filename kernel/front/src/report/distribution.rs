@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use sched_dag::law::Histogram;
 use sched_dag::sorted_by_key;
 
-use executive::text::json::Object;
+use crate::text::json::Object;
 
 /// The samples of one quantity, in nanoseconds.
 ///

@@ -19,15 +19,15 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use super::ending::Ending;
 use crate::report::Ns;
-use executive::text::json;
+use crate::text::json;
 use sched_dag::engine::Run;
 
 /// Whether the app was compiled without optimization, as its entry says.
-pub(crate) static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
+pub static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
 
 /// What is known of bounds in the runs so far.
 #[derive(Debug)]
-pub(crate) struct BoundVerdict {
+pub struct BoundVerdict {
     are_judged: Cell<bool>,
     /// Whether several cores share one clock.
     shares_clock: bool,
@@ -48,7 +48,9 @@ struct Exceeded {
 }
 
 impl BoundVerdict {
-    pub(crate) const fn new(are_judged: bool, shares_clock: bool) -> Self {
+    /// Begins without a run. `shares_clock`: several cores share one clock.
+    #[must_use]
+    pub const fn new(are_judged: bool, shares_clock: bool) -> Self {
         Self {
             are_judged: Cell::new(are_judged),
             shares_clock,
@@ -57,13 +59,13 @@ impl BoundVerdict {
     }
 
     /// Leaves the bounds of all runs to the app.
-    pub(crate) fn accept(&self) {
+    pub fn accept(&self) {
         self.are_judged.set(false);
     }
 
     /// Says which DAGs of a run took longer than is proven, and notes it. Allocates
     /// only if there are any.
-    pub(crate) fn note(&self, run: &Run) {
+    pub fn note(&self, run: &Run) {
         let dags = (0..).map(DagId).take(run.task_set().dags().len());
         let ends = dags.flat_map(|dag| {
             let sinks = run.task_set().dag(dag).sinks();
@@ -82,7 +84,7 @@ impl BoundVerdict {
     }
 
     /// Returns how an app ends whose function has returned `result`.
-    pub(crate) fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
+    pub fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
         let complaint = self.complaint.take().filter(|_| self.are_judged.get());
         Ending::or_complaint(result, complaint)
     }

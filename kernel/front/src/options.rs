@@ -245,7 +245,7 @@ fn parse_number(key: &str, value: &str, allowed: &RangeInclusive<u64>) -> Result
 }
 
 /// Reads a whole number: digits alone, without the sign that `parse` would take.
-pub(crate) fn whole_number(text: &str) -> Option<u64> {
+pub fn whole_number(text: &str) -> Option<u64> {
     let is_whole = text.bytes().all(|byte| byte.is_ascii_digit());
     is_whole.then(|| text.parse().ok()).flatten()
 }

@@ -10,7 +10,7 @@ use crate::options::{Options, UsageError};
 /// # Errors
 ///
 /// If the word is neither `auto` nor numbers of cores.
-pub(super) fn read(options: &Options<'_>) -> Result<Option<Vec<u32>>, UsageError> {
+pub fn read(options: &Options<'_>) -> Result<Option<Vec<u32>>, UsageError> {
     if options.text("clusters") == Some("auto") {
         return Ok(None);
     }

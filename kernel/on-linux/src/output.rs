@@ -4,32 +4,16 @@
 //! lock: so printing allocates nothing, and what a value's `Display` does is its own affair. Text
 //! and machine lines are told apart: only `json` can print a line that begins with `{`.
 
-#[path = "../../../executive/src/text/console/piece.rs"]
-mod piece;
-
 use std::fmt::{self, Write as _};
 use std::io::{Write as _, stdout};
 use std::sync::{Mutex, PoisonError};
 
-use piece::{Kind, Pieces};
+use front::console::{Kind, Pieces};
 
 /// Whether the output is at the begin of a line.
 static BEGINS: Mutex<bool> = Mutex::new(true);
 
-/// Writes text. A line that begins with `{` gets a blank before it.
-pub fn write(text: fmt::Arguments<'_>) {
-    write_as(Kind::Text, text);
-}
-
-/// Writes a machine line and its end, on a line of its own.
-pub fn write_line(is_kernels: bool, line: &dyn fmt::Display) {
-    let kind = if is_kernels {
-        Kind::KernelLine
-    } else {
-        Kind::Line
-    };
-    write_as(kind, format_args!("{line}"));
-}
+front::output!(write_as);
 
 fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
     let mut pieces = Pieces::new(kind, |piece, is_first| hand_over(piece, kind, is_first));
@@ -50,23 +34,4 @@ fn hand_over(piece: &[u8], kind: Kind, is_first: bool) {
     // If nobody reads any more, nobody misses it.
     let written = out.write_all(before).and_then(|()| out.write_all(piece));
     let _ = written.and_then(|()| out.flush());
-}
-
-/// Prints text, formatted as by `std::print!`.
-#[macro_export]
-macro_rules! print {
-    ($($argument:tt)*) => {
-        $crate::console::write(::core::format_args!($($argument)*))
-    };
-}
-
-/// Prints a line, formatted as by `std::println!`.
-#[macro_export]
-macro_rules! println {
-    () => {
-        $crate::print!("\n")
-    };
-    ($($argument:tt)*) => {
-        $crate::print!("{}\n", ::core::format_args!($($argument)*))
-    };
 }

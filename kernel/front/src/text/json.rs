@@ -207,12 +207,12 @@ pub fn emit(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
         !KERNELS.contains(&kind),
         "a machine line of kind `{kind}` is the kernel's to print; choose another kind"
     );
-    console::write_line(false, &line(kind, fields));
+    console::write_line(console::Kind::Line, &line(kind, fields));
 }
 
 /// Prints a machine line of the kernel's own, of any kind.
 pub fn report(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
-    console::write_line(true, &line(kind, fields));
+    console::write_line(console::Kind::KernelLine, &line(kind, fields));
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use super::ending::Ending;
 
 /// What is known of faults in the runs so far.
 #[derive(Debug, Default)]
-pub(crate) struct FaultVerdict {
+pub struct FaultVerdict {
     are_accepted: Cell<bool>,
     /// Why the app fails, if it does.
     complaint: RefCell<Option<String>>,
@@ -22,13 +22,13 @@ pub(crate) struct FaultVerdict {
 
 impl FaultVerdict {
     /// Leaves the faults of all runs to the app.
-    pub(crate) fn accept(&self) {
+    pub fn accept(&self) {
         self.are_accepted.set(true);
     }
 
     /// Notes which DAGs of a run have been ended by faults. Allocates only if there
     /// are any.
-    pub(crate) fn note(&self, task_set: &TaskSet, faults: impl Fn(DagId) -> u64) {
+    pub fn note(&self, task_set: &TaskSet, faults: impl Fn(DagId) -> u64) {
         let dags = (0..).map(DagId).zip(task_set.dags());
         let mut ended = dags.filter(|(dag, _)| faults(*dag) > 0);
         let mut complaint = self.complaint.borrow_mut();
@@ -48,7 +48,7 @@ impl FaultVerdict {
     }
 
     /// Returns how an app ends whose function has returned `result`.
-    pub(crate) fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
+    pub fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
         let complaint = self.complaint.take().filter(|_| !self.are_accepted.get());
         Ending::or_complaint(result, complaint)
     }

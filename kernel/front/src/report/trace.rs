@@ -5,14 +5,14 @@ use core::fmt;
 use sched_dag::journal::Event;
 use sched_dag::{Dag, SubtaskId};
 
-use executive::text::{graph, json};
+use crate::text::{graph, json};
 use sched_dag::engine::Run;
 
 /// The most events on one line.
 const EVENTS_A_LINE: usize = 32;
 
 /// Prints the model and the events of a run, the `number`th since boot.
-pub(crate) fn dump(run: &Run, number: u64) {
+pub fn dump(run: &Run, number: u64) {
     json::emit("trace_begin", |line| {
         graph::scheduling(line, &run.options(), run.task_set());
         line.number("run", number);

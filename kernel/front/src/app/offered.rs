@@ -13,11 +13,11 @@ use fass::Tunable;
 use sched_dag::nearest_of;
 
 /// The parameters that an app offers.
-pub(crate) struct Parameters(pub(crate) Vec<Arc<dyn Tunable>>);
+pub struct Parameters(pub Vec<Arc<dyn Tunable>>);
 
 impl Parameters {
     /// Takes those that an app offers; two of one name are refused in words.
-    pub(crate) fn new(parameters: &[&dyn Tunable]) -> Result<Self, String> {
+    pub fn new(parameters: &[&dyn Tunable]) -> Result<Self, String> {
         let mut names = (1..).zip(parameters);
         if let Some((_, twice)) = names.find(|(next, parameter)| {
             let rest = parameters.get(*next..).unwrap_or_default();
@@ -33,7 +33,7 @@ impl Parameters {
     }
 
     /// Sets those that a word of the command line names, as `NAME=VALUE,...`.
-    pub(crate) fn set_all(&self, word: &str) -> Result<(), UsageError> {
+    pub fn set_all(&self, word: &str) -> Result<(), UsageError> {
         for part in word.split(',') {
             let mut refusal = None;
             match part.split_once('=') {
@@ -50,7 +50,7 @@ impl Parameters {
     }
 
     /// Sets one of them, or tells why not.
-    pub(crate) fn set(
+    pub fn set(
         &self,
         name: &str,
         value: &str,

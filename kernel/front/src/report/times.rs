@@ -5,12 +5,12 @@ use core::fmt;
 use sched_dag::law::Histogram;
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use executive::text::json::{self, Object};
+use crate::text::json::{self, Object};
 use sched_dag::engine::Run;
 
 /// Prints the statistics of a run: a line for each DAG, for each subtask, and for each of
 /// several sinks.
-pub(crate) fn dump(run: &Run) {
+pub fn dump(run: &Run) {
     let Some(times) = run.times() else {
         crate::println!("there are no statistics, for not all events were recorded");
         return;

@@ -2,10 +2,10 @@
 
 use fass::{Wire, WireCounts};
 
-use executive::text::json;
+use crate::text::json;
 
 /// Says it in a line for people and in one for programs.
-pub(crate) fn report(wire: &Wire) {
+pub fn report(wire: &Wire) {
     let WireCounts {
         packets,
         bytes,
@@ -15,7 +15,7 @@ pub(crate) fn report(wire: &Wire) {
         unsent_bytes,
         ..
     } = wire.counts();
-    executive::println!(
+    crate::println!(
         "wire `{}`: {packets} packets came, {lost_packets} were lost, {malformed} malformed; \
          {sent_bytes} bytes sent, {unsent_bytes} lost",
         wire.name()

@@ -8,11 +8,11 @@
 use core::fmt;
 
 /// The most bytes that are handed over at once.
-pub(super) const LONGEST: usize = 1024;
+pub const LONGEST: usize = 1024;
 
 /// What is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub enum Kind {
     /// Text for people.
     Text,
     /// A machine line of an app's.
@@ -23,7 +23,7 @@ pub(super) enum Kind {
 
 /// Collects text and hands it over in pieces; `hand_over` gets each one, and whether
 /// it is the first.
-pub(super) struct Pieces<F: FnMut(&[u8], bool)> {
+pub struct Pieces<F: FnMut(&[u8], bool)> {
     bytes: [u8; LONGEST],
     length: usize,
     kind: Kind,
@@ -32,7 +32,8 @@ pub(super) struct Pieces<F: FnMut(&[u8], bool)> {
 }
 
 impl<F: FnMut(&[u8], bool)> Pieces<F> {
-    pub(super) const fn new(kind: Kind, hand_over: F) -> Self {
+    /// Begins a text, or a line.
+    pub const fn new(kind: Kind, hand_over: F) -> Self {
         Self {
             bytes: [0; LONGEST],
             length: 0,
@@ -43,7 +44,7 @@ impl<F: FnMut(&[u8], bool)> Pieces<F> {
     }
 
     /// Ends the text, or the line.
-    pub(super) fn end(mut self) {
+    pub fn end(mut self) {
         if self.kind != Kind::Text {
             self.push(b'\n');
         }

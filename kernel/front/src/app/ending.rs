@@ -8,7 +8,7 @@ use alloc::string::String;
 use fass::CommitError;
 
 use crate::options::UsageError;
-use executive::text::json;
+use crate::text::json;
 
 /// Why an app ends other than by success.
 ///
@@ -33,7 +33,7 @@ pub enum Ending {
 
 impl Ending {
     /// Returns how an app ends whose run a person has ended and broke so many rules.
-    pub(crate) fn after_shutdown(violations: usize) -> Self {
+    pub fn after_shutdown(violations: usize) -> Self {
         match violations {
             0 => Self::Shutdown,
             count => Self::Failure(format!("shut down before its end, with {count} violations")),
@@ -42,10 +42,7 @@ impl Ending {
 
     /// Returns a complaint of the kernel's as the ending of an app that ends well, or as a
     /// person wants it. The app's own error takes precedence.
-    pub(crate) fn or_complaint(
-        result: Result<(), Self>,
-        complaint: Option<String>,
-    ) -> Result<(), Self> {
+    pub fn or_complaint(result: Result<(), Self>, complaint: Option<String>) -> Result<(), Self> {
         match (result, complaint) {
             (Ok(()) | Err(Self::Shutdown), Some(text)) => Err(Self::Failure(text)),
             (result, _) => result,
@@ -55,14 +52,17 @@ impl Ending {
 
 /// How an app has ended, for the program or the machine that ends with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Told {
+pub enum Told {
+    /// Well, or as a person wants it.
     Success,
+    /// By a command line that is wrong.
     Usage,
+    /// By anything else.
     Failure,
 }
 
 /// Prints how the app ended; the verdict is the last line.
-pub(crate) fn tell(result: &Result<(), Ending>) -> Told {
+pub fn tell(result: &Result<(), Ending>) -> Told {
     let (told, word) = match result {
         Ok(()) | Err(Ending::Shutdown) => (Told::Success, "success"),
         Err(Ending::Usage(_)) => (Told::Usage, "usage"),

@@ -2,29 +2,29 @@
 
 use sched_dag::{Dag, DagId, DagStatistics};
 
-use executive::text::json;
+use crate::text::json;
 
 /// The facts that are told of a DAG.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Counts {
+pub struct Counts {
     /// Its state now, in a word.
-    pub(crate) state: &'static str,
+    pub state: &'static str,
     /// The fates of its jobs.
-    pub(crate) statistics: DagStatistics,
+    pub statistics: DagStatistics,
     /// Jobs in flight.
-    pub(crate) in_flight: u64,
+    pub in_flight: u64,
     /// Due jobs that wait for an older one to end.
-    pub(crate) waiting: u64,
+    pub waiting: u64,
 }
 
 impl Counts {
     /// Prints the lines of a DAG with its counts.
-    pub(crate) fn show(&self, dag: DagId, model: &Dag) {
+    pub fn show(&self, dag: DagId, model: &Dag) {
         self.show_by(dag, model, Self::print);
     }
 
     /// Prints the line of a DAG for people, of which `print` makes the rest, and its machine line.
-    pub(crate) fn show_by(&self, dag: DagId, model: &Dag, print: fn(&Self, &Dag)) {
+    pub fn show_by(&self, dag: DagId, model: &Dag, print: fn(&Self, &Dag)) {
         crate::print!("  dag {} ", dag.0);
         print(self, model);
         let of = self.statistics;
@@ -46,7 +46,7 @@ impl Counts {
     }
 
     /// Prints the counts.
-    pub(crate) fn print(&self, model: &Dag) {
+    pub fn print(&self, model: &Dag) {
         let of = self.statistics;
         crate::println!(
             "`{}`: {}; {} jobs released, {} completed, {} in flight, {} waiting; {} deadlines \

@@ -1,0 +1,34 @@
+//! What an app sees and a person reads, on whatever platform the app runs.
+//!
+//! Lines, the words of the command line, reports and verdicts are the same on the bare machine
+//! and on Linux, because they are made here, once. An app names `kernel`, never this.
+//!
+//! # Rooms, from top to bottom
+//!
+//! `app` judges runs and serves what an app offers to people, `report` tells of a run when it is
+//! over, `options` reads the command line, `text` makes lines. Where text goes is bound when a
+//! program is linked: its platform names a function by [`output!`], exactly once.
+//!
+//! # What is guaranteed
+//!
+//! - Only [`json`] can print a line that begins with `{`.
+//! - Printing allocates nothing.
+//!
+//! # What is relied on
+//!
+//! - `fass` and `sched-dag` alone; nothing here knows a machine.
+
+#![cfg_attr(not(test), no_std)]
+#![allow(
+    rustdoc::private_intra_doc_links,
+    reason = "its readers have its source; what apps use is documented in `kernel`, too"
+)]
+
+extern crate alloc;
+
+pub mod app;
+pub mod options;
+pub mod report;
+pub mod text;
+
+pub use text::{console, graph, json};

@@ -1,0 +1,12 @@
+//! What is told of a run when it is over: its trace, its statistics, and figures over many
+//! samples. All of it is computed from the journal.
+
+pub mod counts;
+mod distribution;
+mod time;
+pub mod times;
+pub mod trace;
+pub mod wire;
+
+pub use distribution::Distribution;
+pub use time::Ns;
