@@ -11,6 +11,11 @@ use core::sync::atomic::Ordering;
 use front::app::bound_verdict::IS_UNOPTIMIZED;
 
 pub use boot::BootInfo;
+pub use executive::console::write_as;
+pub use front::output;
+
+#[cfg(test)]
+front::output!(write_as);
 
 /// Makes an app's function the one that the image runs.
 ///
@@ -60,6 +65,8 @@ macro_rules! entry {
         fn kernel_main(info: &'static $crate::entry::BootInfo) -> ! {
             $crate::entry::start(info, env!("CARGO_PKG_NAME"), cfg!(unoptimized), $app)
         }
+
+        $crate::entry::output!($crate::entry::write_as);
 
         $crate::memory_functions!();
     };

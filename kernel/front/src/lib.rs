@@ -7,7 +7,7 @@
 //!
 //! `app` judges runs and serves what an app offers to people, `report` tells of a run when it is
 //! over, `options` reads the command line, `text` makes lines. Where text goes is bound when a
-//! program is linked: its platform names a function by [`output!`], exactly once.
+//! program is linked: its entry names its platform's function by [`output!`], once.
 //!
 //! # What is guaranteed
 //!

@@ -5,6 +5,9 @@ use std::process::ExitCode;
 
 use linux::EndSignals;
 
+pub use crate::output::write_as;
+pub use front::output;
+
 use crate::app::machine_handle::{Machine, memory_kib};
 use crate::app::words;
 use crate::options::Options;
@@ -18,6 +21,8 @@ macro_rules! entry {
     ($app:path) => {
         #[global_allocator]
         static HEAP: $crate::Heap = $crate::Heap;
+
+        $crate::entry::output!($crate::entry::write_as);
 
         /// Runs the app on this computer.
         pub(crate) fn program() -> std::process::ExitCode {

@@ -13,9 +13,8 @@ use front::console::{Kind, Pieces};
 /// Whether the output is at the begin of a line.
 static BEGINS: Mutex<bool> = Mutex::new(true);
 
-front::output!(write_as);
-
-fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
+/// Takes all text of a program; its entry names this to [`front::output!`].
+pub fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
     let mut pieces = Pieces::new(kind, |piece, is_first| hand_over(piece, kind, is_first));
     // Only a `Display` that fails of its own accord can fail here.
     let _ = pieces.write_fmt(text);

@@ -34,10 +34,9 @@ static DEFERRED: AtomicBool = AtomicBool::new(false);
 /// Whether the buffer holds anything, readable without the lock.
 static PENDING: AtomicBool = AtomicBool::new(false);
 
-front::output!(write_as);
-
+/// Takes all text of an image; its entry names this to [`front::output!`].
 #[inline(never)]
-fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
+pub fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
     let mut fits = true;
     let mut pieces = Pieces::new(kind, |piece, begins| {
         // What comes after a gap would only look like something else.
@@ -129,4 +128,10 @@ pub fn resume() -> u64 {
     DEFERRED.store(false, Ordering::Relaxed);
     while send_pending_byte() {}
     core::mem::take(&mut BUFFER.lock().dropped)
+}
+
+#[cfg(test)]
+#[allow(unsafe_code, reason = "the symbol, for a program of tests")]
+mod tests {
+    front::output!(super::write_as);
 }

@@ -1,8 +1,8 @@
 //! The way of text to the platform's output.
 //!
 //! Text and machine lines are told apart: only [`json`](super::json) can print a line that begins
-//! with `{`. What is printed goes to the function that the program's platform names by
-//! [`output!`](crate::output). It is found when the program is linked: a pointer to it would cost
+//! with `{`. What is printed goes to the function of the platform that the program's entry names
+//! by [`output!`](crate::output). It is found when the program is linked: a pointer to it would cost
 //! each image bytes, and each line a look.
 
 mod piece;
