@@ -130,15 +130,11 @@ pub fn first_core(number: usize) -> u32 {
     nth(number).core(FIRST_SEAT)
 }
 
-/// Does something as if this core belonged to another cluster, whose lock is held. The core's
-/// seat, if it has one there, is then counted from that cluster's first core.
-pub(super) fn among<R>(cluster: &Cluster, what: impl FnOnce() -> R) -> R {
+/// Has this core belong to another cluster, whose lock is held, and returns its own seat, which it
+/// is to take again. Its seat, if it has one there, is then counted from that cluster's first core.
+pub(super) fn visit(cluster: &Cluster) -> u32 {
     let core = this_core::get();
-    let own = core.place.load(Ordering::Relaxed);
     // As journals have it, and back in the number that it is added to.
     let seat = (core.index.wrapping_sub(cluster.core(FIRST_SEAT))) & u32::from(u16::MAX);
-    core.place.store(seat, Ordering::Relaxed);
-    let result = what();
-    core.place.store(own, Ordering::Relaxed);
-    result
+    core.place.swap(seat, Ordering::Relaxed)
 }

@@ -4,14 +4,15 @@
 //! cluster's lock for a bounded time; nothing is allocated.
 
 use alloc::sync::Arc;
+use core::sync::atomic::Ordering;
 
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, Snapshot, TaskSet};
 
 use super::core_set::CoreSet;
 use super::{cluster, divided};
-use crate::machine::clock;
 use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, this_core};
 
 /// Returns the model of the run, if one goes on.
 pub fn task_set() -> Option<Arc<TaskSet>> {
@@ -64,9 +65,9 @@ pub(super) fn serve(plan: Option<u64>, dag: DagId, request: Request) {
         _ => {}
     }
     let mut woken = CoreSet::default();
-    cluster::among(cluster, || {
-        execution.step(clock::now_ns(), &mut woken, |moment| moment.serve(request))
-    });
+    let seat = cluster::visit(cluster);
+    execution.step(clock::now_ns(), &mut woken, |moment| moment.serve(request));
+    this_core::get().place.store(seat, Ordering::Relaxed);
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.
