@@ -82,6 +82,7 @@ fn check_instances(specs: &[DagSpec], options: &CommitOptions, findings: &mut Fi
     }
 }
 
+#[inline(never)]
 fn check_counts(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
@@ -114,6 +115,7 @@ fn check_counts(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     }
 }
 
+#[inline(never)]
 fn check_times(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
@@ -155,6 +157,7 @@ fn deadline_of(spec: &DagSpec, job: u64) -> Option<u64> {
     (deadline_ns < u64::MAX).then_some(deadline_ns)
 }
 
+#[inline(never)]
 fn check_subtasks(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     for (index, subtask) in spec.subtasks.iter().enumerate() {

@@ -8,6 +8,7 @@ use crate::ids::ClusterId;
 use crate::spec::DagSpec;
 
 /// Checks the clusters of the whole commit.
+#[inline(never)]
 pub(super) fn check(specs: &[DagSpec], options: &CommitOptions, findings: &mut Findings) {
     let sizes = options.clusters.sizes();
     for (cluster, _) in (0..)

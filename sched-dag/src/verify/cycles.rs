@@ -49,6 +49,7 @@ pub(super) fn shortest_cycles(graph: &Graph) -> Vec<Vec<SubtaskId>> {
 }
 
 /// Returns the knots, and within each the subtasks, ascending.
+#[inline(never)]
 fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
     let mut number = vec![NONE; graph.len()];
     let mut lowest = vec![NONE; graph.len()];

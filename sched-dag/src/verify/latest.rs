@@ -24,6 +24,7 @@ pub(super) fn check(specs: &[DagSpec], topologies: &mut [Topology<'_>], findings
     }
 }
 
+#[inline(never)]
 fn check_one(specs: &[DagSpec], dag: usize, latest: &LatestSpec, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = DagLabel::new(specs, dag);

@@ -15,6 +15,7 @@ use crate::nearest::nearest;
 use crate::spec::{DagSpec, SubtaskSpec};
 
 /// Adds to the first faults which topic was probably meant.
+#[inline(never)]
 pub(super) fn suggest(specs: &[DagSpec], faults: &mut [Fault]) {
     for index in 0..faults.len().min(MOST_FAULTS) {
         let found = match &faults[index] {

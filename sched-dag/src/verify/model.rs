@@ -57,6 +57,7 @@ impl TaskSet {
 
 /// Returns for each DAG without priorities the number of its first one:
 /// deadline monotonic, after all that are given.
+#[inline(never)]
 fn priority_bases(specs: &[DagSpec], findings: &mut Findings) -> Vec<u32> {
     let given = specs
         .iter()
@@ -95,6 +96,7 @@ fn has_priorities(spec: &DagSpec) -> bool {
         .all(|subtask| subtask.priority.is_some())
 }
 
+#[inline(never)]
 fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
     let Shape {
         graph,

@@ -36,6 +36,7 @@ impl Shape {
 }
 
 /// Checks the graph of DAG number `dag`.
+#[inline(never)]
 pub(super) fn check(
     specs: &[DagSpec],
     dag: usize,
@@ -170,6 +171,7 @@ impl Check<'_> {
     /// value that nobody uses. Where one sink is wanted and a subtask without
     /// outputs is there to be it, other ends of the graph are no sinks but
     /// writers of unread topics, most likely of misspelt ones.
+    #[inline(never)]
     fn sinks(&self, unread: &[(usize, &str)], findings: &mut Findings) {
         let ends: Vec<SubtaskId> = self
             .graph

@@ -53,6 +53,7 @@ pub(super) fn check(specs: &[DagSpec], findings: &mut Findings) {
     }
 }
 
+#[inline(never)]
 fn check_users(specs: &[DagSpec], dag: usize, state: &StateSpec, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
@@ -107,6 +108,7 @@ fn check_users(specs: &[DagSpec], dag: usize, state: &StateSpec, findings: &mut 
 }
 
 /// Returns the precedence that shared states add to a graph without cycle.
+#[inline(never)]
 pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence> {
     let mut precedences = Vec::new();
     if !spec.states.iter().any(is_shared) {

@@ -87,6 +87,7 @@ pub(super) fn check<'a>(
 
 /// Returns all ends grouped by topic, within a topic in the order of DAGs and
 /// subtasks, and where each group starts.
+#[inline(never)]
 fn ends_by_topic(specs: &[DagSpec]) -> (Vec<End<'_>>, Vec<usize>) {
     let mut unordered: Vec<End<'_>> = Vec::new();
     for (dag, spec) in specs.iter().enumerate() {
@@ -138,6 +139,7 @@ fn report_shared(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Findings) {
 }
 
 /// Checks the ends that one topic has in one DAG.
+#[inline(never)]
 fn check_topic<'a>(
     specs: &'a [DagSpec],
     options: &CommitOptions,
