@@ -110,6 +110,17 @@ fn take(given: &[Option<Outbox>], lost: &Lost, value: &Recorded<'_>, at_ns: u64)
     }
 }
 
+/// Something happened in an instance.
+fn at(instance: Instance, at_ns: u64) -> Happened {
+    Happened {
+        dag: instance.dag,
+        subtask: instance.subtask.0,
+        job: instance.job,
+        release_ns: None,
+        at_ns,
+    }
+}
+
 impl Crossing for Tape {
     fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool {
         open(&mut self.header, dag, graph, channels);
@@ -144,28 +155,14 @@ impl Crossing for Tape {
                 take(&self.given, &self.lost, sample, at_ns);
             });
         }
-        let failed = Happened {
-            dag: instance.dag,
-            subtask: instance.subtask.0,
-            job: instance.job,
-            release_ns: None,
-            at_ns,
-        };
-        self.put(recording::What::Fault, &failed);
+        self.put(recording::What::Fault, &at(instance, at_ns));
     }
 
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
         let number = u16::try_from(instance.dag.0);
         let mut channels = self.header.channels.iter();
         if channels.any(|channel| Ok(channel.dag) == number) {
-            let asked = Happened {
-                dag: instance.dag,
-                subtask: instance.subtask.0,
-                job: instance.job,
-                release_ns: None,
-                at_ns,
-            };
-            self.put(recording::What::Clock, &asked);
+            self.put(recording::What::Clock, &at(instance, at_ns));
         }
         clock_ns
     }
