@@ -82,9 +82,10 @@ pub trait Alternate {
     fn is_fallback(&self) -> bool;
 }
 
+/// One that is made anew each time.
 impl Alternate for () {
     fn is_there(&self) -> bool {
-        false
+        true
     }
 
     fn is_fallback(&self) -> bool {

@@ -19,7 +19,7 @@ const ABSENT: usize = usize::MAX;
 
 /// A heap with the smallest key on top.
 #[derive(Clone, Debug, Hash)]
-pub(crate) struct IndexedHeap<K> {
+pub(super) struct IndexedHeap<K> {
     entries: Vec<(K, usize)>,
     /// Where in `entries` each item is.
     positions: Box<[usize]>,
@@ -28,7 +28,7 @@ pub(crate) struct IndexedHeap<K> {
 impl<K: Ord + Copy> IndexedHeap<K> {
     /// Makes an empty heap for the items `0..capacity`.
     #[inline]
-    pub(crate) fn new(capacity: usize) -> Self {
+    pub(super) fn new(capacity: usize) -> Self {
         Self {
             entries: Vec::with_capacity(capacity),
             positions: vec![ABSENT; capacity].into_boxed_slice(),
@@ -37,19 +37,13 @@ impl<K: Ord + Copy> IndexedHeap<K> {
 
     /// Returns the smallest key and its item.
     #[inline]
-    pub(crate) fn peek(&self) -> Option<(K, usize)> {
+    pub(super) fn peek(&self) -> Option<(K, usize)> {
         self.entries.first().copied()
-    }
-
-    /// Returns an item's key, if it is in.
-    #[inline]
-    pub(crate) fn key(&self, item: usize) -> Option<K> {
-        self.entries.get(self.positions[item]).map(|&(key, _)| key)
     }
 
     /// Puts an item into the heap, or gives it another key.
     #[inline]
-    pub(crate) fn set(&mut self, item: usize, key: K) {
+    pub(super) fn set(&mut self, item: usize, key: K) {
         let position = self.positions[item];
         let entry = (key, item);
         match self.entries.get(position) {
@@ -64,7 +58,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
 
     /// Takes the item with the smallest key out.
     #[inline]
-    pub(crate) fn pop(&mut self) -> Option<(K, usize)> {
+    pub(super) fn pop(&mut self) -> Option<(K, usize)> {
         let (key, item) = self.peek()?;
         self.remove(item);
         Some((key, item))
@@ -72,7 +66,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
 
     /// Takes an item out, if it is in.
     #[inline]
-    pub(crate) fn remove(&mut self, item: usize) {
+    pub(super) fn remove(&mut self, item: usize) {
         let position = self.positions[item];
         if position == ABSENT {
             return;

@@ -45,7 +45,7 @@ mod dispatch;
 mod dropping;
 mod ending;
 mod hand_off;
-pub(crate) mod heap;
+mod heap;
 mod instances;
 mod jobs;
 mod key;

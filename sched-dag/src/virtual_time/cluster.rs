@@ -1,4 +1,4 @@
-//! One cluster in virtual time: its engine, and when what its cores execute finishes.
+//! One cluster in virtual time: its engine, and what its cores execute until when.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -10,42 +10,24 @@ use crate::journal::What;
 use crate::kept::Journal;
 use crate::lifecycle::{Request, Requests};
 use crate::placement::Next;
-use crate::scheduler::heap::IndexedHeap;
 use crate::scheduler::{Decision, Moment, Notice, Scheduler};
 
 /// What runs by itself.
 pub(super) struct Cluster<B: Body> {
-    /// Parked is a body with the time that its instance has left.
-    pub(super) engine: Engine<B, (B, u64)>,
+    /// Parked is a body, behind the time that its instance has left.
+    pub(super) engine: Engine<B, (u64, B)>,
     /// How many cores other clusters have before.
     pub(super) first: u32,
-    /// The bodies of the instances on busy cores.
-    running: Box<[Option<B>]>,
-    /// When the instance on each busy core finishes if nothing intervenes; at
-    /// one instant the core with the smaller number comes first.
-    finish_times: IndexedHeap<(u64, CoreId)>,
+    /// By core, the body of its instance, and when that finishes if nothing intervenes.
+    running: Box<[Option<(u64, B)>]>,
 }
 
 /// An instant in virtual time.
-struct Now<'a, W> {
-    now_ns: u64,
-    finish_times: &'a mut IndexedHeap<(u64, CoreId)>,
-    workload: &'a mut W,
-    /// Why nothing happens any more.
-    end: Option<End>,
-}
-
-impl<W> Now<'_, W> {
-    fn run(&mut self, core: CoreId, instance: Instance, left_ns: u64) {
-        match self.now_ns.checked_add(left_ns) {
-            Some(finish_ns) => self.finish_times.set(core.index(), (finish_ns, core)),
-            None => self.end = self.end.or(Some(End::TimeOverflow(instance))),
-        }
-    }
-
-    fn end(&self) -> Result<(), End> {
-        self.end.map_or(Ok(()), Err)
-    }
+pub(super) struct Now<'a, W> {
+    pub(super) now_ns: u64,
+    pub(super) workload: &'a mut W,
+    /// How long the instance that has begun last executes.
+    pub(super) begun_ns: Result<u64, End>,
 }
 
 impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
@@ -61,11 +43,9 @@ impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
         self.now_ns
     }
 
-    fn start(&mut self, core: CoreId, body: &mut B) -> u64 {
-        match self.workload.execute(body, self.now_ns) {
-            Some(execution_ns) => self.run(core, body.subject().instance(), execution_ns),
-            None => self.end = Some(End::Stopped),
-        }
+    fn start(&mut self, _: CoreId, body: &mut B) -> u64 {
+        let execution_ns = self.workload.execute(body, self.now_ns);
+        self.begun_ns = execution_ns.ok_or(End::Stopped);
         self.now_ns
     }
 
@@ -80,9 +60,6 @@ impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
     }
 }
 
-/// An engine, what runs by core, and the instant.
-type Parts<'s, B, W> = (&'s mut Engine<B, (B, u64)>, &'s mut [Option<B>], Now<'s, W>);
-
 impl<B: Body> Cluster<B> {
     pub(super) fn new(
         scheduler: Scheduler,
@@ -90,146 +67,118 @@ impl<B: Body> Cluster<B> {
         after_fault: Vec<Option<DagId>>,
     ) -> Self {
         type Any<'a> = Now<'a, ExecutionTimes<fn(Instance) -> u64>>;
-        let cores = scheduler.options().cores as usize;
+        let cores = scheduler.options().cores;
         let (journal, none) = (Journal::none(), Requests::new(0, None));
-        let engine = Engine::new::<Any<'_>>(cluster, scheduler, journal, none, after_fault);
         Self {
-            engine,
+            engine: Engine::new::<Any<'_>>(cluster, scheduler, journal, none, after_fault),
             first,
             running: (0..cores).map(|_| None).collect(),
-            finish_times: IndexedHeap::new(cores),
         }
     }
 
     pub(super) fn next_finish_ns(&self) -> Option<u64> {
-        self.finish_times.peek().map(|((at_ns, _), _)| at_ns)
+        let running = self.running.iter().flatten();
+        running.map(|(finish_ns, _)| *finish_ns).min()
     }
 
-    /// Returns a core whose instance finishes at `now_ns`, and that; the core is free then.
-    pub(super) fn take_finished(&mut self, now_ns: u64) -> Option<(CoreId, Instance)> {
-        let next = self.finish_times.peek();
-        let ((_, core), index) = next.filter(|((at_ns, _), _)| *at_ns <= now_ns)?;
-        self.finish_times.remove(index);
-        let body = self.running[index].as_ref()?;
-        Some((core, body.subject().instance()))
+    /// Takes what finishes by now from the first core that has such a thing.
+    pub(super) fn take_finished(&mut self, now_ns: u64) -> Option<(CoreId, B)> {
+        let mut cores = (0..).map(CoreId).zip(&mut self.running);
+        cores.find_map(|(core, running)| {
+            let (_, body) = running.take_if(|(finish_ns, _)| *finish_ns <= now_ns)?;
+            Some((core, body))
+        })
     }
 
     /// Makes a change at an instant, which stays open.
     pub(super) fn tell(
         &mut self,
-        now_ns: u64,
-        workload: &mut impl Workload<B>,
+        now: &mut Now<'_, impl Workload<B>>,
         change: impl FnOnce(&mut Moment<'_>),
     ) {
-        let (engine, _, mut now) = self.parts(now_ns, workload);
-        engine.tell((now_ns, engine.scheduler.log.here), &mut now, change);
+        let here = self.engine.scheduler.log.here;
+        self.engine.tell((now.now_ns, here), now, change);
     }
 
     /// Completes what has finished on a core, and reports whether that is all of the instant.
     pub(super) fn complete(
         &mut self,
-        now_ns: u64,
         core: CoreId,
+        body: B,
         is_alone: bool,
-        workload: &mut impl Workload<B>,
+        now: &mut Now<'_, impl Workload<B>>,
     ) -> Result<bool, End> {
-        let (engine, running, mut now) = self.parts(now_ns, workload);
-        let Some(body) = running[core.index()].take() else {
-            return Ok(false);
-        };
+        let (engine, now_ns) = (&mut self.engine, now.now_ns);
         let instance = body.subject().instance();
         let vertex = engine.task_set.vertex(instance);
-        let done = engine.complete((core, vertex), body, now_ns, is_alone, &mut now);
+        let done = engine.complete((core, vertex), body, now_ns, is_alone, now);
         now.workload.ended(instance, None);
         match done {
-            Continuation::Run(body) => {
-                running[core.index()] = Some(body);
-                now.end().map(|()| true)
-            }
-            Continuation::Look { .. } => self.go_on(now_ns, core, workload).map(|()| true),
+            Continuation::Run(body) => self.run(core, body, now_ns, now.begun_ns)?,
+            Continuation::Look { .. } => self.go_on(core, now)?,
             Continuation::Step(ended) => {
                 if let Some(instance) = ended {
-                    let complete = |moment: &mut Moment<'_>| moment.complete(instance);
-                    engine.tell((now_ns, core), &mut now, complete);
+                    engine.tell((now_ns, core), now, |moment| moment.complete(instance));
                 }
-                Ok(false)
+                return Ok(false);
             }
         }
+        Ok(true)
     }
 
-    /// Frees a core whose instance has failed.
-    pub(super) fn lose(&mut self, core: CoreId) {
-        self.engine.placement.lose(core.index());
-    }
-
-    /// Ends that instance.
-    pub(super) fn fail(&mut self, now_ns: u64, core: CoreId, workload: &mut impl Workload<B>) {
-        let (engine, running, mut now) = self.parts(now_ns, workload);
-        if let Some(body) = running[core.index()].take() {
-            let instance = body.subject().instance();
-            let vertex = engine.task_set.vertex(instance);
+    /// Ends what has failed on a core.
+    pub(super) fn fail(&mut self, core: CoreId, body: B, now: &mut Now<'_, impl Workload<B>>) {
+        let instance = body.subject().instance();
+        if let Some(vertex) = self.engine.placement.lose(core.index()) {
             let body = Some(body).filter(|_| now.workload.is_replaceable(instance));
-            let cost = engine.tell_fault((now_ns, core), vertex, body, &mut now);
+            let cost = (self.engine).tell_fault((now.now_ns, core), vertex, body, now);
             now.workload.ended(instance, Some(cost));
         }
     }
 
     /// Ends the instant, and has its cores follow.
-    pub(super) fn decide(
-        &mut self,
-        now_ns: u64,
-        workload: &mut impl Workload<B>,
-    ) -> Result<(), End> {
-        let (engine, _, mut now) = self.parts(now_ns, workload);
-        engine.decide(now_ns, &mut now);
+    pub(super) fn decide(&mut self, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+        let now_ns = now.now_ns;
+        self.engine.decide(now_ns, now);
         for place in 0..self.engine.decisions().len() {
             let decision = self.engine.decisions()[place];
             let core = decision.core();
-            let Decision::Preempt { .. } = decision else {
-                self.go_on(now_ns, core, workload)?;
-                continue;
-            };
-            let finish_ns = self.finish_times.key(core.index());
-            let left_ns = finish_ns.map_or(now_ns, |(at_ns, _)| at_ns) - now_ns;
-            if let Some(body) = self.running[core.index()].take() {
-                self.engine.suspend(core, now_ns, (body, left_ns));
+            if let Decision::Preempt { .. } = decision {
+                if let Some((finish_ns, body)) = self.running[core.index()].take() {
+                    let parked = (finish_ns - now_ns, body);
+                    self.engine.suspend(core, now_ns, parked);
+                }
+            } else {
+                self.go_on(core, now)?;
             }
         }
         Ok(())
     }
 
     /// Has a core without an instance begin or continue what it should.
-    fn go_on(
-        &mut self,
-        now_ns: u64,
-        core: CoreId,
-        workload: &mut impl Workload<B>,
-    ) -> Result<(), End> {
-        let (engine, running, mut now) = self.parts(now_ns, workload);
-        running[core.index()] = match engine.next(core, &mut now) {
-            Next::Nothing => return Ok(()),
-            Next::Start(_, body) => Some(body),
-            Next::Continue((body, left_ns)) => {
-                let instance = body.subject().instance();
-                engine.note(What::Resume, core, engine.task_set.vertex(instance), now_ns);
-                now.run(core, instance, left_ns);
-                Some(body)
+    fn go_on(&mut self, core: CoreId, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+        let (engine, now_ns) = (&mut self.engine, now.now_ns);
+        match engine.next(core, now) {
+            Next::Nothing => Ok(()),
+            Next::Start(_, body) => self.run(core, body, now_ns, now.begun_ns),
+            Next::Continue((left_ns, body)) => {
+                let vertex = engine.task_set.vertex(body.subject().instance());
+                engine.note(What::Resume, core, vertex, now_ns);
+                self.run(core, body, now_ns, Ok(left_ns))
             }
-        };
-        now.end()
+        }
     }
 
-    fn parts<'s, W: Workload<B>>(
-        &'s mut self,
+    fn run(
+        &mut self,
+        core: CoreId,
+        body: B,
         now_ns: u64,
-        workload: &'s mut W,
-    ) -> Parts<'s, B, W> {
-        let now = Now {
-            now_ns,
-            finish_times: &mut self.finish_times,
-            workload,
-            end: None,
-        };
-        (&mut self.engine, &mut self.running, now)
+        left_ns: Result<u64, End>,
+    ) -> Result<(), End> {
+        let finish_ns = now_ns.checked_add(left_ns?);
+        let finish_ns = finish_ns.ok_or(End::TimeOverflow(body.subject().instance()))?;
+        self.running[core.index()] = Some((finish_ns, body));
+        Ok(())
     }
 }

@@ -42,30 +42,129 @@
 
 mod cluster;
 mod serving;
-mod workload;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 
-use crate::engine::Body;
+use crate::engine::{Body, Cost};
 use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
-use crate::journal::Event;
+use crate::journal::{Event, Subject};
 use crate::kept::Journal;
 use crate::lifecycle::{Lifecycle, Request};
 use crate::policy::SchedulerOptions;
-use crate::scheduler::Scheduler;
+use crate::scheduler::{Notice, Scheduler};
 use crate::task_set::TaskSet;
-use cluster::Cluster;
-pub use workload::{ExecutionTimes, Stub, Workload};
+use cluster::{Cluster, Now};
+
+/// What instances do and how long it takes them.
+pub trait Workload<B = Instance> {
+    /// Returns the execution time of an instance in nanoseconds; 0 is allowed. Called once for
+    /// each instance, at its start. `None`: the run is [stopped](End::Stopped) at once.
+    fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
+
+    /// Reports whether an instance fails, instead of finishing, when its
+    /// execution time is over: then its DAG is ended, or its job dropped. Called once for each
+    /// instance, at its end.
+    fn fails(&mut self, instance: Instance) -> bool {
+        let _ = instance;
+        false
+    }
+
+    /// Reports whether the function of an instance that fails could be replaced, if its body says
+    /// so as well. Called once for each, right before the scheduler is told.
+    fn is_replaceable(&mut self, instance: Instance) -> bool {
+        let _ = instance;
+        true
+    }
+
+    /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
+    fn ended(&mut self, instance: Instance, fault: Option<Cost>) {
+        let _ = (instance, fault);
+    }
+
+    /// A job is released, skipped or completed, or a DAG stopped.
+    fn hear(&mut self, notice: &Notice) {
+        let _ = notice;
+    }
+
+    /// Takes a request that has come now, by a completion or a fault.
+    fn request(&mut self, request: Request, now_ns: u64) {
+        let _ = (request, now_ns);
+    }
+
+    /// Returns when the next request comes. Asked again at every instant.
+    fn next_request_ns(&self) -> Option<u64> {
+        None
+    }
+
+    /// Returns the next request that has come by now, and forgets it.
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
+        let _ = now_ns;
+        None
+    }
+
+    /// Returns how late the timer's interrupt is that is due then; what comes before it at the
+    /// scheduler does what is due. Asked several times for one interrupt.
+    fn late_ns(&self, due_ns: u64) -> u64 {
+        let _ = due_ns;
+        0
+    }
+
+    /// Reports whether the run is to stop, though jobs are left. Asked before each
+    /// instant.
+    fn stops(&self) -> bool {
+        false
+    }
+}
+
+/// A workload of which only the execution times matter.
+#[derive(Debug)]
+pub struct ExecutionTimes<F>(
+    /// Returns the execution time of an instance in nanoseconds.
+    pub F,
+);
+
+impl<B: Body, F: FnMut(Instance) -> u64> Workload<B> for ExecutionTimes<F> {
+    fn execute(&mut self, body: &mut B, _now_ns: u64) -> Option<u64> {
+        Some((self.0)(body.subject().instance()))
+    }
+}
+
+/// Stands for a body without a function, which can always be replaced.
+impl Body for Instance {
+    type Alternate = ();
+
+    fn set_job(&mut self, job: u64) {
+        self.job = job;
+    }
+
+    fn subject(&self) -> Subject {
+        Subject::of(*self)
+    }
+
+    fn discard(&mut self, _: u64) {}
+
+    fn has_effects(&self) -> bool {
+        false
+    }
+
+    fn complete(&mut self, _: u64, _: &mut dyn FnMut(Request)) {}
+
+    fn alternate(&self) -> Option<()> {
+        Some(())
+    }
+
+    fn replace(&mut self) {}
+}
 
 /// A scheduler in virtual time with its bodies, or those of all clusters.
-pub struct VirtualTime<B: Body = Stub> {
+pub struct VirtualTime<B: Body = Instance> {
     clusters: Box<[Cluster<B>]>,
     now_ns: u64,
     /// What fails at the present instant.
-    failing: Vec<(Instance, CoreId)>,
+    failing: Vec<(Instance, CoreId, B)>,
     lifecycle: Option<Box<dyn Lifecycle>>,
     has_begun: bool,
     /// Whether a request waits for jobs to end.
@@ -95,28 +194,23 @@ impl VirtualTime {
     pub fn new(scheduler: Scheduler) -> Self {
         let task_set = Arc::clone(scheduler.task_set());
         let cluster = Cluster::new(scheduler, (ClusterId(0), 0), Vec::new());
-        Self::with(Box::from([cluster]), stubs(&task_set))
+        Self::with(Box::from([cluster]), instances(&task_set))
     }
 
     /// Makes one likewise for the clusters of a task set on the machine that the options
     /// describe; if its cores are not divided, for one scheduler of all.
     #[must_use]
     pub fn of_clusters(task_set: &Arc<TaskSet>, options: SchedulerOptions) -> Self {
-        Self::of_bodies(task_set, options, stubs(task_set), &[])
+        Self::of_bodies(task_set, options, instances(task_set), &[])
     }
 }
 
-fn stubs(task_set: &TaskSet) -> impl Iterator<Item = Stub> {
+fn instances(task_set: &TaskSet) -> impl Iterator<Item = Instance> {
     let dags = (0..).map(DagId).zip(task_set.dags());
     dags.flat_map(|(dag, model)| {
         let subtasks = (0..).map(SubtaskId).take(model.subtasks().len());
-        subtasks.map(move |subtask| Stub {
-            instance: Instance {
-                dag,
-                subtask,
-                job: 0,
-            },
-        })
+        let job = 0;
+        subtasks.map(move |subtask| Instance { dag, job, subtask })
     })
 }
 
@@ -137,23 +231,22 @@ impl<B: Body> VirtualTime<B> {
         Self::with(clusters.collect(), bodies)
     }
 
-    fn with(mut clusters: Box<[Cluster<B>]>, bodies: impl IntoIterator<Item = B>) -> Self {
-        for body in bodies {
-            let instance = body.subject().instance();
-            let engine = &mut clusters[place(&clusters, instance.dag)].engine;
-            engine.put(engine.task_set.vertex(instance), body);
-        }
-        let cores = clusters
-            .iter()
-            .map(|cluster| cluster.engine.scheduler.options().cores as usize);
-        Self {
-            failing: Vec::with_capacity(cores.sum()),
+    fn with(clusters: Box<[Cluster<B>]>, bodies: impl IntoIterator<Item = B>) -> Self {
+        let cores = |cluster: &Cluster<B>| cluster.engine.scheduler.options().cores as usize;
+        let mut this = Self {
+            failing: Vec::with_capacity(clusters.iter().map(cores).sum()),
             now_ns: 0,
             clusters,
             lifecycle: None,
             has_begun: false,
             waits: false,
+        };
+        for body in bodies {
+            let instance = body.subject().instance();
+            let engine = &mut this.clusters[this.place(instance.dag)].engine;
+            engine.put(engine.task_set.vertex(instance), body);
         }
+        this
     }
 
     /// Takes what serves requests other than signals.
@@ -196,14 +289,21 @@ impl<B: Body> VirtualTime<B> {
     /// Runs all events up to and including those at `until_ns`. May be called
     /// again with a later time.
     pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload<B>) -> End {
-        while !workload.stops() {
+        let begun_ns = Ok(0);
+        let now = &mut Now {
+            now_ns: self.now_ns,
+            workload,
+            begun_ns,
+        };
+        while !now.workload.stops() {
             let of_scheduler = |cluster: &Cluster<B>| cluster.engine.scheduler.next_event_ns();
             let due = self.clusters.iter().filter_map(of_scheduler);
             // The time may have passed the due one already, by another event.
-            let interrupts = due
-                .map(|due_ns| (due_ns.saturating_add(workload.late_ns(due_ns))).max(self.now_ns));
+            let interrupts = due.map(|due_ns| {
+                (due_ns.saturating_add(now.workload.late_ns(due_ns))).max(self.now_ns)
+            });
             let scheduler_ns = interrupts.min();
-            let request_ns = workload.next_request_ns();
+            let request_ns = now.workload.next_request_ns();
             let request_ns = request_ns.map(|request_ns| request_ns.max(self.now_ns));
             let events = [self.next_finish_ns(), scheduler_ns, request_ns];
             let Some(event_ns) = events.into_iter().flatten().min() else {
@@ -212,7 +312,8 @@ impl<B: Body> VirtualTime<B> {
             if event_ns > until_ns {
                 return End::TimeReached;
             }
-            if let Err(end) = self.step(event_ns, workload) {
+            now.now_ns = event_ns;
+            if let Err(end) = self.step(now) {
                 return end;
             }
         }
@@ -232,7 +333,7 @@ impl<B: Body> VirtualTime<B> {
     /// If there is no such DAG.
     #[must_use]
     pub fn scheduler_of(&self, dag: DagId) -> &Scheduler {
-        &self.clusters[place(&self.clusters, dag)].engine.scheduler
+        &self.clusters[self.place(dag)].engine.scheduler
     }
 
     /// Reports whether every DAG is over.
@@ -248,49 +349,59 @@ impl<B: Body> VirtualTime<B> {
     }
 
     /// Goes through one instant. That the run cannot go on is the error.
-    fn step(&mut self, now_ns: u64, workload: &mut impl Workload<B>) -> Result<(), End> {
-        self.now_ns = now_ns;
-        if self.finish(now_ns, workload)? {
+    fn step(&mut self, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+        self.now_ns = now.now_ns;
+        if self.finish(now)? {
             return Ok(());
         }
-        self.failing.sort_unstable();
-        for (instance, core) in self.failing.drain(..) {
-            let place = place(&self.clusters, instance.dag);
-            self.clusters[place].fail(now_ns, core, workload);
+        let mut failing = core::mem::take(&mut self.failing);
+        failing.sort_unstable_by_key(|(instance, ..)| *instance);
+        for (instance, core, body) in failing.drain(..) {
+            let place = self.place(instance.dag);
+            self.clusters[place].fail(core, body, now);
         }
+        self.failing = failing;
         if !core::mem::replace(&mut self.has_begun, true) {
-            self.serve(Request::Begin, workload);
+            self.serve(Request::Begin, now);
         }
         if core::mem::take(&mut self.waits) {
-            self.serve(Request::GoOn, workload);
+            self.serve(Request::GoOn, now);
         }
-        while let Some(request) = workload.take_request(now_ns) {
-            self.serve(request, workload);
+        while let Some(request) = now.workload.take_request(now.now_ns) {
+            self.serve(request, now);
         }
         let mut clusters = self.clusters.iter_mut();
-        clusters.try_for_each(|cluster| cluster.decide(now_ns, workload))
+        clusters.try_for_each(|cluster| cluster.decide(now))
     }
 
-    /// Completes what finishes at `now_ns`, and notes what fails instead.
+    /// Completes what finishes now, and notes what fails instead.
     /// If it is one instance and nothing else happens, that may be the whole
     /// instant, which is the result.
-    fn finish(&mut self, now_ns: u64, workload: &mut impl Workload<B>) -> Result<bool, End> {
+    fn finish(&mut self, now: &mut Now<'_, impl Workload<B>>) -> Result<bool, End> {
         let mut is_first = true;
         for place in 0..self.clusters.len() {
-            while let Some((core, instance)) = self.clusters[place].take_finished(now_ns) {
-                let mut others_ns = [self.next_finish_ns(), workload.next_request_ns()].into_iter();
-                let is_last = others_ns.all(|ns| ns.is_none_or(|ns| ns > now_ns));
+            while let Some((core, body)) = self.clusters[place].take_finished(now.now_ns) {
+                let mut others_ns =
+                    [self.next_finish_ns(), now.workload.next_request_ns()].into_iter();
+                let is_last = others_ns.all(|ns| ns.is_none_or(|ns| ns > now.now_ns));
                 let is_alone = core::mem::take(&mut is_first) && is_last && !self.waits;
-                let cluster = &mut self.clusters[place];
-                if workload.fails(instance) {
-                    cluster.lose(core);
-                    self.failing.push((instance, core));
-                } else if cluster.complete(now_ns, core, is_alone, workload)? {
+                let (cluster, instance) = (&mut self.clusters[place], body.subject().instance());
+                if now.workload.fails(instance) {
+                    self.failing.push((instance, core, body));
+                } else if cluster.complete(core, body, is_alone, now)? {
                     return Ok(true);
                 }
             }
         }
         Ok(false)
+    }
+
+    /// Returns the place of the cluster that runs a DAG.
+    fn place(&self, dag: DagId) -> usize {
+        match &*self.clusters {
+            [_] => 0,
+            several => several[0].engine.task_set.dag(dag).cluster().index(),
+        }
     }
 }
 
@@ -298,19 +409,5 @@ impl<B: Body> fmt::Debug for VirtualTime<B> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("VirtualTime");
         shown.field("now_ns", &self.now_ns).finish_non_exhaustive()
-    }
-}
-
-/// Returns the place of the cluster that runs a DAG.
-fn place<B: Body>(clusters: &[Cluster<B>], dag: DagId) -> usize {
-    match clusters {
-        [_] => 0,
-        several => several[0]
-            .engine
-            .scheduler
-            .task_set()
-            .dag(dag)
-            .cluster()
-            .index(),
     }
 }
