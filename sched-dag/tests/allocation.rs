@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use random::Random;
-use sched_dag::virtual_time::{End, ExecutionTimes, Stub, VirtualTime, Workload};
+use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, OverrunPolicy, Policy, Preemption,
     Scheduler, SchedulerOptions, SubtaskSpec, verify,
@@ -108,7 +108,7 @@ fn nothing_is_allocated_from_first_release_to_last_completion() {
 struct Failing(Random);
 
 impl Workload for Failing {
-    fn execute(&mut self, _body: &mut Stub, _now_ns: u64) -> Option<u64> {
+    fn execute(&mut self, _instance: &mut Instance, _now_ns: u64) -> Option<u64> {
         Some(self.0.between(0, 50))
     }
 

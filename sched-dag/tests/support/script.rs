@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
-use sched_dag::virtual_time::{End, Stub, VirtualTime, Workload};
+use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{DagId, Instance, Scheduler, TaskSet};
 
 use super::{Takes, ask, kind, line, told};
@@ -67,8 +67,8 @@ impl<'a, T: Takes> Script<'a, T> {
 }
 
 impl<T: Takes> Workload for Script<'_, T> {
-    fn execute(&mut self, body: &mut Stub, _now_ns: u64) -> Option<u64> {
-        Some(self.takes.takes_ns(body.instance))
+    fn execute(&mut self, instance: &mut Instance, _now_ns: u64) -> Option<u64> {
+        Some(self.takes.takes_ns(*instance))
     }
 
     fn fails(&mut self, instance: Instance) -> bool {
