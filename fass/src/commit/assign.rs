@@ -2,8 +2,8 @@
 
 use alloc::format;
 
+use sched_dag::TaskSet;
 use sched_dag::analysis::{self, NotAssigned, Settings};
-use sched_dag::{DagLabel, TaskSet};
 
 use crate::platform::{LaunchError, Platform};
 
@@ -24,9 +24,8 @@ use crate::platform::{LaunchError, Platform};
 /// }
 /// ```
 pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-    analysis::assign(task_set, &settings(platform)).map_err(|NotAssigned { dag: id, reason }| {
-        let name = task_set.dag(id).name().into();
-        let dag = DagLabel { id, name };
+    analysis::assign(task_set, &settings(platform)).map_err(|NotAssigned { dag, reason }| {
+        let dag = task_set.label(dag);
         LaunchError::new(format!("{dag} gets no cores: {reason}"))
     })
 }

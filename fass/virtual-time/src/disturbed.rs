@@ -43,7 +43,7 @@ impl VirtualTime {
     /// finish_create_dags(&[dag]).unwrap();
     ///
     /// let report = machine.run();
-    /// let late_ns = |job: &virtual_time::JobRecord| job.released_at_ns - job.release_ns;
+    /// let late_ns = |job: &virtual_time::JobRecord| job.released_ns.unwrap() - job.release_ns;
     /// assert!(report.jobs.iter().any(|job| late_ns(job) > 500_000));
     /// assert!(report.jobs.iter().all(|job| late_ns(job) <= 1_000_000));
     /// assert_eq!(report.violations(), []);

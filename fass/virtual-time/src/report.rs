@@ -1,7 +1,6 @@
 //! What a run leaves behind.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::sync::Arc;
 
 use sched_dag::chains::{Chain, Latencies};
@@ -188,98 +187,76 @@ impl Report {
         let Event {
             time_ns, what, job, ..
         } = event;
-        let dag = self.dag_name(event.dag);
+        let dag = self.task_set.label(event.dag);
+        let or_number = |name: String, number: String| match name.is_empty() {
+            true => number,
+            false => name,
+        };
+        let dag = or_number(dag.name, format!("dag {}", dag.id.0));
         let name = match event.instance() {
-            Some(instance) => self.subtask_name(instance),
+            Some(instance) => {
+                let subtask = self.task_set.subtask_label(instance.dag, instance.subtask);
+                or_number(subtask.name, format!("subtask {}", subtask.id.0))
+            }
             None if *what == What::Entered => return format!("{time_ns} entered mode {job}"),
             None if what.is_of_dag() => return format!("{time_ns} {what} {dag}"),
             None => dag,
         };
-        let mut line = format!("{time_ns} {what} {name}[{job}]");
         let more = match what {
-            _ if what.is_of_machine() => write!(line, " core {}", event.core.0),
+            _ if what.is_of_machine() => format!(" core {}", event.core.0),
             What::Completed => {
                 let mut jobs = self.jobs.iter();
                 let of_job = jobs.find(|of_job| (of_job.dag, of_job.job) == (event.dag, *job));
                 let outcome = of_job.and_then(|of_job| of_job.outcome);
                 let outcome = outcome.map_or(String::new(), |outcome| format!(" {outcome:?}"));
-                write!(line, "{}", outcome.to_lowercase())
+                outcome.to_lowercase()
             }
-            _ => Ok(()),
+            _ => String::new(),
         };
-        // Writing to a string cannot fail.
-        let _ = more;
-        line
+        format!("{time_ns} {what} {name}[{job}]{more}")
     }
 
     /// Fills in what the events say about instances and jobs.
     pub(crate) fn look_at_events(&mut self, executed_ns: &BTreeMap<Instance, u64>) {
         let record = self.record();
         for event in &self.events {
-            if event.what == What::Released
-                && let Some(of_job) = record.job(event.dag, event.job)
-            {
-                let release_ns = of_job.release_ns.unwrap_or(event.time_ns);
-                let relative_deadline_ns = self.task_set.dag(event.dag).relative_deadline_ns();
-                self.jobs.push(JobRecord {
-                    dag: event.dag,
-                    job: event.job,
-                    release_ns,
-                    released_at_ns: event.time_ns,
-                    deadline_ns: release_ns.saturating_add(relative_deadline_ns),
-                    finish_ns: of_job.ended_ns,
-                    outcome: of_job.outcome,
-                    has_missed: of_job.missed_ns.is_some(),
-                });
+            let Event { dag, job, .. } = *event;
+            match (event.what, event.instance()) {
+                (What::Released, _) => self.jobs.extend(record.job(dag, job).map(|times| {
+                    let release_ns = times.release_ns.unwrap_or(event.time_ns);
+                    let deadline_ns = self.task_set.dag(dag).relative_deadline_ns();
+                    JobRecord {
+                        dag,
+                        job,
+                        release_ns,
+                        deadline_ns: release_ns.saturating_add(deadline_ns),
+                        times: *times,
+                    }
+                })),
+                (What::Ready, Some(instance)) => {
+                    let execution_ns = executed_ns.get(&instance).copied().unwrap_or(0);
+                    let times = record.instance(instance).copied();
+                    self.instances.extend(times.map(|times| InstanceRecord {
+                        instance,
+                        execution_ns,
+                        times,
+                    }));
+                }
+                _ => {}
             }
-            if event.what == What::Ready
-                && let Some(instance) = event.instance()
-                && let Some(times) = record.instance(instance)
-            {
-                self.instances.push(InstanceRecord {
-                    instance,
-                    ready_ns: event.time_ns,
-                    start_ns: times.start_ns,
-                    finish_ns: times.finish_ns,
-                    failed_ns: times.failed_ns,
-                    execution_ns: executed_ns.get(&instance).copied().unwrap_or(0),
-                    core: times.core,
-                    preemptions: times.preemptions,
-                });
-            }
-        }
-    }
-
-    /// Returns a DAG's name, or `dag 0`.
-    pub(crate) fn dag_name(&self, dag: DagId) -> String {
-        match self.task_set.dag(dag).name() {
-            "" => format!("dag {}", dag.0),
-            name => name.to_owned(),
-        }
-    }
-
-    /// Returns the name of an instance's subtask, or `subtask 0`.
-    pub(crate) fn subtask_name(&self, instance: Instance) -> String {
-        let dag = self.task_set.dag(instance.dag);
-        match dag.subtask(instance.subtask).name() {
-            "" => format!("subtask {}", instance.subtask.0),
-            name => name.to_owned(),
         }
     }
 
     fn find(&self, dag: &str, subtask: &str) -> (DagId, SubtaskId) {
-        for (dag_id, candidate) in (0..).map(DagId).zip(self.task_set.dags()) {
-            if candidate.name() != dag {
-                continue;
-            }
-            for (subtask_id, candidate) in (0..).map(SubtaskId).zip(candidate.subtasks()) {
-                if candidate.name() == subtask {
-                    return (dag_id, subtask_id);
-                }
-            }
-            panic!("dag `{dag}` has no subtask `{subtask}`");
+        let mut dags = (0..).map(DagId).zip(self.task_set.dags());
+        let Some((id, model)) = dags.find(|(_, model)| model.name() == dag) else {
+            panic!("there is no dag `{dag}`");
+        };
+        let mut subtasks = (0..).map(SubtaskId).zip(model.subtasks());
+        match subtasks.find(|(_, model)| model.name() == subtask) {
+            Some((subtask, _)) => (id, subtask),
+            None => panic!("dag `{dag}` has no subtask `{subtask}`"),
         }
-        panic!("there is no dag `{dag}`");
     }
 }
 

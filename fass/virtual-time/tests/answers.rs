@@ -299,10 +299,7 @@ fn a_wcet_of_zero_proves_nothing() {
         );
         assert_eq!(commit.warnings()[0].code(), "zero_wcet");
         let report = machine.run();
-        let responses = report
-            .jobs
-            .iter()
-            .filter_map(|job| job.finish_ns.map(|end| end - job.release_ns));
+        let responses = report.jobs.iter().filter_map(|job| job.response_time_ns());
         let observed_ns = match policy {
             Policy::StaticPriority => 26_000_000,
             Policy::Edf => 13_000_000,

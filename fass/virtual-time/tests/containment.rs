@@ -123,7 +123,7 @@ fn a_branch_that_has_started_runs_to_its_end() {
     let long = report.subtask("branches", "long");
     assert_eq!((long.len(), long[0].finish_ns), (1, Some(9 * MS)));
     assert_eq!(report.subtask("branches", "join"), []);
-    assert_eq!(report.jobs[0].finish_ns, Some(9 * MS));
+    assert_eq!(report.jobs[0].ended_ns, Some(9 * MS));
     assert_eq!(report.statistics[1].completed, 2);
     assert_eq!(report.violations(), []);
 }

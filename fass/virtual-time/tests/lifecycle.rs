@@ -130,7 +130,7 @@ fn l3_what_is_in_flight_goes_on_and_a_dag_may_pause_itself() {
     let report = run(&machine, &[dag]);
     let statistics = report.statistics[0];
     assert_eq!((statistics.completed, statistics.skips), (1, 2));
-    assert_eq!(report.jobs[0].finish_ns, Some(3_000_000));
+    assert_eq!(report.jobs[0].ended_ns, Some(3_000_000));
 }
 
 #[test]

@@ -8,6 +8,7 @@ use core::fmt;
 
 use crate::ids::{DagId, SubtaskId};
 use crate::spec::DagSpec;
+use crate::task_set::TaskSet;
 
 /// A DAG as messages name it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,6 +34,30 @@ impl DagLabel {
             id: DagId(saturating_u32(dag)),
             name: specs[dag].name.clone(),
         }
+    }
+}
+
+impl TaskSet {
+    /// Returns a DAG as messages name it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    pub fn label(&self, id: DagId) -> DagLabel {
+        let name = self.dag(id).name().into();
+        DagLabel { id, name }
+    }
+
+    /// Returns a subtask as messages name it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such subtask.
+    #[must_use]
+    pub fn subtask_label(&self, dag: DagId, id: SubtaskId) -> SubtaskLabel {
+        let name = self.dag(dag).subtask(id).name().into();
+        SubtaskLabel { id, name }
     }
 }
 

@@ -265,8 +265,8 @@ impl Unproven {
         };
         Self {
             reason,
-            subtasks: labels.map(|id| subtask_label(task_set, dag, id)).collect(),
-            other: other.map(|other| dag_label(task_set, other)),
+            subtasks: labels.map(|id| task_set.subtask_label(dag, id)).collect(),
+            other: other.map(|other| task_set.label(other)),
         }
     }
 }
@@ -308,7 +308,7 @@ impl Answers {
                 wcets: (task_set.dag(dag).subtasks().iter())
                     .map(Subtask::wcet_source)
                     .collect(),
-                dag: dag_label(task_set, dag),
+                dag: task_set.label(dag),
                 overheads: platform.overhead_source(),
                 verdict,
             }
@@ -353,19 +353,9 @@ fn sinks(task_set: &TaskSet, dag: DagId, bounds_ns: &[Option<u64>]) -> Vec<SinkA
     let model = task_set.dag(dag);
     let sinks = model.sinks().iter().zip(bounds_ns);
     let answers = sinks.map(|(&sink, bound_ns)| SinkAnswer {
-        sink: subtask_label(task_set, dag, sink),
+        sink: task_set.subtask_label(dag, sink),
         relative_deadline: Duration::from_nanos(model.subtask(sink).relative_deadline_ns()),
         bound: bound_ns.map(Duration::from_nanos),
     });
     answers.collect()
-}
-
-fn dag_label(task_set: &TaskSet, id: DagId) -> DagLabel {
-    let name = task_set.dag(id).name().into();
-    DagLabel { id, name }
-}
-
-fn subtask_label(task_set: &TaskSet, dag: DagId, id: SubtaskId) -> SubtaskLabel {
-    let name = task_set.dag(dag).subtask(id).name().into();
-    SubtaskLabel { id, name }
 }

@@ -13,13 +13,13 @@ use std::time::Duration;
 use fass::edge::Outcome;
 use fass::{Plan, Runner};
 use sched_dag::virtual_time::{End, VirtualTime as Driver};
-use sched_dag::{Dag, DagId, DagLabel, Instance, SchedulerOptions, SubtaskLabel, TaskSet};
+use sched_dag::{Dag, DagId, SchedulerOptions, TaskSet};
 
 use calls::{Called, Calls};
 
 use crate::edge::Edge;
 use crate::error::RunError;
-use crate::record::{JobRecord, PanicRecord};
+use crate::record::PanicRecord;
 use crate::report::Report;
 use crate::surroundings::Surroundings;
 
@@ -92,10 +92,10 @@ impl Session {
                 u64::MAX
             }
         };
-        let report = || self.report(&machine.edge, false);
         let has_arrived = until.is_some_and(|(dag, last)| {
-            let is_behind = |job: &JobRecord| job.dag == dag && job.job >= last;
-            (report().jobs.iter()).any(|job| is_behind(job) && job.finish_ns.is_some())
+            let record = self.report(&machine.edge, false).record();
+            let mut jobs = record.numbered(dag);
+            jobs.any(|(job, times)| job >= last && times.ended_ns.is_some())
         });
         let mut calls = Calls {
             task_set: &self.task_set,
@@ -116,8 +116,8 @@ impl Session {
         });
         if let Some(PanicRecord { instance, message }) = panic {
             return Err(RunError::Panicked {
-                dag: self.dag_label(instance.dag),
-                subtask: self.subtask_label(instance),
+                dag: self.task_set.label(instance.dag),
+                subtask: self.task_set.subtask_label(instance.dag, instance.subtask),
                 job: instance.job,
                 message,
                 report: Box::new(self.report(&machine.edge, false)),
@@ -128,8 +128,8 @@ impl Session {
                 Ok(self.report(&machine.edge, end == End::Finished))
             }
             End::TimeOverflow(instance) => Err(RunError::TimeOverflow {
-                dag: self.dag_label(instance.dag),
-                subtask: self.subtask_label(instance),
+                dag: self.task_set.label(instance.dag),
+                subtask: self.task_set.subtask_label(instance.dag, instance.subtask),
                 job: instance.job,
             }),
         }
@@ -142,25 +142,9 @@ impl Session {
         match dags.find(|(_, dag)| is_endless(dag)) {
             None => Ok(()),
             Some((dag, _)) => Err(RunError::Endless {
-                dag: self.dag_label(dag),
+                dag: self.task_set.label(dag),
             }),
         }
-    }
-
-    fn dag_label(&self, id: DagId) -> DagLabel {
-        let name = self.task_set.dag(id).name().to_owned();
-        DagLabel { id, name }
-    }
-
-    fn subtask_label(&self, instance: Instance) -> SubtaskLabel {
-        let id = instance.subtask;
-        let name = self
-            .task_set
-            .dag(instance.dag)
-            .subtask(id)
-            .name()
-            .to_owned();
-        SubtaskLabel { id, name }
     }
 
     /// Returns the recording of the run so far.
