@@ -8,6 +8,7 @@ use fass::{
     Answer, Dag, Fault, OverheadSource, Overheads, Policy, Preemption, Reason, SubtaskAttributes,
     Test, Untyped, Verdict, create_dag, finish_create_dags,
 };
+use support::sharing::every;
 use support::{execute, ms, named};
 use virtual_time::VirtualTime;
 
@@ -318,11 +319,8 @@ fn a_wcet_of_zero_proves_nothing() {
 }
 
 fn star(branches: [u64; 7], sink: u64) -> Dag {
-    let dag = create_dag();
-    dag.name("star")
-        .jobs(20)
-        .period(ms(13))
-        .relative_deadline(ms(13));
+    let dag = every(13, "star");
+    dag.jobs(20);
     let subtask = |name: &str, priority, time| {
         let time = ms(time);
         let attributes = named(name).wcet(time).priority(priority);

@@ -2,17 +2,19 @@
 
 mod support;
 
+use support::run;
+
 use fass::{ConstructionPolicy, Dag, Latest, Policy, Raiser, Sample};
 use fass::{create_dag, finish_create_dags, finish_create_dags_with};
-use support::sharing::{Seen, ms, named, taking, work};
+use support::sharing::{Seen, every, job_numbers, ms, named, taking, work};
 use virtual_time::{CoreId, VirtualTime};
 
 /// A DAG of one subtask that takes `work_ms` in each of `jobs` periods of 10 ms.
 fn busy(name: &str, cluster: u32, work_ms: u64, jobs: u64) -> Dag {
-    let dag = create_dag();
-    dag.name(name).cluster(cluster).jobs(jobs).period(ms(10));
-    dag.relative_deadline(ms(10));
-    dag.register_untyped_subtask(move |_job| work(work_ms), taking("work", work_ms));
+    let dag = every(10, name);
+    dag.cluster(cluster)
+        .jobs(jobs)
+        .register_untyped_subtask(move |_job| work(work_ms), taking("work", work_ms));
     dag
 }
 
@@ -57,13 +59,12 @@ fn a_fault_in_one_cluster_ends_nothing_in_the_other() {
         .clusters(&[1, 1])
         .contain_panics();
     let calm = busy("calm", 0, 6, 5);
-    let faulty = create_dag();
-    faulty.name("faulty").cluster(1).jobs(5).period(ms(10));
-    faulty.relative_deadline(ms(10));
-    faulty.register_untyped_subtask(|job| assert!(job < 2, "as meant"), named("panic"));
-    finish_create_dags(&[calm, faulty]).unwrap();
-    let report = machine.run();
-    assert_eq!(report.violations(), []);
+    let faulty = every(10, "faulty");
+    faulty
+        .cluster(1)
+        .jobs(5)
+        .register_untyped_subtask(|job| assert!(job < 2, "as meant"), named("panic"));
+    let report = run(&machine, &[calm, faulty]);
     assert_eq!(report.statistics[0].completed, 5);
     assert_eq!(report.statistics[1].completed, 2);
 }
@@ -73,12 +74,7 @@ fn counting(cluster: u32) -> (Dag, Latest<u64>) {
     let dag = create_dag();
     dag.name("count").cluster(cluster).jobs(4);
     dag.relative_deadline(ms(10));
-    let mut job = 0_u64;
-    let count = move || {
-        work(4);
-        job += 1;
-        (job - 1,)
-    };
+    let count = job_numbers(4);
     dag.register_periodic_subtask(count, vec!["count"], ms(10), taking("count", 4));
     let latest = dag.latest("count");
     (dag, latest)
@@ -118,21 +114,20 @@ fn a_signal_crosses_at_the_instant_of_its_completion() {
         answer.relative_deadline(ms(5));
         let signal =
             answer.register_sporadic_subtask(|| work(1), vec![], ms(8), taking("answer", 1));
-        let ask = create_dag();
-        ask.name("ask").cluster(raises).jobs(3).period(ms(10));
-        ask.relative_deadline(ms(10));
-        ask.using(signal.raising()).register_untyped_subtask(
-            |mut signal: Raiser<'_>, _job| {
-                work(3);
-                signal.raise();
-            },
-            taking("ask", 3),
-        );
+        let ask = every(10, "ask");
+        ask.cluster(raises)
+            .jobs(3)
+            .using(signal.raising())
+            .register_untyped_subtask(
+                |mut signal: Raiser<'_>, _job| {
+                    work(3);
+                    signal.raise();
+                },
+                taking("ask", 3),
+            );
         // It keeps the other core busy, and ends where the signal comes.
         let beside = busy("beside", answers, 3, 3);
-        finish_create_dags(&[ask, answer, beside]).unwrap();
-        let report = machine.run();
-        assert_eq!(report.violations(), []);
+        let report = run(&machine, &[ask, answer, beside]);
         let starts = report.subtask("answer", "answer");
         let starts = starts.iter().map(|record| record.start_ns.unwrap());
         let expected = [3_000_000, 13_000_000, 23_000_000];
@@ -143,17 +138,15 @@ fn a_signal_crosses_at_the_instant_of_its_completion() {
 #[test]
 fn the_commit_divides_the_cores_and_says_why() {
     let machine = VirtualTime::new().cores(4).assign_clusters();
-    let heavy = create_dag();
-    heavy.name("heavy").jobs(5).period(ms(10));
-    heavy.relative_deadline(ms(10));
+    let heavy = every(10, "heavy");
+    heavy.jobs(5);
     for name in ["left", "middle", "right"] {
         heavy.register_untyped_subtask(|_job| work(4), taking(name, 4));
     }
     let light = [("a", 7), ("b", 5), ("c", 4)].map(|(name, ms_of_work)| {
-        let dag = create_dag();
-        dag.name(name).jobs(5).period(ms(10));
-        dag.relative_deadline(ms(10));
-        dag.register_untyped_subtask(move |_job| work(ms_of_work), taking("work", ms_of_work));
+        let dag = every(10, name);
+        dag.jobs(5)
+            .register_untyped_subtask(move |_job| work(ms_of_work), taking("work", ms_of_work));
         dag
     });
     let dags = [&light[..1], &[heavy], &light[1..]].concat();

@@ -2,10 +2,9 @@
 
 mod support;
 
-use std::sync::{Arc, Mutex};
-
 use fass::{Dag, FaultLimit, Sample, Unique, create_dag};
-use support::{commit, execute, ms, named, pair};
+use support::sharing::Seen;
+use support::{execute, ms, named, pair, run};
 use virtual_time::{DagStatistics, JobOutcome, VirtualTime};
 
 /// At most one fault within three jobs.
@@ -27,16 +26,12 @@ fn counting(jobs: u64) -> Dag {
 }
 
 /// Registers a sink that keeps what it reads.
-fn keeping<T: Clone + Send + 'static>(dag: &Dag, topic: &str) -> Arc<Mutex<Vec<T>>> {
-    let kept = Arc::new(Mutex::new(Vec::new()));
-    let keep = Arc::clone(&kept);
-    let sink = move |(value,): (T,)| keep.lock().expect("nobody panics here").push(value);
+fn keeping<T: Clone + Send + 'static>(dag: &Dag, topic: &str) -> Seen<T> {
+    let kept = Seen::default();
+    let keep = kept.clone();
+    let sink = move |(value,): (T,)| keep.add(value);
     dag.register_sink_subtask(sink, vec![topic], ms(10), named("sink"));
     kept
-}
-
-fn taken<T: Clone>(kept: &Mutex<Vec<T>>) -> Vec<T> {
-    kept.lock().expect("nobody panics here").clone()
 }
 
 /// Returns the counts of faults, jobs lost by them, and complete jobs.
@@ -68,11 +63,10 @@ fn each_fault_costs_one_job_and_makes_the_function_anew() {
     let kept = keeping::<(u64, u32)>(&dag, "calls");
     let healthy = pair("healthy", ms(5), ms(5), [ms(1), ms(1)]);
     healthy.jobs(24);
-    commit(&[dag, healthy]);
-    let report = machine.run();
-    let jobs: Vec<u64> = taken(&kept).iter().map(|(job, _)| *job).collect();
+    let report = run(&machine, &[dag, healthy]);
+    let jobs: Vec<u64> = kept.all().iter().map(|(job, _)| *job).collect();
     assert_eq!(jobs, [0, 1, 2, 3, 5, 6, 7, 8, 10, 11]);
-    assert_eq!(taken(&kept)[4], (5, 1), "it is another function");
+    assert_eq!(kept.all()[4], (5, 1), "it is another function");
     assert_eq!(counts(&report.statistics[0]), [2, 2, 10]);
     assert_eq!(counts(&report.statistics[1]), [0, 0, 24]);
     assert_eq!(report.statistics[1].misses, 0);
@@ -98,7 +92,6 @@ fn each_fault_costs_one_job_and_makes_the_function_anew() {
         ]
     );
     assert_eq!(report.degraded, [false, false]);
-    assert_eq!(report.violations(), []);
 }
 
 #[test]
@@ -108,15 +101,13 @@ fn a_fault_too_many_ends_the_dag() {
     let make = || |(job,): (u64,)| assert!(![2, 5, 7].contains(&job), "job {job}");
     dag.restarting(make)
         .register_sink_subtask(vec!["job"], ms(10), named("sink"));
-    commit(&[dag]);
-    let report = machine.run();
+    let report = run(&machine, &[dag]);
     let counted = report.statistics[0];
     assert_eq!(counts(&counted), [3, 2, 5]);
     assert_eq!(
         (counted.released, counted.cut_short, counted.restarts),
         (8, 1, 2)
     );
-    assert_eq!(report.violations(), []);
 }
 
 #[test]
@@ -135,12 +126,10 @@ fn a_fault_while_the_next_function_is_made_ends_the_dag() {
     };
     dag.restarting(make)
         .register_sink_subtask(vec!["job"], ms(10), named("sink"));
-    commit(&[dag]);
-    let report = machine.run();
+    let report = run(&machine, &[dag]);
     // Jobs 2 and 4 are lost; the function for job 5 cannot be made.
     assert_eq!(counts(&report.statistics[0]), [3, 2, 3]);
     assert_eq!(report.statistics[0].restarts, 2);
-    assert_eq!(report.violations(), []);
 }
 
 #[test]
@@ -158,12 +147,10 @@ fn the_second_function_is_fallen_back_on_once() {
     dag.falling_back(precise, rough)
         .register_subtask(vec!["job"], vec!["result"], named("middle"));
     let kept = keeping::<u64>(&dag, "result");
-    commit(&[dag]);
-    let report = machine.run();
-    assert_eq!(taken(&kept), [0, 10, 20, 4, 5, 6, 7]);
+    let report = run(&machine, &[dag]);
+    assert_eq!(kept.all(), [0, 10, 20, 4, 5, 6, 7]);
     assert_eq!(report.degraded, [true]);
     assert_eq!(counts(&report.statistics[0]), [2, 1, 7]);
-    assert_eq!(report.violations(), []);
 }
 
 #[test]
@@ -185,25 +172,21 @@ fn states_that_it_used_are_reset_and_others_are_not() {
         vec!["sum"],
         named("add"),
     );
-    let kept = Arc::new(Mutex::new(Vec::new()));
-    let keep = Arc::clone(&kept);
+    let kept = Seen::default();
+    let keep = kept.clone();
     let sink = move |(sum, count): (&u64, &mut u64), (sent,): (u64,)| {
         *count += 1;
         assert_eq!(*sum, sent);
-        keep.lock()
-            .expect("nobody panics here")
-            .push((sent, *count));
+        keep.add((sent, *count));
     };
     dag.using((sum.read(), count.update()))
         .register_sink_subtask(sink, vec!["sum"], ms(10), named("sink"));
-    commit(&[dag]);
-    let report = machine.run();
+    let report = run(&machine, &[dag]);
     assert_eq!(
-        taken(&kept),
+        kept.all(),
         [(100, 1), (101, 2), (203, 3), (207, 4), (206, 5)]
     );
     assert_eq!(counts(&report.statistics[0]), [2, 2, 5]);
-    assert_eq!(report.violations(), []);
 }
 
 #[test]
@@ -216,23 +199,21 @@ fn what_waits_for_the_lost_function_is_for_the_next_one() {
     let mut next = 0_u64..;
     let source = move || (Unique::new(next.next().expect("it has no end")),);
     dag.register_periodic_subtask(source, vec!["job"], ms(10), named("source"));
-    let kept = Arc::new(Mutex::new(Vec::new()));
-    let keep = Arc::clone(&kept);
+    let kept = Seen::default();
+    let keep = kept.clone();
     let make = move || {
-        let keep = Arc::clone(&keep);
+        let keep = keep.clone();
         move |(job,): (Unique<u64>,)| {
             execute(ms(25));
             assert!(*job != 1, "slow and wrong");
-            keep.lock().expect("nobody panics with it").push(*job);
+            keep.add(*job);
         }
     };
     dag.restarting(make)
         .register_sink_subtask(vec!["job"], ms(10), named("sink"));
-    commit(&[dag]);
-    let report = machine.run();
-    assert_eq!(taken(&kept), [0, 2, 3, 4, 5]);
+    let report = run(&machine, &[dag]);
+    assert_eq!(kept.all(), [0, 2, 3, 4, 5]);
     assert_eq!(counts(&report.statistics[0]), [1, 1, 5]);
-    assert_eq!(report.violations(), []);
 }
 
 #[test]
@@ -258,20 +239,18 @@ fn a_source_restarts_and_its_latest_value_shows_again() {
         .jobs(4)
         .offset(ms(5))
         .relative_deadline(ms(10));
-    let kept = Arc::new(Mutex::new(Vec::new()));
-    let keep = Arc::clone(&kept);
+    let kept = Seen::default();
+    let keep = kept.clone();
     let read = move |pose: Option<Sample<'_, u32>>| {
         let seen = pose.map(|pose| (pose.job, *pose.value));
-        keep.lock().expect("nobody panics here").push(seen);
+        keep.add(seen);
     };
     reader
         .using(pose.sample())
         .register_periodic_subtask(read, vec![], ms(10), named("read"));
-    commit(&[dag, reader]);
-    let report = machine.run();
+    run(&machine, &[dag, reader]);
     assert_eq!(
-        taken(&kept),
+        kept.all(),
         [Some((0, 1)), Some((1, 2)), Some((1, 2)), Some((3, 1))]
     );
-    assert_eq!(report.violations(), []);
 }

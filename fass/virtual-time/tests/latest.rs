@@ -2,8 +2,10 @@
 
 mod support;
 
+use support::run;
+
 use fass::{Dag, Latest, Sample, Unique, create_dag, finish_create_dags};
-use support::sharing::{Seen, ms, named, taking, work};
+use support::sharing::{Seen, job_numbers, ms, named, taking};
 use virtual_time::VirtualTime;
 
 /// Offers job numbers as `count`, every `period`, each after 4 ms of work.
@@ -12,12 +14,7 @@ fn writer(period_ms: u64, jobs: u64) -> (Dag, Latest<u64>) {
     dag.name("writer")
         .jobs(jobs)
         .relative_deadline(ms(period_ms));
-    let mut job = 0_u64;
-    let source = move || {
-        work(4);
-        job += 1;
-        (job - 1,)
-    };
+    let source = job_numbers(4);
     dag.register_periodic_subtask(source, vec!["count"], ms(period_ms), taking("write", 4));
     let latest = dag.latest("count");
     (dag, latest)
@@ -80,8 +77,7 @@ fn several_readers_each_have_their_own_view() {
     let (other, seen_by_other) = reader(&latest, 25, 2);
     one.name("one");
     other.name("other");
-    finish_create_dags(&[write, one, other]).unwrap();
-    machine.run();
+    run(&machine, &[write, one, other]);
     assert_eq!(seen_by_one.all()[5], (25, Some((2, 24))));
     assert_eq!(seen_by_other.all()[1], (25, Some((2, 24))));
 }
@@ -154,8 +150,7 @@ fn a_panicking_instance_publishes_nothing() {
         );
         (read, seen)
     };
-    finish_create_dags(&[dag, read]).unwrap();
-    machine.run();
+    run(&machine, &[dag, read]);
     assert_eq!(seen.all()[..], [1, 2, 2, 2, 2]);
 }
 

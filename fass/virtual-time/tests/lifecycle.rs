@@ -5,8 +5,9 @@ mod support;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use fass::{Dag, Shutdown, Switch, create_dag, finish_create_dags, shutting_down};
-use support::lifecycle::{asking, events, run, ticking};
-use support::sharing::{ms, named, work};
+use support::lifecycle::{asking, events, ticking};
+use support::run;
+use support::sharing::{every, ms, named, work};
 use virtual_time::{DagId, VirtualTime, What};
 
 #[test]
@@ -47,11 +48,8 @@ fn l2_requests_are_served_in_the_order_in_which_the_uses_are_stated() {
     for resumes_last in [false, true] {
         let machine = VirtualTime::new().cores(2);
         let ticks = ticking("ticks", 3);
-        let asks = create_dag();
-        asks.name("asks")
-            .jobs(1)
-            .period(ms(20))
-            .relative_deadline(ms(20));
+        let asks = every(20, "asks");
+        asks.jobs(1);
         let function = move |(mut one, mut other): (Switch<'_>, Switch<'_>), _job| {
             if resumes_last {
                 one.pause();
@@ -116,11 +114,8 @@ fn l3_a_dag_pauses_another_and_resumes_it_on_the_old_grid() {
 #[test]
 fn l3_what_is_in_flight_goes_on_and_a_dag_may_pause_itself() {
     let machine = VirtualTime::new().cores(1);
-    let dag = create_dag();
-    dag.name("once")
-        .jobs(3)
-        .period(ms(10))
-        .relative_deadline(ms(10));
+    let dag = every(10, "once");
+    dag.jobs(3);
     let pause = |mut switch: Switch<'_>, _job| switch.pause();
     let first = dag
         .using(dag.switching())
@@ -180,8 +175,7 @@ fn l4_a_dag_that_starts_paused_releases_nothing_before_it_is_resumed() {
 
 /// A DAG that ends the run in job 1.
 fn ending() -> Dag {
-    let dag = create_dag();
-    dag.name("ends").period(ms(20)).relative_deadline(ms(20));
+    let dag = every(20, "ends");
     let end = |mut shutdown: Shutdown<'_>, job| {
         work(2);
         if job == 1 {
@@ -198,8 +192,7 @@ fn l5_a_shutdown_releases_nothing_more_and_waits_for_what_is_in_flight() {
     for clusters in [&[][..], &[1, 1, 1]] {
         let machine = VirtualTime::new().cores(3).clusters(clusters);
         let ticks = ticking("ticks", 0);
-        let slow = create_dag();
-        slow.name("slow").period(ms(15)).relative_deadline(ms(15));
+        let slow = every(15, "slow");
         slow.register_untyped_subtask(|_job| work(14), named("work"));
         let dags = [ticks, slow, ending()];
         if !clusters.is_empty() {
@@ -351,11 +344,7 @@ fn a_fault_releases_the_dag_that_brings_about_a_safe_state_and_that_ends_the_run
     let signal =
         safe.using(shutting_down())
             .register_sporadic_subtask(hold, vec![], ms(50), named("hold"));
-    let steering = create_dag();
-    steering
-        .name("steering")
-        .period(ms(10))
-        .relative_deadline(ms(10));
+    let steering = every(10, "steering");
     steering.on_fault(&signal);
     let steer = |job| assert_ne!(job, 3, "a fault");
     steering.register_untyped_subtask(steer, named("steer"));

@@ -3,8 +3,9 @@
 mod support;
 
 use fass::{Dag, Entrance, Mode, Modes, create_dag};
-use support::lifecycle::{events, run, ticking};
-use support::sharing::{ms, named, work};
+use support::lifecycle::{events, ticking};
+use support::run;
+use support::sharing::{every, ms, named, work};
 use virtual_time::VirtualTime;
 
 /// What a function does with a mode.
@@ -12,11 +13,8 @@ type Ask = fn(Entrance<'_>);
 
 /// A DAG that asks for a mode in its only job, after 12 ms.
 fn asking(mode: &Mode, ask: Ask) -> Dag {
-    let dag = create_dag();
-    dag.name("asks")
-        .jobs(1)
-        .period(ms(20))
-        .relative_deadline(ms(20));
+    let dag = every(20, "asks");
+    dag.jobs(1);
     let function = move |mode: Entrance<'_>, _job| {
         ask(mode);
         work(12);
@@ -28,12 +26,9 @@ fn asking(mode: &Mode, ask: Ask) -> Dag {
 
 /// A DAG of four jobs, one every 10 ms, each of which executes for 5 ms.
 fn busy(name: &str) -> Dag {
-    let dag = create_dag();
-    dag.name(name)
-        .jobs(4)
-        .period(ms(10))
-        .relative_deadline(ms(10));
-    dag.register_untyped_subtask(|_job| work(5), named("work"));
+    let dag = every(10, name);
+    dag.jobs(4)
+        .register_untyped_subtask(|_job| work(5), named("work"));
     dag
 }
 
@@ -87,13 +82,8 @@ fn what_a_fault_releases_enters_the_mode_of_the_safe_state() {
     let modes = Modes::new();
     modes.mode("flight", &[&cruise]);
     let landing = modes.mode("landing", &[&descend]);
-    let camera = create_dag();
-    camera
-        .name("camera")
-        .jobs(5)
-        .period(ms(10))
-        .relative_deadline(ms(10));
-    camera.register_untyped_subtask(
+    let camera = every(10, "camera");
+    camera.jobs(5).register_untyped_subtask(
         |job| {
             work(2);
             assert!(job < 1, "as was asked for");

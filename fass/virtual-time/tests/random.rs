@@ -4,6 +4,8 @@
 //!
 //! Each case has its seed; a failure prints it, and `case(SEED)` repeats it.
 
+#[path = "../../../sched-dag/tests/support/random.rs"]
+mod random;
 mod support;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -13,30 +15,13 @@ use fass::{
     Commit, Dag, OverrunPolicy, Policy, Preemption, SubtaskAttributes, create_dag,
     finish_create_dags,
 };
+use random::Random;
 use support::execute;
 use virtual_time::{Report, VirtualTime};
 
 const CASES: u64 = 400;
 
-/// A small generator of pseudo-random numbers (xorshift64*; S. Vigna, "An
-/// experimental exploration of Marsaglia's xorshift generators, scrambled",
-/// ACM TOMS 42(4), 2016).
-struct Random(u64);
-
 impl Random {
-    fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    /// Returns a number below `limit`.
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let number = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33;
-        usize::try_from(number).expect("31 bits") % limit
-    }
-
     fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.below(choices.len())]
     }

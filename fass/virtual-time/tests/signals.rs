@@ -2,6 +2,8 @@
 
 mod support;
 
+use support::run;
+
 use fass::{Dag, Raiser, create_dag, finish_create_dags};
 use support::sharing::{ms, named, work};
 use virtual_time::{DagId, VirtualTime};
@@ -23,9 +25,7 @@ fn a_signal_takes_effect_at_the_completion_that_raises_it() {
         ms(10),
         named("ask"),
     );
-    finish_create_dags(&[answers, asks]).unwrap();
-    let report = machine.run();
-    assert_eq!(report.violations(), []);
+    let report = run(&machine, &[answers, asks]);
     let releases = report.jobs.iter().filter(|job| job.dag == DagId(0));
     let releases: Vec<u64> = releases.map(|job| job.release_ns / 1_000_000).collect();
     // Raised at 3, 13, 23 and 33 ms; 13 waits for 18, and 23 for 33, which drops 33.
@@ -80,8 +80,7 @@ fn a_subtask_cannot_raise_a_signal_behind_the_models_back() {
     let asks = create_dag();
     asks.jobs(1).relative_deadline(ms(10));
     asks.register_periodic_subtask(move || event.raise(), vec![], ms(10), named("ask"));
-    finish_create_dags(&[answers, asks]).unwrap();
-    let report = machine.run();
+    let report = run(&machine, &[answers, asks]);
     assert!(
         report.panics[0]
             .message

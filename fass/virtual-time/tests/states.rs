@@ -2,8 +2,10 @@
 
 mod support;
 
+use support::run;
+
 use fass::{Dag, create_dag, finish_create_dags};
-use support::sharing::{Seen, ms, named, taking, work};
+use support::sharing::{Seen, job_numbers, ms, named, taking, work};
 use virtual_time::VirtualTime;
 
 /// source -> (left, middle, right) -> sink, where the three share a list.
@@ -11,11 +13,7 @@ fn sharing(jobs: u64) -> (Dag, Seen<(u64, Vec<&'static str>)>) {
     let dag = create_dag();
     dag.name("sharing").jobs(jobs);
     let order = dag.state("order", Vec::new());
-    let mut job = 0_u64;
-    let source = move || {
-        job += 1;
-        (job - 1,)
-    };
+    let source = job_numbers(0);
     dag.register_periodic_subtask(source, vec!["job"], ms(20), named("source"));
     for (name, time_ms) in [("left", 5), ("middle", 3), ("right", 1)] {
         dag.using(order.update()).register_subtask(
@@ -46,9 +44,7 @@ fn sharing(jobs: u64) -> (Dag, Seen<(u64, Vec<&'static str>)>) {
 fn updaters_take_turns_in_the_order_of_registration_and_keep_the_state_over_jobs() {
     let machine = VirtualTime::new().cores(4);
     let (dag, seen) = sharing(2);
-    finish_create_dags(&[dag]).unwrap();
-    let report = machine.run();
-    assert_eq!(report.violations(), []);
+    let report = run(&machine, &[dag]);
     let once = ["left", "middle", "right"];
     let twice = [once, once].concat();
     let seen = seen.all();

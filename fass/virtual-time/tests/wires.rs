@@ -1,38 +1,28 @@
 //! Bytes in and out: what arrives, what is sent, what is lost, and when.
 
+mod support;
+
 use std::fmt::Write;
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use fass::{
-    Dag, Framing, Packet, Received, Sender, SubtaskAttributes, Wire, WireOptions, create_dag,
-    finish_create_dags,
+    Dag, Framing, Packet, Received, Sender, Wire, WireOptions, create_dag, finish_create_dags,
 };
+use support::{ms, named, run};
 use virtual_time::{Silent, VirtualTime};
-
-const fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
-}
 
 fn number(packet: &[u8]) -> Option<u32> {
     str::from_utf8(packet).ok()?.parse().ok()
 }
 
 /// Each job's packets, as numbers and the time of each in ms.
-type Seen = Arc<Mutex<Vec<Vec<(u32, u64)>>>>;
+type Seen = support::sharing::Seen<Vec<(u32, u64)>>;
 
 fn look(seen: &Seen) -> impl FnMut(Received<'_, u32>) + Send + use<> {
-    let seen = Arc::clone(seen);
+    let seen = seen.clone();
     move |packets| {
         let look = |packet: Packet<u32>| (packet.value, packet.received_ns / 1_000_000);
-        seen.lock()
-            .expect("nobody panics with it")
-            .push(packets.map(look).collect());
+        seen.add(packets.map(look).collect());
     }
-}
-
-fn taken(seen: &Seen) -> Vec<Vec<(u32, u64)>> {
-    seen.lock().expect("nobody panics with it").clone()
 }
 
 /// A DAG of one subtask that receives every 10 ms, for `jobs` jobs.
@@ -43,7 +33,7 @@ fn periodic(wire: &Wire, jobs: u64, seen: &Seen) -> Dag {
         look(seen),
         vec![],
         ms(10),
-        SubtaskAttributes::named("receive").wcet(ms(1)),
+        named("receive").wcet(ms(1)),
     );
     dag
 }
@@ -58,7 +48,7 @@ fn a_periodic_source_takes_all_that_came_since_its_last_job() {
     machine.arrive_at(&wire, ms(20), b"5\n"); // at a release: that job has it
     machine.run();
     let jobs = [vec![], vec![(1, 1), (23, 4), (4, 4)], vec![(5, 20)], vec![]];
-    assert_eq!(taken(&seen), jobs);
+    assert_eq!(seen.all(), jobs);
     let counts = wire.counts();
     assert_eq!((counts.packets, counts.bytes, counts.malformed), (5, 9, 1));
 }
@@ -68,7 +58,7 @@ fn a_packet_raises_the_sporadic_dag_that_receives_it() {
     let (wire, seen) = (Wire::new("numbers"), Seen::default());
     let dag = create_dag();
     dag.relative_deadline(ms(5));
-    let attributes = SubtaskAttributes::named("receive").wcet(ms(1));
+    let attributes = named("receive").wcet(ms(1));
     let receiving = dag.using(wire.receiving(number));
     let _raised = receiving.register_sporadic_subtask(look(&seen), vec![], ms(10), attributes);
     let machine = VirtualTime::new().silent(Silent::Wcet);
@@ -87,7 +77,7 @@ fn a_packet_raises_the_sporadic_dag_that_receives_it() {
         .collect();
     assert_eq!(releases, [5, 15, 50]);
     assert_eq!(
-        taken(&seen),
+        seen.all(),
         [vec![(7, 5)], vec![(8, 6), (9, 9), (10, 9)], vec![(11, 50)]]
     );
     assert_eq!(report.violations(), []);
@@ -113,7 +103,7 @@ fn a_wire_without_room_loses_the_newest_packets_and_counts_them() {
         vec![(11, 1), (12, 1), (13, 1), (14, 1)],
         vec![(17, 11)],
     ];
-    assert_eq!(taken(&seen), jobs);
+    assert_eq!(seen.all(), jobs);
     let counts = wire.counts();
     assert_eq!(
         (counts.packets, counts.lost_packets, counts.lost_bytes),
@@ -134,7 +124,7 @@ fn what_is_not_taken_stays_for_the_next_job() {
             look(packets);
         }
     };
-    let attributes = SubtaskAttributes::named("receive");
+    let attributes = named("receive");
     (dag.using(wire.receiving(number))).register_periodic_subtask(
         one_by_one,
         vec![],
@@ -146,7 +136,7 @@ fn what_is_not_taken_stays_for_the_next_job() {
     machine.arrive_at(&wire, ms(1), b"1\n");
     machine.arrive_at(&wire, ms(11), b"2\n3\n4\n");
     machine.run();
-    assert_eq!(taken(&seen), [[(4, 11)]]);
+    assert_eq!(seen.all(), [[(4, 11)]]);
 }
 
 /// A DAG whose sink sends each job's number, and panics in job 1 before it is complete.
@@ -154,12 +144,7 @@ fn sending(wire: &Wire, jobs: u64, panics: bool) -> Dag {
     let (mut job, dag) = (0_u32.., create_dag());
     dag.jobs(jobs);
     let source = move || (job.next().expect("it has no end"),);
-    dag.register_periodic_subtask(
-        source,
-        vec!["job"],
-        ms(10),
-        SubtaskAttributes::named("count"),
-    );
+    dag.register_periodic_subtask(source, vec!["job"], ms(10), named("count"));
     dag.using(wire.sending()).register_sink_subtask(
         move |mut wire: Sender<'_>, (job,): (u32,)| {
             wire.send(format!("job {job}").as_bytes());
@@ -168,7 +153,7 @@ fn sending(wire: &Wire, jobs: u64, panics: bool) -> Dag {
         },
         vec!["job"],
         ms(10),
-        SubtaskAttributes::named("send").wcet(ms(3)),
+        named("send").wcet(ms(3)),
     );
     dag
 }
@@ -207,11 +192,10 @@ fn an_instance_that_sends_too_much_sends_nothing_and_that_is_counted() {
     let dag = create_dag();
     dag.jobs(3).relative_deadline(ms(10));
     let send = move |mut wire: Sender<'_>| wire.send(&vec![b'x'; lengths.next().unwrap()]);
-    let attributes = SubtaskAttributes::named("send");
+    let attributes = named("send");
     (dag.using(wire.sending())).register_periodic_subtask(send, vec![], ms(10), attributes);
     let machine = VirtualTime::new().connect(&wire);
-    finish_create_dags(&[dag]).unwrap();
-    machine.run();
+    run(&machine, &[dag]);
     assert_eq!(machine.sent(&wire).len(), 21);
     let counts = wire.counts();
     assert_eq!((counts.sent_bytes, counts.unsent_bytes), (21, 17));
@@ -225,7 +209,7 @@ fn a_decoder_that_panics_is_contained_like_a_function() {
     let (bad, good, seen) = (Wire::new("bad"), Wire::new("good"), Seen::default());
     let dag = create_dag();
     dag.jobs(3).relative_deadline(ms(10));
-    let attributes = SubtaskAttributes::named("receive");
+    let attributes = named("receive");
     let count = |packets: Received<'_, u32>| assert_eq!(packets.count(), 0);
     (dag.using(bad.receiving(hostile))).register_periodic_subtask(
         count,
@@ -247,7 +231,7 @@ fn a_decoder_that_panics_is_contained_like_a_function() {
         ),
         (1, 3)
     );
-    assert_eq!(taken(&seen), [vec![], vec![(1, 1)], vec![]]);
+    assert_eq!(seen.all(), [vec![], vec![(1, 1)], vec![]]);
 }
 
 #[test]
@@ -256,7 +240,7 @@ fn a_replay_takes_what_the_receiver_wrote_and_no_bytes() {
         let dag = create_dag();
         dag.name("sum").record::<u32>("sum");
         let sum = |packets: Received<'_, u32>| (packets.map(|packet| packet.value).sum::<u32>(),);
-        let attributes = SubtaskAttributes::named("receive");
+        let attributes = named("receive");
         let _raised = (dag.using(wire.receiving(number))).register_sporadic_subtask(
             sum,
             vec!["sum"],
@@ -267,7 +251,7 @@ fn a_replay_takes_what_the_receiver_wrote_and_no_bytes() {
             |mut wire: Sender<'_>, (sum,): (u32,)| writeln!(wire, "{sum}").unwrap(),
             vec!["sum"],
             ms(10),
-            SubtaskAttributes::named("send"),
+            named("send"),
         );
         dag
     };
@@ -312,7 +296,7 @@ fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
     let dag = create_dag();
     dag.name("far");
     let receive = |_: Received<'_, u32>, _: (u32,)| ();
-    let attributes = SubtaskAttributes::named("late");
+    let attributes = named("late");
     (dag.using(Wire::new("radio").receiving(number))).register_sink_subtask(
         receive,
         vec!["x"],

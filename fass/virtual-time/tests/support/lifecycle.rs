@@ -2,15 +2,14 @@
 
 #![allow(dead_code, reason = "one test program uses this")]
 
-use fass::{Dag, Switch, create_dag, finish_create_dags};
-use virtual_time::{Report, VirtualTime};
+use fass::{Dag, Switch};
+use virtual_time::Report;
 
-use super::sharing::{ms, named, work};
+use super::sharing::{every, named, work};
 
 /// A DAG of one subtask that executes for 1 ms, every 10 ms.
 pub(crate) fn ticking(name: &str, jobs: u64) -> Dag {
-    let dag = create_dag();
-    dag.name(name).period(ms(10)).relative_deadline(ms(10));
+    let dag = every(10, name);
     if jobs > 0 {
         dag.jobs(jobs);
     }
@@ -26,11 +25,8 @@ pub(crate) fn asking(
     jobs: u64,
     mut ask: impl FnMut(Switch<'_>, u64) + Send + 'static,
 ) -> Dag {
-    let dag = create_dag();
-    dag.name("asks")
-        .period(ms(20))
-        .relative_deadline(ms(20))
-        .jobs(jobs);
+    let dag = every(20, "asks");
+    dag.jobs(jobs);
     let function = move |switch: Switch<'_>, job| {
         ask(switch, job);
         work(takes);
@@ -38,13 +34,6 @@ pub(crate) fn asking(
     dag.using(of.switching())
         .register_untyped_subtask(function, named("ask"));
     dag
-}
-
-pub(crate) fn run(machine: &VirtualTime, dags: &[Dag]) -> Report {
-    finish_create_dags(dags).expect("the DAGs are sound");
-    let report = machine.run();
-    assert_eq!(report.violations(), []);
-    report
 }
 
 /// The events of these words, with the times in milliseconds.

@@ -8,6 +8,7 @@ pub(crate) mod sharing;
 use std::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use virtual_time::{Report, VirtualTime};
 
 pub(crate) const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
@@ -21,10 +22,20 @@ pub(crate) fn execute(duration: Duration) {
     execute_for(duration, Occupation::Spin);
 }
 
+#[track_caller]
 pub(crate) fn commit(dags: &[Dag]) {
     if let Err(error) = finish_create_dags(dags) {
         panic!("{error}");
     }
+}
+
+/// Commits DAGs and runs them, by the rules.
+#[track_caller]
+pub(crate) fn run(machine: &VirtualTime, dags: &[Dag]) -> Report {
+    commit(dags);
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    report
 }
 
 /// Source and sink of the given execution times; the sink insists on receiving

@@ -4,7 +4,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use fass::{Occupation, SubtaskAttributes, execute_for};
+use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 
 pub(crate) use super::{ms, named};
 
@@ -14,6 +14,22 @@ pub(crate) fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
 
 pub(crate) fn work(time_ms: u64) {
     execute_for(ms(time_ms), Occupation::Spin);
+}
+
+/// Makes a DAG that is due every so many milliseconds, each job before the next one.
+pub(crate) fn every(period_ms: u64, name: &str) -> Dag {
+    let (dag, period) = (create_dag(), ms(period_ms));
+    dag.name(name).period(period).relative_deadline(period);
+    dag
+}
+
+/// A source that works for so long, and writes the number of its job.
+pub(crate) fn job_numbers(takes_ms: u64) -> impl FnMut() -> (u64,) + Send + 'static {
+    let mut jobs = 0_u64..;
+    move || {
+        work(takes_ms);
+        (jobs.next().expect("it has no end"),)
+    }
 }
 
 /// What functions saw, kept for the test.
