@@ -3,6 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
+use fass::Wire;
 use sched_dag::DagId;
 use sched_dag::lifecycle::Request;
 
@@ -33,8 +34,15 @@ pub(crate) struct Surroundings {
     pub(crate) now_ns: Cell<u64>,
     /// What the running function has executed; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
-    /// The requests to come, by time and in the order in which they were made.
-    requests: RefCell<BTreeMap<(u64, usize), Request>>,
+    /// What is to come, by time and in the order in which it was made.
+    arrivals: RefCell<BTreeMap<(u64, usize), Arrival>>,
+}
+
+/// What comes from outside of the scheduler.
+#[derive(Debug)]
+pub(crate) enum Arrival {
+    Request(Request),
+    Bytes(Wire, Vec<u8>),
 }
 
 impl Surroundings {
@@ -47,46 +55,45 @@ impl Surroundings {
 
     /// Notes a signal that is recorded, or one of a run that is no replay.
     pub(crate) fn signal_of_replay_at(&self, time_ns: u64, dag: DagId) {
-        self.keep(time_ns, Request::Signal(dag));
+        self.keep(time_ns, Arrival::Request(Request::Signal(dag)));
     }
 
     /// Notes what a completion asks for.
     pub(crate) fn request_at(&self, time_ns: u64, request: Request) {
         match request {
             Request::Signal(dag) => self.signal_at(time_ns, dag),
-            _ => self.keep(time_ns, request),
+            _ => self.keep(time_ns, Arrival::Request(request)),
         }
     }
 
-    fn keep(&self, time_ns: u64, request: Request) {
-        let mut requests = self.requests.borrow_mut();
-        let mut of_this_time = requests.range((time_ns, 0)..=(time_ns, usize::MAX));
-        let place = of_this_time
-            .next_back()
-            .map_or(0, |(&(_, last), _)| last + 1);
-        requests.insert((time_ns, place), request);
+    /// Notes what comes at a time.
+    pub(crate) fn keep(&self, time_ns: u64, arrival: Arrival) {
+        let mut arrivals = self.arrivals.borrow_mut();
+        let mut of_this_time = arrivals.range((time_ns, 0)..=(time_ns, usize::MAX));
+        let last = of_this_time.next_back();
+        let place = last.map_or(0, |(&(_, last), _)| last + 1);
+        arrivals.insert((time_ns, place), arrival);
     }
 
     /// Returns the time of the next request, or of bytes that may raise a signal.
     pub(crate) fn next_request_ns(&self) -> Option<u64> {
-        let times = [self.requested_ns(), self.wires.next_ns()];
-        times.into_iter().flatten().min()
-    }
-
-    fn requested_ns(&self) -> Option<u64> {
-        let requests = self.requests.borrow();
-        requests.first_key_value().map(|(&(time_ns, _), _)| time_ns)
+        let arrivals = self.arrivals.borrow();
+        arrivals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
     }
 
     /// Takes the next request that is due by `now_ns`.
     pub(crate) fn take_request(&self, now_ns: u64) -> Option<Request> {
-        while let Some(raised) = self.wires.arrive(now_ns) {
-            raised
-                .into_iter()
-                .for_each(|dag| self.signal_at(now_ns, dag));
+        loop {
+            self.next_request_ns().filter(|&at_ns| at_ns <= now_ns)?;
+            let ((at_ns, _), arrival) = self.arrivals.borrow_mut().pop_first()?;
+            match arrival {
+                Arrival::Request(request) => return Some(request),
+                Arrival::Bytes(wire, bytes) => {
+                    if let Some((_, dag)) = wire.arrive(&bytes, at_ns) {
+                        self.signal_at(now_ns, dag);
+                    }
+                }
+            }
         }
-        self.requested_ns().filter(|&at_ns| at_ns <= now_ns)?;
-        let (_, request) = self.requests.borrow_mut().pop_first()?;
-        Some(request)
     }
 }

@@ -5,24 +5,18 @@
 //! an instance that sends more than its wire has room for loses bytes.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use fass::Wire;
-use sched_dag::DagId;
 
 use crate::VirtualTime;
+use crate::surroundings::Arrival;
 
 /// The wires of a machine.
 #[derive(Debug, Default)]
 pub(crate) struct Wires {
     connected: RefCell<Vec<Connected>>,
-    /// What is to arrive, by time and in the order of the calls.
-    arrivals: RefCell<BTreeMap<(u64, usize), Arrival>>,
 }
-
-/// Bytes, and the wire on which they arrive.
-type Arrival = (Wire, Vec<u8>);
 
 #[derive(Debug)]
 struct Connected {
@@ -31,19 +25,6 @@ struct Connected {
 }
 
 impl Wires {
-    /// Returns when the next bytes arrive.
-    pub(crate) fn next_ns(&self) -> Option<u64> {
-        let arrivals = self.arrivals.borrow();
-        arrivals.first_key_value().map(|(&(at_ns, _), _)| at_ns)
-    }
-
-    /// Lets the next bytes arrive that are due. The inner value is the DAG that they raise.
-    pub(crate) fn arrive(&self, now_ns: u64) -> Option<Option<DagId>> {
-        self.next_ns().filter(|&at_ns| at_ns <= now_ns)?;
-        let ((at_ns, _), (wire, bytes)) = self.arrivals.borrow_mut().pop_first()?;
-        Some(wire.arrive(&bytes, at_ns).map(|(_, dag)| dag))
-    }
-
     /// Takes what has been sent.
     pub(crate) fn collect(&self) {
         for Connected { wire, sent } in self.connected.borrow_mut().iter_mut() {
@@ -71,9 +52,8 @@ impl VirtualTime {
     pub fn arrive_at(&self, wire: &Wire, time: Duration, bytes: &[u8]) {
         let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
         let at_ns = ns.max(self.machine.surroundings.now_ns.get());
-        let mut arrivals = self.machine.surroundings.wires.arrivals.borrow_mut();
-        let place = arrivals.range((at_ns, 0)..=(at_ns, usize::MAX)).count();
-        arrivals.insert((at_ns, place), (wire.clone(), bytes.to_vec()));
+        let arrival = Arrival::Bytes(wire.clone(), bytes.to_vec());
+        self.machine.surroundings.keep(at_ns, arrival);
     }
 
     /// Returns all that complete instances have sent so far on a wire that is connected.

@@ -15,8 +15,7 @@ fn overloaded(policy: OverrunPolicy, in_flight: u32) -> Report {
     let machine = VirtualTime::new().cores(4);
     let dag = diamond(ms(10), ms(15), [ms(2), ms(5), ms(20), ms(12)]);
     dag.jobs(40).in_flight(in_flight).overrun(policy);
-    let report = run(&machine, &[dag]);
-    report
+    run(&machine, &[dag])
 }
 
 #[test]

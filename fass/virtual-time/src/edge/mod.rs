@@ -11,7 +11,7 @@ use std::cell::{Cell, RefCell};
 
 use fass::edge::{self, Outcome, Replay};
 use fass::{LatestJobs, Plan, Recorded};
-use recording::{Channel, Entry, Header, Malformed, Recordable, Role, Schema, Shown, What, Writer};
+use recording::{Channel, Entry, Header, Malformed, Recordable, Role, Shown, What, Writer};
 use sched_dag::journal::Event;
 use sched_dag::law::Record;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
@@ -33,20 +33,33 @@ pub(crate) struct Edge {
     replay: RefCell<Option<Replay>>,
 }
 
+/// An entry of the recording to be.
 #[derive(Debug)]
 struct Value {
-    of: Of,
+    what: What,
+    dag: u16,
+    /// The channel; or the subtask, of what it was answered that asked for the time.
+    place: u16,
     job: u64,
     at_ns: u64,
-    bytes: Option<Vec<u8>>,
+    bytes: Vec<u8>,
 }
 
-/// What a value is of.
-#[derive(Clone, Copy, Debug)]
-enum Of {
-    Channel(u16),
-    /// What an instance was answered that asked for the time.
-    Clock(Instance),
+impl Value {
+    fn new(header: &Header, value: &Recorded<'_>) -> Self {
+        Self {
+            what: value.bytes.map_or(What::Lost, |_| What::Value),
+            dag: header.channels[usize::from(value.channel)].dag,
+            place: value.channel,
+            job: value.job,
+            at_ns: value.completed_ns,
+            bytes: value.bytes.unwrap_or_default().to_vec(),
+        }
+    }
+}
+
+fn narrow(number: u32) -> u16 {
+    u16::try_from(number).unwrap_or(u16::MAX)
 }
 
 /// A value of a job, for people.
@@ -143,16 +156,15 @@ impl Edge {
         if let Some(bytes) = self.clock.end() {
             let mut values = self.values.borrow_mut();
             if let Some(latest) = self.latest.borrow().as_ref() {
-                values.retain(|value| match value.of {
-                    Of::Clock(of) => latest.has(of.dag.index(), of.job),
-                    Of::Channel(_) => true,
-                });
+                values.retain(|value| latest.has(value.dag.into(), value.job));
             }
             values.push(Value {
-                of: Of::Clock(instance),
+                what: What::Clock,
+                dag: narrow(instance.dag.0),
+                place: narrow(instance.subtask.0),
                 job: instance.job,
                 at_ns: start_ns,
-                bytes: Some(bytes),
+                bytes,
             });
         }
     }
@@ -166,12 +178,8 @@ impl Edge {
             latest.take(value);
             return;
         }
-        self.values.borrow_mut().push(Value {
-            of: Of::Channel(value.channel),
-            job: value.job,
-            at_ns: value.completed_ns,
-            bytes: value.bytes.map(<[u8]>::to_vec),
-        });
+        let value = Value::new(&self.header.borrow(), value);
+        self.values.borrow_mut().push(value);
     }
 
     /// Lends the recorded value of a channel of the plan.
@@ -217,35 +225,30 @@ impl Edge {
     pub(crate) fn crossed(&self, dag: DagId, job: u64) -> Vec<Crossed> {
         let header = self.header.borrow();
         let times = Vec::<u64>::schema();
-        let shown = |schema: &Schema, bytes: &Option<Vec<u8>>| {
-            let bytes = bytes.as_deref()?;
-            Some(Shown { schema, bytes }.to_string())
-        };
         let values = self.values.borrow();
-        let of_job = values.iter().filter(|value| value.job == job);
-        let crossed = of_job.map(|value| match value.of {
-            Of::Channel(number) => {
-                let channel = &header.channels[usize::from(number)];
-                let crossed = Crossed {
-                    role: Some(channel.role),
-                    subtask: SubtaskId(channel.subtask.into()),
-                    topic: channel.topic.clone(),
-                    json: shown(&channel.schema, &value.bytes),
-                };
-                (DagId(channel.dag.into()), crossed)
+        let mut crossed = Vec::new();
+        for value in values.iter() {
+            if (value.dag, value.job) != (narrow(dag.0), job) {
+                continue;
             }
-            Of::Clock(instance) => {
-                let crossed = Crossed {
-                    role: None,
-                    subtask: instance.subtask,
-                    topic: "the time".into(),
-                    json: shown(&times, &value.bytes),
-                };
-                (instance.dag, crossed)
-            }
-        });
-        let of_dag = crossed.filter(|(of, _)| *of == dag);
-        of_dag.map(|(_, crossed)| crossed).collect()
+            let channel =
+                (value.what != What::Clock).then(|| &header.channels[usize::from(value.place)]);
+            let (schema, bytes) = (
+                channel.map_or(&times, |channel| &channel.schema),
+                &value.bytes,
+            );
+            crossed.push(Crossed {
+                role: channel.map(|channel| channel.role),
+                subtask: SubtaskId(
+                    channel
+                        .map_or(value.place, |channel| channel.subtask)
+                        .into(),
+                ),
+                topic: channel.map_or("the time".into(), |channel| channel.topic.clone()),
+                json: (value.what != What::Lost).then(|| Shown { schema, bytes }.to_string()),
+            });
+        }
+        crossed
     }
 
     /// Returns the recording of the run so far.
@@ -262,40 +265,19 @@ impl Edge {
             of_job.and_then(|job| job.release_ns).unwrap_or(at_ns)
         };
         let latest = self.latest.borrow();
-        let kept = latest
-            .iter()
-            .flat_map(LatestJobs::values)
-            .map(|value| Value {
-                of: Of::Channel(value.channel),
-                job: value.job,
-                at_ns: value.completed_ns,
-                bytes: value.bytes.map(<[u8]>::to_vec),
-            });
-        let kept: Vec<Value> = kept.collect();
+        let kept = latest.iter().flat_map(LatestJobs::values);
+        let kept: Vec<Value> = kept.map(|value| Value::new(&header, &value)).collect();
         let is_kept = |dag: usize, job| latest.as_ref().is_none_or(|latest| latest.has(dag, job));
         let values = self.values.borrow();
-        let narrow = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
-        let values = values.iter().filter(|value| match value.of {
-            Of::Clock(Instance { dag, job, .. }) => is_kept(dag.index(), job),
-            Of::Channel(_) => true,
-        });
-        let values = values.chain(&kept).map(|value| {
-            let what = value.bytes.as_ref().map_or(What::Lost, |_| What::Value);
-            let (what, dag, place) = match value.of {
-                Of::Channel(channel) => (what, header.channels[usize::from(channel)].dag, channel),
-                Of::Clock(Instance { dag, subtask, .. }) => {
-                    (What::Clock, narrow(dag.0), narrow(subtask.0))
-                }
-            };
-            Entry {
-                what,
-                dag,
-                place,
-                job: value.job,
-                release_ns: release_ns(dag, value.job, value.at_ns),
-                at_ns: value.at_ns,
-                value: value.bytes.as_deref().unwrap_or_default(),
-            }
+        let values = (values.iter()).filter(|value| is_kept(value.dag.into(), value.job));
+        let values = values.chain(&kept).map(|value| Entry {
+            what: value.what,
+            dag: value.dag,
+            place: value.place,
+            job: value.job,
+            release_ns: release_ns(value.dag, value.job, value.at_ns),
+            at_ns: value.at_ns,
+            value: &value.bytes,
         });
         let others = events.iter().filter_map(|event| {
             let is_sporadic = task_set.dag(event.dag).is_sporadic();
@@ -308,10 +290,7 @@ impl Edge {
             Some(Entry {
                 what,
                 dag,
-                place: event
-                    .subtask
-                    .and_then(|subtask| u16::try_from(subtask.0).ok())
-                    .unwrap_or(0),
+                place: event.subtask.map_or(0, |subtask| narrow(subtask.0)),
                 job: event.job,
                 release_ns: release_ns(dag, event.job, event.time_ns),
                 at_ns: event.time_ns,
