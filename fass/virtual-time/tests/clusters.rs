@@ -195,15 +195,3 @@ fn of_two_ways_to_divide_the_cores_the_last_counts() {
     let place = commit.answers()[0].cluster.as_ref().unwrap();
     assert_eq!(place.why, None);
 }
-
-#[test]
-fn a_cluster_that_there_is_not_is_refused_with_the_last_one() {
-    let _machine = VirtualTime::new().cores(2).clusters(&[1, 1]);
-    let error = finish_create_dags(&[busy("calm", 2, 6, 1)]).unwrap_err();
-    assert_eq!(error.faults()[0].code(), "unknown_cluster");
-    let text = error.to_string();
-    assert!(
-        text.contains("cluster 2") && text.ends_with("cluster 1"),
-        "{text}"
-    );
-}

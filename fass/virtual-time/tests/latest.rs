@@ -153,17 +153,6 @@ fn a_panicking_instance_publishes_nothing() {
     run(&machine, &[dag, read]);
     assert_eq!(seen.all()[..], [1, 2, 2, 2, 2]);
 }
-
-#[test]
-fn the_writers_dag_must_be_in_the_commit() {
-    let _machine = VirtualTime::new();
-    let (write, latest) = writer(10, 3);
-    let (read, _) = reader(&latest, 10, 3);
-    let error = finish_create_dags(&[read]).unwrap_err();
-    assert_eq!(error.faults()[0].code(), "latest_not_committed");
-    drop(write);
-}
-
 #[test]
 fn the_same_set_can_be_built_again() {
     let run = || {

@@ -311,17 +311,6 @@ fn a_release_of_a_dag_that_is_off_is_a_breach() {
         assert!(texts.contains(&text.to_owned()), "{texts:?}");
     }
 }
-
-#[test]
-fn what_a_subtask_may_pause_is_in_the_commit() {
-    let machine = VirtualTime::new();
-    let elsewhere = ticking("elsewhere", 1);
-    let asks = asking(&elsewhere, 1, 1, |mut switch, _| switch.pause());
-    let error = finish_create_dags(&[asks]).unwrap_err();
-    drop(machine);
-    assert_eq!(error.faults()[0].code(), "switched_not_committed");
-}
-
 #[test]
 fn what_is_committed_is_not_paused_at_the_start_any_more() {
     let machine = VirtualTime::new();

@@ -114,20 +114,3 @@ fn what_a_fault_releases_enters_the_mode_of_the_safe_state() {
         ]
     );
 }
-
-#[test]
-fn an_instance_that_fails_enters_no_mode() {
-    let machine = VirtualTime::new().cores(2).contain_panics();
-    let (cruise, descend) = (ticking("cruise", 3), ticking("descend", 3));
-    let modes = Modes::new();
-    modes.mode("flight", &[&cruise]);
-    let ask = |mut mode: Entrance<'_>| {
-        mode.at_once();
-        panic!("after it has asked");
-    };
-    let asks = asking(&modes.mode("landing", &[&descend]), ask);
-    let report = run(&machine, &[cruise, descend, asks]);
-    assert_eq!(report.panics.len(), 1);
-    assert_eq!(report.statistics[0].completed, 3);
-    assert_eq!(report.statistics[1].completed, 0);
-}

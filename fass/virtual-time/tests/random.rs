@@ -160,11 +160,15 @@ fn run(seed: u64, late_ns: u64) -> (Commit, Report) {
     (commit, report)
 }
 
-/// Runs a case without late interrupts and returns how many of its DAGs were proven.
-fn case(seed: u64) -> usize {
+/// Runs a case without late interrupts and returns how many of its DAGs were proven, and how many
+/// jobs were queued, skipped and aborted.
+fn case(seed: u64) -> (usize, [u64; 3]) {
     let (commit, report) = run(seed, 0);
-    let mut proven = 0;
+    let (mut proven, mut overruns) = (0, [0; 3]);
     for (statistics, answer) in report.statistics.iter().zip(commit.answers()) {
+        overruns[0] += statistics.queued;
+        overruns[1] += statistics.skips;
+        overruns[2] += statistics.aborts;
         let Some(bound) = answer.verdict.bound() else {
             continue;
         };
@@ -176,21 +180,25 @@ fn case(seed: u64) -> usize {
             assert!(taken <= Some(bound), "{answer}, but {taken:?}");
         }
     }
-    proven
+    (proven, overruns)
 }
 
 #[test]
 fn random_dags_keep_the_rules_and_the_bounds() {
-    let mut proven = 0;
+    let (mut proven, mut overruns) = (0, [0; 3]);
     for seed in 0..CASES {
         match catch_unwind(AssertUnwindSafe(|| case(seed))) {
-            Ok(of_case) => proven += of_case,
+            Ok((of_case, of_policies)) => {
+                proven += of_case;
+                overruns = [0, 1, 2].map(|policy| overruns[policy] + of_policies[policy]);
+            }
             Err(panic) => {
                 eprintln!("the failing case is `case({seed})`");
                 resume_unwind(panic);
             }
         }
     }
+    assert!(overruns.iter().all(|jobs| *jobs > 100), "{overruns:?}");
     println!("{proven} DAGs of {CASES} commits were proven");
     assert!(proven > 50, "only {proven} bounds were put to the test");
 }

@@ -87,38 +87,3 @@ fn a_subtask_cannot_raise_a_signal_behind_the_models_back() {
             .contains("dag.using(signal.raising())")
     );
 }
-
-#[test]
-fn the_signals_dag_must_be_in_the_commit() {
-    let _machine = VirtualTime::new();
-    let other = create_dag();
-    let event = other.sporadic(ms(5));
-    let dag = create_dag();
-    dag.name("asks").jobs(1).relative_deadline(ms(5));
-    dag.using(event.raising()).register_periodic_subtask(
-        |_: Raiser<'_>| (),
-        vec![],
-        ms(5),
-        named("ask"),
-    );
-    let error = finish_create_dags(&[dag]).unwrap_err();
-    assert_eq!(error.faults()[0].code(), "signal_not_committed");
-}
-
-#[test]
-fn a_dag_is_released_by_the_clock_or_by_a_signal() {
-    let _machine = VirtualTime::new();
-    let dag = create_dag();
-    dag.name("both");
-    dag.register_periodic_subtask(|| (1,), vec!["a"], ms(5), named("clock"));
-    let _ = dag.register_sporadic_subtask(|| (1,), vec!["b"], ms(5), named("button"));
-    dag.register_sink_subtask(
-        |(_, _): (i32, i32)| (),
-        vec!["a", "b"],
-        ms(5),
-        named("sink"),
-    );
-    let error = finish_create_dags(&[dag]).unwrap_err();
-    let codes: Vec<&str> = error.faults().iter().map(fass::Fault::code).collect();
-    assert_eq!(codes, ["activations_differ", "several_sources"]);
-}
