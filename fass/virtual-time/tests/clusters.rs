@@ -89,8 +89,7 @@ fn a_latest_value_crosses_at_the_instant_of_its_completion() {
         let reader = create_dag();
         reader.name("read").cluster(reads).jobs(20);
         reader.relative_deadline(ms(2));
-        let seen = Seen::default();
-        let keep = seen.clone();
+        let (seen, keep) = Seen::shared();
         reader.using(latest.sample()).register_periodic_subtask(
             move |count: Option<Sample<'_, u64>>| keep.add(count.map(|count| *count.value)),
             vec![],

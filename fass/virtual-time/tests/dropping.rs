@@ -27,8 +27,7 @@ fn counting(jobs: u64) -> Dag {
 
 /// Registers a sink that keeps what it reads.
 fn keeping<T: Clone + Send + 'static>(dag: &Dag, topic: &str) -> Seen<T> {
-    let kept = Seen::default();
-    let keep = kept.clone();
+    let (kept, keep) = Seen::shared();
     let sink = move |(value,): (T,)| keep.add(value);
     dag.register_sink_subtask(sink, vec![topic], ms(10), named("sink"));
     kept
@@ -172,8 +171,7 @@ fn states_that_it_used_are_reset_and_others_are_not() {
         vec!["sum"],
         named("add"),
     );
-    let kept = Seen::default();
-    let keep = kept.clone();
+    let (kept, keep) = Seen::shared();
     let sink = move |(sum, count): (&u64, &mut u64), (sent,): (u64,)| {
         *count += 1;
         assert_eq!(*sum, sent);
@@ -199,8 +197,7 @@ fn what_waits_for_the_lost_function_is_for_the_next_one() {
     let mut next = 0_u64..;
     let source = move || (Unique::new(next.next().expect("it has no end")),);
     dag.register_periodic_subtask(source, vec!["job"], ms(10), named("source"));
-    let kept = Seen::default();
-    let keep = kept.clone();
+    let (kept, keep) = Seen::shared();
     let make = move || {
         let keep = keep.clone();
         move |(job,): (Unique<u64>,)| {
@@ -239,8 +236,7 @@ fn a_source_restarts_and_its_latest_value_shows_again() {
         .jobs(4)
         .offset(ms(5))
         .relative_deadline(ms(10));
-    let kept = Seen::default();
-    let keep = kept.clone();
+    let (kept, keep) = Seen::shared();
     let read = move |pose: Option<Sample<'_, u32>>| {
         let seen = pose.map(|pose| (pose.job, *pose.value));
         keep.add(seen);

@@ -29,8 +29,7 @@ fn reader(latest: &Latest<u64>, period_ms: u64, jobs: u64) -> (Dag, Seen<Sampled
     dag.name("reader")
         .jobs(jobs)
         .relative_deadline(ms(period_ms));
-    let seen = Seen::default();
-    let keep = seen.clone();
+    let (seen, keep) = Seen::shared();
     dag.using(latest.sample()).register_periodic_subtask(
         move |count: Option<Sample<'_, u64>>| {
             let found = count.map(|count| {
@@ -140,8 +139,7 @@ fn a_panicking_instance_publishes_nothing() {
     let (read, seen) = {
         let read = create_dag();
         read.jobs(5).relative_deadline(ms(10)).offset(ms(5));
-        let seen = Seen::default();
-        let keep = seen.clone();
+        let (seen, keep) = Seen::shared();
         read.using(latest.sample()).register_periodic_subtask(
             move |job: Option<Sample<'_, u64>>| keep.add(*job.unwrap().value),
             vec![],

@@ -25,8 +25,7 @@ fn commit(gain: &Parameter<f64>) -> Seen<(f64, f64)> {
         };
         dag.register_subtask(pass, vec!["gain"], vec![side], taking(side, 2));
     }
-    let seen = Seen::default();
-    let keep = seen.clone();
+    let (seen, keep) = Seen::shared();
     let sink = move |both: (f64, f64)| keep.add(both);
     dag.register_sink_subtask(sink, vec!["left", "right"], ms(10), named("sink"));
     finish_create_dags(&[dag]).expect("a sound DAG");

@@ -27,8 +27,7 @@ fn sharing(jobs: u64) -> (Dag, Seen<(u64, Vec<&'static str>)>) {
             named(name),
         );
     }
-    let seen = Seen::default();
-    let keep = seen.clone();
+    let (seen, keep) = Seen::shared();
     dag.using(order.read()).register_sink_subtask(
         move |order: &Vec<&'static str>, (job, _, _): (u64, u64, u64)| {
             keep.add((job, order.clone()));

@@ -4,18 +4,14 @@ use fass::{Dag, Sample, Signal, create_dag, finish_create_dags};
 use recording::{Recording, Role, What, Writer};
 use virtual_time::{Value, VirtualTime};
 
-use super::{ms, named, record};
+use super::{counting, ms, named, record};
 
 /// A DAG, one that samples it and fails at what it finds in a job, and one that this one releases
 /// and that fails, too. Their sources count from `from`.
 fn failing(from: u64) -> ([Dag; 3], Signal) {
     let teller = create_dag();
     teller.name("teller").jobs(1_000).relative_deadline(ms(1));
-    let mut told = from;
-    let tell = move || {
-        told += 1;
-        (told,)
-    };
+    let tell = counting(from);
     teller.register_periodic_subtask(tell, vec!["told"], ms(1), named("tell"));
     let latest = teller.record::<u64>("told").latest::<u64>("told");
 
@@ -23,11 +19,7 @@ fn failing(from: u64) -> ([Dag; 3], Signal) {
     last.name("last")
         .record::<u64>("pressed")
         .relative_deadline(ms(4));
-    let mut presses = from;
-    let press = move || {
-        presses += 1;
-        (presses,)
-    };
+    let press = counting(from);
     let signal = last.register_sporadic_subtask(press, vec!["pressed"], ms(2), named("press"));
     let odd = |(presses,): (u64,)| assert!(presses != 341, "odd");
     last.register_sink_subtask(odd, vec!["pressed"], ms(4), named("odd"));

@@ -1,26 +1,35 @@
 //! What was recorded in one run is computed again in others.
 
 mod latest;
+#[path = "../support/mod.rs"]
+mod support;
 mod until;
 mod wrong;
 
+use std::ops::AddAssign;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use fass::{
-    Dag, FaultLimit, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag, execute_for,
-    finish_create_dags,
+    Dag, FaultLimit, Occupation, OverrunPolicy, Policy, create_dag, execute_for, finish_create_dags,
 };
 use recording::{Recording, What};
+use support::{ms, named};
 use virtual_time::{Report, VirtualTime};
 
-const fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
-}
+const FAULT_LIMIT: FaultLimit = FaultLimit {
+    faults: 1,
+    window: 1,
+    in_all: 8,
+};
 
-fn named(name: &str) -> SubtaskAttributes {
-    SubtaskAttributes::named(name)
+/// A source that counts on.
+fn counting<T: Copy + AddAssign + From<u8>>(from: T) -> impl FnMut() -> (T,) {
+    let mut count = from;
+    move || {
+        count += T::from(1);
+        (count,)
+    }
 }
 
 /// A fork and a join, each branch with a memory, from a source that counts on from `from`.
@@ -270,17 +279,9 @@ fn a_fault_is_replayed() {
     let build = |from: u32| {
         let dag = create_dag();
         dag.name("frail").jobs(8);
-        dag.survive_faults(FaultLimit {
-            faults: 1,
-            window: 1,
-            in_all: 8,
-        });
+        dag.survive_faults(FAULT_LIMIT);
         dag.record::<u32>("input").record::<u32>("output");
-        let mut input = from;
-        let source = move || {
-            input += 1;
-            (input,)
-        };
+        let source = counting(from);
         dag.register_periodic_subtask(source, vec!["input"], ms(10), named("source"));
         dag.restarting(|| {
             let mut calls = 0;
@@ -307,17 +308,8 @@ fn what_ran_next_to_a_fault_runs_in_its_replay() {
     let build = || {
         let dag = create_dag();
         dag.name("forked").jobs(4);
-        let (faults, window, in_all) = (1, 1, 8);
-        dag.survive_faults(FaultLimit {
-            faults,
-            window,
-            in_all,
-        });
-        let mut input = 0_u32;
-        let source = move || {
-            input += 1;
-            (input,)
-        };
+        dag.survive_faults(FAULT_LIMIT);
+        let source = counting(0_u32);
         dag.register_periodic_subtask(source, vec!["in"], ms(10), named("source"));
         dag.restarting(|| {
             |(input,): (u32,)| {

@@ -43,6 +43,12 @@ impl<T> Default for Seen<T> {
 }
 
 impl<T: Clone> Seen<T> {
+    /// Makes an end for the test, and one for a function.
+    pub(crate) fn shared() -> (Self, Self) {
+        let seen = Self::default();
+        (seen.clone(), seen)
+    }
+
     pub(crate) fn add(&self, seen: T) {
         self.0
             .lock()
