@@ -57,6 +57,9 @@ pub struct Engine<B: Body, P> {
     after_fault: Vec<Option<DagId>>,
     /// Room to look at notices in.
     notices: Vec<Notice>,
+    /// Cancelled instances whose bodies run older ones, and so cannot discard yet. While there are
+    /// any, [`Request::Step`] keeps completions from taking the short way.
+    undiscarded: Vec<(Vertex, u64)>,
 }
 
 impl<B: Body, P> Engine<B, P> {
@@ -70,6 +73,10 @@ impl<B: Body, P> Engine<B, P> {
     ) -> Self {
         let task_set = Arc::clone(scheduler.task_set());
         let (vertices, cores) = (task_set.vertices(), scheduler.options().cores as usize);
+        let instances = task_set
+            .dags()
+            .iter()
+            .map(|dag| dag.slots() * dag.subtasks().len());
         let room = scheduler.hear(C::HEARS.iter().copied().chain([What::Cancelled]));
         scheduler.log.journal = journal;
         Self {
@@ -80,6 +87,7 @@ impl<B: Body, P> Engine<B, P> {
             alternates: (0..vertices).map(|_| None).collect(),
             after_fault,
             notices: Vec::with_capacity(room),
+            undiscarded: Vec::with_capacity(instances.sum()),
             scheduler,
             task_set,
         }
@@ -111,10 +119,7 @@ impl<B: Body, P> Engine<B, P> {
     }
 
     /// Tells the scheduler what has happened and what is asked for. The instant stays open.
-    ///
-    /// It is a part of its callers, so that an engine in a static is known by its address in all of
-    /// the scheduler's code, which is worth 2 % of a release.
-    #[inline(always)]
+    #[inline]
     pub fn tell(
         &mut self,
         (now_ns, here): (u64, CoreId),
@@ -124,22 +129,18 @@ impl<B: Body, P> Engine<B, P> {
         self.scheduler.log.here = here;
         let mut moment = self.scheduler.at(now_ns);
         happened(&mut moment);
-        if !self.requests.are_none() || port.has_letters() {
-            self.serve(now_ns, port);
+        let has_requests = !self.requests.are_none();
+        if has_requests {
+            self.requests.give_away(|request| port.forward(request));
+        }
+        match port.letters() {
+            Some(letters) => (self.requests).serve_letters(letters, self.cluster, &mut moment),
+            None => self.requests.serve(&mut moment),
+        }
+        if has_requests {
+            self.discard_late();
         }
         self.act(port);
-    }
-
-    /// Serves what is asked for. Apart, as in most steps nothing is.
-    #[cold]
-    #[inline(never)]
-    fn serve(&mut self, now_ns: u64, port: &mut impl Port<B>) {
-        self.requests.give_away(|request| port.forward(request));
-        let mut moment = self.scheduler.at(now_ns);
-        if let Some(letters) = port.take_letters() {
-            (self.requests).take_letters(letters, self.cluster, &mut moment);
-        }
-        self.requests.serve(&mut moment);
     }
 
     /// Ends the instant: what is due is released, and the cores are given what they should run.
@@ -314,8 +315,8 @@ impl<B: Body, P> Engine<B, P> {
         self.placement.suspend(vertex, parked)
     }
 
-    /// A body that goes and comes stays in a register.
-    #[inline]
+    /// Apart, as most bodies have no effects; a body that goes and comes stays in a register.
+    #[inline(never)]
     fn publish(requests: &mut Requests, mut body: B, finish_ns: u64) -> B {
         body.complete(finish_ns, &mut |request| requests.keep(request));
         body
@@ -336,10 +337,30 @@ impl<B: Body, P> Engine<B, P> {
             port.hear(notice);
             if notice.event.what == What::Cancelled
                 && let Some(instance) = notice.event.instance()
-                && let Some(body) = (self.placement).resting(self.task_set.vertex(instance))
             {
-                body.discard(instance.job);
+                let vertex = self.task_set.vertex(instance);
+                self.undiscarded.push((vertex, instance.job));
             }
+        }
+        self.discard_late();
+    }
+
+    /// Discards the inputs of cancelled instances as soon as their bodies rest: before the places of
+    /// these inputs are used again, as jobs end in their order.
+    #[cold]
+    #[inline(never)]
+    fn discard_late(&mut self) {
+        self.undiscarded.retain(|&(vertex, job)| {
+            if let Some(body) = self.placement.resting(vertex) {
+                body.discard(job);
+                return false;
+            }
+            !self
+                .scheduler
+                .is_ended(self.scheduler.instance_of(vertex).dag)
+        });
+        if !self.undiscarded.is_empty() {
+            self.requests.keep(Request::Step);
         }
     }
 

@@ -72,7 +72,8 @@ impl Lifecycle for Changes {
             | Request::Resume(_)
             | Request::Signal(_)
             | Request::Close(_)
-            | Request::Stop(_) => {}
+            | Request::Stop(_)
+            | Request::Step => {}
         }
     }
 

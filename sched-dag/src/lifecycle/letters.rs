@@ -119,7 +119,7 @@ impl Letters {
                 }
                 return false;
             }
-            Request::Begin | Request::GoOn => return false,
+            Request::Begin | Request::GoOn | Request::Step => return false,
         };
         if Some(to) == from {
             return false;
@@ -136,7 +136,7 @@ impl Letters {
                 let place = &self.clusters[to.index()].mode;
                 place.store(packed(mode, entry), Ordering::Release);
             }
-            Request::ShutDown | Request::Begin | Request::GoOn => {}
+            Request::ShutDown | Request::Begin | Request::GoOn | Request::Step => {}
         }
         sent(to);
         true

@@ -51,8 +51,11 @@ impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
 
     /// All requests of an instant are served after all its completions.
     fn forward(&mut self, request: Request) -> bool {
-        self.workload.request(request, self.now_ns);
-        true
+        let is_asked = request != Request::Step;
+        if is_asked {
+            self.workload.request(request, self.now_ns);
+        }
+        is_asked
     }
 
     fn hear(&mut self, notice: &Notice) {
