@@ -10,23 +10,24 @@
 use std::collections::{HashMap, VecDeque};
 
 use sched_dag::journal::{Event, What};
+use sched_dag::law::{Terms, dispatch_violations, violations};
 use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Journal, Scheduler};
 
-use crate::Outcome;
 use crate::random::Random;
-use crate::record::outcome;
+use crate::rules::{Facts, SAID, place};
 use crate::set::Set;
 use crate::support::scheduler;
 
-/// Runs a set and returns what happened, or why that contradicts itself.
-pub(crate) fn drive(set: &Set) -> Result<Outcome, String> {
+/// Runs a set and returns its journal, or in what that is not as the rules say.
+pub(crate) fn drive(set: &Set) -> Result<Vec<Event>, String> {
     let mut scheduler = scheduler(&set.specs(), set.options);
     scheduler.log.journal = Journal::growing();
-    scheduler.hear([What::Released, What::Skipped, What::Completed]);
+    scheduler.hear(SAID);
     let cores = scheduler.options().cores;
     let mut driver = Driver {
         set,
         scheduler,
+        facts: Facts::new(set),
         random: Random::new(set.choices),
         signals: set.signals(),
         cores: vec![None; cores as usize],
@@ -50,14 +51,21 @@ pub(crate) fn drive(set: &Set) -> Result<Outcome, String> {
         }
     }
     let events: Vec<Event> = driver.scheduler.log.journal.events().collect();
-    let mut notices = Vec::new();
-    driver.scheduler.log.exchange_notices(&mut notices);
-    outcome(set, &driver.scheduler, &events, &notices)
+    let task_set = driver.scheduler.task_set();
+    let mut found = violations(task_set, Terms::EXACT, events.iter().copied());
+    let of_dispatch =
+        dispatch_violations(task_set, &set.options, Terms::EXACT, events.iter().copied());
+    found.extend(of_dispatch);
+    match &found[..] {
+        [] => Ok(events),
+        [first, ..] => Err(format!("the law finds: {first}")),
+    }
 }
 
 struct Driver<'a> {
     set: &'a Set,
     scheduler: Scheduler,
+    facts: Facts<'a>,
     random: Random,
     /// The signals that are to come, with their DAGs, in order.
     signals: VecDeque<(u64, DagId)>,
@@ -89,6 +97,16 @@ impl Driver<'_> {
     }
 
     fn instant(&mut self, now_ns: u64) -> Result<(), String> {
+        self.facts.at(now_ns);
+        self.take(now_ns)?;
+        self.facts.end_instant();
+        let mut notices = Vec::new();
+        self.scheduler.log.exchange_notices(&mut notices);
+        let compared = self.facts.compare(&self.scheduler, &notices);
+        compared.map_err(|found| format!("at {now_ns} {found}"))
+    }
+
+    fn take(&mut self, now_ns: u64) -> Result<(), String> {
         self.now_ns = now_ns;
         if self.random.chance(20) {
             let core = self.random.below(self.cores.len());
@@ -105,8 +123,9 @@ impl Driver<'_> {
         let last = if is_quiet { ended.pop() } else { None };
         for (core, instance) in ended {
             self.idle.push(core);
-            let mut moment = self.scheduler.at(now_ns);
-            moment.complete(instance);
+            self.scheduler.log.here = core;
+            self.scheduler.at(now_ns).complete(instance);
+            self.facts.complete(place(instance));
         }
         if let Some((core, instance)) = last
             && self.complete_last(core, instance)?
@@ -115,11 +134,14 @@ impl Driver<'_> {
         }
         for (core, instance) in failed {
             self.idle.push(core);
+            self.scheduler.log.here = core;
             let mut moment = self.scheduler.at(now_ns);
             if self.set.is_replaceable(instance) {
                 moment.fail_replaceable(instance);
+                self.facts.fail_replaceable(place(instance));
             } else {
                 moment.fail(instance);
+                self.facts.fail(place(instance));
             }
         }
         self.command();
@@ -143,6 +165,8 @@ impl Driver<'_> {
     /// that there are. Reports whether that was the whole instant.
     fn complete_last(&mut self, core: CoreId, instance: Instance) -> Result<bool, String> {
         let now_ns = self.now_ns;
+        self.facts.complete(place(instance));
+        self.scheduler.log.here = core;
         let vertex = self.scheduler.vertex(instance);
         let way = self.random.between(0, 4);
         if way == 0 {
@@ -193,18 +217,22 @@ impl Driver<'_> {
         for (id, dag) in (0..).map(DagId).zip(&self.set.dags) {
             if dag.stop_ns == Some(now_ns) {
                 moment.stop(id);
+                self.facts.stop(id.index());
             }
             for &(from_ns, to_ns) in &dag.pauses_ns {
                 if from_ns == now_ns {
                     moment.pause(id);
+                    self.facts.pause(id.index());
                 }
                 if to_ns == now_ns {
                     moment.resume(id);
+                    self.facts.resume(id.index());
                 }
             }
         }
         while let Some((_, dag)) = self.signals.pop_front_if(|(at_ns, _)| *at_ns <= now_ns) {
             moment.signal(dag);
+            self.facts.signal(dag.index());
         }
     }
 

@@ -271,11 +271,20 @@ impl Dag {
         self.edges.iter().all(|&(from, _)| from != subtask)
     }
 
-    pub(crate) fn is_paused_at(&self, now_ns: u64) -> bool {
-        let pauses = self.pauses_ns.iter();
-        pauses
-            .into_iter()
-            .any(|&(from_ns, to_ns)| (from_ns..to_ns).contains(&now_ns))
+    pub(crate) fn jobs(&self) -> usize {
+        usize::try_from(self.jobs).expect("few jobs")
+    }
+
+    /// Returns the relative deadline of a sink.
+    pub(crate) fn relative_ns(&self, sink: usize) -> u64 {
+        self.subtasks[sink].deadline_ns.unwrap_or(self.deadline_ns)
+    }
+
+    /// Returns the relative deadline of the most urgent sink that a subtask reaches.
+    pub(crate) fn earliest_ns(&self, subtask: usize) -> u64 {
+        let successors = self.edges.iter().filter(|edge| edge.0 == subtask);
+        let of_successors = successors.map(|edge| self.earliest_ns(edge.1)).min();
+        of_successors.unwrap_or_else(|| self.relative_ns(subtask))
     }
 
     fn spec(&self) -> DagSpec {

@@ -1,17 +1,15 @@
 //! The exploration: each state's steps, each state once.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use sched_dag::{
-    CommitOptions, ConstructionPolicy, CoreId, DagId, Instance, Notice, Scheduler, SubtaskId,
-    verify,
-};
+use sched_dag::{CommitOptions, ConstructionPolicy, DagId, Scheduler, verify};
 
-use crate::rules::{Facts, Place, SAID};
-use crate::world::World;
+use crate::rules::{Facts, Place, SAID, instance};
+use crate::set::Set;
+use crate::world::{disturbances, horizon_ns};
 
 /// By so much a late driver comes later: a release and its deadline may both have passed.
 const LATE_NS: u64 = 3;
@@ -88,7 +86,7 @@ struct Node<'w> {
 type Ways = Vec<(u64, Step, Option<usize>)>;
 
 /// Explores a world; the error is the way to the first difference.
-pub(crate) fn explore(world: &World, counts: &mut Counts) -> Result<(), String> {
+pub(crate) fn explore(world: &Set, counts: &mut Counts) -> Result<(), String> {
     let options = CommitOptions::new(world.options.policy, world.options.cores)
         .with_construction(ConstructionPolicy::any_graph());
     let verified = verify(&world.specs(), &options).expect("the world is right");
@@ -118,8 +116,7 @@ pub(crate) fn explore(world: &World, counts: &mut Counts) -> Result<(), String> 
             if is_new {
                 ways.push((time_ns, what, node.step));
             }
-            let compared = taken.and_then(|()| compare(&next));
-            compared.map_err(|found| {
+            taken.map_err(|found| {
                 let way = way(&ways, node.step);
                 format!("{found}\nafter {way:?} and, at {time_ns}, {what:?}")
             })?;
@@ -145,7 +142,7 @@ fn way(ways: &Ways, mut step: Option<usize>) -> Vec<(u64, Step)> {
 }
 
 /// Returns every step of a driver: at this instant, at the next, or one later still.
-fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, Step)> {
+fn steps(world: &Set, node: &Node<'_>) -> Vec<(u64, Step)> {
     let started = node.facts.started();
     let mut whats = vec![Step::Nothing];
     for &one in &started {
@@ -153,9 +150,9 @@ fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, Step)> {
         let others = started.iter().filter(|&&other| other != one);
         whats.extend(others.map(|&other| Step::Both(one, other)));
     }
-    if node.disturbances < world.disturbances() {
+    if node.disturbances < disturbances(world) {
         whats.extend(started.iter().map(|&place| Step::Fail(place)));
-        let may_survive = |place: &&Place| world.dags[place.0].survives.is_some();
+        let may_survive = |place: &&Place| world.dags[place.0].fault_limit.is_some();
         whats.extend(
             started
                 .iter()
@@ -168,11 +165,11 @@ fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, Step)> {
                 true => Step::Resume(dag),
                 false => Step::Pause(dag),
             });
-            whats.extend(model.is_sporadic.then_some(Step::Signal(dag)));
+            whats.extend(model.signals_ns.is_some().then_some(Step::Signal(dag)));
         }
     }
     let now_ns = node.facts.now_ns;
-    let last_ns = now_ns.max(world.horizon_ns());
+    let last_ns = now_ns.max(horizon_ns(world));
     let times_ns = [0, 1, LATE_NS].map(|later_ns| now_ns + later_ns);
     let times_ns = times_ns.into_iter().filter(|&time_ns| time_ns <= last_ns);
     let steps = times_ns.flat_map(|time_ns| whats.iter().map(move |&what| (time_ns, what)));
@@ -189,14 +186,13 @@ fn steps(world: &World, node: &Node<'_>) -> Vec<(u64, Step)> {
     steps.filter(is_step).collect()
 }
 
-/// Tells both what happens, and compares what both say of jobs.
+/// Tells both what happens, and compares what comes of it.
 fn take(node: &mut Node<'_>, time_ns: u64, what: Step) -> Result<(), String> {
     let Node {
         scheduler, facts, ..
     } = node;
     let mut moment = scheduler.at(time_ns);
-    facts.now_ns = time_ns;
-    facts.said.iter_mut().for_each(Vec::clear);
+    facts.at(time_ns);
     match what {
         Step::Nothing => {}
         Step::Complete(place) => {
@@ -240,51 +236,9 @@ fn take(node: &mut Node<'_>, time_ns: u64, what: Step) -> Result<(), String> {
     }
     let _decisions = moment.release_due().dispatch();
     facts.end_instant();
-    let mut said = vec![Vec::new(); facts.said.len()];
     let mut notices = Vec::new();
     scheduler.log.exchange_notices(&mut notices);
-    for Notice { event, outcome, .. } in notices {
-        let job = usize::try_from(event.job).expect("few jobs");
-        said[event.dag.index()].push((event.what, job, outcome));
-    }
-    same("reports", &facts.said, &said)
-}
-
-/// Returns what the scheduler has that the rules have not.
-fn compare(node: &Node<'_>) -> Result<(), String> {
-    let Node {
-        scheduler, facts, ..
-    } = node;
-    let cores = (0..scheduler.options().cores).map(CoreId);
-    let running: BTreeSet<Instance> = cores.filter_map(|core| scheduler.running(core)).collect();
-    let expected: BTreeSet<Instance> = facts.running.iter().copied().map(instance).collect();
-    same("running", &expected, &running)?;
-    same(
-        "next event",
-        &facts.next_event_ns(),
-        &scheduler.next_event_ns(),
-    )?;
-    for (dag, of_dag) in facts.dags.iter().enumerate() {
-        same(
-            "counters",
-            &of_dag.statistics,
-            scheduler.statistics(id(dag)),
-        )?;
-        same("ended", &of_dag.is_ended, &scheduler.is_ended(id(dag)))?;
-        same("closed", &of_dag.is_closed, &scheduler.is_closed(id(dag)))?;
-        let waiting = facts.waiting(dag) as u64;
-        same("waiting", &waiting, &scheduler.waiting(id(dag)))?;
-    }
-    Ok(())
-}
-
-fn same<T: PartialEq + fmt::Debug>(what: &str, expected: &T, happened: &T) -> Result<(), String> {
-    match expected == happened {
-        true => Ok(()),
-        false => Err(format!(
-            "{what}: expected {expected:?}, happened {happened:?}"
-        )),
-    }
+    facts.compare(scheduler, &notices)
 }
 
 fn hash(node: &Node<'_>) -> u128 {
@@ -316,12 +270,4 @@ impl Hasher for Mixed {
 
 fn id(dag: usize) -> DagId {
     DagId(u32::try_from(dag).expect("few DAGs"))
-}
-
-fn instance((dag, job, subtask): Place) -> Instance {
-    Instance {
-        dag: id(dag),
-        job: job as u64,
-        subtask: SubtaskId(u32::try_from(subtask).expect("few subtasks")),
-    }
 }

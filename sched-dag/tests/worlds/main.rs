@@ -5,14 +5,21 @@
 //! that comes late); of the instances that have started one or two complete or fail, on
 //! their core or after they have lost it, and a fault may cost the DAG or a job; a DAG is stopped, closed, paused or resumed, or
 //! gets a signal. After each step the scheduler has to be as the rules say (`rules`), which are
-//! written here once more, without a queue, a counter or a timer. States are told apart by
+//! written there once more, without a queue, a counter or a timer. States are told apart by
 //! the hashes of both, so each is entered once.
 //!
 //! By default a selection of worlds is explored. All of them, in some minutes:
 //! `WORLDS=all cargo test --release -p sched-dag --test worlds -- --nocapture`.
 
 mod explore;
+#[path = "../support/random.rs"]
+mod random;
+#[allow(dead_code, reason = "its own test uses all of it")]
+#[path = "../properties/rules/mod.rs"]
 mod rules;
+#[allow(dead_code, reason = "its own test uses all of it")]
+#[path = "../properties/set.rs"]
+mod set;
 mod world;
 
 use explore::{Counts, explore};
@@ -23,13 +30,13 @@ fn every_order_of_events_is_scheduled_by_the_rules() {
     let mut worlds = world::all();
     let there_are = worlds.len();
     if !all {
-        worlds.retain(|world| world.subtasks() <= 3);
+        worlds.retain(|world| world::subtasks(world) <= 3);
         worlds = worlds.into_iter().step_by(29).collect();
     }
     let mut counts = Counts::default();
     for world in &worlds {
         if let Err(found) = explore(world, &mut counts) {
-            panic!("{world:?}\n{found}");
+            panic!("{world}\n{found}");
         }
     }
     println!("{counts} of {there_are}");

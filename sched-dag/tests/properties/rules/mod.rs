@@ -3,6 +3,7 @@
 //! Which jobs there are and how far, what has started, finished, failed or was cancelled;
 //! everything else is asked of these, each time anew.
 
+mod compare;
 mod faults;
 mod releases;
 
@@ -11,13 +12,22 @@ use std::collections::BTreeSet;
 use sched_dag::journal::What;
 use sched_dag::{DagStatistics, JobOutcome, Policy, Preemption};
 
-use crate::world::{Dag, JOBS, MOST_SUBTASKS, World};
+pub(crate) use compare::instance;
+#[allow(unused_imports, reason = "not each test is told of instances")]
+pub(crate) use compare::place;
+
+use crate::set::{Dag, Set};
+
+/// Of a DAG.
+const MOST_SUBTASKS: usize = 7;
 
 /// What is reported of a DAG's jobs, in order: the job, if it is about one, and its outcome.
-pub(crate) type Said = (What, usize, Option<JobOutcome>);
+type Said = (What, usize, Option<JobOutcome>);
 
 /// The kinds of reports that are compared.
-pub(crate) const SAID: [What; 11] = [
+pub(crate) const SAID: [What; 13] = [
+    What::Ready,
+    What::Cancelled,
     What::Released,
     What::Queued,
     What::Skipped,
@@ -61,61 +71,68 @@ pub(crate) struct Job {
     is_aborted: bool,
     is_cut: bool,
     has_failed: bool,
-    is_judged: bool,
     is_missed: bool,
+    /// Of each sink, whether it was held against its deadline.
+    is_judged: [bool; MOST_SUBTASKS],
     /// Those that the DAG does not have are absent.
     parts: [Part; MOST_SUBTASKS],
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct OfDag {
-    pub(crate) jobs: [Job; JOBS],
-    pub(crate) is_ended: bool,
-    pub(crate) is_closed: bool,
+    jobs: Vec<Job>,
+    is_ended: bool,
+    is_closed: bool,
     pub(crate) is_paused: bool,
     resumed_ns: u64,
     /// The jobs of the faults that were survived.
     survived: Vec<usize>,
-    pub(crate) statistics: DagStatistics,
+    statistics: DagStatistics,
+    sink_misses: [u64; MOST_SUBTASKS],
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct Facts<'w> {
-    world: &'w World,
+    set: &'w Set,
     pub(crate) now_ns: u64,
     pub(crate) dags: Vec<OfDag>,
     pub(crate) running: BTreeSet<Place>,
     /// Of each DAG, at this instant.
-    pub(crate) said: Vec<Vec<Said>>,
+    said: Vec<Vec<Said>>,
+    /// What has become ready or was cancelled at this instant, and whether it is ready.
+    turned: BTreeSet<(Place, bool)>,
 }
 
 impl<'w> Facts<'w> {
-    pub(crate) fn new(world: &'w World) -> Self {
+    pub(crate) fn new(set: &'w Set) -> Self {
         let job = |dag: &Dag, number: usize| Job {
             state: State::Ahead,
-            due_ns: (!dag.is_sporadic).then(|| dag.period_ns * number as u64),
+            due_ns: (dag.signals_ns.is_none())
+                .then(|| dag.offset_ns + dag.period_ns * number as u64),
             is_aborted: false,
             is_cut: false,
             has_failed: false,
-            is_judged: false,
             is_missed: false,
+            is_judged: [false; MOST_SUBTASKS],
             parts: [Part::Absent; MOST_SUBTASKS],
         };
         let of_dag = |dag: &Dag| OfDag {
-            jobs: std::array::from_fn(|number| job(dag, number)),
+            jobs: (0..dag.jobs()).map(|number| job(dag, number)).collect(),
             is_ended: false,
             is_closed: false,
             is_paused: false,
             resumed_ns: 0,
             survived: Vec::new(),
             statistics: DagStatistics::default(),
+            sink_misses: [0; MOST_SUBTASKS],
         };
         Self {
-            world,
+            set,
             now_ns: 0,
-            dags: world.dags.iter().map(of_dag).collect(),
+            dags: set.dags.iter().map(of_dag).collect(),
             running: BTreeSet::new(),
-            said: vec![Vec::new(); world.dags.len()],
+            said: vec![Vec::new(); set.dags.len()],
+            turned: BTreeSet::new(),
         }
     }
 
@@ -126,32 +143,26 @@ impl<'w> Facts<'w> {
         started
     }
 
-    /// Returns how many due jobs of a DAG wait.
-    pub(crate) fn waiting(&self, dag: usize) -> usize {
-        let jobs = self.dags[dag].jobs.iter();
-        jobs.filter(|job| job.state == State::Waiting).count()
-    }
-
     /// Returns when the driver has to come next, if nothing completes before.
     pub(crate) fn next_event_ns(&self) -> Option<u64> {
         let of_dag = |dag: usize| {
-            let deadline_ns = self.world.dags[dag].deadline_ns;
-            let ahead = self.next_due(dag).and_then(|(_, due_ns)| due_ns);
-            let jobs = self.dags[dag].jobs.iter();
-            let late_ns = jobs.filter(|job| job.is_unjudged()).filter_map(|job| {
-                let due_ns = job.due_ns?;
-                Some(due_ns + deadline_ns + 1)
-            });
-            late_ns.chain(ahead).min()
+            let due_ns = self.next_due(dag).and_then(|(_, due_ns)| due_ns);
+            let late_ns = self.unjudged(dag).map(|(deadline_ns, ..)| deadline_ns + 1);
+            due_ns.into_iter().chain(late_ns).min()
         };
         (0..self.dags.len()).filter_map(of_dag).min()
+    }
+
+    /// Begins an instant, unless it is begun.
+    pub(crate) fn at(&mut self, now_ns: u64) {
+        self.now_ns = now_ns;
     }
 
     pub(crate) fn complete(&mut self, place: Place) {
         let (dag, _, subtask) = place;
         *self.part_mut(place) = Part::Finished;
         self.running.remove(&place);
-        if self.world.dags[dag].is_sink(subtask) {
+        if self.set.dags[dag].is_sink(subtask) {
             self.judge(dag, Some(place));
         }
         self.settle(dag);
@@ -165,26 +176,43 @@ impl<'w> Facts<'w> {
         self.dispatch();
     }
 
-    /// R4: notices what is late, job by job. What ends at this very instant, after a deadline
-    /// that nobody has noticed, is late as well.
+    /// The first deadline that sinks of jobs were not held against: when it is, how long after the
+    /// nominal release, and of which job.
+    fn unjudged(&self, dag: usize) -> Option<(u64, u64, usize)> {
+        let model = &self.set.dags[dag];
+        let jobs = self.dags[dag].jobs.iter().enumerate();
+        let is_known = |job: &Job| {
+            matches!(job.state, State::Waiting | State::InFlight) && !job.starts_nothing()
+        };
+        let of_job = |(number, job): (usize, &Job)| {
+            let sinks = (0..model.subtasks.len()).filter(|&subtask| model.is_sink(subtask));
+            let unjudged = sinks.filter(|&sink| is_known(job) && !job.is_judged[sink]);
+            let relative_ns = unjudged.map(|sink| model.relative_ns(sink)).min()?;
+            Some((job.due_ns? + relative_ns, relative_ns, number))
+        };
+        jobs.filter_map(of_job).min()
+    }
+
+    /// R4: notices what is late, in the order of the deadlines. What ends at this very instant,
+    /// after a deadline that nobody has noticed, is late as well.
     fn judge(&mut self, dag: usize, ending: Option<Place>) {
-        let model = &self.world.dags[dag];
-        let now_ns = self.now_ns;
-        let OfDag {
-            jobs, statistics, ..
-        } = &mut self.dags[dag];
-        for (number, job) in jobs.iter_mut().enumerate() {
-            let due_ns = job.due_ns.unwrap_or(u64::MAX - model.deadline_ns);
-            if !job.is_unjudged() || due_ns + model.deadline_ns >= now_ns {
-                continue;
+        let model = &self.set.dags[dag];
+        while let Some((deadline_ns, relative_ns, number)) = self.unjudged(dag)
+            && deadline_ns < self.now_ns
+        {
+            let of_dag = &mut self.dags[dag];
+            let (job, statistics) = (&mut of_dag.jobs[number], &mut of_dag.statistics);
+            let is_of =
+                |&sink: &usize| model.is_sink(sink) && model.relative_ns(sink) == relative_ns;
+            let mut late = 0;
+            for sink in (0..model.subtasks.len()).filter(is_of) {
+                job.is_judged[sink] = true;
+                let has_just_ended = ending == Some((dag, number, sink));
+                let is_late = job.parts[sink] != Part::Finished || has_just_ended;
+                of_dag.sink_misses[sink] += u64::from(is_late);
+                late += u64::from(is_late);
             }
-            job.is_judged = true;
-            let is_late = |subtask: usize| {
-                let has_just_ended = ending == Some((dag, number, subtask));
-                model.is_sink(subtask) && (job.parts[subtask] != Part::Finished || has_just_ended)
-            };
-            if (0..model.subtasks()).any(is_late) {
-                job.is_missed = true;
+            if late > 0 && !std::mem::replace(&mut job.is_missed, true) {
                 self.said[dag].push((What::Missed, number, None));
                 statistics.misses += 1;
                 statistics.consecutive_misses += 1;
@@ -200,8 +228,8 @@ impl<'w> Facts<'w> {
         let mut changes = true;
         while changes {
             changes = false;
-            for job in 0..JOBS {
-                for subtask in 0..self.world.dags[dag].subtasks() {
+            for job in 0..self.dags[dag].jobs.len() {
+                for subtask in 0..self.set.dags[dag].subtasks.len() {
                     let place = (dag, job, subtask);
                     let is_cut = self.dags[dag].jobs[job].starts_nothing();
                     let next = match self.part(place) {
@@ -211,12 +239,13 @@ impl<'w> Facts<'w> {
                         _ => continue,
                     };
                     *self.part_mut(place) = next;
+                    self.turned.insert((place, next == Part::Ready));
                     changes = true;
                 }
             }
         }
-        for job in 0..JOBS {
-            let parts = &self.dags[dag].jobs[job].parts[..self.world.dags[dag].subtasks()];
+        for job in 0..self.dags[dag].jobs.len() {
+            let parts = &self.dags[dag].jobs[job].parts[..self.set.dags[dag].subtasks.len()];
             let is_complete = parts.iter().all(|part| part.has_ended());
             if is_complete && self.dags[dag].jobs[job].state == State::InFlight {
                 self.end_job(dag, job);
@@ -253,7 +282,7 @@ impl<'w> Facts<'w> {
     fn is_free(&self, (dag, job, subtask): Place) -> bool {
         let jobs = &self.dags[dag].jobs;
         let ended = |job: usize, subtask: usize| jobs[job].parts[subtask].has_ended();
-        let mut edges = self.world.dags[dag].edges.iter();
+        let mut edges = self.set.dags[dag].edges.iter();
         let was_released = |job: &usize| jobs[*job].parts.iter().any(|part| *part != Part::Absent);
         jobs[job].state == State::InFlight
             && edges.all(|&(from, to)| to != subtask || ended(job, from))
@@ -265,10 +294,10 @@ impl<'w> Facts<'w> {
 
     /// R5.
     fn dispatch(&mut self) {
-        let options = self.world.options;
+        let options = self.set.options;
         let keeps_core = |&(dag, _, subtask): &Place| {
             options.preemption == Preemption::Disabled
-                || self.world.dags[dag].is_first_non_preemptive && subtask == 0
+                || self.set.dags[dag].subtasks[subtask].non_preemptive
         };
         let mut selected: BTreeSet<Place> =
             self.running.iter().copied().filter(keeps_core).collect();
@@ -277,12 +306,12 @@ impl<'w> Facts<'w> {
             matches!(self.part(place), Part::Ready | Part::Started) && !selected.contains(&place)
         });
         others.sort_by_key(|&(dag, job, subtask)| {
-            let model = &self.world.dags[dag];
+            let model = &self.set.dags[dag];
             let urgency = match options.policy {
-                Policy::StaticPriority => Some(u64::from(model.priorities[subtask])),
+                Policy::StaticPriority => Some(u64::from(model.subtasks[subtask].priority)),
                 Policy::Edf => {
                     let due_ns = self.dags[dag].jobs[job].due_ns;
-                    due_ns.map(|due_ns| due_ns + model.deadline_ns)
+                    due_ns.map(|due_ns| due_ns + model.earliest_ns(subtask))
                 }
             };
             (urgency, dag, job, subtask)
@@ -296,10 +325,11 @@ impl<'w> Facts<'w> {
     }
 
     fn places(&self) -> Vec<Place> {
-        let dags = self.world.dags.iter().enumerate();
+        let dags = self.set.dags.iter().enumerate();
         let places = dags.flat_map(|(dag, model)| {
-            (0..JOBS)
-                .flat_map(move |job| (0..model.subtasks()).map(move |subtask| (dag, job, subtask)))
+            let subtasks = model.subtasks.len();
+            (0..model.jobs())
+                .flat_map(move |job| (0..subtasks).map(move |subtask| (dag, job, subtask)))
         });
         places.collect()
     }
@@ -321,11 +351,6 @@ impl<'w> Facts<'w> {
 impl Job {
     fn starts_nothing(&self) -> bool {
         self.is_aborted || self.is_cut || self.has_failed
-    }
-
-    fn is_unjudged(&self) -> bool {
-        let is_known = matches!(self.state, State::Waiting | State::InFlight);
-        is_known && !self.starts_nothing() && !self.is_judged
     }
 }
 

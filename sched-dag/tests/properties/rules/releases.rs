@@ -50,7 +50,7 @@ impl Facts<'_> {
             self.serve(dag);
         }
         let is_kept = self.first(dag, State::Waiting).is_some();
-        let model = &self.world.dags[dag];
+        let model = &self.set.dags[dag];
         let now_ns = self.now_ns;
         let next = self.next_due(dag);
         self.dags[dag].statistics.signals += 1;
@@ -61,7 +61,7 @@ impl Facts<'_> {
                     .map(|job| self.dags[dag].jobs[job].due_ns);
                 let earliest_ns = before_ns
                     .flatten()
-                    .map_or(0, |due_ns| due_ns + model.period_ns);
+                    .map_or(model.offset_ns, |due_ns| due_ns + model.period_ns);
                 self.dags[dag].jobs[job].due_ns = Some(now_ns.max(earliest_ns));
             }
             _ => self.dags[dag].statistics.dropped_signals += 1,
@@ -86,7 +86,7 @@ impl Facts<'_> {
         }
         self.release_waiting(dag);
         if self.dags[dag].jobs[job].state == State::Due {
-            match self.world.dags[dag].overrun {
+            match self.set.dags[dag].overrun {
                 OverrunPolicy::Queue => {}
                 OverrunPolicy::Skip => self.skip_oldest(dag),
                 OverrunPolicy::Abort => self.make_room(dag),
@@ -116,7 +116,7 @@ impl Facts<'_> {
 
     fn release_waiting(&mut self, dag: usize) {
         while let Some(job) = self.oldest_waiting(dag) {
-            let room = self.world.dags[dag].in_flight;
+            let room = usize::try_from(self.set.dags[dag].in_flight).expect("few jobs");
             let mut jobs = self.dags[dag].jobs.iter().enumerate();
             if jobs.any(|(other, of)| of.state == State::InFlight && other + room <= job) {
                 break;

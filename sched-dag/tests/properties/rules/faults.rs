@@ -43,7 +43,7 @@ impl Facts<'_> {
 
     fn survives(&self, dag: usize, job: usize) -> bool {
         let before = &self.dags[dag].survived;
-        self.world.dags[dag].survives.is_some_and(|limit| {
+        self.set.dags[dag].fault_limit.is_some_and(|limit| {
             let nth = before.iter().rev().nth(limit.faults as usize - 1);
             let window = usize::try_from(limit.window).expect("a small window");
             !self.dags[dag].is_ended
@@ -61,10 +61,11 @@ impl Facts<'_> {
             jobs,
             is_ended,
             is_closed,
+            is_paused,
             statistics,
             ..
         } = &mut self.dags[dag];
-        (*is_ended, *is_closed) = (true, true);
+        (*is_ended, *is_closed, *is_paused) = (true, true, false);
         self.said[dag].push((What::Stopped, 0, None));
         for job in jobs {
             match job.state {
