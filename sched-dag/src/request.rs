@@ -25,13 +25,18 @@ pub enum Request {
     /// What waits may come about. A driver asks for that in each step until it has, before all
     /// else.
     GoOn,
+    /// Nothing but a step. An engine asks for that, lest a completion take the short way.
+    Step,
 }
 
 impl Request {
     /// Reports whether what it comes to is for a [`Lifecycle`](crate::lifecycle::Lifecycle) to say, where there is one.
     #[must_use]
     pub const fn is_of_lifecycle(self) -> bool {
-        !matches!(self, Self::Signal(_) | Self::Close(_) | Self::Stop(_))
+        !matches!(
+            self,
+            Self::Signal(_) | Self::Close(_) | Self::Stop(_) | Self::Step
+        )
     }
 }
 

@@ -38,52 +38,7 @@ use crate::scheduler::Moment;
 pub use changes::Changes;
 pub use letters::{Letters, Parts, divide};
 
-/// A change that is asked of a run: by a function, with effect from its completion on, by another
-/// cluster, or from outside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// A sporadic DAG gets a signal.
-    Signal(DagId),
-    /// A DAG releases no jobs until it is resumed.
-    Pause(DagId),
-    /// A paused DAG releases jobs again.
-    Resume(DagId),
-    /// A DAG releases no further job, and what is in flight goes on. Asked from outside only.
-    Close(DagId),
-    /// A DAG is ended: nothing of it starts any more. Asked from outside only.
-    Stop(DagId),
-    /// Another set of DAGs runs.
-    Enter(ModeId, Entry),
-    /// The run ends: no DAG releases a further job.
-    ShutDown,
-    /// The run begins. No function asks for that, but a driver, before all else.
-    Begin,
-    /// What waits may come about. A driver asks for that in each step until it has, before all
-    /// else.
-    GoOn,
-    /// Nothing but a step. An engine asks for that, lest a completion take the short way.
-    Step,
-}
-
-impl Request {
-    /// Reports whether what it comes to is for a [`Lifecycle`] to say, where there is one.
-    #[must_use]
-    pub const fn is_of_lifecycle(self) -> bool {
-        !matches!(
-            self,
-            Self::Signal(_) | Self::Close(_) | Self::Stop(_) | Self::Step
-        )
-    }
-}
-
-/// When a mode is entered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Entry {
-    /// At the instant of the request (M2).
-    AtOnce,
-    /// When nothing is in flight of the DAGs that leave (M3).
-    WhenIdle,
-}
+pub use crate::request::{Entry, Request};
 
 /// What a request comes to, in a scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,29 +122,20 @@ impl Requests {
         self.kept.retain(|&request| !take(request));
     }
 
-    /// Passes on what has come from other clusters, and what is kept.
-    #[inline]
-    pub fn serve_letters(
-        &mut self,
-        letters: &Letters,
-        cluster: ClusterId,
-        moment: &mut Moment<'_>,
-    ) {
+    /// Takes what has come from other clusters and from outside. What concerns one DAG only, and
+    /// no [`Lifecycle`], is passed on at once.
+    #[inline(always)]
+    pub fn take_letters(&mut self, letters: &Letters, cluster: ClusterId, moment: &mut Moment<'_>) {
         letters.take(cluster, |request| {
-            let is_served = self.lifecycle.is_some();
-            if !(is_served && request.is_of_lifecycle()) {
-                moment.serve(request);
-            } else {
+            if self.lifecycle.is_some() && request.is_of_lifecycle() {
                 self.keep(request);
+            } else {
+                moment.serve(request);
             }
         });
-        self.serve(moment);
     }
 
     /// Passes the requests on, after the completions of the instant.
-    ///
-    /// No pointer to the scheduler leaves this function, so where that is a static, the compiler
-    /// knows its address in all of the scheduler's code, which is 4 % of a release.
     #[inline(always)]
     pub fn serve(&mut self, moment: &mut Moment<'_>) {
         let mut waits = false;
@@ -202,9 +148,9 @@ impl Requests {
             }
             for change in self.changes.drain(..) {
                 match change {
-                    Change::Pause(dag) => moment.pause(dag),
-                    Change::Resume(dag) => moment.resume(dag),
-                    Change::Close(dag) => moment.close(dag),
+                    Change::Pause(dag) => moment.serve(Request::Pause(dag)),
+                    Change::Resume(dag) => moment.serve(Request::Resume(dag)),
+                    Change::Close(dag) => moment.serve(Request::Close(dag)),
                     Change::Await(dag) if moment.in_flight(dag) == 0 => {}
                     Change::Await(_) => {
                         waits = true;

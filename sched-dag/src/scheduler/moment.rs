@@ -3,7 +3,7 @@
 use super::{Decision, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
 use crate::journal::What;
-use crate::lifecycle::Request;
+use crate::request::Request;
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]
@@ -19,6 +19,27 @@ pub struct Moment<'s> {
 #[must_use = "an instant without `dispatch` leaves cores idle"]
 pub struct Released<'s> {
     scheduler: &'s mut Scheduler,
+}
+
+impl Scheduler {
+    /// Does what is asked of one DAG. Compiled with its callers, so that a scheduler in a static is
+    /// known there by its address, which is worth 2 % of a release; and once, as it is rare.
+    #[cold]
+    #[inline]
+    fn serve_request(&mut self, request: Request) {
+        match request {
+            Request::Signal(dag) => self.signal(dag),
+            Request::Pause(dag) => self.pause(dag),
+            Request::Resume(dag) => self.resume(dag),
+            Request::Close(dag) => self.close(dag),
+            Request::Stop(dag) => self.stop(dag),
+            Request::Enter(..)
+            | Request::ShutDown
+            | Request::Begin
+            | Request::GoOn
+            | Request::Step => {}
+        }
+    }
 }
 
 impl<'s> Moment<'s> {
@@ -156,20 +177,9 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If there is no such DAG, or a signal is to one that is not sporadic.
-    #[inline]
+    #[inline(always)]
     pub fn serve(&mut self, request: Request) {
-        match request {
-            Request::Signal(dag) => self.signal(dag),
-            Request::Pause(dag) => self.pause(dag),
-            Request::Resume(dag) => self.resume(dag),
-            Request::Close(dag) => self.close(dag),
-            Request::Stop(dag) => self.stop(dag),
-            Request::Enter(..)
-            | Request::ShutDown
-            | Request::Begin
-            | Request::GoOn
-            | Request::Step => {}
-        }
+        self.scheduler.serve_request(request);
     }
 
     /// Writes down that the run is in another mode.
