@@ -13,11 +13,10 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use recording::{Channel, Role, Schema, Shown};
-use sched_dag::journal::What;
-use sched_dag::{DagId, Instance};
+use sched_dag::{DagId, Instance, Notice};
 
 use super::replay::Outcome;
-use super::{Crossing, Drain, Echoing, Happened, Seen};
+use super::{Crossing, Drain, Echoing, Seen};
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
 
@@ -122,9 +121,9 @@ impl Crossing for Echo {
         }
     }
 
-    fn happened(&mut self, what: What, happened: &Happened) {
+    fn happened(&mut self, notice: &Notice) {
         if let Some(inner) = &mut self.inner {
-            inner.happened(what, happened);
+            inner.happened(notice);
         }
     }
 

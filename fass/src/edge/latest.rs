@@ -11,12 +11,12 @@ use core::mem;
 
 use recording::{Channel, Entry, Header, Stream};
 use sched_dag::journal::What;
-use sched_dag::{DagId, Instance};
+use sched_dag::{DagId, Instance, Notice};
 
 use super::drain::{Releases, SIGNALS};
 use super::guard::narrow;
 use super::replay::Outcome;
-use super::{Crossing, Drain, Drained, Happened, name, open};
+use super::{Crossing, Drain, Drained, name, open};
 use crate::run::crossing::Recorded;
 use crate::run::latest_jobs::LatestJobs;
 use crate::run::line::LineOf;
@@ -84,17 +84,16 @@ impl Crossing for Latest {
         }
     }
 
-    fn happened(&mut self, what: What, happened: &Happened) {
+    fn happened(&mut self, notice: &Notice) {
+        let (dag, job) = (notice.event.dag.index(), notice.event.job);
         // A skipped job counts, or those after it would be others in a replay.
-        if let What::Released | What::Skipped = what
+        if let What::Due | What::Skipped = notice.event.what
             && let Some(kept) = &mut self.kept
-            && let Some(release_ns) = happened.release_ns
-            && let Some(releases) = kept.releases.get_mut(happened.dag.index())
-            && kept
-                .latest
-                .is_of_interest(happened.dag.index(), happened.job)
+            && let Some(release_ns) = notice.at_ns
+            && let Some(releases) = kept.releases.get_mut(dag)
+            && kept.latest.is_of_interest(dag, job)
         {
-            releases.note(happened.job, release_ns);
+            releases.note(job, release_ns);
         }
     }
 
@@ -220,7 +219,10 @@ mod tests {
     use alloc::vec;
 
     use recording::{Recordable, Recording, Role};
-    use sched_dag::{Activation, CommitOptions, DagSpec, Policy, SubtaskId, SubtaskSpec, verify};
+    use sched_dag::journal::Event;
+    use sched_dag::{
+        Activation, CommitOptions, CoreId, DagSpec, Policy, SubtaskId, SubtaskSpec, verify,
+    };
 
     use super::*;
 
@@ -279,14 +281,16 @@ mod tests {
     }
 
     fn run(latest: &mut Latest, job: u64) {
-        let happened = Happened {
+        let event = Event {
+            time_ns: due_ns(job),
+            what: What::Due,
+            core: CoreId(0),
             dag: DagId(FAILS.into()),
-            subtask: 0,
             job,
-            release_ns: Some(due_ns(job)),
-            at_ns: due_ns(job),
+            subtask: None,
         };
-        latest.happened(What::Released, &happened);
+        let at_ns = Some(due_ns(job));
+        latest.happened(&Notice { event, at_ns });
         for channel in [STEADY, FAILS] {
             let at_ns = due_ns(job) + 1;
             let value = Recorded {

@@ -5,13 +5,12 @@ use alloc::format;
 use alloc::string::String;
 
 use recording::{Channel, Header};
-use sched_dag::DagId;
-use sched_dag::Instance;
 use sched_dag::journal::What;
+use sched_dag::{DagId, Instance, Notice};
 
 use super::replay::{Outcome, Replay};
 use super::signals::Signals;
-use super::{Crossing, Drain, Happened, Host, name, open};
+use super::{Crossing, Drain, Host, name, open};
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
 
@@ -61,11 +60,11 @@ impl Crossing for OfMachine {
         }
     }
 
-    fn happened(&mut self, what: What, happened: &Happened) {
-        if let What::Released | What::Skipped = what
+    fn happened(&mut self, notice: &Notice) {
+        if let What::Due | What::Skipped = notice.event.what
             && let (Some(replay), Some(signals)) = (&mut self.replay, &self.signals)
         {
-            let dag = happened.dag;
+            let dag = notice.event.dag;
             signals.follow(dag, replay.next_signal_ns(dag));
         }
     }

@@ -28,7 +28,7 @@ use core::fmt;
 
 use recording::{Channel, DagHeader, Header, Schema};
 use sched_dag::journal::What;
-use sched_dag::{DagId, Instance, TaskSet};
+use sched_dag::{DagId, Instance, Notice, TaskSet};
 
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
@@ -98,8 +98,8 @@ pub trait Crossing: Send {
     /// Takes a value, at the completion of its writer: `at_ns` on the time of the run.
     fn record(&mut self, value: &Recorded<'_>, at_ns: u64);
 
-    /// Takes what has become of a job, or of an instance.
-    fn happened(&mut self, what: What, happened: &Happened);
+    /// Takes what has become of a job, or of an instance: an event of those of [`HEARS`].
+    fn happened(&mut self, notice: &Notice);
 
     /// Takes note that an instance has failed, and what it had sampled: `at_ns` on the time of
     /// the run, `clock_ns` on that of [`crate::now_ns`].
@@ -205,23 +205,6 @@ pub struct Drained {
     pub is_cut: bool,
 }
 
-/// To what something has happened, and when.
-///
-/// See [`Crossing`].
-#[derive(Clone, Copy, Debug)]
-pub struct Happened {
-    /// The DAG.
-    pub dag: DagId,
-    /// The subtask, where it is an instance's.
-    pub subtask: u32,
-    /// The job.
-    pub job: u64,
-    /// When the job was due.
-    pub release_ns: Option<u64>,
-    /// When it happened.
-    pub at_ns: u64,
-}
-
 /// Begins to do what is wished.
 pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
     match wish {
@@ -250,11 +233,14 @@ pub fn name(header: &mut Header, app: &str, task_set: &TaskSet) {
     }
 }
 
+/// The events that a platform tells a [`Crossing`] of.
+pub const HEARS: &[What] = &[What::Due, What::Skipped, What::Cancelled, What::Restarted];
+
 /// Returns what a recording says of an event, if it says anything.
 #[must_use]
-pub fn recorded(what: What, is_sporadic: bool) -> Option<recording::What> {
+pub const fn recorded(what: What) -> Option<recording::What> {
     match what {
-        What::Released if is_sporadic => Some(recording::What::Signal),
+        What::Due => Some(recording::What::Signal),
         What::Skipped => Some(recording::What::Skip),
         What::Cancelled => Some(recording::What::Cut),
         What::Restarted => Some(recording::What::Restart),

@@ -12,14 +12,13 @@ use core::mem;
 use core::sync::atomic::AtomicU64;
 
 use recording::{Channel, Header};
-use sched_dag::journal::What;
-use sched_dag::{DagId, Instance};
+use sched_dag::{DagId, Instance, Notice, SubtaskId};
 
 use super::drain::{OfTape, Tag};
 use super::lost::{Lost, LostJobs};
 use super::replay::Outcome;
 use super::ring::{Event, EventWriter, WORDS, ring};
-use super::{Crossing, Drain, Happened, name, open, recorded};
+use super::{Crossing, Drain, name, open, recorded};
 use crate::run::cell::outbox::Outbox;
 use crate::run::crossing::Recorded;
 use crate::run::line::LineOf;
@@ -76,17 +75,15 @@ impl Tape {
 
 impl Tape {
     /// Puts an event into its ring; without room the recording ends.
-    fn put(&mut self, what: recording::What, happened: &Happened) {
-        let Happened {
-            dag,
-            subtask,
-            job,
-            release_ns,
-            at_ns,
-        } = *happened;
+    fn put(&mut self, what: recording::What, of: Instance, release_ns: Option<u64>, at_ns: u64) {
+        let tag = Tag {
+            what,
+            dag: of.dag,
+            subtask: of.subtask.0,
+        };
         let event = Event {
-            tag: Tag { what, dag, subtask }.to_word(),
-            job,
+            tag: tag.to_word(),
+            job: of.job,
             at_ns,
             release_ns,
         };
@@ -107,17 +104,6 @@ fn take(given: &[Option<Outbox>], lost: &Lost, value: &Recorded<'_>, at_ns: u64)
         .is_some_and(|(bytes, outbox)| outbox.put(value.job, value.completed_ns, bytes));
     if !is_put {
         lost.note(value, at_ns);
-    }
-}
-
-/// Something happened in an instance.
-fn at(instance: Instance, at_ns: u64) -> Happened {
-    Happened {
-        dag: instance.dag,
-        subtask: instance.subtask.0,
-        job: instance.job,
-        release_ns: None,
-        at_ns,
     }
 }
 
@@ -142,10 +128,13 @@ impl Crossing for Tape {
         take(&self.given, &self.lost, value, at_ns);
     }
 
-    fn happened(&mut self, what: What, happened: &Happened) {
-        // The platform tells of releases only where they are signals.
-        if let Some(what) = recorded(what, true) {
-            self.put(what, happened);
+    fn happened(&mut self, notice: &Notice) {
+        let event = notice.event;
+        if let Some(what) = recorded(event.what) {
+            let subtask = event.subtask.unwrap_or(SubtaskId(0));
+            let (dag, job) = (event.dag, event.job);
+            let of = Instance { dag, job, subtask };
+            self.put(what, of, notice.at_ns, event.time_ns);
         }
     }
 
@@ -155,14 +144,14 @@ impl Crossing for Tape {
                 take(&self.given, &self.lost, sample, at_ns);
             });
         }
-        self.put(recording::What::Fault, &at(instance, at_ns));
+        self.put(recording::What::Fault, instance, None, at_ns);
     }
 
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
         let number = u16::try_from(instance.dag.0);
         let mut channels = self.header.channels.iter();
         if channels.any(|channel| Ok(channel.dag) == number) {
-            self.put(recording::What::Clock, &at(instance, at_ns));
+            self.put(recording::What::Clock, instance, None, at_ns);
         }
         clock_ns
     }

@@ -18,6 +18,7 @@
 
 use super::{DagPhase, Scheduler};
 use crate::ids::DagId;
+use crate::journal::What;
 
 impl Scheduler {
     /// Closes a DAG (C1, C2).
@@ -28,7 +29,7 @@ impl Scheduler {
         }
         self.judge(dag, None);
         self.dags[dag.index()].jobs.close(DagPhase::Closed);
-        self.log.closed(dag);
+        self.log.of_dag(What::Closed, dag);
         while self.waiting(dag) > 0 {
             self.skip_oldest_waiting(dag);
         }

@@ -32,6 +32,7 @@ use alloc::vec;
 
 use super::Scheduler;
 use crate::ids::{DagId, Instance};
+use crate::journal::What;
 use crate::policy::{JobOutcome, OnFault};
 
 /// The latest survived faults of a DAG.
@@ -110,7 +111,7 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         state.statistics.faults += 1;
         state.statistics.restarts += 1;
-        self.log.restarted(instance);
+        self.log.of(What::Restarted, instance);
         if state.jobs.cut(sequence, JobOutcome::Failed) {
             state.statistics.failed += 1;
             self.cancel_ready(dag, sequence);

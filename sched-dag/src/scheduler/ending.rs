@@ -38,6 +38,7 @@
 
 use super::Scheduler;
 use crate::ids::{DagId, Instance};
+use crate::journal::What;
 
 impl Scheduler {
     /// Ends an instance that has started, and its DAG (E1).
@@ -63,7 +64,7 @@ impl Scheduler {
         state.statistics.cut_short += cut_short;
         state.statistics.dropped += dropped;
         self.set_timer(dag);
-        self.log.ended(dag);
+        self.log.of_dag(What::Stopped, dag);
         self.cancel_ready(dag, u64::MAX);
     }
 }

@@ -231,7 +231,7 @@ impl Scheduler {
             && is_untold
         {
             self.write_finish(core, vertex, finish_ns);
-            self.log.ready(decision.instance());
+            self.log.of(What::Ready, decision.instance());
         }
         done
     }

@@ -10,7 +10,7 @@ use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
 use super::{DagPhase, Log, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
-use crate::policy::JobOutcome;
+use crate::journal::What;
 
 impl Scheduler {
     /// Ends an instance that has started.
@@ -86,7 +86,7 @@ impl Scheduler {
             if vertex.phase == Phase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
                 self.ready.remove(self.ready.key(number, vertex, || job));
-                self.log.cancelled(vertex.instance(job));
+                self.log.of(What::Cancelled, vertex.instance(job));
                 vertex.phase = Phase::Absent;
                 self.ending.push(number);
             }
@@ -146,7 +146,7 @@ impl Scheduler {
             let next = vertices.successor(place);
             if let Some(successor) = vertices.arrive(next, sequence) {
                 if is_cut {
-                    log.cancelled(successor.instance(job));
+                    log.of(What::Cancelled, successor.instance(job));
                     ending.push(next);
                 } else {
                     line_up(next, successor, job, ready, log);
@@ -170,7 +170,7 @@ impl Scheduler {
             let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
             if job.cut.is_some() {
-                self.log.cancelled(vertex.instance(job));
+                self.log.of(What::Cancelled, vertex.instance(job));
                 self.ending.push(number);
             } else {
                 line_up(number, vertex, job, &mut self.ready, &mut self.log);
@@ -190,24 +190,22 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);
-        let outcome = if let Some(cut) = job.cut {
+        if job.cut.is_some() {
             if state.jobs.phase != DagPhase::Ended {
                 let first = self.task_set.first_vertex(dag) as usize;
                 let subtasks = self.task_set.dag(dag).subtasks().len();
                 self.vertices.allow_passing_on(first..first + subtasks);
             }
-            cut
-        } else if job.missed {
-            state.statistics.completed += 1;
-            JobOutcome::Missed
         } else {
             state.statistics.completed += 1;
-            state.statistics.count_met();
-            JobOutcome::Met
-        };
+            if !job.missed {
+                state.statistics.count_met();
+            }
+        }
         state.jobs.end_oldest();
         let has_limit = self.task_set.dag(dag).jobs().is_some();
-        self.log.job_completed(dag, job.number, outcome, has_limit);
+        self.log.jobs_ended += u64::from(has_limit);
+        self.log.of_job(What::Completed, dag, job.number, None);
         self.set_timer(dag);
     }
 
@@ -238,5 +236,5 @@ pub(super) fn line_up(
     vertex.phase = Phase::Ready;
     vertex.job = job.number;
     ready.insert(ready.key(number, vertex, || job));
-    log.ready(vertex.instance(job));
+    log.of(What::Ready, vertex.instance(job));
 }

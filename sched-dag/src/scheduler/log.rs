@@ -6,21 +6,17 @@
 
 use alloc::vec::Vec;
 
-use crate::ids::{CoreId, DagId, Instance, ModeId};
+use crate::ids::{CoreId, DagId, Instance};
 use crate::journal::{Event, Subject, What};
 use crate::kept::Journal;
-use crate::policy::JobOutcome;
 
-/// An event that a driver acts on, with what the journal has no room for: the nominal release, the
-/// deadline or the outcome.
+/// An event that a driver acts on, with a time that the journal has no room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Notice {
     /// The event.
     pub event: Event,
-    /// When the job was to be released, or its deadline was; `u64::MAX` if there is none.
-    pub at_ns: u64,
-    /// What became of a completed job.
-    pub outcome: Option<JobOutcome>,
+    /// When the job was to be released, or its deadline was, in nanoseconds.
+    pub at_ns: Option<u64>,
 }
 
 /// The journal with what the next events of it have in common.
@@ -117,23 +113,32 @@ impl Log {
         self.on_core(self.here, what, time_ns, instance);
     }
 
-    /// Writes down that the run is in another mode, which the scheduler does not know.
+    /// Writes down what has happened to an instance, at this instant.
     #[inline]
-    pub fn entered(&mut self, mode: ModeId) {
-        self.of_job(What::Entered, DagId(0), mode.0.into(), u64::MAX);
+    pub(super) fn of(&mut self, what: What, instance: Instance) {
+        self.write(what, self.now_ns, Subject::of(instance));
+        self.notify(what, Subject::of(instance), None);
     }
 
+    /// Does the same of a job as a whole, or of a DAG, and says when that was due or late.
     #[inline]
-    fn of_job(&mut self, what: What, dag: DagId, job: u64, at_ns: u64) {
+    pub(super) fn of_job(&mut self, what: What, dag: DagId, job: u64, at_ns: Option<u64>) {
         self.has_job_event = true;
         self.write(what, self.now_ns, Subject::of_job(dag, job));
-        self.notify(what, Subject::of_job(dag, job), at_ns, None);
+        self.notify(what, Subject::of_job(dag, job), at_ns);
     }
 
+    /// Does the same of a DAG.
     #[inline]
-    fn of(&mut self, what: What, instance: Instance) {
-        self.write(what, self.now_ns, Subject::of(instance));
-        self.notify(what, Subject::of(instance), u64::MAX, None);
+    pub(super) fn of_dag(&mut self, what: What, dag: DagId) {
+        self.of_job(what, dag, 0, None);
+    }
+
+    /// Writes down that a sporadic DAG's job was due then, right before its release.
+    #[inline]
+    pub(super) fn due(&mut self, dag: DagId, job: u64, release_ns: u64) {
+        self.write(What::Due, release_ns, Subject::of_job(dag, job));
+        self.notify(What::Due, Subject::of_job(dag, job), Some(release_ns));
     }
 
     #[inline]
@@ -142,110 +147,18 @@ impl Log {
     }
 
     #[inline]
-    fn notify(&mut self, what: What, subject: Subject, at_ns: u64, outcome: Option<JobOutcome>) {
+    fn notify(&mut self, what: What, subject: Subject, at_ns: Option<u64>) {
         if self.heard & bit(what) != 0 {
-            self.keep(what, subject, at_ns, outcome);
+            self.keep(what, subject, at_ns);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn keep(&mut self, what: What, subject: Subject, at_ns: u64, outcome: Option<JobOutcome>) {
+    fn keep(&mut self, what: What, subject: Subject, at_ns: Option<u64>) {
         let words = Event::words(self.now_ns, what, self.here, subject);
-        self.notices
-            .extend(Event::unpack(words).map(|event| Notice {
-                event,
-                at_ns,
-                outcome,
-            }));
-    }
-
-    #[inline]
-    pub(super) fn released(&mut self, dag: DagId, job: u64, release_ns: u64, is_sporadic: bool) {
-        if is_sporadic {
-            self.write(What::Due, release_ns, Subject::of_job(dag, job));
-            self.notify(What::Due, Subject::of_job(dag, job), release_ns, None);
-        }
-        self.of_job(What::Released, dag, job, release_ns);
-    }
-
-    #[inline]
-    pub(super) fn queued(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.of_job(What::Queued, dag, job, release_ns);
-    }
-
-    #[inline]
-    pub(super) fn skipped(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.of_job(What::Skipped, dag, job, release_ns);
-    }
-
-    #[inline]
-    pub(super) fn signalled(&mut self, dag: DagId, job: u64, release_ns: Option<u64>) {
-        let what = match release_ns {
-            Some(_) => What::Signalled,
-            None => What::Dropped,
-        };
-        self.of_job(what, dag, job, release_ns.unwrap_or(u64::MAX));
-    }
-
-    #[inline]
-    pub(super) fn ready(&mut self, instance: Instance) {
-        self.of(What::Ready, instance);
-    }
-
-    #[inline]
-    pub(super) fn cancelled(&mut self, instance: Instance) {
-        self.of(What::Cancelled, instance);
-    }
-
-    #[inline]
-    pub(super) fn aborted(&mut self, dag: DagId, job: u64) {
-        self.of_job(What::Aborted, dag, job, u64::MAX);
-    }
-
-    #[inline]
-    pub(super) fn restarted(&mut self, instance: Instance) {
-        self.of(What::Restarted, instance);
-    }
-
-    #[inline]
-    pub(super) fn ended(&mut self, dag: DagId) {
-        self.of_job(What::Stopped, dag, 0, u64::MAX);
-    }
-
-    #[inline]
-    pub(super) fn switched_off(&mut self, dag: DagId) {
-        self.of_job(What::Off, dag, 0, u64::MAX);
-    }
-
-    #[inline]
-    pub(super) fn switched_on(&mut self, dag: DagId) {
-        self.of_job(What::On, dag, 0, u64::MAX);
-    }
-
-    #[inline]
-    pub(super) fn closed(&mut self, dag: DagId) {
-        self.of_job(What::Closed, dag, 0, u64::MAX);
-    }
-
-    #[inline]
-    pub(super) fn deadline_missed(&mut self, dag: DagId, job: u64, deadline_ns: u64) {
-        self.of_job(What::Missed, dag, job, deadline_ns);
-    }
-
-    #[inline]
-    pub(super) fn job_completed(
-        &mut self,
-        dag: DagId,
-        job: u64,
-        outcome: JobOutcome,
-        has_limit: bool,
-    ) {
-        self.has_job_event = true;
-        self.jobs_ended += u64::from(has_limit);
-        let subject = Subject::of_job(dag, job);
-        self.write(What::Completed, self.now_ns, subject);
-        self.notify(What::Completed, subject, u64::MAX, Some(outcome));
+        let event = Event::unpack(words);
+        (self.notices).extend(event.map(|event| Notice { event, at_ns }));
     }
 }
 

@@ -185,7 +185,8 @@ impl<'s> Moment<'s> {
     /// Writes down that the run is in another mode.
     #[inline]
     pub fn entered(&mut self, mode: ModeId) {
-        self.scheduler.log.entered(mode);
+        let job = u64::from(mode.0);
+        (self.scheduler.log).of_job(What::Entered, DagId(0), job, None);
     }
 
     /// Makes a core, if it is idle, the first that is given an instance, instead of the one that

@@ -41,6 +41,7 @@
 
 use super::Scheduler;
 use crate::ids::DagId;
+use crate::journal::What;
 use crate::policy::OverrunPolicy;
 
 impl Scheduler {
@@ -87,7 +88,7 @@ impl Scheduler {
         }
         if self.is_waiting(dag, job) {
             self.dags[dag.index()].statistics.queued += 1;
-            self.log.queued(dag, job, release_ns);
+            self.log.of_job(What::Queued, dag, job, Some(release_ns));
         }
     }
 
@@ -112,7 +113,10 @@ impl Scheduler {
             let sequence = state.jobs.release_waiting(model);
             state.statistics.released += 1;
             let release_ns = state.jobs.job(sequence).release_ns;
-            self.log.released(dag, job, release_ns, is_sporadic);
+            if is_sporadic {
+                self.log.due(dag, job, release_ns);
+            }
+            (self.log).of_job(What::Released, dag, job, Some(release_ns));
             self.release_sources(dag, sequence);
         }
     }
@@ -125,7 +129,8 @@ impl Scheduler {
             return;
         };
         state.statistics.aborts += 1;
-        self.log.aborted(dag, state.jobs.job(sequence).number);
+        let job = state.jobs.job(sequence).number;
+        self.log.of_job(What::Aborted, dag, job, None);
         self.cancel_ready(dag, sequence);
     }
 
@@ -134,6 +139,6 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         let (job, release_ns) = state.jobs.skip_waiting(self.task_set.dag(dag));
         state.statistics.skips += 1;
-        self.log.skipped(dag, job, release_ns);
+        self.log.of_job(What::Skipped, dag, job, Some(release_ns));
     }
 }

@@ -21,6 +21,7 @@
 
 use super::{DagPhase, Scheduler};
 use crate::ids::DagId;
+use crate::journal::What;
 
 impl Scheduler {
     /// Reports whether a DAG is paused.
@@ -56,7 +57,7 @@ impl Scheduler {
         self.judge(dag, None);
         let phase = &mut self.dags[dag.index()].jobs.phase;
         if core::mem::replace(phase, DagPhase::Paused) != DagPhase::Paused {
-            self.log.switched_off(dag);
+            self.log.of_dag(What::Off, dag);
         }
         while self.waiting(dag) > 0 {
             self.skip_oldest_waiting(dag);
@@ -71,7 +72,7 @@ impl Scheduler {
         if state.jobs.phase == DagPhase::Paused {
             state.jobs.phase = DagPhase::Running;
             state.resumed_ns = self.log.now_ns;
-            self.log.switched_on(dag);
+            self.log.of_dag(What::On, dag);
         }
     }
 }

@@ -26,6 +26,7 @@
 
 use super::Scheduler;
 use crate::ids::DagId;
+use crate::journal::What;
 
 impl Scheduler {
     /// Takes a signal to a sporadic DAG.
@@ -48,7 +49,11 @@ impl Scheduler {
         if release_ns.is_none() {
             state.statistics.dropped_signals += 1;
         }
-        self.log.signalled(dag, job, release_ns);
+        let what = match release_ns {
+            Some(_) => What::Signalled,
+            None => What::Dropped,
+        };
+        self.log.of_job(what, dag, job, release_ns);
         self.set_timer(dag);
     }
 }

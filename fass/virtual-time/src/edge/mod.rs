@@ -12,7 +12,7 @@ use std::cell::{Cell, RefCell};
 use fass::edge::{self, Outcome, Replay};
 use fass::{LatestJobs, Plan, Recorded};
 use recording::{Channel, Entry, Header, Malformed, Recordable, Role, Shown, What, Writer};
-use sched_dag::journal::Event;
+use sched_dag::journal::{self, Event};
 use sched_dag::law::Record;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
@@ -281,7 +281,13 @@ impl Edge {
         });
         let others = events.iter().filter_map(|event| {
             let is_sporadic = task_set.dag(event.dag).is_sporadic();
-            let what = edge::recorded(event.what, is_sporadic)?;
+            // A signal is one at the instant of the release.
+            let what = match event.what {
+                journal::What::Due => return None,
+                journal::What::Released if is_sporadic => journal::What::Due,
+                what => what,
+            };
+            let what = edge::recorded(what)?;
             let dag = u16::try_from(event.dag.0).ok()?;
             // What was skipped or cut in the recorded run is not so here.
             if self.is_replayed(event.dag) || !is_kept(event.dag.index(), event.job) {

@@ -9,10 +9,9 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::edge::{Begin, Crossing, Drain, Happened, Outcome, Seen, Wish};
+use fass::edge::{Begin, Crossing, Drain, Outcome, Seen, Wish};
 use fass::{Channel, LaunchError, Plan, Recorded};
-use sched_dag::journal::What;
-use sched_dag::{DagId, Instance};
+use sched_dag::{DagId, Instance, Notice};
 
 use crate::machine::debug_port;
 use crate::machine::once::Once;
@@ -209,11 +208,11 @@ pub fn record(value: &Recorded<'_>, at_ns: u64) {
 
 /// Takes what became of a job or an instance, if it is of interest. The scheduler's lock is
 /// held.
-pub fn happened(what: What, happened: &Happened) {
+pub fn happened(notice: &Notice) {
     if IS_ON.load(Ordering::Relaxed)
         && let Some(crossing) = CROSSING.lock_uninterrupted().as_mut()
     {
-        crossing.happened(what, happened);
+        crossing.happened(notice);
     }
 }
 

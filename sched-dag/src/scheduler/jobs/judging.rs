@@ -15,6 +15,7 @@ use alloc::boxed::Box;
 
 use super::Jobs;
 use crate::ids::{DagId, SubtaskId};
+use crate::journal::What;
 use crate::order::sorted_by_key;
 use crate::scheduler::Scheduler;
 use crate::scheduler::vertices::Vertices;
@@ -211,8 +212,8 @@ impl Scheduler {
             };
             if state.jobs.count_late(&unjudged, is_late) && state.jobs.note_miss(&unjudged) {
                 state.statistics.count_miss();
-                self.log
-                    .deadline_missed(dag, unjudged.number, unjudged.deadline_ns);
+                let deadline_ns = Some(unjudged.deadline_ns);
+                (self.log).of_job(What::Missed, dag, unjudged.number, deadline_ns);
             }
         }
     }

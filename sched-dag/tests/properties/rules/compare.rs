@@ -17,24 +17,15 @@ impl Facts<'_> {
     ) -> Result<(), String> {
         let mut said = vec![Vec::new(); self.said.len()];
         let mut turned = BTreeSet::new();
-        for Notice {
-            event,
-            at_ns,
-            outcome,
-        } in notices
-        {
+        for Notice { event, at_ns } in notices {
             let (dag, job) = (event.dag.index(), usize::try_from(event.job).expect("few"));
             if let Some(subtask) = event.subtask.filter(|_| event.what != What::Restarted) {
                 turned.insert(((dag, job, subtask.index()), event.what == What::Ready));
                 continue;
             }
-            said[dag].push((event.what, job, *outcome));
+            said[dag].push((event.what, job));
             if matches!(event.what, What::Released | What::Queued | What::Skipped) {
-                same(
-                    "nominal release",
-                    &self.dags[dag].jobs[job].due_ns,
-                    &Some(*at_ns),
-                )?;
+                same("nominal release", &self.dags[dag].jobs[job].due_ns, at_ns)?;
             }
         }
         same("reports", &self.said, &said)?;

@@ -30,7 +30,7 @@ impl Facts<'_> {
         survived.push(number);
         statistics.faults += 1;
         statistics.restarts += 1;
-        self.said[dag].push((What::Restarted, number, None));
+        self.said[dag].push((What::Restarted, number));
         let job = &mut jobs[number];
         if !job.starts_nothing() {
             job.has_failed = true;
@@ -66,7 +66,7 @@ impl Facts<'_> {
             ..
         } = &mut self.dags[dag];
         (*is_ended, *is_closed, *is_paused) = (true, true, false);
-        self.said[dag].push((What::Stopped, 0, None));
+        self.said[dag].push((What::Stopped, 0));
         for job in jobs {
             match job.state {
                 State::InFlight if !job.starts_nothing() => {

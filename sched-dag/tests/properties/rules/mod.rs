@@ -10,7 +10,7 @@ mod releases;
 use std::collections::BTreeSet;
 
 use sched_dag::journal::What;
-use sched_dag::{DagStatistics, JobOutcome, Policy, Preemption};
+use sched_dag::{DagStatistics, Policy, Preemption};
 
 pub(crate) use compare::instance;
 #[allow(unused_imports, reason = "not each test is told of instances")]
@@ -21,8 +21,8 @@ use crate::set::{Dag, Set};
 /// Of a DAG.
 const MOST_SUBTASKS: usize = 7;
 
-/// What is reported of a DAG's jobs, in order: the job, if it is about one, and its outcome.
-type Said = (What, usize, Option<JobOutcome>);
+/// What is reported of a DAG's jobs, in order: the job, if it is about one.
+type Said = (What, usize);
 
 /// The kinds of reports that are compared.
 pub(crate) const SAID: [What; 13] = [
@@ -213,7 +213,7 @@ impl<'w> Facts<'w> {
                 late += u64::from(is_late);
             }
             if late > 0 && !std::mem::replace(&mut job.is_missed, true) {
-                self.said[dag].push((What::Missed, number, None));
+                self.said[dag].push((What::Missed, number));
                 statistics.misses += 1;
                 statistics.consecutive_misses += 1;
                 statistics.most_consecutive_misses = statistics
@@ -260,22 +260,12 @@ impl<'w> Facts<'w> {
         } = &mut self.dags[dag];
         let job = &mut jobs[number];
         job.state = State::Over;
-        let outcome = if job.is_aborted {
-            JobOutcome::Aborted
-        } else if job.is_cut {
-            JobOutcome::DagEnded
-        } else if job.has_failed {
-            JobOutcome::Failed
-        } else if job.is_missed {
-            JobOutcome::Missed
-        } else {
-            JobOutcome::Met
-        };
         statistics.completed += u64::from(!job.starts_nothing());
-        if outcome == JobOutcome::Met {
+        let is_cut = job.is_aborted || job.is_cut || job.has_failed;
+        if !is_cut && !job.is_missed {
             statistics.consecutive_misses = 0;
         }
-        self.said[dag].push((What::Completed, number, Some(outcome)));
+        self.said[dag].push((What::Completed, number));
     }
 
     /// R2: nothing but cores holds it back.

@@ -12,7 +12,7 @@ impl Facts<'_> {
         }
         self.judge(dag, None);
         if !std::mem::replace(&mut self.dags[dag].is_paused, true) {
-            self.said[dag].push((What::Off, 0, None));
+            self.said[dag].push((What::Off, 0));
         }
         while let Some(job) = self.first(dag, State::Waiting) {
             self.skip(dag, job);
@@ -22,7 +22,7 @@ impl Facts<'_> {
     pub(crate) fn resume(&mut self, dag: usize) {
         if std::mem::take(&mut self.dags[dag].is_paused) {
             self.dags[dag].resumed_ns = self.now_ns;
-            self.said[dag].push((What::On, 0, None));
+            self.said[dag].push((What::On, 0));
         }
     }
 
@@ -34,7 +34,7 @@ impl Facts<'_> {
         self.judge(dag, None);
         self.dags[dag].is_closed = true;
         self.dags[dag].is_paused = false;
-        self.said[dag].push((What::Closed, 0, None));
+        self.said[dag].push((What::Closed, 0));
         while let Some(job) = self.first(dag, State::Waiting) {
             self.skip(dag, job);
         }
@@ -95,7 +95,7 @@ impl Facts<'_> {
         if self.dags[dag].jobs[job].state == State::Due {
             self.dags[dag].jobs[job].state = State::Waiting;
             self.dags[dag].statistics.queued += 1;
-            self.said[dag].push((What::Queued, job, None));
+            self.said[dag].push((What::Queued, job));
         }
     }
 
@@ -105,7 +105,7 @@ impl Facts<'_> {
         match oldest.into_iter().find(|(_, job)| in_flight(job)) {
             Some((number, oldest)) => {
                 oldest.is_aborted = true;
-                self.said[dag].push((What::Aborted, number, None));
+                self.said[dag].push((What::Aborted, number));
                 self.dags[dag].statistics.aborts += 1;
                 self.settle(dag);
             }
@@ -123,7 +123,7 @@ impl Facts<'_> {
             }
             self.dags[dag].jobs[job].state = State::InFlight;
             self.dags[dag].statistics.released += 1;
-            self.said[dag].push((What::Released, job, None));
+            self.said[dag].push((What::Released, job));
             self.settle(dag);
         }
     }
@@ -143,7 +143,7 @@ impl Facts<'_> {
     fn skip(&mut self, dag: usize, job: usize) {
         self.dags[dag].jobs[job].state = State::Over;
         self.dags[dag].statistics.skips += 1;
-        self.said[dag].push((What::Skipped, job, None));
+        self.said[dag].push((What::Skipped, job));
     }
 
     pub(super) fn next_due(&self, dag: usize) -> Option<(usize, Option<u64>)> {

@@ -2,7 +2,6 @@
 
 use core::sync::atomic::Ordering;
 
-use fass::edge::Happened;
 use sched_dag::engine::Port;
 use sched_dag::journal::What;
 use sched_dag::lifecycle::{self, Request};
@@ -30,7 +29,7 @@ pub(super) struct SmpPort<'a> {
 
 impl Port<Loan> for SmpPort<'_> {
     /// The edge tells of these, where a topic is recorded.
-    const HEARS: &'static [What] = &[What::Due, What::Skipped, What::Restarted];
+    const HEARS: &'static [What] = fass::edge::HEARS;
 
     fn now_ns(&self) -> u64 {
         since_epoch(clock::now_ns())
@@ -86,18 +85,6 @@ impl Port<Loan> for SmpPort<'_> {
     }
 
     fn hear(&mut self, notice: &Notice) {
-        let Notice { event, at_ns, .. } = *notice;
-        let what = match event.what {
-            What::Due => What::Released,
-            what => what,
-        };
-        let happened = Happened {
-            dag: event.dag,
-            subtask: event.subtask.map_or(0, |subtask| subtask.0),
-            job: event.job,
-            release_ns: (at_ns != u64::MAX).then_some(at_ns),
-            at_ns: event.time_ns,
-        };
-        edge::happened(what, &happened);
+        edge::happened(notice);
     }
 }

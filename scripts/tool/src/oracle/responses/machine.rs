@@ -185,7 +185,7 @@ impl Watch<'_> {
         let flying = &mut self.flying[dag.index()];
         if notice.event.what == What::Released {
             self.ready += self.task_set.dag(dag).sources().len() as u64;
-            flying.push((job, notice.at_ns));
+            flying.push((job, notice.at_ns.unwrap_or(0)));
         } else if let Some(place) = flying.iter().position(|(other, _)| *other == job) {
             let (_, release_ns) = flying.swap_remove(place);
             let longest_ns = &mut self.longest_ns[dag.index()];
