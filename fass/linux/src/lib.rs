@@ -61,7 +61,7 @@ mod worker;
 
 pub use control::Control;
 pub use end_signals::EndSignals;
-pub use machine::{Linux, Mechanism, StartError, processors};
+pub use machine::{Linux, Mechanism, StartError, own_core, processors};
 pub use run::{Counts, Run};
 pub use state::Fault;
 pub use wires::Connection;

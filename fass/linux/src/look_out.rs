@@ -39,11 +39,15 @@ pub(crate) struct LookOut {
     last: AtomicU32,
     /// Until when the next event is left to the thread that has claimed it.
     claimed_until_ns: AtomicU64,
+    /// Whether idle workers never sleep. Then the release thread is not needed for events: nothing
+    /// is preempted, so one that is due while all cores are busy is seen to by the next end.
+    polls: bool,
 }
 
 impl LookOut {
-    pub(crate) const fn new() -> Self {
+    pub(crate) const fn new(polls: bool) -> Self {
         Self {
+            polls,
             next_ns: AtomicU64::new(u64::MAX),
             idle: AtomicU64::new(0),
             last: AtomicU32::new(0),
@@ -107,6 +111,9 @@ impl LookOut {
 
     /// Returns when the release thread looks at an event, or whether a core has become idle.
     pub(crate) fn of_release(&self, next_ns: u64, now_ns: u64) -> u64 {
+        if self.polls {
+            return u64::MAX;
+        }
         let early_ns = next_ns.saturating_sub(EARLY_NS);
         let own_ns = match self.idle.load(Ordering::Relaxed) {
             0 if now_ns < early_ns && next_ns < u64::MAX => return early_ns,
@@ -118,8 +125,9 @@ impl LookOut {
 
     /// Reports whether the release thread, which looks at `looks_at_ns`, would come too late for
     /// the next event, or longer after it than it ever may.
-    pub(crate) const fn is_late(looks_at_ns: u64, next_ns: u64) -> bool {
-        next_ns.saturating_add(2 * PATIENCE_NS) < looks_at_ns
+    pub(crate) const fn is_late(&self, looks_at_ns: u64, next_ns: u64) -> bool {
+        // At the end of all it has to look in any case.
+        (!self.polls || next_ns == 0) && next_ns.saturating_add(2 * PATIENCE_NS) < looks_at_ns
     }
 }
 
@@ -134,14 +142,14 @@ mod tests {
 
     #[test]
     fn the_core_that_became_idle_last_looks_first_and_the_release_thread_last() {
-        let look_out = LookOut::new();
+        let look_out = LookOut::new(false);
         assert_eq!(look_out.of_release(7, 0), 7, "nobody else is there");
         look_out.rest(CoreId(1));
         look_out.rest(CoreId(0));
         assert_eq!(look_out.of_worker(CoreId(0), 7), 7);
         assert_eq!(look_out.of_worker(CoreId(1), 7), 7 + PATIENCE_NS);
         assert_eq!(look_out.of_release(7, 0), 7 + 2 * PATIENCE_NS);
-        assert!(!LookOut::is_late(7 + 2 * PATIENCE_NS, 7));
+        assert!(!look_out.is_late(7 + 2 * PATIENCE_NS, 7));
         look_out.leave(CoreId(0));
         assert_eq!(
             look_out.of_worker(CoreId(1), 7),
@@ -158,7 +166,7 @@ mod tests {
 
     #[test]
     fn one_thread_makes_the_step_and_the_others_leave_it_to_that_one_for_a_while() {
-        let look_out = LookOut::new();
+        let look_out = LookOut::new(false);
         look_out.announce(1_000);
         look_out.rest(CoreId(1));
         look_out.rest(CoreId(0));
@@ -176,7 +184,7 @@ mod tests {
 
     #[test]
     fn the_release_thread_does_not_wake_up_at_an_event_that_an_idle_core_sees_to() {
-        let (look_out, next_ns) = (LookOut::new(), 1_000_000);
+        let (look_out, next_ns) = (LookOut::new(false), 1_000_000);
         let early_ns = look_out.of_release(next_ns, 0);
         assert!(early_ns < next_ns, "all cores are busy yet");
         assert_eq!(look_out.of_release(next_ns, early_ns), next_ns);

@@ -16,7 +16,9 @@ use crate::platform::{HOST, Terms};
 use crate::run::{self, Run};
 use crate::seats::Seats;
 use crate::sys;
+use crate::team::with_own_worker;
 use crate::warnings;
+use crate::worker::Worker;
 
 /// How the scheduler's decisions are carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +32,10 @@ pub enum Mechanism {
     /// By threads like all others: nothing is preempted, and other programs have their
     /// share of the cores. It needs no privilege.
     Normal,
+    /// As [`Normal`](Self::Normal), by threads that never sleep: an idle core's thread watches for
+    /// work, so that being called takes a cache line and not a wake of the kernel's. It keeps its
+    /// processors busy as long as the run goes on.
+    Poll,
 }
 
 /// Cores of this computer, for the DAGs that are committed next.
@@ -74,6 +80,13 @@ impl fmt::Display for StartError {
 }
 
 impl std::error::Error for StartError {}
+
+/// Returns the core of the model that the calling thread computes for, counted within its cluster;
+/// `None` outside of functions of a run.
+#[must_use]
+pub fn own_core() -> Option<u32> {
+    with_own_worker(Worker::seat).flatten().map(|core| core.0)
+}
 
 /// Returns how many processors this program may use.
 #[must_use]
@@ -144,7 +157,7 @@ impl Linux {
             Mechanism::SchedExt => {
                 levels = Some(Levels::SchedExt(Seats::take().map_err(StartError)?));
             }
-            Mechanism::Normal => {}
+            Mechanism::Normal | Mechanism::Poll => {}
         }
         if levels.is_some() {
             let is_throttled = mechanism == Mechanism::Fifo;
@@ -169,6 +182,9 @@ impl Linux {
             preemption,
             processors: processors.into(),
             levels,
+            polls: mechanism == Mechanism::Poll,
+            skips_idle: false,
+            most_events: u64::MAX,
             overheads: Overheads::default(),
             budget_factor: 0,
             clusters: Clusters::Undivided,
@@ -211,6 +227,20 @@ impl Linux {
     #[must_use = "the machine itself is returned"]
     pub fn budget_factor(self, wcets: u64) -> Self {
         self.change(|terms| terms.budget_factor = wcets)
+    }
+
+    /// Has the run's time skip what would pass idly: when no core has work, the next event is due
+    /// at once. So jobs follow one another as fast as they go, whatever their periods. For
+    /// measuring; it needs one cluster, or clusters that have no instant in common.
+    #[must_use = "the machine itself is returned"]
+    pub fn skipping_idle_time(self) -> Self {
+        self.change(|terms| terms.skips_idle = true)
+    }
+
+    /// Sets for how many events the journals have room at most; 0: nothing is written down.
+    #[must_use = "the machine itself is returned"]
+    pub fn most_events(self, most_events: u64) -> Self {
+        self.change(|terms| terms.most_events = most_events)
     }
 
     /// Has commits take WCETs from a file's text, as `./scripts/run --observe` writes it.

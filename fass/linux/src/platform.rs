@@ -24,6 +24,12 @@ pub(crate) struct Terms {
     pub(crate) preemption: Preemption,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
+    /// Whether idle threads watch instead of sleeping.
+    pub(crate) polls: bool,
+    /// Whether the run's time skips what would pass idly.
+    pub(crate) skips_idle: bool,
+    /// The most events that the journals have room for.
+    pub(crate) most_events: u64,
     pub(crate) overheads: Overheads,
     pub(crate) budget_factor: u64,
     pub(crate) clusters: Clusters,
@@ -217,6 +223,7 @@ fn teams(
         );
     }
     let share = JOURNAL_BYTES / bodies.len();
+    let most_events = terms.most_events / bodies.len() as u64;
     let clusters = task_set.clusters().zip(bodies).zip(parts);
     let team = |((cluster, bodies), lifecycle)| {
         let cores = task_set.cores_of(cluster, options.cores);
@@ -226,11 +233,11 @@ fn teams(
             Scheduler::of_cluster(Arc::clone(task_set), options, cluster),
             bodies,
             (requests, plan.after_fault.clone()),
-            Journal::of_cluster(task_set, cluster, share, u64::MAX),
+            Journal::of_cluster(task_set, cluster, share, most_events),
             terms.processors[cores.start as usize..cores.end as usize].into(),
             terms.levels,
         );
-        Arc::new(Team::new(state, office))
+        Arc::new(Team::new(state, office, terms))
     };
     clusters.map(team).collect()
 }

@@ -217,6 +217,20 @@ impl State {
         time_ns.saturating_sub(self.epoch_ns)
     }
 
+    /// If nothing runs, lets the next event be due now; reports whether that is to be seen to.
+    pub(crate) fn skip_to_next_event(&mut self) -> bool {
+        let cores = 0..self.active.len();
+        let is_idle = |core| {
+            self.engine.placement.current(core).is_none() && !self.engine.placement.is_wanted(core)
+        };
+        let next_ns = self.engine.scheduler.next_event_ns();
+        let Some(next_ns) = next_ns.filter(|_| cores.into_iter().all(is_idle)) else {
+            return false;
+        };
+        self.epoch_ns = self.epoch_ns.min(sys::now_ns().saturating_sub(next_ns));
+        true
+    }
+
     /// Writes down what has happened now to an instance.
     pub(crate) fn note(&mut self, what: What, core: CoreId, vertex: Vertex) {
         self.note_at(sys::now_ns(), what, core, vertex);

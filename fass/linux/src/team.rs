@@ -15,6 +15,7 @@ use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
 use crate::office::Office;
+use crate::platform::Terms;
 use crate::state::{Left, Number, Runner, State};
 use crate::sys;
 use crate::worker::Worker;
@@ -34,6 +35,8 @@ pub(crate) struct Team {
     state: Mutex<State>,
     pub(crate) workers: Box<[Worker]>,
     pub(crate) levels: Option<Levels>,
+    polls: bool,
+    skips_idle: bool,
     pub(crate) cluster: ClusterId,
     pub(crate) office: Arc<Office>,
     pub(crate) look_out: LookOut,
@@ -48,13 +51,16 @@ pub(crate) struct Team {
 }
 
 impl Team {
-    pub(crate) fn new(state: State, office: &Arc<Office>) -> Self {
+    pub(crate) fn new(state: State, office: &Arc<Office>, terms: &Terms) -> Self {
+        let workers = state.seats.iter().map(|_| Worker::new(terms.polls));
         Self {
-            workers: state.seats.iter().map(|_| Worker::default()).collect(),
+            workers: workers.collect(),
+            polls: terms.polls,
+            skips_idle: terms.skips_idle,
             levels: state.levels,
             cluster: state.engine.cluster,
             office: Arc::clone(office),
-            look_out: LookOut::new(),
+            look_out: LookOut::new(terms.polls),
             looks_at_ns: AtomicU64::new(u64::MAX),
             begun: AtomicU32::new(0),
             hand_offs: AtomicU64::new(0),
@@ -65,6 +71,14 @@ impl Team {
 
     /// Takes the scheduler's lock. A panic under it would be ours, and was reported.
     pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
+        if self.polls {
+            for _ in 0..PATIENCE {
+                match self.state.try_lock() {
+                    Ok(state) => return state,
+                    Err(_) => std::hint::spin_loop(),
+                }
+            }
+        }
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -258,7 +272,14 @@ impl Team {
 
     /// Ends a worker's step: finds what it does next, and calls others.
     fn go_on(&self, me: Number, mut state: MutexGuard<'_, State>) -> Option<Box<Runner>> {
-        let next = state.find_work(me, &self.workers);
+        let mut next = state.find_work(me, &self.workers);
+        if next.is_none() && self.skips_idle && state.skip_to_next_event() {
+            let core = state.seats[me];
+            state.step(&self.workers, |moment| {
+                core.into_iter().for_each(|core| moment.prefer(core));
+            });
+            next = core.and_then(|_| state.find_work(me, &self.workers));
+        }
         self.settle(me, &state, next.is_some());
         self.announce(&state);
         self.call(state);
@@ -304,7 +325,10 @@ impl Team {
             None => u64::MAX,
         };
         self.look_out.announce(next_ns);
-        if LookOut::is_late(self.looks_at_ns.load(Ordering::SeqCst), next_ns) {
+        if self
+            .look_out
+            .is_late(self.looks_at_ns.load(Ordering::SeqCst), next_ns)
+        {
             self.looks_at_ns.store(next_ns, Ordering::SeqCst);
             self.office.ring(self.cluster);
         }
@@ -320,6 +344,9 @@ enum Woken {
     /// All jobs have ended.
     ToEnd,
 }
+
+/// How often a thread that polls tries to take the lock before it sleeps for it.
+const PATIENCE: u32 = 2_000;
 
 /// The most workers that are called before the lock is taken once more.
 const AT_ONCE: usize = 16;

@@ -41,9 +41,23 @@ pub(crate) struct Worker {
     holds: AtomicBool,
     /// 1 if it is to look for work.
     call: AtomicU32,
+    /// Whether it watches for that instead of sleeping.
+    polls: bool,
 }
 
+/// How often a worker looks before it lets other threads have its processor, in case there are
+/// fewer processors than workers.
+const PATIENCE: u32 = 5_000;
+
 impl Worker {
+    /// Makes one that watches for calls, or sleeps until one comes.
+    pub(crate) fn new(polls: bool) -> Self {
+        Self {
+            polls,
+            ..Self::default()
+        }
+    }
+
     /// Says which thread it is. To be called by that thread, first of all.
     pub(crate) fn begin(&self) {
         let _ = self.thread.set(sys::thread());
@@ -75,12 +89,17 @@ impl Worker {
     /// Makes it look for work.
     pub(crate) fn call(&self) {
         self.call.store(1, Ordering::Release);
-        sys::wake(&self.call, 1);
+        if !self.watches() {
+            sys::wake(&self.call, 1);
+        }
     }
 
     /// Sleeps until it is called, or until an instant, for which it wakes up a little early. By
     /// itself. Reports whether it was called.
     pub(crate) fn wait_for_call(&self, until_ns: u64, lead: &mut Lead) -> bool {
+        if self.watches() {
+            return self.poll(until_ns);
+        }
         let alarm_ns = (until_ns < u64::MAX).then(|| lead.before(until_ns));
         while self.call.swap(0, Ordering::Acquire) == 0 {
             if alarm_ns.is_some_and(|alarm_ns| sys::now_ns() >= alarm_ns) {
@@ -97,6 +116,28 @@ impl Worker {
             }
         }
         true
+    }
+
+    /// Reports whether it watches while it waits: one without a core sleeps in any case.
+    fn watches(&self) -> bool {
+        self.polls && self.seat().is_some()
+    }
+
+    /// Watches for a call, and for an instant every now and then. Reports whether it was called;
+    /// it may also return for nothing, so that its caller sees what has changed else.
+    fn poll(&self, until_ns: u64) -> bool {
+        for _ in 0..PATIENCE {
+            // Reading leaves the line with all who read it.
+            if self.call.load(Ordering::Relaxed) != 0 {
+                return self.call.swap(0, Ordering::Acquire) != 0;
+            }
+            if until_ns < u64::MAX && sys::now_ns() >= until_ns {
+                return false;
+            }
+            std::hint::spin_loop();
+        }
+        std::thread::yield_now();
+        false
     }
 
     /// Watches the clock until an instant, or until it is called, and reports whether it was.

@@ -15,7 +15,7 @@ use fass::{
 use linux::{Linux, Mechanism, Run};
 use sched_dag::DagId;
 use sched_dag::journal::What;
-use support::{Alone, alone_on, breaches, ms};
+use support::{ALL, Alone, alone_on, breaches, ms};
 
 /// The divisions that all is tried in.
 const DIVISIONS: [&[u32]; 4] = [&[1, 1], &[2, 1], &[1, 2], &[2, 1, 1]];
@@ -24,7 +24,7 @@ const DIVISIONS: [&[u32]; 4] = [&[1, 1], &[2, 1], &[1, 2], &[2, 1, 1]];
 /// clusters it has. Cores may share a processor, so what runs there holds and does not compute.
 fn in_all_divisions(test: impl Fn(Alone, u32)) {
     for sizes in DIVISIONS {
-        for mechanism in [Mechanism::Fifo, Mechanism::Normal] {
+        for mechanism in ALL {
             for policy in [Policy::StaticPriority, Policy::Edf] {
                 let cores = sizes.iter().sum();
                 let share = || Linux::sharing(cores, mechanism).expect("there is a processor");

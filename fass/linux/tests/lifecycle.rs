@@ -14,11 +14,12 @@ use support::{Alone, alone_on, ms};
 
 /// On one core, on two, and on two that are divided: there what asks is in cluster 0, and all that
 /// it asks for in the other one.
-const SETTINGS: [(Mechanism, &[u32]); 4] = [
+const SETTINGS: [(Mechanism, &[u32]); 5] = [
     (Mechanism::Normal, &[1]),
     (Mechanism::Fifo, &[2]),
     (Mechanism::Normal, &[1, 1]),
     (Mechanism::Fifo, &[1, 1]),
+    (Mechanism::Poll, &[1, 1]),
 ];
 
 fn machine(mechanism: Mechanism, sizes: &[u32]) -> Alone {

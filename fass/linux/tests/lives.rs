@@ -10,13 +10,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use fass::{FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
 use sched_dag::DagId;
-use support::{alone, ms, ticking};
-
-const BOTH: [Mechanism; 2] = [Mechanism::Fifo, Mechanism::Normal];
+use support::{ALL, alone, ms, ticking};
 
 #[test]
 fn a_panic_ends_its_dag_alone() {
-    for mechanism in BOTH {
+    for mechanism in ALL {
         let alone = alone(2, mechanism);
         let faulty = create_dag();
         faulty
@@ -55,7 +53,7 @@ fn a_dag_in_a_cluster_is_refused() {
 
 #[test]
 fn a_fault_costs_a_job_and_the_dag_goes_on() {
-    for mechanism in BOTH {
+    for mechanism in ALL {
         let alone = alone(1, mechanism);
         let dag = create_dag();
         dag.name("camera").jobs(100).relative_deadline(ms(2));
@@ -83,7 +81,7 @@ fn a_fault_costs_a_job_and_the_dag_goes_on() {
 
 #[test]
 fn an_endless_function_loses_its_core_after_its_budget() {
-    for mechanism in BOTH {
+    for mechanism in ALL {
         let alone = alone(1, mechanism);
         let may_end = Arc::new(AtomicBool::new(false));
         let endless = create_dag();

@@ -34,7 +34,7 @@ static ALLOCATOR: Counting = Counting;
 fn jobs_allocate_nothing_preempted_or_not() {
     const JOBS: u64 = 40;
     let ms = Duration::from_millis;
-    for mechanism in [Mechanism::Fifo, Mechanism::Normal] {
+    for mechanism in [Mechanism::Fifo, Mechanism::Normal, Mechanism::Poll] {
         let machine = Linux::new(1, mechanism).unwrap();
         machine.limit_real_time(Duration::from_secs(5)).unwrap();
         let seen = Arc::new([AtomicU64::new(0), AtomicU64::new(0)]);

@@ -14,7 +14,7 @@ use fass::{
 };
 use linux::{Linux, Mechanism, Run};
 use sched_dag::DagId;
-use support::{alone, alone_on, breaches, ms, spin, ticking};
+use support::{ALL, alone, alone_on, breaches, ms, spin, ticking};
 
 /// One source, two branches of `us` each, and a sink that checks what it joins.
 fn fork_join(jobs: u64, us: u64) -> (Dag, Arc<AtomicU64>) {
@@ -51,7 +51,7 @@ fn assert_lawful(run: &Run) {
 
 #[test]
 fn r2_every_job_is_joined_under_both_mechanisms_and_policies() {
-    for mechanism in [Mechanism::Fifo, Mechanism::Normal] {
+    for mechanism in ALL {
         for policy in [Policy::StaticPriority, Policy::Edf] {
             let alone = alone(2, mechanism).with(|machine| machine.policy(policy));
             let (dag, joined) = fork_join(30, 300);
@@ -118,7 +118,7 @@ fn r5_without_preemption_a_function_keeps_its_core() {
 fn a_chain_on_one_core_wakes_nobody() {
     const LENGTH: u64 = 12;
     const JOBS: u64 = 40;
-    for mechanism in [Mechanism::Fifo, Mechanism::Normal] {
+    for mechanism in ALL {
         let alone = alone(1, mechanism);
         let dag = create_dag();
         dag.name("chain")

@@ -9,6 +9,9 @@ use fass::{Dag, Occupation, Preemption, SubtaskAttributes, create_dag, execute_f
 use linux::{Linux, Mechanism, Run};
 use sched_dag::law::Violation;
 
+/// The mechanisms that every computer has.
+pub(crate) const ALL: [Mechanism; 3] = [Mechanism::Fifo, Mechanism::Normal, Mechanism::Poll];
+
 /// A machine, and the right to be the only one.
 pub(crate) struct Alone {
     pub(crate) machine: Linux,
