@@ -263,7 +263,6 @@ fn every_reason_of_a_platform_is_listed() {
         "kernel/executive/src/run/execution/mod.rs",
         "kernel/executive/src/run/execution/stacks.rs",
         "fass/virtual-time/src/platform.rs",
-        "fass/native/src/platform.rs",
         "fass/linux/src/platform.rs",
         "sched-dag/src/lifecycle/letters.rs",
     ]);

@@ -158,12 +158,12 @@ impl Team {
         budgets: &mut Budgets,
         rests: &mut bool,
     ) -> Option<u64> {
-        if sys::now_ns() < state.epoch_ns {
+        if sys::now_ns() < state.time.epoch_ns {
             // What is asked for before time 0 is done then. The workers look out from now on.
-            self.look_out.announce(state.epoch_ns);
+            self.look_out.announce(state.time.epoch_ns);
             let active = state.active.iter();
             active.for_each(|worker| self.workers[*worker].call());
-            return Some(state.epoch_ns);
+            return Some(state.time.epoch_ns);
         }
         state.step(&self.workers, |_| ());
         let look_ns = loop {

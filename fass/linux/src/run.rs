@@ -10,7 +10,7 @@ use sched_dag::engine::{self, Proven};
 
 use crate::office::Office;
 use crate::release::Budgets;
-use crate::state::{Fault, Number};
+use crate::state::{Fault, Number, RunTime};
 use crate::sys;
 use crate::team::Team;
 
@@ -82,7 +82,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let allocations = (launched.allocations)();
     let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
     for team in teams {
-        team.lock().epoch_ns = epoch_ns;
+        team.lock().time = RunTime::beginning(epoch_ns);
     }
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();

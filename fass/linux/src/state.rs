@@ -81,16 +81,47 @@ pub(crate) struct State {
     called: Vec<CoreId>,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
-    /// Time 0 of the run on the clock; `u64::MAX` until the run has begun.
-    pub(crate) epoch_ns: u64,
+    pub(crate) time: RunTime,
     pub(crate) preemptions: u64,
+}
+
+/// The time of a cluster's run, as it follows from the clock.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RunTime {
+    /// Time 0 on the clock; `u64::MAX` until the run has begun.
+    pub(crate) epoch_ns: u64,
+    /// What was skipped since, because nothing ran.
+    skipped_ns: u64,
+}
+
+impl RunTime {
+    const NOT_BEGUN: Self = Self::beginning(u64::MAX);
+
+    /// Makes that of a run that begins then.
+    pub(crate) const fn beginning(epoch_ns: u64) -> Self {
+        let skipped_ns = 0;
+        Self {
+            epoch_ns,
+            skipped_ns,
+        }
+    }
+
+    /// Converts a time on the clock; one before time 0 becomes that.
+    const fn of_run(self, clock_ns: u64) -> u64 {
+        clock_ns.saturating_sub(self.epoch_ns) + self.skipped_ns
+    }
+
+    /// Converts a time of the run.
+    pub(crate) const fn on_clock(self, time_ns: u64) -> u64 {
+        (time_ns.saturating_sub(self.skipped_ns)).saturating_add(self.epoch_ns)
+    }
 }
 
 /// Linux below a cluster's engine: its clock, its threads, and the office.
 pub(crate) struct ThreadPort<'s> {
     office: &'s Office,
     cluster: ClusterId,
-    epoch_ns: u64,
+    time: RunTime,
     active: &'s [Number],
     workers: &'s [Worker],
     opened: &'s mut u64,
@@ -98,11 +129,11 @@ pub(crate) struct ThreadPort<'s> {
 
 impl Port<Box<Runner>> for ThreadPort<'_> {
     fn now_ns(&self) -> u64 {
-        sys::now_ns().saturating_sub(self.epoch_ns)
+        self.time.of_run(sys::now_ns())
     }
 
     fn on_clock(&self, time_ns: u64) -> u64 {
-        time_ns.saturating_add(self.epoch_ns)
+        self.time.on_clock(time_ns)
     }
 
     #[inline]
@@ -207,14 +238,14 @@ impl State {
             called: Vec::with_capacity(2 * cores),
             processors,
             levels,
-            epoch_ns: u64::MAX,
+            time: RunTime::NOT_BEGUN,
             preemptions: 0,
         }
     }
 
     /// Returns a time of the clock on the run's time.
     pub(crate) const fn since_epoch(&self, time_ns: u64) -> u64 {
-        time_ns.saturating_sub(self.epoch_ns)
+        self.time.of_run(time_ns)
     }
 
     /// If nothing runs, lets the next event be due now; reports whether that is to be seen to.
@@ -224,10 +255,12 @@ impl State {
             self.engine.placement.current(core).is_none() && !self.engine.placement.is_wanted(core)
         };
         let next_ns = self.engine.scheduler.next_event_ns();
-        let Some(next_ns) = next_ns.filter(|_| cores.into_iter().all(is_idle)) else {
+        let has_begun = sys::now_ns() >= self.time.epoch_ns;
+        let Some(next_ns) = next_ns.filter(|_| has_begun && cores.into_iter().all(is_idle)) else {
             return false;
         };
-        self.epoch_ns = self.epoch_ns.min(sys::now_ns().saturating_sub(next_ns));
+        let now_ns = self.time.of_run(sys::now_ns());
+        self.time.skipped_ns += next_ns.saturating_sub(now_ns);
         true
     }
 
@@ -251,7 +284,7 @@ impl State {
         let port = ThreadPort {
             office: &self.office,
             cluster: self.engine.cluster,
-            epoch_ns: self.epoch_ns,
+            time: self.time,
             active: &self.active,
             workers,
             opened: &mut self.opened,

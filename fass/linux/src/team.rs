@@ -320,7 +320,7 @@ impl Team {
     #[inline]
     pub(crate) fn announce(&self, state: &State) {
         let next_ns = match state.engine.scheduler.next_event_ns() {
-            Some(next_ns) => next_ns.saturating_add(state.epoch_ns),
+            Some(next_ns) => state.time.on_clock(next_ns),
             None if state.engine.scheduler.is_finished() => 0,
             None => u64::MAX,
         };

@@ -63,7 +63,7 @@ impl Stage {
         for core in 0..cores {
             state.pin(core as usize, CoreId(core), &team.workers);
         }
-        state.epoch_ns = sys::now_ns();
+        state.time = crate::state::RunTime::beginning(sys::now_ns());
         drop(state);
         Self { team, cores }
     }

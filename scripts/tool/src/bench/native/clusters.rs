@@ -6,11 +6,10 @@
 
 use std::time::Instant;
 
-use native::{Closure, Pinning, Setting};
-use sched_dag::{Policy, TaskSet};
+use sched_dag::Policy;
 
 use super::figure::Figure;
-use super::workload::{Graph, Rounds, closures, divided, task_set};
+use super::workload::{Graph, Rounds, commit, empty, machine};
 
 /// The graphs that are measured.
 const GRAPHS: [Graph; 2] = [Graph::Chain, Graph::Layered];
@@ -27,7 +26,6 @@ const WINDOW: usize = 4;
 /// What two clusters do, compared with one core.
 pub(super) struct Together {
     pub(super) figures: Vec<Figure>,
-    pub(super) pinned: bool,
     /// For each graph, how many times the instances.
     times: Vec<(Graph, f64)>,
 }
@@ -48,8 +46,7 @@ impl Together {
         let line = |(graph, times): &(Graph, f64)| {
             format!(
                 "{{\"kind\":\"bench\",\"name\":\"native-clusters\",\"workload\":\"{graph}\",\
-                 \"clusters\":2,\"pinned\":{},\"times\":{times:.3}}}\n",
-                self.pinned
+                 \"clusters\":2,\"times\":{times:.3}}}\n"
             )
         };
         self.times.iter().map(line).collect()
@@ -60,7 +57,6 @@ impl Together {
 pub(super) fn measure(windows: usize) -> Result<Together, String> {
     let mut together = Together {
         figures: Vec::new(),
-        pinned: true,
         times: Vec::new(),
     };
     for graph in GRAPHS {
@@ -69,29 +65,18 @@ pub(super) fn measure(windows: usize) -> Result<Together, String> {
         let a_round = jobs_a_round as f64 * graph.instances() as f64;
         let rounds = windows.div_ceil(PASSES) + 2 * WINDOW;
         let jobs = jobs_a_round * rounds as u64 + 1;
-        let policy = Policy::StaticPriority;
-        let mut run = |task_set: TaskSet, workers: u32| {
+        let run = |workers: u32| {
             let marks: Vec<Rounds> = (0..workers).map(|_| Rounds::default()).collect();
-            let bodies: Vec<Vec<Closure>> = marks
-                .iter()
-                .flat_map(|marks| closures(graph, marks, jobs_a_round))
-                .collect();
-            let report = native::run(task_set, bodies, Setting { policy, workers });
-            together.pinned &= report.pinning == Pinning::Pinned;
-            if report
-                .statistics
-                .iter()
-                .any(|of_dag| of_dag.completed != jobs)
-            {
-                return Err(format!("{graph}: not all of {jobs} jobs are complete"));
-            }
-            Ok(marks.iter().map(Rounds::times).collect::<Vec<_>>())
+            let machine = machine(Policy::StaticPriority, workers)?.divided();
+            let functions = marks.iter().map(|marks| empty(graph, marks, jobs_a_round));
+            commit(graph, jobs, functions.collect());
+            let ran = machine.run(jobs);
+            ran.map_err(|why| format!("{graph}: {why}"))?;
+            Ok::<_, String>(marks.iter().map(Rounds::times).collect::<Vec<_>>())
         };
         for _ in 0..PASSES {
-            let times = run(task_set(graph, jobs, policy, 1), 1)?;
-            alone.extend(per_instance(&times, a_round));
-            let times = run(divided(graph, jobs, policy), 2)?;
-            both.extend(per_instance(&times, a_round));
+            alone.extend(per_instance(&run(1)?, a_round));
+            both.extend(per_instance(&run(2)?, a_round));
         }
         if alone.is_empty() || both.is_empty() {
             return Err(format!(
@@ -174,7 +159,7 @@ mod tests {
 
     #[test]
     fn a_short_run_has_a_figure_for_each_graph() {
-        if native::processors().len() < 2 {
+        if linux::processors() < 2 {
             return;
         }
         let Ok(together) = measure(600) else {

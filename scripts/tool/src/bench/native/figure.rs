@@ -76,10 +76,10 @@ impl Figure {
     }
 
     /// Returns the machine line.
-    pub(super) fn json(&self, pinned: bool) -> String {
+    pub(super) fn json(&self) -> String {
         format!(
             "{{\"kind\":\"bench\",\"name\":\"native\",\"workload\":\"{}\",\"what\":\"{}\",\
-             \"runner\":\"{}\",\"workers\":{},\"pinned\":{pinned},\"samples\":{},\
+             \"runner\":\"{}\",\"workers\":{},\"samples\":{},\
              \"min_ns\":{:.2},\"median_ns\":{:.2},\"p99_ns\":{:.2}}}",
             self.workload,
             self.what,

@@ -13,11 +13,10 @@ use std::sync::atomic::{
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use native::{Closure, Setting, worker};
 use sched_dag::Policy;
 
 use super::figure::Figure;
-use super::workload::{Graph, task_set};
+use super::workload::{Graph, Tick, commit, machine};
 
 /// How long a branch computes.
 const WORK: Duration = Duration::from_micros(2);
@@ -43,7 +42,7 @@ impl Stamps {
     fn put(&self, job: u64, time_ns: u64) {
         let place = usize::try_from(job).unwrap_or(usize::MAX);
         self.times[place].store(time_ns, Relaxed);
-        self.workers[place].store(worker().map_or(0, u64::from), Relaxed);
+        self.workers[place].store(linux::own_core().map_or(0, u64::from), Relaxed);
     }
 
     fn get(&self, job: usize) -> (f64, u64) {
@@ -69,21 +68,13 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
         other_end,
         sink_start,
     ] = [(); 6].map(|()| Stamps::new(count));
-    let bodies: Vec<Closure> = vec![
+    let functions: Vec<Tick> = vec![
         end(epoch, &source_end),
         branch(epoch, &one_start, &one_end),
         branch(epoch, &other_start, &other_end),
         end(epoch, &sink_start),
     ];
-    let setting = Setting {
-        policy: Policy::StaticPriority,
-        workers: 2,
-    };
-    let task_set = task_set(Graph::ForkJoin(2), jobs, setting.policy, setting.workers);
-    let report = native::run(task_set, vec![bodies], setting);
-    if report.statistics[0].completed != jobs {
-        return Err(format!("{WORKLOAD}: not all {jobs} jobs are complete"));
-    }
+    run(jobs, functions)?;
     let reading = clock[clock.len() / 2];
     let (mut joins, mut starts) = (Vec::new(), Vec::new());
     for job in count / 10..count {
@@ -113,16 +104,24 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
     ])
 }
 
+/// Runs a fork-join of two branches on two cores.
+fn run(jobs: u64, functions: Vec<Tick>) -> Result<(), String> {
+    let machine = machine(Policy::StaticPriority, 2)?;
+    commit(Graph::ForkJoin(2), jobs, vec![vec![functions]]);
+    let ran = machine.run(jobs);
+    ran.map_err(|why| format!("{WORKLOAD}: {why}"))
+}
+
 fn now_ns(epoch: Instant) -> u64 {
     u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX)
 }
 
-fn end(epoch: Instant, stamps: &Arc<Stamps>) -> Closure {
+fn end(epoch: Instant, stamps: &Arc<Stamps>) -> Tick {
     let stamps = Arc::clone(stamps);
     Box::new(move |job| stamps.put(job, now_ns(epoch)))
 }
 
-fn branch(epoch: Instant, start: &Arc<Stamps>, end: &Arc<Stamps>) -> Closure {
+fn branch(epoch: Instant, start: &Arc<Stamps>, end: &Arc<Stamps>) -> Tick {
     let (start, end) = (Arc::clone(start), Arc::clone(end));
     let work_ns = u64::try_from(WORK.as_nanos()).unwrap_or(u64::MAX);
     Box::new(move |job| {
@@ -148,7 +147,7 @@ fn transfer() -> Result<Vec<f64>, String> {
     const ROUNDS: u64 = 200;
     let lines = Arc::new([Line(AtomicU64::new(0)), Line(AtomicU64::new(0))]);
     let samples = Arc::new(Mutex::new(Vec::new()));
-    let side = |own: usize| -> Closure {
+    let side = |own: usize| -> Tick {
         let (lines, samples) = (Arc::clone(&lines), Arc::clone(&samples));
         Box::new(move |_| {
             let (own_line, other_line) = (&lines[own].0, &lines[1 - own].0);
@@ -174,14 +173,8 @@ fn transfer() -> Result<Vec<f64>, String> {
             }
         })
     };
-    let nothing = || -> Closure { Box::new(|_| ()) };
-    let bodies = vec![vec![nothing(), side(0), side(1), nothing()]];
-    let setting = Setting {
-        policy: Policy::StaticPriority,
-        workers: 2,
-    };
-    let task_set = task_set(Graph::ForkJoin(2), 1, setting.policy, setting.workers);
-    native::run(task_set, bodies, setting);
+    let nothing = || -> Tick { Box::new(|_| ()) };
+    run(1, vec![nothing(), side(0), side(1), nothing()])?;
     let samples = samples.lock().unwrap_or_else(PoisonError::into_inner);
     if samples.is_empty() {
         return Err(format!("{WORKLOAD}: no cache line was exchanged"));

@@ -1,6 +1,6 @@
 //! What the scheduler costs on the host's own processors.
 //!
-//! The same scheduler that the kernel runs, driven by threads (crate `native`), on the
+//! The same engine that the kernel has, on threads of Linux that poll, with the
 //! graphs of `bench hand-off` with empty bodies. Nothing here is emulated, so the
 //! figures can be compared with those of libraries that run task graphs on threads.
 //!
@@ -64,8 +64,8 @@ static TABLE: Command = Command {
     ],
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under
-the scheduler, without values; `typed` are functions of fass with a u64 on each edge (of
-layered-1000 and dags-1000: without values, but by fass). `static` and `edf` are the policies.
+the scheduler, without values; `typed` are functions with a u64 on each edge (not of
+layered-1000 and dags-1000). `static` and `edf` are the policies.
 `clusters` runs a graph in each of two clusters of one core, next to one on one core alone.
 
 Prints a table and a JSON object for each figure. Times depend on the host and on what
@@ -122,8 +122,8 @@ impl Plan {
         }
         let workers = options.text("workers").unwrap_or_default().split(',');
         let workers: Vec<u32> = workers.filter_map(|number| number.parse().ok()).collect();
-        let most = native::processors().len();
-        if let Some(count) = workers.iter().find(|count| **count as usize > most) {
+        let most = linux::processors();
+        if let Some(count) = workers.iter().find(|count| **count > most) {
             return Err(format!(
                 "`--workers {count}`: this host has {most} processors for us; ask for at most those"
             ));
@@ -145,8 +145,7 @@ impl Plan {
 
 fn measure(plan: &Plan) -> ExitCode {
     let mut figures = Vec::new();
-    let mut pinned = true;
-    let total = plan.graphs.len() as u64 * throughput::passes(&plan.workers);
+    let total = throughput::passes(&plan.graphs, &plan.workers);
     let mut progress = Progress::new(total, "passes");
     let mut over = 0;
     for &graph in &plan.graphs {
@@ -154,10 +153,7 @@ fn measure(plan: &Plan) -> ExitCode {
             over += 1;
             progress.show(over);
         }) {
-            Ok((of_graph, all_pinned)) => {
-                figures.extend(of_graph);
-                pinned &= all_pinned;
-            }
+            Ok(of_graph) => figures.extend(of_graph),
             Err(line) => return TABLE.fail(&line),
         }
     }
@@ -173,7 +169,6 @@ fn measure(plan: &Plan) -> ExitCode {
         match clusters::measure(plan.rounds) {
             Ok(mut of_clusters) => {
                 figures.append(&mut of_clusters.figures);
-                pinned &= of_clusters.pinned;
                 together = Some(of_clusters);
             }
             Err(line) => return TABLE.fail(&line),
@@ -183,11 +178,8 @@ fn measure(plan: &Plan) -> ExitCode {
     if let Some(together) = &together {
         print!("{}", together.lines());
     }
-    if !pinned {
-        println!("workers were not pinned, as `taskset` (util-linux) is missing or refused");
-    }
     for figure in &figures {
-        println!("{}", figure.json(pinned));
+        println!("{}", figure.json());
     }
     if let Some(together) = &together {
         print!("{}", together.json());
@@ -218,7 +210,7 @@ mod tests {
 
     #[test]
     fn more_workers_than_processors_are_refused() {
-        let most = native::processors().len();
+        let most = linux::processors();
         if most < 64 {
             let line = plan("--workers 64").err().expect("refused");
             assert!(line.contains(&format!("{most} processors")), "{line}");
@@ -228,8 +220,12 @@ mod tests {
     #[test]
     fn a_short_run_measures_every_graph() {
         for graph in Graph::ALL {
-            let (figures, _) = throughput::measure(graph, &[1], 3, || {}).expect("it runs");
-            assert_eq!(figures.len(), 4, "{graph}");
+            let figures = throughput::measure(graph, &[1], 3, || {}).expect("it runs");
+            assert_eq!(
+                figures.len(),
+                3 + usize::from(graph.has_values()),
+                "{graph}"
+            );
         }
     }
 }

@@ -2,11 +2,10 @@
 
 use std::time::Duration;
 
-use native::{Native, Pinning, Report, Setting};
 use sched_dag::Policy;
 
 use super::figure::Figure;
-use super::workload::{Graph, Rounds, closures, commit_typed, task_set};
+use super::workload::{Graph, Rounds, commit, commit_typed, empty, machine};
 
 /// How often each runner gets its turn, so that a change of the host's speed meets all.
 const PASSES: usize = 3;
@@ -19,10 +18,10 @@ const INSTANCES_A_ROUND: usize = 20_000;
 enum Runner {
     /// A loop over the functions.
     Floor,
-    /// The scheduler, with functions.
+    /// The scheduler, with functions of no values.
     Closures(Policy),
-    /// The scheduler, with the bodies of `fass`.
-    Typed(Policy),
+    /// The scheduler, with a value on each edge, by static priority.
+    Typed,
 }
 
 impl Runner {
@@ -31,33 +30,30 @@ impl Runner {
             Self::Floor => "floor",
             Self::Closures(Policy::StaticPriority) => "closures, static",
             Self::Closures(Policy::Edf) => "closures, edf",
-            Self::Typed(Policy::StaticPriority) => "typed, static",
-            Self::Typed(Policy::Edf) => "typed, edf",
+            Self::Typed => "typed, static",
         }
     }
 }
 
 /// Returns how many passes [`measure`] makes.
-pub(super) fn passes(workers: &[u32]) -> u64 {
-    (PASSES * runners(workers).len()) as u64
+pub(super) fn passes(graphs: &[Graph], workers: &[u32]) -> u64 {
+    let of_graph = |graph: &Graph| (PASSES * runners(*graph, workers).len()) as u64;
+    graphs.iter().map(of_graph).sum()
 }
 
-/// Measures all runners, calling `show` after each pass; reports also whether all workers
-/// were pinned.
+/// Measures all runners, calling `show` after each pass.
 pub(super) fn measure(
     graph: Graph,
     workers: &[u32],
     rounds: usize,
     mut show: impl FnMut(),
-) -> Result<(Vec<Figure>, bool), String> {
-    let runners = runners(workers);
-    let mut all_pinned = true;
+) -> Result<Vec<Figure>, String> {
+    let runners = runners(graph, workers);
     let mut samples = vec![Vec::new(); runners.len()];
     for _ in 0..PASSES {
         for (samples, &(runner, workers)) in samples.iter_mut().zip(&runners) {
-            let (durations, pinned) = pass(graph, runner, workers, rounds.div_ceil(PASSES))?;
-            samples.extend(durations);
-            all_pinned &= pinned;
+            let durations = pass(graph, runner, workers, rounds.div_ceil(PASSES));
+            samples.extend(durations.map_err(|why| format!("{graph}, {}: {why}", runner.name()))?);
             show();
         }
     }
@@ -71,17 +67,17 @@ pub(super) fn measure(
             let samples = samples.into_iter().map(per_step).collect();
             Figure::new(graph, step, runner.name(), workers, samples)
         });
-    Ok((figures.collect(), all_pinned))
+    Ok(figures.collect())
 }
 
-fn runners(workers: &[u32]) -> Vec<(Runner, u32)> {
+fn runners(graph: Graph, workers: &[u32]) -> Vec<(Runner, u32)> {
     let mut runners = vec![(Runner::Floor, 1)];
     for &workers in workers {
         runners.extend([
             (Runner::Closures(Policy::StaticPriority), workers),
             (Runner::Closures(Policy::Edf), workers),
-            (Runner::Typed(Policy::StaticPriority), workers),
         ]);
+        runners.extend(graph.has_values().then_some((Runner::Typed, workers)));
     }
     runners
 }
@@ -101,37 +97,27 @@ fn pass(
     runner: Runner,
     workers: u32,
     rounds: usize,
-) -> Result<(Vec<Duration>, bool), String> {
+) -> Result<Vec<Duration>, String> {
     let jobs_a_round = jobs_a_round(graph);
     let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
     let times = Rounds::default();
-    let report: Report = match runner {
+    let mut functions = empty(graph, &times, jobs_a_round);
+    match runner {
         Runner::Floor => {
-            let mut bodies = closures(graph, &times, jobs_a_round);
             for job in 0..jobs {
-                for body in bodies.iter_mut().flatten() {
-                    body(job);
-                }
+                functions.iter_mut().flatten().for_each(|tick| tick(job));
             }
-            return Ok((times.durations(), true));
         }
         Runner::Closures(policy) => {
-            let bodies = closures(graph, &times, jobs_a_round);
-            let task_set = task_set(graph, jobs, policy, workers);
-            native::run(task_set, bodies, Setting { policy, workers })
+            let machine = machine(policy, workers)?;
+            commit(graph, jobs, vec![functions]);
+            machine.run(jobs)?;
         }
-        Runner::Typed(policy) => {
-            let machine = Native::new().workers(workers).policy(policy);
+        Runner::Typed => {
+            let machine = machine(Policy::StaticPriority, workers)?;
             commit_typed(graph, jobs, &times, jobs_a_round);
-            machine.run()
+            machine.run(jobs)?;
         }
-    };
-    let completed = report.statistics[0].completed;
-    if completed != jobs {
-        let name = runner.name();
-        return Err(format!(
-            "{graph}, {name}: {completed} of {jobs} jobs are complete"
-        ));
     }
-    Ok((times.durations(), report.pinning == Pinning::Pinned))
+    Ok(times.durations())
 }

@@ -3,16 +3,16 @@
 //! Only the source does something: once a round it reads the clock.
 
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
-use hand_off::Shape;
-use native::Closure;
-use sched_dag::{
-    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, Policy, SubtaskSpec, TaskSet,
-    verify,
+use fass::{
+    ConstructionPolicy, Dag, Policy, SubtaskAttributes, create_dag, finish_create_dags,
+    finish_create_dags_with,
 };
+use hand_off::Shape;
+use linux::{Linux, Mechanism};
+use sched_dag::DagId;
 
 /// A graph that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +74,11 @@ impl Graph {
         self.dags() * self.shape().subtasks()
     }
 
+    /// Reports whether there is a form of it with a value on each edge.
+    pub(super) const fn has_values(self) -> bool {
+        matches!(self, Self::Chain | Self::ForkJoin(_))
+    }
+
     /// Returns what a step is called, and how many steps a job of each DAG has.
     pub(super) fn steps(self) -> (&'static str, f64) {
         match self {
@@ -121,53 +126,56 @@ impl Rounds {
 /// A period that no job needs, with which the releases are back to back.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Makes empty functions, DAG by DAG; the first source counts rounds.
-pub(super) fn closures(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Closure>> {
-    let empty = || -> Closure { Box::new(|_| ()) };
-    let of_dag = || (0..graph.shape().subtasks()).map(|_| empty()).collect();
-    let mut bodies: Vec<Vec<Closure>> = (0..graph.dags()).map(|_| of_dag()).collect();
-    let mut source = rounds.source(jobs_a_round);
-    bodies[0][0] = Box::new(move |_| source());
-    bodies
+/// So many cores of this host by threads that poll, and the right to be the program's only ones.
+pub(super) struct Machine {
+    pub(super) linux: Linux,
+    _right: MutexGuard<'static, ()>,
 }
 
-/// Verifies the graph, each DAG with `jobs` jobs.
-pub(super) fn task_set(graph: Graph, jobs: u64, policy: Policy, workers: u32) -> TaskSet {
-    let specs: Vec<DagSpec> = (0..graph.dags())
-        .map(|dag| spec(graph, dag, jobs))
-        .collect();
-    verified(&specs, CommitOptions::new(policy, workers))
+/// Takes them; jobs follow one another as fast as they go, and nothing is written down.
+pub(super) fn machine(policy: Policy, workers: u32) -> Result<Machine, String> {
+    static RIGHT: Mutex<()> = Mutex::new(());
+    let right = RIGHT.lock().unwrap_or_else(PoisonError::into_inner);
+    let linux = Linux::new(workers, Mechanism::Poll).map_err(|why| why.to_string())?;
+    Ok(Machine {
+        linux: linux.policy(policy).skipping_idle_time().most_events(0),
+        _right: right,
+    })
 }
 
-/// Verifies a graph of one DAG twice, each in a cluster of one core.
-pub(super) fn divided(graph: Graph, jobs: u64, policy: Policy) -> TaskSet {
-    let specs = [0, 1].map(|cluster| DagSpec {
-        cluster: Some(ClusterId(cluster)),
-        ..spec(graph, 0, jobs)
-    });
-    let options = CommitOptions::new(policy, 2).with_clusters(Clusters::Of(vec![1, 1]));
-    verified(&specs, options)
-}
+impl Machine {
+    /// Divides the cores into clusters of one each, if there are several.
+    pub(super) fn divided(self) -> Self {
+        let sizes = vec![1; self.linux.cores() as usize];
+        let linux = match sizes.len() {
+            1 => self.linux,
+            _ => self.linux.clusters(&sizes),
+        };
+        Self { linux, ..self }
+    }
 
-fn spec(graph: Graph, dag: usize, jobs: u64) -> DagSpec {
-    let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).ok();
-    DagSpec {
-        name: format!("native{dag}"),
-        period_ns: nanoseconds(PERIOD),
-        relative_deadline_ns: nanoseconds(deadline(graph, dag)),
-        jobs: Some(jobs),
-        in_flight: Some(1),
-        subtasks: vec![SubtaskSpec::default(); graph.shape().subtasks()],
-        edges: graph.shape().edges(),
-        ..DagSpec::default()
+    /// Runs what is committed, and reports whether each DAG has completed so many jobs.
+    pub(super) fn run(&self, jobs: u64) -> Result<(), String> {
+        let run = self.linux.run().map_err(|why| why.to_string())?;
+        let dags = (0..).map(DagId).take(run.task_set().dags().len());
+        let completed = dags.map(|dag| run.statistics(dag).completed).min();
+        match completed.unwrap_or(0) {
+            least if least == jobs => Ok(()),
+            least => Err(format!("{least} of {jobs} jobs are complete")),
+        }
     }
 }
 
-fn verified(specs: &[DagSpec], options: CommitOptions) -> TaskSet {
-    let options = options.with_construction(ConstructionPolicy::any_graph());
-    verify(specs, &options)
-        .expect("the graphs are right")
-        .task_set
+/// A function of no values.
+pub(super) type Tick = Box<dyn FnMut(u64) + Send>;
+
+/// Makes empty functions of a graph's DAGs, subtask by subtask; the first source counts rounds.
+pub(super) fn empty(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Tick>> {
+    let of_dag = || (0..graph.shape().subtasks()).map(|_| Box::new(|_| ()) as Tick);
+    let mut all: Vec<Vec<Tick>> = (0..graph.dags()).map(|_| of_dag().collect()).collect();
+    let mut source = rounds.source(jobs_a_round);
+    all[0][0] = Box::new(move |_| source());
+    all
 }
 
 /// Returns the relative deadline of a DAG: the period, or as many microseconds less as DAGs
@@ -178,43 +186,42 @@ fn deadline(graph: Graph, dag: usize) -> Duration {
     PERIOD - Duration::from_micros(before as u64)
 }
 
-/// Commits the graph by `fass` to the thread's machine, as an app would write it.
-pub(super) fn commit_typed(graph: Graph, jobs: u64, rounds: &Rounds, jobs_a_round: u64) {
-    let tick = rounds.source(jobs_a_round);
-    let dags = match graph {
-        Graph::Layered | Graph::Dags(_) => untyped(graph, jobs, tick),
-        _ => vec![typed(graph, jobs, tick)],
-    };
-    finish_create_dags(&dags).expect("the graphs are right");
-}
-
 fn named(number: usize) -> SubtaskAttributes {
     SubtaskAttributes::named(&format!("s{number}"))
 }
 
-/// Makes DAGs without values.
-fn untyped(graph: Graph, jobs: u64, tick: impl FnMut() + Send + 'static) -> Vec<Dag> {
-    let mut tick = Some(tick);
-    let mut register = |dag: &Dag, number| match tick.take() {
-        Some(mut tick) => dag.register_untyped_subtask(move |_| tick(), named(number)),
-        None => dag.register_untyped_subtask(|_| (), named(number)),
-    };
-    let dag = |number| {
-        let dag = create_dag();
-        dag.name(&format!("untyped{number}"))
-            .jobs(jobs)
-            .in_flight(1);
-        dag.period(PERIOD);
-        dag.relative_deadline(deadline(graph, number));
-        let shape = graph.shape();
-        let subtasks = 0..shape.subtasks();
-        let subtasks: Vec<_> = subtasks.map(|number| register(&dag, number)).collect();
-        for (earlier, later) in shape.edges() {
-            dag.precede(&subtasks[earlier], &subtasks[later]);
+/// Commits DAGs without values, of a shape that is any graph; each of the clusters has such ones.
+pub(super) fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
+    let is_divided = clusters.len() > 1;
+    let mut dags = Vec::new();
+    for (cluster, of_dags) in (0..).zip(clusters) {
+        for (number, functions) in of_dags.into_iter().enumerate() {
+            let dag = create_dag();
+            dag.name(&format!("native{cluster}-{number}"));
+            dag.jobs(jobs).in_flight(1).period(PERIOD);
+            dag.relative_deadline(deadline(graph, number));
+            if is_divided {
+                dag.cluster(cluster);
+            }
+            let functions = functions.into_iter().enumerate();
+            let subtasks: Vec<_> = functions
+                .map(|(number, mut tick)| {
+                    dag.register_untyped_subtask(move |job| tick(job), named(number))
+                })
+                .collect();
+            for (earlier, later) in graph.shape().edges() {
+                dag.precede(&subtasks[earlier], &subtasks[later]);
+            }
+            dags.push(dag);
         }
-        dag
-    };
-    (0..graph.dags()).map(dag).collect()
+    }
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the graphs are right");
+}
+
+/// Commits a graph of one DAG with a value on each edge.
+pub(super) fn commit_typed(graph: Graph, jobs: u64, rounds: &Rounds, jobs_a_round: u64) {
+    let dag = typed(graph, jobs, rounds.source(jobs_a_round));
+    finish_create_dags(&[dag]).expect("the graphs are right");
 }
 
 /// Makes one DAG with a value on each edge.
