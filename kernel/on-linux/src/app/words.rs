@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | `cores=N` | how many of the processors that the program may use are its cores | all of them |
 //! | `share=off\|on` | whether several cores share a processor where there are more cores | `off` |
-//! | `mechanism=fifo\|sched_ext\|normal` | by which class of Linux's threads run | `fifo` |
+//! | `mechanism=fifo\|sched_ext\|normal\|poll` | by which class of Linux's threads run | `fifo` |
 //! | `module=FILE` | a file for the app | |
 //! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
 //! | `input=-` | what comes on standard input arrives on the app's wire | |
@@ -68,6 +68,7 @@ pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending
         ("fifo", Mechanism::Fifo),
         ("sched_ext", Mechanism::SchedExt),
         ("normal", Mechanism::Normal),
+        ("poll", Mechanism::Poll),
     ];
     let mechanism = options.choice("mechanism", &mechanisms)?;
     let cores = options.number("cores", 1..=1024, u64::from(linux::processors()))?;
