@@ -26,7 +26,10 @@ fn random_sets_keep_the_rules() {
     for seed in first..first + sets {
         let mut random = Random(seed);
         let (policy, cores) = terms(&mut random);
-        let mechanism = [Mechanism::Fifo, Mechanism::Poll][seed as usize % 2];
+        let mechanism = match seed % 2 {
+            0 => Mechanism::Fifo,
+            _ => Mechanism::Poll,
+        };
         let alone = alone(cores, mechanism).with(|machine| machine.policy(policy));
         let run = run(&alone.machine, &mut random);
         let found = breaches(&run);

@@ -47,6 +47,8 @@ pub struct Run {
 }
 
 /// The response times that a commit has proven.
+///
+/// See [`Run`].
 #[derive(Clone, Debug, Default)]
 pub struct Proven {
     /// By DAG.
@@ -56,6 +58,8 @@ pub struct Proven {
 }
 
 /// The numbers of a run that its platform knows.
+///
+/// See [`Run`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// The instant from which releases count, on the clock that functions read.
@@ -85,6 +89,8 @@ impl OfDag {
 
 impl Run {
     /// Takes it out of an engine that has come to its end, on so many cores in all.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn of<B: Body, P>(engine: &mut Engine<B, P>, proven: Proven, cores: u32) -> Self {
         let scheduler = &mut engine.scheduler;
@@ -106,6 +112,8 @@ impl Run {
     }
 
     /// Takes over what the engine of another cluster has of the same run.
+    ///
+    /// See [`Run`].
     pub fn absorb<B: Body, P>(&mut self, other: &mut Engine<B, P>) {
         let (task_set, cluster) = (&self.task_set, other.cluster);
         let ids = (0..).map(DagId).zip(&mut self.dags);
@@ -118,12 +126,16 @@ impl Run {
     }
 
     /// Adds what the platform has counted.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn with_counts(self, counts: Counts) -> Self {
         Self { counts, ..self }
     }
 
     /// Returns the model that was run.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
@@ -137,6 +149,8 @@ impl Run {
     /// # Panics
     ///
     /// If there is no memory for it.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn record(&self) -> &Record {
         self.record
@@ -162,12 +176,16 @@ impl Run {
     }
 
     /// Returns counts and maxima of all times, as [`times`](Self::times) does, in less memory.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn coarse_times(&self) -> Option<Tally> {
         self.journal.coarse_statistics(&self.task_set)
     }
 
     /// Returns the journal: what has happened, in its order.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn journal(&self) -> &Journal {
         &self.journal
@@ -175,6 +193,8 @@ impl Run {
 
     /// Returns the instant from which releases count, in nanoseconds on the clock that functions
     /// read.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn epoch_ns(&self) -> u64 {
         self.counts.epoch_ns
@@ -185,6 +205,8 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
         &self.dags[dag.index()].snapshot.statistics
@@ -195,6 +217,8 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn snapshot(&self, dag: DagId) -> &Snapshot {
         &self.dags[dag.index()].snapshot
@@ -206,6 +230,8 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG, or the subtask is no sink of it.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
         let place = self.place_of(dag, sink);
@@ -214,18 +240,24 @@ impl Run {
     }
 
     /// Returns how the scheduler was told to work.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn options(&self) -> SchedulerOptions {
         self.options
     }
 
     /// Returns the response time that the commit has proven of a DAG, if it has.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn bound_ns(&self, dag: DagId) -> Option<u64> {
         *self.proven.bounds_ns.get(dag.index())?
     }
 
     /// Returns the response time that the commit has proven of a sink, if it has.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
         let place = self.place_of(dag, sink)?;
@@ -239,12 +271,16 @@ impl Run {
     /// Returns every breach of the model's rules R1 to R4, and whether each instance had one life
     /// and each core one instance at a time. However long something takes is right, for that is
     /// the machine's affair.
+    ///
+    /// See [`Run`].
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         self.journal.violations(&self.task_set).into_iter()
     }
 
     /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
     /// `bound_ns`: a decision takes effect when a core has changed over. `None` if events are lost.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
         self.journal
@@ -253,6 +289,8 @@ impl Run {
 
     /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,
     /// and how long it takes to react; of the latest jobs if events are lost.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub fn latencies(&self, chain: &Chain) -> Latencies {
         chain.latencies(&self.task_set, self.journal.events())
@@ -260,6 +298,8 @@ impl Run {
 
     /// Returns how often anything allocated memory between the start of the run and its last
     /// completion.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn allocations(&self) -> u64 {
         self.counts.allocations
@@ -267,6 +307,8 @@ impl Run {
 
     /// Returns how often the schedulers' locks were taken between the start of the run and its
     /// last completion, modulo 2^32; 0 where nobody counts.
+    ///
+    /// See [`Run`].
     #[must_use]
     pub const fn lock_acquisitions(&self) -> u32 {
         self.counts.lock_acquisitions

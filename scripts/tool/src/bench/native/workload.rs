@@ -205,9 +205,7 @@ pub(super) fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
             }
             let functions = functions.into_iter().enumerate();
             let subtasks: Vec<_> = functions
-                .map(|(number, mut tick)| {
-                    dag.register_untyped_subtask(move |job| tick(job), named(number))
-                })
+                .map(|(number, tick)| dag.register_untyped_subtask(tick, named(number)))
                 .collect();
             for (earlier, later) in graph.shape().edges() {
                 dag.precede(&subtasks[earlier], &subtasks[later]);
