@@ -29,7 +29,7 @@ pub struct Runner {
     pub vertex: Vertex,
     /// The instance that it runs, or ran last.
     pub instance: Instance,
-    /// The part of [`subject`](Self::subject) that is the same for all.
+    /// The part of the subject of events that is the same for all.
     ids: u64,
 }
 
