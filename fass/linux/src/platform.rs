@@ -5,10 +5,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use fass::{
-    Body, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
+    Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Runner,
 };
 use sched_dag::lifecycle::{self, Parts, Request, Requests};
-use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions, TaskSet, Vertex};
+use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions, TaskSet};
 
 use crate::level::Levels;
 use crate::office::Office;
@@ -211,33 +211,27 @@ fn teams(
 ) -> Vec<Arc<Team>> {
     let task_set = &plan.task_set;
     let dags = task_set.dags().len();
-    let mut bodies: Vec<Vec<(Vertex, Body)>> = task_set.clusters().map(|_| Vec::new()).collect();
-    let mut vertices = (0..).map(Vertex);
-    for (dag, of_dag) in task_set.dags().iter().zip(plan.bodies) {
-        let vertices = vertices.by_ref();
-        bodies[dag.cluster().index()].extend(
-            of_dag
-                .into_iter()
-                .zip(vertices)
-                .map(|(body, vertex)| (vertex, body)),
-        );
+    let mut runners: Vec<Vec<Runner>> = task_set.clusters().map(|_| Vec::new()).collect();
+    for runner in Runner::all(task_set, plan.bodies) {
+        let cluster = task_set.dag(runner.instance.dag).cluster();
+        runners[cluster.index()].push(runner);
     }
-    let share = JOURNAL_BYTES / bodies.len();
-    let most_events = terms.most_events / bodies.len() as u64;
-    let clusters = task_set.clusters().zip(bodies).zip(parts);
-    let team = |((cluster, bodies), lifecycle)| {
+    let share = JOURNAL_BYTES / runners.len();
+    let most_events = terms.most_events / runners.len() as u64;
+    let clusters = task_set.clusters().zip(runners).zip(parts);
+    let team = |((cluster, runners), lifecycle)| {
         let cores = task_set.cores_of(cluster, options.cores);
         let requests = Requests::new(dags, lifecycle);
         let state = State::new(
             (cluster, office),
             Scheduler::of_cluster(Arc::clone(task_set), options, cluster),
-            bodies,
+            runners,
             (requests, plan.after_fault.clone()),
             Journal::of_cluster(task_set, cluster, share, most_events),
             terms.processors[cores.start as usize..cores.end as usize].into(),
             terms.levels,
         );
-        Arc::new(Team::new(state, office, terms))
+        Arc::new(Team::new(state, office, (terms.polls, terms.skips_idle)))
     };
     clusters.map(team).collect()
 }

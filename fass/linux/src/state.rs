@@ -7,9 +7,9 @@
 
 use std::sync::Arc;
 
-use fass::{Body, Replacement};
-use sched_dag::engine::{self, Cost, Engine, Port};
-use sched_dag::journal::{Subject, What};
+use fass::Runner;
+use sched_dag::engine::{Cost, Engine, Port};
+use sched_dag::journal::What;
 use sched_dag::lifecycle::{Letters, Request, Requests};
 use sched_dag::placement::Next;
 use sched_dag::{ClusterId, CoreId, DagId, Instance, Journal, Moment, Scheduler, Vertex};
@@ -18,16 +18,6 @@ use crate::level::{Levels, Role};
 use crate::office::Office;
 use crate::sys;
 use crate::worker::Worker;
-
-/// What runs the instances of one subtask. Boxed where it moves.
-pub(crate) struct Runner {
-    pub(crate) body: Body,
-    pub(crate) vertex: Vertex,
-    /// The same of all its instances.
-    ids: u64,
-    /// The job whose instance it runs, or ran last.
-    pub(crate) job: u64,
-}
 
 /// An instance that has finished, and is not reported yet.
 pub(crate) struct Left {
@@ -158,46 +148,12 @@ impl Port<Box<Runner>> for ThreadPort<'_> {
     }
 }
 
-impl engine::Body for Box<Runner> {
-    type Alternate = Replacement;
-
-    fn set_job(&mut self, job: u64) {
-        self.job = job;
-    }
-
-    fn subject(&self) -> Subject {
-        let ids = self.ids;
-        Subject { ids, job: self.job }
-    }
-
-    fn discard(&mut self, job: u64) {
-        self.body.discard(job);
-    }
-
-    #[inline]
-    fn has_effects(&self) -> bool {
-        self.body.has_effects()
-    }
-
-    fn complete(&mut self, finish_ns: u64, keep: &mut dyn FnMut(Request)) {
-        self.body.complete(finish_ns, keep);
-    }
-
-    fn alternate(&self) -> Option<Replacement> {
-        self.body.replacement()
-    }
-
-    fn replace(&mut self) {
-        self.body.replace();
-    }
-}
-
 impl State {
     /// Makes that of a cluster, for its DAGs' bodies and its processors.
     pub(crate) fn new(
         (cluster, office): (ClusterId, &Arc<Office>),
         scheduler: Scheduler,
-        bodies: Vec<(Vertex, Body)>,
+        runners: Vec<Runner>,
         (requests, after_fault): (Requests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
@@ -205,18 +161,11 @@ impl State {
     ) -> Self {
         let dags = scheduler.task_set().dags().len();
         let cores = processors.len();
-        let workers = cores + bodies.len();
+        let workers = cores + runners.len();
         let mut engine =
             Engine::new::<ThreadPort<'_>>(cluster, scheduler, journal, requests, after_fault);
-        for (vertex, body) in bodies {
-            let any = engine.scheduler.instance_of(vertex);
-            let runner = Runner {
-                body,
-                vertex,
-                ids: Subject::of(any).ids,
-                job: 0,
-            };
-            engine.put(vertex, Box::new(runner));
+        for runner in runners {
+            engine.put(runner.vertex, Box::new(runner));
         }
         let mut seats = vec![None; workers].into_boxed_slice();
         for (core, seat) in (0..).map(CoreId).zip(&mut seats[..cores]) {

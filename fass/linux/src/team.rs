@@ -8,6 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use fass::Runner;
 use sched_dag::ClusterId;
 use sched_dag::engine::{Continuation, Port as _};
 
@@ -15,8 +16,7 @@ use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
 use crate::office::Office;
-use crate::platform::Terms;
-use crate::state::{Left, Number, Runner, State};
+use crate::state::{Left, Number, State};
 use crate::sys;
 use crate::worker::Worker;
 
@@ -51,16 +51,21 @@ pub(crate) struct Team {
 }
 
 impl Team {
-    pub(crate) fn new(state: State, office: &Arc<Office>, terms: &Terms) -> Self {
-        let workers = state.seats.iter().map(|_| Worker::new(terms.polls));
+    /// Makes it; idle threads poll, and the run's time skips what would pass idly, or not.
+    pub(crate) fn new(
+        state: State,
+        office: &Arc<Office>,
+        (polls, skips_idle): (bool, bool),
+    ) -> Self {
+        let workers = state.seats.iter().map(|_| Worker::new(polls));
         Self {
             workers: workers.collect(),
-            polls: terms.polls,
-            skips_idle: terms.skips_idle,
+            polls,
+            skips_idle,
             levels: state.levels,
             cluster: state.engine.cluster,
             office: Arc::clone(office),
-            look_out: LookOut::new(terms.polls),
+            look_out: LookOut::new(polls),
             looks_at_ns: AtomicU64::new(u64::MAX),
             begun: AtomicU32::new(0),
             hand_offs: AtomicU64::new(0),
@@ -181,8 +186,7 @@ impl Team {
     /// Calls the function; the error is a panic's message.
     #[inline]
     fn execute(&self, runner: &mut Runner) -> Result<(), String> {
-        let job = runner.job;
-        let body = AssertUnwindSafe(|| runner.body.run(job));
+        let body = AssertUnwindSafe(|| runner.run());
         catch_unwind(body).map_err(|panic| message(&*panic))
     }
 

@@ -31,6 +31,7 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
+mod arrival;
 mod command;
 mod disturbed;
 mod edge;

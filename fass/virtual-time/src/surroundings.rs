@@ -3,10 +3,10 @@
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
-use fass::Wire;
 use sched_dag::DagId;
 use sched_dag::lifecycle::Request;
 
+use crate::arrival::Arrival;
 use crate::disturbed::{Fault, Late};
 use crate::edge::Edge;
 use crate::silent::Silent;
@@ -36,13 +36,6 @@ pub(crate) struct Surroundings {
     pub(crate) executed_ns: Cell<Option<u64>>,
     /// What is to come, by time and in the order in which it was made.
     arrivals: RefCell<BTreeMap<(u64, usize), Arrival>>,
-}
-
-/// What comes from outside of the scheduler.
-#[derive(Debug)]
-pub(crate) enum Arrival {
-    Request(Request),
-    Bytes(Wire, Vec<u8>),
 }
 
 impl Surroundings {

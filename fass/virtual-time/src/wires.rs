@@ -10,7 +10,7 @@ use std::time::Duration;
 use fass::Wire;
 
 use crate::VirtualTime;
-use crate::surroundings::Arrival;
+use crate::arrival::Arrival;
 
 /// The wires of a machine.
 #[derive(Debug, Default)]

@@ -17,8 +17,9 @@ use sched_dag::CoreId;
 use sched_dag::engine::Port as _;
 use sched_dag::journal::What;
 
-use crate::state::{Left, Number, Runner, State};
+use crate::state::{Left, Number, State};
 use crate::worker::Worker;
+use fass::Runner;
 
 impl State {
     /// Returns when the instance of a worker has ended whose function returned at a time. If it

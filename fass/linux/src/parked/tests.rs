@@ -6,9 +6,10 @@ use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
 use sched_dag::{CoreId, DagId};
 
 use crate::platform::HOST;
-use crate::state::{Number, Runner};
+use crate::state::Number;
 use crate::team::Team;
 use crate::{Linux, Mechanism, sys};
+use fass::Runner;
 
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
 const DAGS: [&str; 3] = ["low", "urgent", "first"];
