@@ -70,18 +70,6 @@ impl Cores {
         self.idle.pop()
     }
 
-    /// Takes a core from the idle ones, which the caller gives an instance or frees.
-    ///
-    /// # Panics
-    ///
-    /// If it is not idle.
-    #[inline]
-    pub(super) fn take_this(&mut self, core: CoreId) {
-        let place = self.idle.iter().rposition(|&idle| idle == core);
-        let place = place.expect("the core that is to go on has to be idle");
-        self.idle.remove(place);
-    }
-
     /// Makes a core, if it is idle, the next one that is taken.
     pub(super) fn prefer(&mut self, core: CoreId) {
         if let Some(place) = self.idle.iter().rposition(|&idle| idle == core) {

@@ -22,7 +22,6 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
-use core::hint::black_box;
 use core::ops::Range;
 
 use super::jobs::Job;
@@ -141,15 +140,6 @@ impl Vertices {
     #[inline]
     pub(super) fn get_mut(&mut self, vertex: u32) -> &mut Vertex {
         &mut self.vertices[vertex as usize]
-    }
-
-    /// Writes what the end of the present instance writes, with no change.
-    #[inline]
-    pub(super) fn touch(&mut self, vertex: u32) {
-        let vertex = &mut self.vertices[vertex as usize];
-        vertex.phase = black_box(vertex.phase);
-        let counter = vertex.counter(&mut self.counters, vertex.progress);
-        *counter = black_box(*counter);
     }
 
     /// Takes note that no job of these vertices' DAG is cut any more.

@@ -2,21 +2,20 @@
 //! offers.
 //!
 //! It is free to choose, and chooses at random: how an instance's completion is told
-//! (as a moment, by [`Scheduler::hand_off`], or by [`Scheduler::hand_over`] for an
-//! idle core), in which order those of one instant are, whether it calls when nothing
-//! has happened, and whether it anticipates. What comes of it, core numbers apart, has
+//! (as a moment, or by [`Scheduler::pass_on`]), in which order those of one instant are, and
+//! whether it calls when nothing has happened. What comes of it, core numbers apart, has
 //! to be the same; and the core numbers have to be those that the docs state.
 
 use std::collections::{HashMap, VecDeque};
 
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{Terms, dispatch_violations, violations};
-use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Journal, Scheduler};
+use sched_dag::{CoreId, DagId, Decision, HandOff, Instance, Journal, Notice, Scheduler};
 
 use crate::random::Random;
 use crate::rules::{Facts, SAID, place};
 use crate::set::Set;
-use crate::support::scheduler;
+use crate::support::{pass_on, scheduler};
 
 /// Runs a set and returns its journal, or in what that is not as the rules say.
 pub(crate) fn drive(set: &Set) -> Result<Vec<Event>, String> {
@@ -34,6 +33,7 @@ pub(crate) fn drive(set: &Set) -> Result<Vec<Event>, String> {
         idle: (0..cores).rev().map(CoreId).collect(),
         left_ns: HashMap::new(),
         now_ns: 0,
+        passed_on: None,
     };
     driver.instant(0)?;
     while let Some(next_ns) = driver.next_ns() {
@@ -76,6 +76,8 @@ struct Driver<'a> {
     /// What preempted instances have left to execute.
     left_ns: HashMap<Instance, u64>,
     now_ns: u64,
+    /// What has become ready by the short way, of which there is no notice.
+    passed_on: Option<Notice>,
 }
 
 impl Driver<'_> {
@@ -102,16 +104,13 @@ impl Driver<'_> {
         self.facts.end_instant();
         let mut notices = Vec::new();
         self.scheduler.log.exchange_notices(&mut notices);
+        notices.extend(self.passed_on.take());
         let compared = self.facts.compare(&self.scheduler, &notices);
         compared.map_err(|found| format!("at {now_ns} {found}"))
     }
 
     fn take(&mut self, now_ns: u64) -> Result<(), String> {
         self.now_ns = now_ns;
-        if self.random.chance(20) {
-            let core = self.random.below(self.cores.len());
-            self.scheduler.anticipate(core_id(core));
-        }
         let mut ended = self.take_ended();
         let mut failed: Vec<_> = ended
             .extract_if(.., |&mut (_, instance)| self.set.fails(instance))
@@ -168,30 +167,17 @@ impl Driver<'_> {
         self.facts.complete(place(instance));
         self.scheduler.log.here = core;
         let vertex = self.scheduler.vertex(instance);
-        let way = self.random.between(0, 4);
-        if way == 0 {
+        if self.random.between(0, 4) == 0 {
             self.scheduler.at(now_ns).complete(instance);
             self.idle.push(core);
             return Ok(false);
         }
-        let other = match way {
-            1 => None,
-            _ if self.idle.is_empty() => None,
-            _ => Some(self.random.below(self.idle.len())),
-        };
-        let taker = other.map_or(core, |place| self.idle[place]);
-        let done = if taker == core {
-            self.scheduler.hand_off(now_ns, core, vertex)
-        } else {
-            self.scheduler.hand_over(now_ns, core, vertex, taker)
-        };
+        let (done, ready) = pass_on(&mut self.scheduler, now_ns, core, vertex);
+        self.passed_on = ready;
         self.idle.push(core);
         if let HandOff::Open = done {
             return Ok(false);
         }
-        // The taker is the first to be given something, now or later.
-        self.idle.retain(|&idle| idle != taker);
-        self.idle.push(taker);
         if let HandOff::To(next, decision) = done {
             if self.scheduler.vertex(decision.instance()) != next {
                 return Err(format!("{decision:?} is not of {next:?}"));
@@ -286,8 +272,4 @@ impl Driver<'_> {
         }
         Ok(())
     }
-}
-
-fn core_id(index: usize) -> CoreId {
-    CoreId(u32::try_from(index).expect("few cores"))
 }

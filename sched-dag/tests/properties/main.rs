@@ -90,29 +90,29 @@ fn look_for(
 
 #[test]
 fn schedules_are_those_of_the_definition() {
-    compare("schedules", 10_000, |random| {
+    compare("schedules", 4_000, |random| {
         set::draw(random, set::Overruns::Never)
     });
 }
 
 #[test]
 fn overruns_are_those_of_the_rules() {
-    compare("overruns", 10_000, |random| {
+    compare("overruns", 4_000, |random| {
         set::draw(random, set::Overruns::Often)
     });
 }
 
 #[test]
 fn ended_dags_leave_the_others_alone() {
-    compare("ends", 10_000, set::draw_failing);
+    compare("ends", 4_000, set::draw_failing);
 }
 
 #[test]
 fn signals_pauses_and_stops_are_those_of_the_rules() {
-    compare("disturbances", 10_000, set::draw_disturbed);
+    compare("disturbances", 4_000, set::draw_disturbed);
 }
 
 #[test]
 fn the_short_ways_are_the_long_one() {
-    look_for(walk::difference, "short ways", 10_000, set::draw_disturbed);
+    look_for(walk::difference, "short ways", 4_000, set::draw_disturbed);
 }

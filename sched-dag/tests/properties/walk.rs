@@ -2,14 +2,14 @@
 //!
 //! Here happens what a driver that is punctual does not meet: several dispatches at one time, a
 //! driver that comes late, ends of instances that have lost their core meanwhile or were moved to
-//! another one. An end is told by [`Scheduler::hand_off`] or [`Scheduler::hand_over`].
+//! another one. An end is told by [`Scheduler::pass_on`].
 
-use sched_dag::{CoreId, DagId, HandOff, Instance, Scheduler};
+use sched_dag::{CoreId, DagId, HandOff, Instance, Notice, Scheduler};
 
 use crate::random::Random;
 use crate::rules::{Facts, SAID, instance, place};
 use crate::set::Set;
-use crate::support::scheduler;
+use crate::support::{pass_on, scheduler};
 
 /// Returns the first difference between a walk and the rules.
 pub(crate) fn difference(set: &Set) -> Option<String> {
@@ -23,6 +23,7 @@ fn walk(set: &Set) -> Result<(), String> {
     let mut facts = Facts::new(set);
     let mut now_ns = 0;
     for step in 0..80 {
+        let mut passed_on = None;
         now_ns = match random.between(0, 5) {
             0 | 1 => now_ns,
             2 | 3 => (scheduler.next_event_ns()).map_or(now_ns, |event_ns| event_ns.max(now_ns)),
@@ -46,12 +47,12 @@ fn walk(set: &Set) -> Result<(), String> {
                 scheduler.at(now_ns).complete(before);
                 facts.complete(place(before));
             }
-            complete(&mut scheduler, now_ns, core, instance, &mut random);
+            passed_on = complete(&mut scheduler, now_ns, core, instance, &mut random);
             facts.complete(place(instance));
         } else if kind < 70 && !preempted.is_empty() {
             let instance = preempted[random.below(preempted.len())];
             let core = any_core(&scheduler, &mut random);
-            complete(&mut scheduler, now_ns, core, instance, &mut random);
+            passed_on = complete(&mut scheduler, now_ns, core, instance, &mut random);
             facts.complete(place(instance));
         } else {
             let at = random.below(set.dags.len());
@@ -89,6 +90,7 @@ fn walk(set: &Set) -> Result<(), String> {
         facts.end_instant();
         let mut notices = Vec::new();
         scheduler.log.exchange_notices(&mut notices);
+        notices.extend(passed_on);
         let compared = facts.compare(&scheduler, &notices);
         compared.map_err(|found| format!("step {step} at {now_ns}: {found}"))?;
     }
@@ -107,22 +109,15 @@ fn complete(
     mut core: CoreId,
     instance: Instance,
     random: &mut Random,
-) {
+) -> Option<Notice> {
     let vertex = scheduler.vertex(instance);
     if random.chance(5) {
         // It was moved, and has finished before it knew.
         core = any_core(scheduler, random);
     }
-    let cores = (0..scheduler.options().cores).map(CoreId);
-    let is_idle = |other: &CoreId| *other != core && scheduler.running(*other).is_none();
-    let idle: Vec<_> = cores.filter(is_idle).collect();
-    let done = if idle.is_empty() || random.chance(30) {
-        scheduler.hand_off(now_ns, core, vertex)
-    } else {
-        scheduler.anticipate(core);
-        scheduler.hand_over(now_ns, core, vertex, idle[random.below(idle.len())])
-    };
+    let (done, passed_on) = pass_on(scheduler, now_ns, core, vertex);
     if let HandOff::Open = done {
         let _decisions = scheduler.at(now_ns).release_due().dispatch();
     }
+    passed_on
 }

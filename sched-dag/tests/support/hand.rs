@@ -15,7 +15,7 @@ use sched_dag::{
     CoreId, DagId, DagSpec, Decision, HandOff, Journal, Moment, Scheduler, SchedulerOptions,
 };
 
-use super::{ask, kind, line, named, scheduler, told};
+use super::{ask, kind, line, named, pass_on, scheduler, told};
 
 /// What is compared where the script has it only.
 const QUIET: [&str; 9] = [
@@ -125,15 +125,11 @@ impl Hand {
 
     /// Tells a finish by a short way.
     fn hand(&mut self, now_ns: u64, whom: &str) -> Option<Decision> {
-        let (instance, taker) = whom.split_once(" to ").unwrap_or((whom, "-"));
-        let vertex = self.scheduler.vertex(named(instance));
+        let vertex = self.scheduler.vertex(named(whom));
         let mut cores = (0..self.scheduler.options().cores).map(CoreId);
-        let core = cores.find(|core| self.scheduler.running(*core) == Some(named(instance)));
+        let core = cores.find(|core| self.scheduler.running(*core) == Some(named(whom)));
         let core = core.expect("it runs");
-        let done = match taker.parse().map(CoreId) {
-            Ok(taker) if taker != core => self.scheduler.hand_over(now_ns, core, vertex, taker),
-            _ => self.scheduler.hand_off(now_ns, core, vertex),
-        };
+        let (done, _) = pass_on(&mut self.scheduler, now_ns, core, vertex);
         self.done = Some(done);
         match done {
             HandOff::To(_, decision) => Some(decision),
