@@ -31,7 +31,7 @@ pub(super) fn clear(executions: &mut [Execution]) {
         *CLEARING.lock() = Some((Arc::clone(&task_set), id, clock::now_ns()));
         let of_dag = |lost: &mut Loan| lost.instance.dag == id;
         let lost = engine.lost.extract_if(.., of_dag);
-        lost.for_each(|lost| lost.give_back().body.forget());
+        lost.for_each(|lost| lost.give_back().inner.body.forget());
         for subtask in (0..).map(SubtaskId).take(dag.subtasks().len()) {
             let any = Instance {
                 dag: id,

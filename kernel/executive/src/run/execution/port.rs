@@ -2,7 +2,7 @@
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::engine::Port;
+use sched_dag::engine::{Body as _, Port};
 use sched_dag::journal::What;
 use sched_dag::lifecycle::{self, Request};
 use sched_dag::{ClusterId, CoreId, Notice};
