@@ -19,6 +19,7 @@ use core::panic::PanicInfo;
 use core::time::Duration;
 
 use sched_dag::Instance;
+use sched_dag::engine::Cost;
 
 use super::{contexts, execution};
 use crate::machine::fault::Exception;
@@ -168,12 +169,15 @@ fn report(instance: Instance, fault: &Fault<'_>) {
     } = fault;
     let core = this_core::get().index;
     // No lock is held by code that has interrupts enabled.
-    let task_set = execution::task_set();
-    let dag = task_set.as_ref().map(|model| model.dag(instance.dag));
-    let subtask = dag.map(|dag| dag.subtask(instance.subtask));
-    let dag = Excerpt::<NAME_BYTES>::of(dag.map_or("", |dag| dag.name()));
-    let subtask = Excerpt::<NAME_BYTES>::of(subtask.map_or("", |subtask| subtask.name()));
-    let cost = execution::cost_of_fault(instance);
+    let known = execution::cost_of_fault(instance);
+    let names = known.as_ref().map(|(_, model)| {
+        let dag = model.dag(instance.dag);
+        (dag.name(), dag.subtask(instance.subtask).name())
+    });
+    let (dag, subtask) = names.unwrap_or_default();
+    let dag = Excerpt::<NAME_BYTES>::of(dag);
+    let subtask = Excerpt::<NAME_BYTES>::of(subtask);
+    let cost = known.as_ref().map_or(Cost::Dag, |(cost, _)| *cost);
     let consequence = cost.consequence();
     front::println!(
         "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \

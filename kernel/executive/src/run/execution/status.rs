@@ -1,10 +1,11 @@
 //! What the rest of the kernel may ask about the run.
 
+use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
 use sched_dag::engine::Cost;
 use sched_dag::journal::Subject;
-use sched_dag::{DagId, Instance, Journal, SubtaskId};
+use sched_dag::{DagId, Instance, Journal, SubtaskId, TaskSet};
 
 use super::cluster::{self, FIRST_SEAT};
 use crate::machine::this_core::{self, Core};
@@ -79,13 +80,15 @@ pub fn budget_ns(instance: Instance) -> u64 {
     })
 }
 
-/// Returns what a fault of an instance that runs here costs if it comes now. Of two faults of a DAG at
-/// one moment, either may take what is left to be survived; the journal tells.
-pub fn cost_of_fault(instance: Instance) -> Cost {
+/// Returns what a fault of an instance that runs here costs if it comes now, and the model, if a
+/// run goes on. Of two faults of a DAG at one moment, either may take what is left to be survived;
+/// the journal tells.
+pub fn cost_of_fault(instance: Instance) -> Option<(Cost, Arc<TaskSet>)> {
     let place = cluster::of(this_core::get()).execution.lock();
-    place.as_ref().map_or(Cost::Dag, |execution| {
-        let vertex = execution.task_set().vertex(instance);
-        execution.engine.cost_of_fault(vertex)
+    place.as_ref().map(|execution| {
+        let task_set = execution.task_set();
+        let cost = execution.engine.cost_of_fault(task_set.vertex(instance));
+        (cost, Arc::clone(task_set))
     })
 }
 
