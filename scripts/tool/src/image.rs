@@ -199,11 +199,14 @@ const FOR_IMAGES: [&str; 4] = [
     "-Cllvm-args=-min-jump-table-entries=8",
 ];
 
+/// The one binary that is no image: firmware places it where it likes.
+const PLACED_BY_FIRMWARE: &str = "boot-efi";
+
 /// Builds one target of a package, of a kind and a name.
 fn build_target(package: &str, profile: &str, target: [&str; 2]) -> Result<Image, ImageError> {
     let [kind, name] = target;
     let (verb, flags) = match kind {
-        "--bin" => ("rustc", &FOR_IMAGES[..]),
+        "--bin" if package != PLACED_BY_FIRMWARE => ("rustc", &FOR_IMAGES[..]),
         _ => ("build", &[][..]),
     };
     let failed = |why: String| ImageError::Build(format!("cannot build `{name}`: {why}"));
