@@ -14,9 +14,10 @@
 //! # What is guaranteed
 //!
 //! - R1 to R4 of the task model, whatever Linux does to the threads: they hold by the order
-//!   of what the scheduler is told. [`Run::violations`] checks them.
+//!   of what the scheduler is told. [`violations`](sched_dag::engine::Run::violations) checks them.
 //! - R5 as far as Linux runs the threads that it is told to: a decision takes effect when it
-//!   has switched. [`Run::dispatch_violations`] checks it within a stated bound.
+//!   has switched. [`dispatch_violations`](sched_dag::engine::Run::dispatch_violations)
+//!   checks it within a stated bound.
 //! - From the commit on, nothing is allocated for a release, a preemption or a completion;
 //!   a completion that concerns its own core makes no system call but to read clocks.
 //! - No thread holds the scheduler's lock below the level of what computes.

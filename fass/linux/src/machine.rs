@@ -256,7 +256,8 @@ impl Linux {
         self.change(|terms| terms.look_at_commit = look)
     }
 
-    /// Says how to count what the program has allocated so far, for [`Run::allocations`].
+    /// Says how to count what the program has allocated so far, for
+    /// [`allocations`](sched_dag::engine::Run::allocations).
     #[must_use = "the machine itself is returned"]
     pub fn allocations(self, count: fn() -> u64) -> Self {
         self.change(|terms| terms.allocations = count)

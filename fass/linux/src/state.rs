@@ -1,6 +1,7 @@
 //! What is under the scheduler's lock, and one step of it.
 //!
-//! The scheduler decides at one instant what each core runs; [`Placement`] keeps what
+//! The scheduler decides at one instant what each core runs;
+//! [`Placement`](sched_dag::placement::Placement) keeps what
 //! each core has, and what it should have. A core that has too much loses it here, by
 //! the thread that makes the step; a core that has nothing and should have something is *called*:
 //! its worker comes and looks.

@@ -5,7 +5,7 @@
 //! that something was stated too small, and that what the commit has proven is not so:
 //! such a run is no success, even if it meets its deadlines. An app whose WCETs are not meant
 //! for this machine says so
-//! ([`Machine::accept_exceeded_bounds`](crate::Machine::accept_exceeded_bounds)).
+//! (`Machine::accept_exceeded_bounds`).
 //!
 //! In mode `threads` a line says it, and the verdict does not: there emulated
 //! processors wait for the host's, which no overhead can state.

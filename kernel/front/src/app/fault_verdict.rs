@@ -2,7 +2,7 @@
 //!
 //! An app that ignores a fault in one of its DAGs has failed, and so says its verdict. An
 //! app to which faults belong says so
-//! ([`Machine::accept_faults`](crate::Machine::accept_faults)) and judges them by itself.
+//! (`Machine::accept_faults`) and judges them by itself.
 
 use alloc::format;
 use alloc::string::String;

@@ -3,7 +3,7 @@
 //! A completing instance's latest values show, and its requests are taken, signals among them,
 //! under the lock and before the scheduler's step; the step passes them on right after the
 //! completion. A signal from outside makes a step of its own. A request that concerns another
-//! cluster is a letter ([`letters`]), which counts once that cluster takes it.
+//! cluster is a letter (`letters`), which counts once that cluster takes it.
 
 use fass::{Plan, Request};
 use sched_dag::DagId;
