@@ -284,6 +284,8 @@ impl<B: Body, P> Engine<B, P> {
             if let Some(mut body) = body {
                 body.replace();
                 self.placement.replace(vertex, body);
+                // Before it may start again, as the next job may reuse the places of older ones.
+                self.discard_late();
             }
             return cost;
         }
