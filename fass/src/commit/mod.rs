@@ -374,14 +374,10 @@ fn verify(
             warnings: verified.warnings,
         }),
         Err(rejected) => {
-            let model_faults = rejected.faults().iter();
-            let news = model_faults.filter(|fault| !is_consequence(fault, &faults));
-            let news: Vec<Fault> = news.cloned().map(Fault::Model).collect();
-            faults.extend(news);
-            Err(CommitError {
-                faults,
-                warnings: rejected.warnings().to_vec(),
-            })
+            let (mut news, warnings) = rejected.into_parts();
+            news.retain(|fault| !is_consequence(fault, &faults));
+            faults.extend(news.into_iter().map(Fault::Model));
+            Err(CommitError { faults, warnings })
         }
     }
 }

@@ -46,14 +46,14 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &Settings) {
         let Some((edges, _)) = edges else {
             continue;
         };
-        let mut with_edges = task_set.clone();
-        with_edges.precede(dag, &edges);
+        let mut precedence = task_set.with_edges(dag, &edges);
         let before = free.take().unwrap_or_else(|| answer(task_set, settings));
-        let after = answer(&with_edges, settings);
+        task_set.exchange(dag, &mut precedence);
+        let after = answer(task_set, settings);
         if is_better(dag, &after, &before) {
-            *task_set = with_edges;
             free = Some(after);
         } else {
+            task_set.exchange(dag, &mut precedence);
             free = Some(before);
         }
     }

@@ -102,6 +102,12 @@ impl Rejected {
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
+
+    /// Returns faults and warnings to keep.
+    #[must_use]
+    pub fn into_parts(self) -> (Vec<Fault>, Vec<Warning>) {
+        (self.faults, self.warnings)
+    }
 }
 
 /// Writes as [`write_faults`] does.

@@ -2,6 +2,7 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use core::mem::swap;
 
 use super::attributes::in_flight;
 use super::fault::Fault;
@@ -39,19 +40,39 @@ pub(super) fn build(
     Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
 }
 
+/// Precedence among a DAG's subtasks.
+pub(crate) struct Precedence {
+    graph: Graph,
+    sources: Box<[SubtaskId]>,
+    sinks: Box<[SubtaskId]>,
+    topological_order: Box<[SubtaskId]>,
+}
+
 impl TaskSet {
-    /// Adds edges to a DAG of which no sink has a deadline of its own. They close no cycle.
-    pub(crate) fn precede(&mut self, dag: DagId, edges: &[(u32, u32)]) {
-        let dag = &mut self.dags[dag.index()];
+    /// Returns a DAG's precedence with more edges, which close no cycle.
+    pub(crate) fn with_edges(&self, dag: DagId, edges: &[(u32, u32)]) -> Precedence {
+        let dag = self.dag(dag);
         let stated = (0..).map(SubtaskId).take(dag.subtasks.len());
         let stated =
             stated.flat_map(|from| dag.successors(from).iter().map(move |to| (from.0, to.0)));
         let edges: Vec<(u32, u32)> = stated.chain(edges.iter().copied()).collect();
         let graph = Graph::new(dag.subtasks.len(), &edges);
-        dag.topological_order = graph.topological_order().into_boxed_slice();
-        dag.sources = without_neighbours(&graph.predecessors);
-        dag.sinks = without_neighbours(&graph.successors);
-        (dag.predecessors, dag.successors) = (graph.predecessors, graph.successors);
+        Precedence {
+            sources: without_neighbours(&graph.predecessors),
+            sinks: without_neighbours(&graph.successors),
+            topological_order: graph.topological_order().into_boxed_slice(),
+            graph,
+        }
+    }
+
+    /// Exchanges the precedence of a DAG of which no sink has a deadline of its own.
+    pub(crate) fn exchange(&mut self, dag: DagId, new: &mut Precedence) {
+        let dag = &mut self.dags[dag.index()];
+        swap(&mut dag.predecessors, &mut new.graph.predecessors);
+        swap(&mut dag.successors, &mut new.graph.successors);
+        swap(&mut dag.sources, &mut new.sources);
+        swap(&mut dag.sinks, &mut new.sinks);
+        swap(&mut dag.topological_order, &mut new.topological_order);
     }
 }
 

@@ -56,43 +56,31 @@ impl Registers {
 
 impl fmt::Display for Registers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rows = [
-            [
-                ("rax", self.rax),
-                ("rbx", self.rbx),
-                ("rcx", self.rcx),
-                ("rdx", self.rdx),
-            ],
-            [
-                ("rsi", self.rsi),
-                ("rdi", self.rdi),
-                ("rbp", self.rbp),
-                ("rsp", self.rsp),
-            ],
-            [
-                ("r8", self.r8),
-                ("r9", self.r9),
-                ("r10", self.r10),
-                ("r11", self.r11),
-            ],
-            [
-                ("r12", self.r12),
-                ("r13", self.r13),
-                ("r14", self.r14),
-                ("r15", self.r15),
-            ],
-            [
-                ("rip", self.rip),
-                ("flags", self.rflags),
-                ("vec", self.vector),
-                ("err", self.error_code),
-            ],
+        let registers = [
+            ("rax", self.rax),
+            ("rbx", self.rbx),
+            ("rcx", self.rcx),
+            ("rdx", self.rdx),
+            ("rsi", self.rsi),
+            ("rdi", self.rdi),
+            ("rbp", self.rbp),
+            ("rsp", self.rsp),
+            ("r8", self.r8),
+            ("r9", self.r9),
+            ("r10", self.r10),
+            ("r11", self.r11),
+            ("r12", self.r12),
+            ("r13", self.r13),
+            ("r14", self.r14),
+            ("r15", self.r15),
+            ("rip", self.rip),
+            ("flags", self.rflags),
+            ("vec", self.vector),
+            ("err", self.error_code),
         ];
-        for row in rows {
-            for (name, value) in row {
-                write!(f, "  {name:>5} {value:016x}")?;
-            }
-            writeln!(f)?;
+        for (index, (name, value)) in registers.iter().enumerate() {
+            let end = if index % 4 == 3 { "\n" } else { "" };
+            write!(f, "  {name:>5} {value:016x}{end}")?;
         }
         Ok(())
     }

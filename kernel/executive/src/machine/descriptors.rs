@@ -6,6 +6,7 @@ use core::arch::asm;
 use alloc::boxed::Box;
 
 use super::once::Once;
+use super::vector::OTHER;
 
 /// The code segment's selector.
 pub(super) const CODE: u16 = 0x08;
@@ -119,12 +120,13 @@ pub(super) fn load_segments(task_state: *mut TaskState) {
 
 static INTERRUPT_TABLE: Once<Box<[[u64; 2]; 256]>> = Once::new();
 
-/// Loads the interrupt table for this core: vector v at `stubs + 16 v`.
+/// Loads the interrupt table for this core: vector v at `stubs + 16 v`, and those above
+/// [`OTHER`] where that is.
 pub(crate) fn load_interrupts(stubs: u64) {
     let table = INTERRUPT_TABLE.get().unwrap_or_else(|| {
         // Only the boot processor gets here, before it starts any other.
         let table = Box::new(core::array::from_fn(|vector| {
-            gate(stubs + 16 * vector as u64, vector)
+            gate(stubs + 16 * vector.min(usize::from(OTHER)) as u64, vector)
         }));
         INTERRUPT_TABLE
             .set(table)

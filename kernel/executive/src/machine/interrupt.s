@@ -23,7 +23,7 @@
 .global interrupt_stubs
 interrupt_stubs:
 .set vector, 0
-.rept 256
+.rept {other} + 1
     .balign 16
     # The processor pushes an error code for these alone (Intel SDM 3, 6.13).
     .if (vector == 8) || ((vector >= 10) && (vector <= 14)) || (vector == 17) || (vector == 21) || (vector == 29) || (vector == 30)
