@@ -151,7 +151,8 @@ fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
 
 /// Settles the modes: where none is named, instructions, and time as real as can be had.
 fn modes(plan: &Plan, image: &Path) -> Result<Vec<Mode>, String> {
-    let machine = plan.boots.iter().max_by_key(|boot| boot.cores);
+    let timed = plan.boots.iter().filter(|boot| boot.is_for(Mode::Kvm));
+    let machine = timed.max_by_key(|boot| boot.cores);
     let machine = machine.map_or_else(Default::default, |boot| boot.qemu(Mode::Kvm));
     let (mode, why) = probe::choose(plan.mode, Mode::Threads, &machine, image)?;
     if let Some(why) = why {
@@ -164,8 +165,9 @@ fn modes(plan: &Plan, image: &Path) -> Result<Vec<Mode>, String> {
 /// Makes all boots in one mode.
 fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     let mut figures: Vec<Figure> = Vec::new();
-    let mut progress = Progress::new(plan.boots.len() as u64, "boots");
-    for (boot, over) in plan.boots.iter().zip(0..) {
+    let boots: Vec<&Boot> = plan.boots.iter().filter(|boot| boot.is_for(mode)).collect();
+    let mut progress = Progress::new(boots.len() as u64, "boots");
+    for (boot, over) in boots.into_iter().zip(0..) {
         progress.show(over);
         for figure in measure(boot, mode, image)? {
             // What is counted afterwards stands with its workload.

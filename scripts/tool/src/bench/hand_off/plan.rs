@@ -22,6 +22,10 @@ fn memory_mib(subtasks: u64, cores: u64) -> u64 {
     256.max((subtasks + 2 * cores) * 3 / 10)
 }
 
+/// Numbers of cores whose figures the baseline keeps, too, where instructions are counted: more
+/// than a host is sure to have, so they say nothing of time.
+const MANY_CORES: [u64; 2] = [8, 64];
+
 /// What one boot measures.
 #[derive(Clone, Debug)]
 pub(super) struct Boot {
@@ -176,7 +180,9 @@ fn boots(options: &Parsed) -> Vec<Boot> {
     };
     // A trace shows what it shows in a few jobs.
     let traced = format!("jobs=20 branches={branches} trace=dump");
-    vec![
+    let many =
+        MANY_CORES.map(|cores| boot(cores, "workloads", format!("jobs={jobs} {}", scale::SIZES)));
+    let few = [
         boot(1, "hand-off", format!("jobs={jobs} {sizes}")),
         boot(1, "traced", traced.clone()),
         Boot {
@@ -189,10 +195,16 @@ fn boots(options: &Parsed) -> Vec<Boot> {
         },
         boot(2, "elsewhere", format!("jobs={jobs}")),
         boot(2, "traced", traced),
-    ]
+    ];
+    few.into_iter().chain(many).collect()
 }
 
 impl Boot {
+    /// Reports whether it measures something in this mode.
+    pub(super) fn is_for(&self, mode: Mode) -> bool {
+        mode == Mode::Deterministic || !MANY_CORES.contains(&self.cores)
+    }
+
     /// Returns a boot that runs the workloads alone, for what their size and the
     /// number of cores cost; `largest` is the most subtasks of a DAG among them.
     pub(super) fn of_scale(cores: u64, jobs: u64, largest: u64, sizes: &str) -> Boot {
