@@ -4,43 +4,19 @@
 //! could tempt a body to allocate: several inputs and outputs, fan-out, shared
 //! and unique messages, 16 arguments, more than one job in flight, discards.
 
+#[path = "../../sched-dag/tests/support/counting.rs"]
+mod counting;
 mod support;
 
 use core::time::Duration;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::Arc;
 
+use counting::allocated;
 use fass::{
     Raiser, Received, Request, Sample, Sender, SubtaskAttributes, Unique, Wire, create_dag,
 };
 use sched_dag::DagId;
 use support::{commit, run_job};
-
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-#[allow(unsafe_code, reason = "an allocator that counts is only possible so")]
-// SAFETY: every call is passed on unchanged to the system's allocator, which
-// keeps the trait's contract; counting does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller keeps `alloc`'s conditions, which are the same.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps `dealloc`'s conditions, which are the same.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 type Sixteen = (
     u8,
@@ -98,7 +74,7 @@ fn a_job_allocates_nothing() {
     );
     let mut plan = commit(&[dag]);
 
-    let before = ALLOCATIONS.get();
+    let before = allocated().0;
     for job in 0..1_000 {
         if job % 10 == 9 {
             plan.bodies[0][0].run(job);
@@ -109,9 +85,9 @@ fn a_job_allocates_nothing() {
             run_job(&mut plan, job);
         }
     }
-    assert_eq!(ALLOCATIONS.get() - before, 0);
+    assert_eq!(allocated().0 - before, 0);
     drop(vec![1]);
-    assert!(ALLOCATIONS.get() > before, "the allocator counts");
+    assert!(allocated().0 > before, "the allocator counts");
 }
 
 #[test]
@@ -146,7 +122,7 @@ fn states_latest_values_and_signals_allocate_nothing() {
     );
     let mut plan = commit(&[dag, reader, answers]);
 
-    let before = ALLOCATIONS.get();
+    let before = allocated().0;
     let mut signals = 0;
     for job in 0..1_000 {
         plan.bodies[0][0].run(job);
@@ -155,7 +131,7 @@ fn states_latest_values_and_signals_allocate_nothing() {
         });
         plan.bodies[1][0].run(job);
     }
-    assert_eq!(ALLOCATIONS.get() - before, 0);
+    assert_eq!(allocated().0 - before, 0);
     assert_eq!(signals, 1_000);
 }
 
@@ -175,7 +151,7 @@ fn wires_allocate_nothing() {
         );
     let mut plan = commit(&[dag]);
 
-    let before = ALLOCATIONS.get();
+    let before = allocated().0;
     let mut gone = 0;
     for job in 0..1_000 {
         wire.arrive(b"a\nb\n", job);
@@ -183,5 +159,5 @@ fn wires_allocate_nothing() {
         plan.bodies[0][0].complete(job, &mut |_| ());
         gone += std::iter::from_fn(|| wire.depart()).count();
     }
-    assert_eq!((gone, ALLOCATIONS.get() - before), (2_000, 0));
+    assert_eq!((gone, allocated().0 - before), (2_000, 0));
 }

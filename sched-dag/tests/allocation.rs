@@ -1,57 +1,19 @@
 //! From the first release to the last completion nothing is allocated.
 
+#[path = "support/counting.rs"]
+mod counting;
 #[path = "support/random.rs"]
 mod random;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::Arc;
 
+use counting::allocated;
 use random::Random;
 use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, OverrunPolicy, Policy, Preemption,
     Scheduler, SchedulerOptions, SubtaskSpec, verify,
 };
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// Counts the allocations of each thread.
-struct Counting;
-
-fn count() {
-    ALLOCATIONS.with(|allocations| allocations.set(allocations.get() + 1));
-}
-
-#[allow(unsafe_code, reason = "an allocator that counts is only possible so")]
-// SAFETY: every method hands its arguments to `System` unchanged and returns
-// what `System` returns; counting touches a `Cell` that is initialized at
-// compile time, so it does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps `GlobalAlloc::alloc`'s contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps `GlobalAlloc::dealloc`'s contract, and the
-        // pointer came from `System` by the methods here.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps `GlobalAlloc::realloc`'s contract, and the
-        // pointer came from `System` by the methods here.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// A layered DAG of 40 subtasks that overruns now and then.
 fn dag(random: &mut Random, overrun: OverrunPolicy) -> DagSpec {
@@ -91,9 +53,9 @@ fn nothing_is_allocated_from_first_release_to_last_completion() {
             };
             let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
 
-            let before = ALLOCATIONS.get();
+            let before = allocated().0;
             let end = run.run(&mut ExecutionTimes(|_| random.between(0, 50)));
-            let allocated = ALLOCATIONS.get() - before;
+            let allocated = allocated().0 - before;
 
             assert_eq!(end, End::Finished);
             assert_eq!(allocated, 0, "{policy:?} {preemption:?}");
@@ -139,9 +101,9 @@ fn nothing_is_allocated_when_dags_are_ended() {
         };
         let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
 
-        let before = ALLOCATIONS.get();
+        let before = allocated().0;
         let end = run.run(&mut Failing(random));
-        let allocated = ALLOCATIONS.get() - before;
+        let allocated = allocated().0 - before;
 
         assert_eq!(end, End::Finished);
         assert!(run.is_finished(), "seed {seed}");
@@ -156,7 +118,7 @@ fn nothing_is_allocated_when_dags_are_ended() {
 
 #[test]
 fn the_counter_counts() {
-    let before = ALLOCATIONS.get();
+    let before = allocated().0;
     drop(std::hint::black_box(Box::new(1)));
-    assert_eq!(ALLOCATIONS.get() - before, 1);
+    assert_eq!(allocated().0 - before, 1);
 }

@@ -31,63 +31,33 @@ const EXAMPLES: [&str; 6] = [
 
 fn not_launched() -> fass::CommitError {
     let machine = virtual_time::VirtualTime::new();
-    let sound = || {
-        let dag = fass::create_dag();
-        dag.period(PERIOD).relative_deadline(PERIOD);
-        dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
-        dag
-    };
-    finish_create_dags(&[sound()]).expect("the first plan is taken");
-    let error = finish_create_dags(&[sound()]).expect_err("a machine takes one plan");
-    drop(machine);
-    error
+    finish_create_dags(&[starting("first")]).expect("the first plan is taken");
+    refused(machine, starting("second")) // a machine takes one plan
 }
 
 fn wcets_refused() -> fass::CommitError {
     let observed = "margin 20\ndag 1 lidar\nwcet 1200000 0 start\nend\n";
     let machine = virtual_time::VirtualTime::new().wcets(observed);
-    let dag = fass::create_dag();
-    dag.name("lidar").period(PERIOD).relative_deadline(PERIOD);
-    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
-    let error = finish_create_dags(&[dag]).expect_err("another graph has that hash");
-    drop(machine);
-    error
+    refused(machine, starting("lidar")) // another graph has that hash
 }
 
 fn cluster_without_cores() -> fass::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[2, 0]);
-    let dag = fass::create_dag();
-    dag.name("lidar")
-        .cluster(0)
-        .period(PERIOD)
-        .relative_deadline(PERIOD);
-    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
-    let error = finish_create_dags(&[dag]).expect_err("nothing can run in cluster 1");
-    drop(machine);
-    error
+    let dag = starting("lidar");
+    dag.cluster(0);
+    refused(machine, dag) // nothing can run in cluster 1
 }
 
 fn clusters_beyond_cores() -> fass::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[1, 2]);
-    let dag = fass::create_dag();
-    dag.name("lidar")
-        .cluster(0)
-        .period(PERIOD)
-        .relative_deadline(PERIOD);
-    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
-    let error = finish_create_dags(&[dag]).expect_err("there are no 3 cores");
-    drop(machine);
-    error
+    let dag = starting("lidar");
+    dag.cluster(0);
+    refused(machine, dag) // there are no 3 cores
 }
 
 fn no_cluster() -> fass::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[1, 1]);
-    let dag = fass::create_dag();
-    dag.name("lidar").period(PERIOD).relative_deadline(PERIOD);
-    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
-    let error = finish_create_dags(&[dag]).expect_err("it could run in either");
-    drop(machine);
-    error
+    refused(machine, starting("lidar")) // it could run in either
 }
 
 fn not_assigned() -> fass::CommitError {
@@ -98,10 +68,21 @@ fn not_assigned() -> fass::CommitError {
         let start = fass::SubtaskAttributes::default().wcet(PERIOD * 2 / 3);
         dag.register_untyped_subtask(|_job| (), start);
     }
+    refused(machine, dag) // it needs 3 cores
+}
+
+/// A DAG of one subtask.
+fn starting(name: &str) -> fass::Dag {
+    let dag = fass::create_dag();
+    dag.name(name).period(PERIOD).relative_deadline(PERIOD);
+    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
+    dag
+}
+
+/// Commits a DAG for a machine that refuses it.
+fn refused(_machine: virtual_time::VirtualTime, dag: fass::Dag) -> fass::CommitError {
     let any_graph = fass::ConstructionPolicy::any_graph();
-    let error = fass::finish_create_dags_with(&[dag], any_graph).expect_err("it needs 3 cores");
-    drop(machine);
-    error
+    fass::finish_create_dags_with(&[dag], any_graph).expect_err("there is a fault")
 }
 
 fn no_cores() -> Vec<Fault> {
@@ -299,10 +280,7 @@ fn every_warning_is_listed() {
 fn every_reason_against_a_proof_is_listed() {
     let documented = table("| text | what to do |").expect("the page");
     let machine = virtual_time::VirtualTime::new();
-    let dag = fass::create_dag();
-    dag.period(PERIOD).relative_deadline(PERIOD);
-    dag.register_untyped_subtask(|_job| (), fass::SubtaskAttributes::named("start"));
-    let commit = finish_create_dags(&[dag]).expect("the DAG is sound");
+    let commit = finish_create_dags(&[starting("lidar")]).expect("the DAG is sound");
     let unproven = commit.answers()[0].verdict.unproven();
     let mut texts = vec![unproven.expect("it has no WCET").to_string()];
     drop(machine);

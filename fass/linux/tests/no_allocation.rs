@@ -1,34 +1,15 @@
 //! Between the first job and the last nothing is allocated.
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "../../../sched-dag/tests/support/counting.rs"]
+mod counting;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
+use counting::allocated;
 use fass::{Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
 use linux::{Linux, Mechanism};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-#[allow(unsafe_code, reason = "an allocator that counts")]
-// SAFETY: all is left to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Relaxed);
-        // SAFETY: the caller keeps the contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn jobs_allocate_nothing_preempted_or_not() {
@@ -45,8 +26,8 @@ fn jobs_allocate_nothing_preempted_or_not() {
         let source = move || {
             job += 1;
             match job {
-                2 => stamps[0].store(ALLOCATIONS.load(Relaxed), Relaxed),
-                JOBS => stamps[1].store(ALLOCATIONS.load(Relaxed), Relaxed),
+                2 => stamps[0].store(allocated().2, Relaxed),
+                JOBS => stamps[1].store(allocated().2, Relaxed),
                 _ => {}
             }
             (job,)

@@ -3,37 +3,14 @@
 //! The program's allocator counts what this thread has allocated, for two promises: writing
 //! into a buffer allocates nothing, and reading no more than its bytes allow.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "../../../sched-dag/tests/support/counting.rs"]
+mod counting;
+
 use std::fmt::Debug;
 use std::sync::Arc;
 
+use counting::allocated;
 use recording::{Decoder, Encoder, MOST_DEPTH, MOST_GROWTH, Recordable, Schema, Shown, to_bytes};
-
-struct Counting;
-
-thread_local! {
-    static ALLOCATED: Cell<usize> = const { Cell::new(0) };
-}
-
-#[allow(unsafe_code, reason = "an allocator that counts is only possible so")]
-// SAFETY: every call is passed on unchanged to the system's allocator, which
-// keeps the trait's contract; counting does not allocate.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATED.set(ALLOCATED.get() + layout.size());
-        // SAFETY: the caller keeps `alloc`'s conditions, which are the same.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps `dealloc`'s conditions, which are the same.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 recording::recordable! {
     /// One of everything.
@@ -126,9 +103,9 @@ impl Random {
 
 /// Reads bytes as a value, by its type and by its schema, which must agree.
 fn read<T: Recordable + Debug>(schema: &Schema, bytes: &[u8]) -> Option<T> {
-    let before = ALLOCATED.get();
+    let before = allocated().1;
     let read = T::from_bytes(bytes);
-    let allocated = ALLOCATED.get() - before;
+    let allocated = allocated().1 - before;
     assert!(
         allocated <= MOST_DEPTH * MOST_GROWTH * bytes.len(),
         "{allocated} bytes of memory from {}",
@@ -270,11 +247,11 @@ fn writing_into_a_buffer_allocates_nothing_and_tells_what_it_needs() {
     let bytes = to_bytes(&value);
     let mut buffer = vec![0; bytes.len()];
     for room in 0..=bytes.len() {
-        let before = ALLOCATED.get();
+        let before = allocated().1;
         let mut out = Encoder::new(&mut buffer[..room]);
         value.encode(&mut out);
         let finished = out.finish();
-        assert_eq!(ALLOCATED.get(), before);
+        assert_eq!(allocated().1, before);
         match finished {
             Ok(written) => assert_eq!((written, room), (bytes.len(), bytes.len())),
             Err(full) => assert_eq!(full.needed, bytes.len()),

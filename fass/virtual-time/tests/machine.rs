@@ -179,20 +179,6 @@ fn an_older_machine_of_the_thread_keeps_its_own_time() {
 }
 
 #[test]
-fn zero_cores_are_refused_at_commit() {
-    let _machine = VirtualTime::new().cores(0);
-    let error = finish_create_dags(&[pair("none", ms(10), ms(10), [ms(1), ms(1)])]);
-    let error = error.expect_err("nowhere to run");
-    assert!(
-        error
-            .faults()
-            .iter()
-            .any(|fault| fault.code() == "no_cores"),
-        "{error}"
-    );
-}
-
-#[test]
 fn a_commit_from_inside_a_subtask_is_refused_and_harmless() {
     let machine = VirtualTime::new();
     let dag = create_dag();

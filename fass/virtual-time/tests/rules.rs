@@ -1,41 +1,13 @@
-//! The rules of the task model, through real functions on real topics.
+//! Deadlines of sinks, and what a function keeps, through real functions on real topics.
 
 mod support;
 
-use fass::{
-    ConstructionPolicy, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags_with,
-};
-use support::{commit, diamond, ms, named, pair, run};
-use virtual_time::{Event, JobOutcome, Rule, SubtaskId, VirtualTime, What};
+use fass::{ConstructionPolicy, Policy, create_dag, finish_create_dags_with};
+use support::{ms, named, run};
+use virtual_time::{JobOutcome, VirtualTime};
 
 const MS: u64 = 1_000_000;
-#[test]
-fn r3_successors_of_one_instance_become_ready_at_one_instant() {
-    let machine = VirtualTime::new().cores(1);
-    let dag = diamond(ms(100), ms(100), [ms(7), ms(5), ms(5), ms(2)]);
-    dag.jobs(1);
-    let report = run(&machine, &[dag]);
-    let lines = report.event_lines();
-    assert_eq!(
-        lines,
-        [
-            "0 released diamond[0]",
-            "0 ready source[0]",
-            "0 start source[0] core 0",
-            "7000000 finish source[0] core 0",
-            "7000000 ready left[0]",
-            "7000000 ready right[0]",
-            "7000000 start left[0] core 0",
-            "12000000 finish left[0] core 0",
-            "12000000 start right[0] core 0",
-            "17000000 finish right[0] core 0",
-            "17000000 ready join[0]",
-            "17000000 start join[0] core 0",
-            "19000000 finish join[0] core 0",
-            "19000000 completed diamond[0] met",
-        ]
-    );
-}
+
 /// One source, a quick sink with a short deadline and a slow one; the slow one is
 /// registered first, so that nothing but its deadline puts it last.
 fn two_ends(name: &str, quick_deadline: u64, jobs: u64) -> fass::Dag {
@@ -94,57 +66,6 @@ fn r5_edf_puts_what_leads_to_the_more_urgent_sink_first() {
 }
 
 #[test]
-fn r5_static_priority_prefers_the_smaller_number_and_preempts() {
-    let run = |preemption| {
-        let machine = (VirtualTime::new().policy(Policy::StaticPriority)).preemption(preemption);
-        let dags = [("low", 0, 20), ("high", 5, 1)].map(|(name, offset, priority)| {
-            let dag = create_dag();
-            dag.name(name).offset(ms(offset)).jobs(1);
-            let attributes = |name: &str| SubtaskAttributes::named(name).priority(priority);
-            dag.register_periodic_subtask(
-                || {
-                    support::execute(ms(10));
-                    (1,)
-                },
-                vec![name],
-                ms(100),
-                attributes("source"),
-            );
-            dag.register_sink_subtask(|_: (i32,)| (), vec![name], ms(100), attributes("sink"));
-            dag
-        });
-        commit(&dags);
-        machine.run()
-    };
-    let report = run(Preemption::Enabled);
-    let low = report.subtask("low", "source")[0];
-    assert_eq!((low.finish_ns, low.preemptions), (Some(20 * MS), 1));
-    assert_eq!(report.subtask("high", "source")[0].finish_ns, Some(15 * MS));
-
-    let report = run(Preemption::Disabled);
-    let low = report.subtask("low", "source")[0];
-    assert_eq!((low.finish_ns, low.preemptions), (Some(10 * MS), 0));
-    assert_eq!(report.subtask("high", "source")[0].start_ns, Some(10 * MS));
-}
-#[test]
-fn overlapping_jobs_keep_their_numbers() {
-    // D = 4 T: up to four jobs are in the diamond at once.
-    let machine = VirtualTime::new().cores(4);
-    let dag = diamond(ms(10), ms(40), [ms(9), ms(2), ms(10), ms(10)]);
-    dag.jobs(50);
-    let report = run(&machine, &[dag]);
-    assert_eq!(report.statistics[0].completed, 50);
-    assert_eq!(report.statistics[0].misses, 0);
-    let response_times = report.jobs.iter().filter_map(|job| job.response_time_ns());
-    assert!(
-        response_times
-            .max()
-            .is_some_and(|longest| longest > 20 * MS),
-        "they overlap"
-    );
-}
-
-#[test]
 fn a_closure_keeps_its_state_from_job_to_job() {
     let machine = VirtualTime::new();
     let (send, receive) = std::sync::mpsc::channel();
@@ -168,40 +89,4 @@ fn a_closure_keeps_its_state_from_job_to_job() {
     dag.register_sink_subtask(sink, vec!["number"], ms(10), named("sink"));
     run(&machine, &[dag]);
     assert_eq!(receive.try_iter().collect::<Vec<_>>(), [1, 2, 4, 7]);
-}
-
-#[test]
-fn the_same_dags_give_the_same_events() {
-    let run = || {
-        let machine = VirtualTime::new().cores(3);
-        let dag = diamond(ms(10), ms(30), [ms(2), ms(9), ms(12), ms(5)]);
-        dag.jobs(30);
-        let other = pair("other", ms(7), ms(7), [ms(2), ms(1)]);
-        other.jobs(40);
-        commit(&[dag, other]);
-        machine.run().event_lines()
-    };
-    assert_eq!(run(), run());
-}
-
-/// `trace_of_virtual_time` tells the same check more lies.
-#[test]
-fn the_check_finds_forged_journals() {
-    let forge = |is_forged: fn(&Event) -> bool| {
-        let machine = VirtualTime::new().cores(2);
-        let dag = diamond(ms(100), ms(100), [ms(1), ms(5), ms(20), ms(2)]);
-        dag.jobs(2);
-        let mut report = run(&machine, &[dag]);
-        for event in &mut report.events {
-            event.time_ns += u64::from(is_forged(event));
-        }
-        let rules = report.violations().into_iter().map(|found| found.rule());
-        rules.collect::<Vec<_>>()
-    };
-    assert!(forge(|event| event.what == What::Released).contains(&Rule::Release));
-    let idle = |event: &Event| {
-        let of = (event.what, event.job, event.subtask);
-        of == (What::Start, 0, Some(SubtaskId(2)))
-    };
-    assert_eq!(forge(idle), [Rule::Dispatch]);
 }
