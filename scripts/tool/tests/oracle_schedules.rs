@@ -20,6 +20,12 @@ j 0 1 4 10 6 1
 end
 ";
 
+/// Splits a row of a table.
+fn split<const N: usize>(row: &str) -> [&str; N] {
+    let cells: Vec<&str> = row.split(" | ").collect();
+    cells.try_into().expect(row)
+}
+
 #[test]
 fn all_public_schedules_agree() {
     for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
@@ -31,169 +37,70 @@ fn all_public_schedules_agree() {
     }
 }
 
+/// What stands in the small case, what is put in its place, and the difference that makes.
+const WRONG: &str =
+    "x 0 1 0 5 6 0 | x 0 1 0 4 6 0 | dag 0 job 1 subtask 0: start: expected 4, replayed 5
+x 0 1 1 6 10 0 | x 0 1 1 6 10 1 | dag 0 job 1 subtask 1: preemptions: expected 1, replayed 0
+j 0 0 0 5 5 1 | j 0 0 0 5 5 0 | dag 0 job 0: missed: expected 0, replayed 1
+j 0 1 4 10 6 1 | j 0 1 4 10 7 1 | dag 0 job 1: response: expected 7, replayed 6";
+
 #[test]
 fn the_first_difference_is_named() {
-    for (from, to, difference) in [
-        (
-            "x 0 1 0 5 6 0",
-            "x 0 1 0 4 6 0",
-            "dag 0 job 1 subtask 0: start: expected 4, replayed 5",
-        ),
-        (
-            "x 0 1 1 6 10 0",
-            "x 0 1 1 6 10 1",
-            "dag 0 job 1 subtask 1: preemptions: expected 1, replayed 0",
-        ),
-        (
-            "j 0 0 0 5 5 1",
-            "j 0 0 0 5 5 0",
-            "dag 0 job 0: missed: expected 0, replayed 1",
-        ),
-        (
-            "j 0 1 4 10 6 1",
-            "j 0 1 4 10 7 1",
-            "dag 0 job 1: response: expected 7, replayed 6",
-        ),
-    ] {
+    for row in WRONG.lines() {
+        let [from, to, difference] = split(row);
         let cases = parse(&SMALL.replace(from, to)).expect("still well formed");
         assert_eq!(check(&cases[0]), Err(difference.to_owned()));
     }
 }
 
+/// What stands in the small case, what is put in its place, and the line and the reason of the
+/// refusal.
+const MALFORMED: &str = r"case small 1 0 1 1 | case small 0 0 1 1 | 1 | expected 1 to 64 cores, found 0
+case small 1 0 1 1 | case small 4294967295 0 1 1 | 1 | expected 1 to 64 cores, found 4294967295
+case small 1 0 1 1 | case small 1 2 1 1 | 1 | expected 0 or 1
+case small 1 0 1 1 | case small 1 0 1 | 1 | takes 5 words
+case small 1 0 1 1 | case small 1 0 1 2 | 6 | expected a `dag` record
+dag 4 4 0 2 2 1 | clusters 1 1\ndag 4 4 0 2 2 1\nin 0 | 2 | clusters of 1 cores in all, found 2
+dag 4 4 0 2 2 1 | clusters 1 0\ndag 4 4 0 2 2 1\nin 0 | 2 | at least 1 core for each cluster
+dag 4 4 0 2 2 1 | clusters 1\ndag 4 4 0 2 2 1 | 4 | expected a `in` record
+dag 4 4 0 2 2 1 | clusters 1\ndag 4 4 0 2 2 1\nin 1 | 4 | no cluster 1
+dag 4 4 0 2 2 1 | dag 4 4 0 2 2 1\nin 0 | 3 | expected a `sub` record
+dag 4 4 0 2 2 1 | dag 0 4 0 2 2 1 | 2 | period of 0
+dag 4 4 0 2 2 1 | dag 4 0 0 2 2 1 | 2 | deadline of 0
+dag 4 4 0 2 2 1 | dag 4 4 0 0 2 1 | 2 | needs at least 1
+dag 4 4 0 2 2 1 | dag 4 4 0 4294967296 2 1 | 2 | too large
+dag 4 4 0 2 2 1 | dag 4 4 0 2 2 2 | 6 | expected a `edge` record
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551615 2 2 1 | 2 | exceeds 18446744073709551615
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551616 2 2 1 | 2 | too large
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551605 2 2 1 | 1 | may end after
+dag 4 4 0 2 2 1 | dag 4 -4 0 2 2 1 | 2 | not a whole number
+sub 1 0 1 1 | sub 1 0 1 | 3 | for each of 2 jobs, found 1
+sub 1 0 1 1 | sub 1 0 1 2 | 3 | not between 1 and the WCET 1
+sub 1 0 1 1 | sub 1 0 0 1 | 3 | not between 1 and the WCET 1
+sub 1 0 1 1 | sub 1 4294967296 1 1 | 3 | too large
+edge 0 1 | edge 0 2 | 5 | no subtask 2
+edge 0 1 | edge 1 1 | 2 | precedes itself
+edge 0 1 | edge 0 1\nsink 2 3 | 6 | no subtask 2
+edge 0 1 | edge 0 1\nsink 1 | 6 | takes 2 words
+edge 0 1 | edge 0 1\nsink 1 3\nsink 1 3 | 7 | twice
+edge 0 1 | edge 0 1\nsink 1 0 | 2 | deadline of 0
+edge 0 1 | edge 0 1\nsink 1 5 | 2 | longer than its DAG's
+edge 0 1 | edge 0 1\nsink 0 3 | 2 | is no sink
+x 0 0 1 1 5 0\n |  | 11 | without 1 `x` records
+x 0 0 1 1 5 0 | x 0 0 0 1 5 0 | 7 | twice
+x 0 0 1 1 5 0 | x 0 2 1 1 5 0 | 7 | no job 2
+x 0 0 1 1 5 0 | x 1 0 1 1 5 0 | 7 | no dag 1
+j 0 1 4 10 6 1 | j 0 1 4 10 6 2 | 11 | expected 0 or 1
+j 0 1 4 10 6 1 | k 0 1 4 10 6 1 | 11 | expected `x`, `j` or `end`
+end\n |  | 12 | the file ends";
+
 #[test]
 fn malformed_files_are_refused_with_their_line() {
-    for (from, to, line, reason) in [
-        (
-            "case small 1 0 1 1",
-            "case small 0 0 1 1",
-            1,
-            "expected 1 to 64 cores, found 0",
-        ),
-        (
-            "case small 1 0 1 1",
-            "case small 4294967295 0 1 1",
-            1,
-            "expected 1 to 64 cores, found 4294967295",
-        ),
-        (
-            "case small 1 0 1 1",
-            "case small 1 2 1 1",
-            1,
-            "expected 0 or 1",
-        ),
-        ("case small 1 0 1 1", "case small 1 0 1", 1, "takes 5 words"),
-        (
-            "case small 1 0 1 1",
-            "case small 1 0 1 2",
-            6,
-            "expected a `dag` record",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "clusters 1 1\ndag 4 4 0 2 2 1\nin 0",
-            2,
-            "clusters of 1 cores in all, found 2",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "clusters 1 0\ndag 4 4 0 2 2 1\nin 0",
-            2,
-            "at least 1 core for each cluster",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "clusters 1\ndag 4 4 0 2 2 1",
-            4,
-            "expected a `in` record",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "clusters 1\ndag 4 4 0 2 2 1\nin 1",
-            4,
-            "no cluster 1",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "dag 4 4 0 2 2 1\nin 0",
-            3,
-            "expected a `sub` record",
-        ),
-        ("dag 4 4 0 2 2 1", "dag 0 4 0 2 2 1", 2, "period of 0"),
-        ("dag 4 4 0 2 2 1", "dag 4 0 0 2 2 1", 2, "deadline of 0"),
-        ("dag 4 4 0 2 2 1", "dag 4 4 0 0 2 1", 2, "needs at least 1"),
-        (
-            "dag 4 4 0 2 2 1",
-            "dag 4 4 0 4294967296 2 1",
-            2,
-            "too large",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "dag 4 4 0 2 2 2",
-            6,
-            "expected a `edge` record",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "dag 4 4 18446744073709551615 2 2 1",
-            2,
-            "exceeds 18446744073709551615",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "dag 4 4 18446744073709551616 2 2 1",
-            2,
-            "too large",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "dag 4 4 18446744073709551605 2 2 1",
-            1,
-            "may end after",
-        ),
-        (
-            "dag 4 4 0 2 2 1",
-            "dag 4 -4 0 2 2 1",
-            2,
-            "not a whole number",
-        ),
-        ("sub 1 0 1 1", "sub 1 0 1", 3, "for each of 2 jobs, found 1"),
-        (
-            "sub 1 0 1 1",
-            "sub 1 0 1 2",
-            3,
-            "not between 1 and the WCET 1",
-        ),
-        (
-            "sub 1 0 1 1",
-            "sub 1 0 0 1",
-            3,
-            "not between 1 and the WCET 1",
-        ),
-        ("sub 1 0 1 1", "sub 1 4294967296 1 1", 3, "too large"),
-        ("edge 0 1", "edge 0 2", 5, "no subtask 2"),
-        ("edge 0 1", "edge 1 1", 2, "precedes itself"),
-        ("edge 0 1", "edge 0 1\nsink 2 3", 6, "no subtask 2"),
-        ("edge 0 1", "edge 0 1\nsink 1", 6, "takes 2 words"),
-        ("edge 0 1", "edge 0 1\nsink 1 3\nsink 1 3", 7, "twice"),
-        ("edge 0 1", "edge 0 1\nsink 1 0", 2, "deadline of 0"),
-        ("edge 0 1", "edge 0 1\nsink 1 5", 2, "longer than its DAG's"),
-        ("edge 0 1", "edge 0 1\nsink 0 3", 2, "is no sink"),
-        ("x 0 0 1 1 5 0\n", "", 11, "without 1 `x` records"),
-        ("x 0 0 1 1 5 0", "x 0 0 0 1 5 0", 7, "twice"),
-        ("x 0 0 1 1 5 0", "x 0 2 1 1 5 0", 7, "no job 2"),
-        ("x 0 0 1 1 5 0", "x 1 0 1 1 5 0", 7, "no dag 1"),
-        ("j 0 1 4 10 6 1", "j 0 1 4 10 6 2", 11, "expected 0 or 1"),
-        (
-            "j 0 1 4 10 6 1",
-            "k 0 1 4 10 6 1",
-            11,
-            "expected `x`, `j` or `end`",
-        ),
-        ("end\n", "", 12, "the file ends"),
-    ] {
+    for row in MALFORMED.lines() {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, line, reason] = split(&row);
         let malformed = parse(&SMALL.replacen(from, to, 1)).expect_err(to);
-        assert_eq!(malformed.line, line, "{to}: {malformed}");
+        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
         assert!(malformed.reason.contains(reason), "{to}: {malformed}");
     }
     assert_eq!(parse("").expect_err("no case").line, 1);
