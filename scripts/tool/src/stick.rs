@@ -17,7 +17,7 @@ use crate::files;
 use crate::image;
 use crate::iso;
 use crate::medium::Medium;
-use crate::options::{Command, Opt, Parsed, Takes};
+use crate::options::{Command, Parsed, Takes, options};
 use crate::qemu::{Loader, Qemu};
 
 /// The table of `image`.
@@ -28,30 +28,18 @@ pub static IMAGE: Command = Command {
         Takes::Text("WORD..."),
         "Words for the app and the kernel, such as `jobs=20`.",
     )),
-    options: &[
-        Opt::new(
-            "app",
-            Takes::Text("NAME"),
-            "The app: a package under apps/.",
-        )
-        .or("fork-join"),
-        Opt::new("iso", Takes::File("FILE"), "The ISO to be made."),
-        Opt::new(
-            "efi",
-            Takes::File("FILE"),
-            "The application of UEFI to be made: EFI/BOOT/BOOTX64.EFI of any FAT stick.",
-        ),
-        Opt::new(
-            "module",
-            Takes::File("MODULE"),
-            "A file that the app finds in memory, as dag-file does its DAGs.",
-        ),
-        Opt::new(
-            "image",
-            Takes::File("IMAGE"),
-            "Take this image; build nothing.",
-        ),
-    ],
+    options: options! {
+        /// The app: a package under apps/.
+        "app": Takes::Text("NAME"), or "fork-join";
+        /// The ISO to be made.
+        "iso": Takes::File("FILE");
+        /// The application of UEFI to be made: EFI/BOOT/BOOTX64.EFI of any FAT stick.
+        "efi": Takes::File("FILE");
+        /// A file that the app finds in memory, as dag-file does its DAGs.
+        "module": Takes::File("MODULE");
+        /// Take this image; build nothing.
+        "image": Takes::File("IMAGE");
+    },
     notes: "\
 The ISO boots by GRUB, under BIOS and UEFI. `cp FILE /dev/DEVICE` writes it to a stick,
 and what was there is lost. The application needs UEFI, and no GRUB: a stick with a FAT file

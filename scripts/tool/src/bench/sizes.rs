@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 use super::code::{self, Frames};
 use crate::image;
-use crate::options::{Command, Opt, Takes};
+use crate::options::{Command, Takes, options};
 use crate::places::Frame;
 use crate::system;
 
@@ -20,7 +20,10 @@ static TABLE: Command = Command {
     invocation: "./scripts/bench sizes",
     about: "Says how many bytes of an image each part of the code takes.",
     positional: None,
-    options: &[Opt::new("app", Takes::Text("APP"), "The app.").or("fork-join")],
+    options: options! {
+        /// The app.
+        "app": Takes::Text("APP"), or "fork-join";
+    },
     notes: "\
 Builds the image. Prints a table, the largest part first, and a JSON object for each part.
 Counted are the bytes that `strip` leaves.

@@ -14,68 +14,11 @@ const LONGEST: usize = 32;
 
 /// Names that cannot be crates, because they mean something already: keywords,
 /// the compiler's own crates, and folders that cargo makes.
-const RESERVED: &[&str] = &[
-    "abstract",
-    "alloc",
-    "as",
-    "async",
-    "await",
-    "become",
-    "box",
-    "break",
-    "build",
-    "const",
-    "continue",
-    "core",
-    "crate",
-    "deps",
-    "do",
-    "dyn",
-    "else",
-    "enum",
-    "examples",
-    "extern",
-    "false",
-    "final",
-    "fn",
-    "for",
-    "gen",
-    "if",
-    "impl",
-    "in",
-    "incremental",
-    "let",
-    "loop",
-    "macro",
-    "match",
-    "mod",
-    "move",
-    "mut",
-    "override",
-    "priv",
-    "proc-macro",
-    "pub",
-    "ref",
-    "return",
-    "self",
-    "static",
-    "std",
-    "struct",
-    "super",
-    "test",
-    "trait",
-    "true",
-    "try",
-    "type",
-    "typeof",
-    "unsafe",
-    "unsized",
-    "use",
-    "virtual",
-    "where",
-    "while",
-    "yield",
-];
+const RESERVED: &str = "\
+    abstract alloc as async await become box break build const continue core crate deps do dyn \
+    else enum examples extern false final fn for gen if impl in incremental let loop macro \
+    match mod move mut override priv proc-macro pub ref return self static std struct super \
+    test trait true try type typeof unsafe unsized use virtual where while yield";
 
 /// Checks that a new app of a workspace can have a name.
 ///
@@ -129,7 +72,7 @@ pub(super) fn check_word(name: &str) -> Result<(), String> {
             name.len()
         ));
     }
-    if RESERVED.contains(&name) {
+    if RESERVED.split(' ').any(|word| word == name) {
         return refuse("Rust or cargo use the word themselves; add another, such as `my-`");
     }
     Ok(())

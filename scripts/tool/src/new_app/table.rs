@@ -1,6 +1,6 @@
 //! What `new-app` accepts: the one table behind its parser and its help text.
 
-use crate::options::{Command, Opt, Takes};
+use crate::options::{Command, Takes, options};
 
 /// The table of `new-app`.
 pub static NEW_APP: Command = Command {
@@ -13,20 +13,13 @@ virtual time.",
         Takes::Text("NAME"),
         "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
     )),
-    options: &[
-        Opt::new(
-            "out",
-            Takes::File("DIR"),
-            "Make the app in this new folder, which is the root of a repository.",
-        ),
-        Opt::new(
-            "git",
-            Takes::Text("URL"),
-            "--out: take the crates from this git repository, not from the folder of these \
-             commands. Its runner is `fass-tool boot`, which `cargo install --git URL tool` \
-             installs.",
-        ),
-    ],
+    options: options! {
+        /// Make the app in this new folder, which is the root of a repository.
+        "out": Takes::File("DIR");
+        /// --out: take the crates from this git repository, not from the folder of these commands.
+        /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
+        "git": Takes::Text("URL");
+    },
     notes: "\
 With --out, cargo run boots the app and cargo test tests it; without, it is in apps/,
 ./scripts/run --app NAME boots it and cargo test -p NAME tests it. docs/guide.md shows

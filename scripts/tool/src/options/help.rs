@@ -79,7 +79,7 @@ fn add_entry(text: &mut String, heading: &str, sentence: &str) {
         line.clear();
     }
     line = format!("{line:TEXT_COLUMN$}");
-    for word in sentence.split(' ') {
+    for word in sentence.split_whitespace() {
         if line.len() + word.len() > WIDTH {
             let _ = writeln!(text, "{}", line.trim_end());
             line = " ".repeat(TEXT_COLUMN);

@@ -60,6 +60,17 @@ pub struct Opt {
     pub help: &'static str,
 }
 
+/// Makes the options of a [`Command`]: above each its sentence for the help text; a short form stands
+/// behind the name, and the value when the option is not given behind `or`.
+macro_rules! options {
+    ($($(#[doc = $help:literal])+ $name:literal $($short:literal)?: $takes:expr $(, or $default:expr)?;)*) => {
+        &[$(
+            $crate::options::Opt::new($name, $takes, concat!($($help),+))$(.short($short))?$(.or($default))?
+        ),*]
+    };
+}
+pub(crate) use options;
+
 /// What follows an option.
 #[derive(Clone, Copy, Debug)]
 pub enum Takes {

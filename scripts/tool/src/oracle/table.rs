@@ -1,6 +1,6 @@
 //! What `oracle KIND` accepts.
 
-use crate::options::{Command, Opt, Takes};
+use crate::options::{Command, Takes, options};
 
 /// What all kinds have in common, for the help texts.
 pub(super) const NOTES: &str = "\
@@ -28,11 +28,10 @@ pub(super) static SCHEDULES: Command = Command {
     about: "Compares starts, finishes, preemptions, response times and misses with those of \
             the scheduler in virtual time.",
     positional: FILES,
-    options: &[Opt::new(
-        "in-kernel",
-        Takes::Nothing,
-        "On the bare machine; with options of its own, see schedules --in-kernel --help.",
-    )],
+    options: options! {
+        /// On the bare machine; with options of its own, see schedules --in-kernel --help.
+        "in-kernel": Takes::Nothing;
+    },
     notes: NOTES,
 };
 

@@ -21,7 +21,7 @@ use std::process::{self, ExitCode};
 use recording::Recording;
 
 use crate::files::{self, Named};
-use crate::options::{Command, Opt, Parsed, Takes};
+use crate::options::{Command, Parsed, Takes, options};
 
 /// The table of `recording`.
 pub static RECORDING: Command = Command {
@@ -31,62 +31,30 @@ pub static RECORDING: Command = Command {
         Takes::File("FILE"),
         "A recording; with --from-csv, a table to make one of.",
     )),
-    options: &[
-        Opt::new(
-            "csv",
-            Takes::File("DIR"),
-            "Write a table of each channel into this folder, and one of what else happened.",
-        ),
-        Opt::new(
-            "mcap",
-            Takes::File("FILE"),
-            "Write an MCAP file, with messages in JSON, for Foxglove and others.",
-        ),
-        Opt::new(
-            "until",
-            Takes::Text("DAG/JOB"),
-            "Show all that is recorded of a job. (What its subtasks compute of it is shown by the \
-             app's own replay.)",
-        ),
-        Opt::new(
-            "from-csv",
-            Takes::Nothing,
-            "Make a recording of a table whose rows are what a source returns.",
-        ),
-        Opt::new(
-            "out",
-            Takes::File("FILE"),
-            "--from-csv: write the recording to this file.",
-        )
-        .short('o'),
-        Opt::new(
-            "dag",
-            Takes::Text("NAME"),
-            "--from-csv: the DAG of the source.",
-        ),
-        Opt::new(
-            "topic",
-            Takes::Text("NAME"),
-            "--from-csv: the topic that it writes.",
-        ),
-        Opt::new(
-            "type",
-            Takes::Text("TYPE"),
-            "--from-csv: the type of the values, as `Seen { at: [f64; 3], name: text }`, its \
-             numbers in the order of the columns; else each column is a field of type f64.",
-        ),
-        Opt::new(
-            "ignore",
-            Takes::Text("COLUMNS"),
-            "--from-csv: columns that are no part of the values, with commas between.",
-        ),
-        Opt::new(
-            "period",
-            Takes::Text("TIME"),
-            "--from-csv: the time from row to row, such as 10ms, if there is no column \
-             release_ns.",
-        ),
-    ],
+    options: options! {
+        /// Write a table of each channel into this folder, and one of what else happened.
+        "csv": Takes::File("DIR");
+        /// Write an MCAP file, with messages in JSON, for Foxglove and others.
+        "mcap": Takes::File("FILE");
+        /// Show all that is recorded of a job. (What its subtasks compute of it is shown by the
+        /// app's own replay.)
+        "until": Takes::Text("DAG/JOB");
+        /// Make a recording of a table whose rows are what a source returns.
+        "from-csv": Takes::Nothing;
+        /// --from-csv: write the recording to this file.
+        "out" 'o': Takes::File("FILE");
+        /// --from-csv: the DAG of the source.
+        "dag": Takes::Text("NAME");
+        /// --from-csv: the topic that it writes.
+        "topic": Takes::Text("NAME");
+        /// --from-csv: the type of the values, as `Seen { at: [f64; 3], name: text }`, its numbers
+        /// in the order of the columns; else each column is a field of type f64.
+        "type": Takes::Text("TYPE");
+        /// --from-csv: columns that are no part of the values, with commas between.
+        "ignore": Takes::Text("COLUMNS");
+        /// --from-csv: the time from row to row, such as 10ms, if there is no column release_ns.
+        "period": Takes::Text("TIME");
+    },
     notes: "\
 Without an option it says what is in the recording. docs/recordings.md explains all of it.
 

@@ -9,7 +9,7 @@ use replay::shown::shown;
 use super::figures::Figures;
 use super::plan::{Length, Part, Plan, usual_bound_ns};
 use super::{Report, run};
-use crate::options::{Command, Opt, Parsed, Takes};
+use crate::options::{Command, Parsed, Takes, options};
 use crate::progress::Progress;
 use crate::qemu::{MOST_CORES, Mode};
 
@@ -21,89 +21,37 @@ static SOAK: Command = Command {
     invocation: "./scripts/soak",
     about: "Runs random DAG sets on the bare machine for a long time, and checks everything.",
     positional: None,
-    options: &[
-        Opt::new(
-            "short",
-            Takes::Nothing,
-            "16 s of guest time instead of 14 minutes, of the same kinds; the host takes longer.",
-        ),
-        Opt::new(
-            "cores",
-            Takes::number(1..=MOST_CORES),
-            "Processors of the guest.",
-        )
-        .or("4"),
-        Opt::new(
-            "load",
-            Takes::number(1..=MOST_LOAD),
-            "The load, in percent of all cores.",
-        )
-        .or("90"),
-        Opt::new(
-            "overload",
-            Takes::number(1..=MOST_LOAD),
-            "The load of the overload, in percent of all cores.",
-        )
-        .or("130"),
-        Opt::new(
-            "seconds",
-            Takes::number(1..=86_400),
-            "Guest time at the load, half of it under each policy.",
-        )
-        .or("600"),
-        Opt::new(
-            "overload-seconds",
-            Takes::number(0..=86_400),
-            "Guest time in overload with each overrun policy, likewise.",
-        )
-        .or("60"),
-        Opt::new(
-            "round-ms",
-            Takes::number(1..=10_000),
-            "Guest time in which a round, that is one set of DAGs, releases jobs.",
-        )
-        .or("5000"),
-        Opt::new(
-            "seed",
-            Takes::number(0..=u64::MAX),
-            "Seed of the sets and the execution times.",
-        )
-        .or("1"),
-        Opt::new(
-            "mode",
-            Takes::OneOf(Mode::NAMES),
-            "What time means; see ./scripts/run --help.",
-        )
-        .or("deterministic"),
-        Opt::new(
-            "only",
-            Takes::Text("PART"),
-            "Only this part, by the table's name, such as edf-130-skip.",
-        ),
-        Opt::new(
-            "first",
-            Takes::number(0..=1_000_000),
-            "The first round of each part.",
-        )
-        .or("0"),
-        Opt::new(
-            "rounds",
-            Takes::number(1..=1_000_000),
-            "The rounds of each part, instead of a time.",
-        ),
-        Opt::new(
-            "bound-us",
-            Takes::number(0..=1_000_000_000),
-            "Microseconds for which an instance may wait for what it is owed; 50, and where \
-             time is real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).",
-        ),
-        Opt::new(
-            "side-by-side",
-            Takes::number(1..=64),
-            "Guests that run at once; as many as the host has processors, and one where \
-             time is real.",
-        ),
-    ],
+    options: options! {
+        /// 16 s of guest time instead of 14 minutes, of the same kinds; the host takes longer.
+        "short": Takes::Nothing;
+        /// Processors of the guest.
+        "cores": Takes::number(1..=MOST_CORES), or "4";
+        /// The load, in percent of all cores.
+        "load": Takes::number(1..=MOST_LOAD), or "90";
+        /// The load of the overload, in percent of all cores.
+        "overload": Takes::number(1..=MOST_LOAD), or "130";
+        /// Guest time at the load, half of it under each policy.
+        "seconds": Takes::number(1..=86_400), or "600";
+        /// Guest time in overload with each overrun policy, likewise.
+        "overload-seconds": Takes::number(0..=86_400), or "60";
+        /// Guest time in which a round, that is one set of DAGs, releases jobs.
+        "round-ms": Takes::number(1..=10_000), or "5000";
+        /// Seed of the sets and the execution times.
+        "seed": Takes::number(0..=u64::MAX), or "1";
+        /// What time means; see ./scripts/run --help.
+        "mode": Takes::OneOf(Mode::NAMES), or "deterministic";
+        /// Only this part, by the table's name, such as edf-130-skip.
+        "only": Takes::Text("PART");
+        /// The first round of each part.
+        "first": Takes::number(0..=1_000_000), or "0";
+        /// The rounds of each part, instead of a time.
+        "rounds": Takes::number(1..=1_000_000);
+        /// Microseconds for which an instance may wait for what it is owed; 50, and where time is
+        /// real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).
+        "bound-us": Takes::number(0..=1_000_000_000);
+        /// Guests that run at once; as many as the host has processors, and one where time is real.
+        "side-by-side": Takes::number(1..=64);
+    },
     notes: "\
 A round draws a random set of 3 to 8 DAGs of 3 to 12 subtasks, whose execution
 times are random too, and runs it for the time of a round. Where instances hold

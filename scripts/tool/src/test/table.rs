@@ -1,6 +1,6 @@
 //! What `test` accepts: the one table behind its parser and its help text.
 
-use crate::options::{Command, Opt, Takes};
+use crate::options::{Command, Takes, options};
 
 /// The table of `test`.
 pub static TEST: Command = Command {
@@ -10,24 +10,14 @@ pub static TEST: Command = Command {
         Takes::Text("FILTER"),
         "Run only tests and checks whose name contains this.",
     )),
-    options: &[
-        Opt::new(
-            "quick",
-            Takes::Nothing,
-            "Only what runs on the host: no guests, no images, no lints.",
-        ),
-        Opt::new(
-            "bless",
-            Takes::Nothing,
-            "Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.",
-        ),
-        Opt::new(
-            "verbose",
-            Takes::Nothing,
-            "Show every test by name, not only those that fail.",
-        )
-        .short('v'),
-    ],
+    options: options! {
+        /// Only what runs on the host: no guests, no images, no lints.
+        "quick": Takes::Nothing;
+        /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
+        "bless": Takes::Nothing;
+        /// Show every test by name, not only those that fail.
+        "verbose" 'v': Takes::Nothing;
+    },
     notes: "\
 The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
 the reasons above it; above these stand the parts that took longest, in seconds.

@@ -11,7 +11,7 @@ use super::chains::Measured;
 use super::model::Run;
 use super::{bound, chains, check, read, report};
 use crate::files;
-use crate::options::{Command, Opt, Parsed, Takes};
+use crate::options::{Command, Parsed, Takes, options};
 
 /// The table of `check-trace`.
 pub static CHECK_TRACE: Command = Command {
@@ -22,36 +22,20 @@ pub static CHECK_TRACE: Command = Command {
         "Serial logs, or other files of JSON lines, with traces: \
          `./scripts/run --trace FILE` makes one.",
     )),
-    options: &[
-        Opt::new(
-            "bound-us",
-            Takes::number(0..=1_000_000_000),
-            "Microseconds for which an instance may wait for what it is owed, because a \
-             decision takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 \
-             by fifo, 10000 by sched_ext, 100000 where nothing is preempted, else 1000.",
-        ),
-        Opt::new(
-            "show",
-            Takes::number(0..=u64::MAX),
-            "Breaches of a run to be shown; all are counted.",
-        )
-        .or("20"),
-        Opt::new(
-            "from",
-            Takes::Text("DAG/SUBTASK"),
-            "Only the chains that begin with this subtask; with --to.",
-        ),
-        Opt::new(
-            "to",
-            Takes::Text("DAG/SUBTASK"),
-            "Only the chains that end with this subtask; with --from.",
-        ),
-        Opt::new(
-            "json",
-            Takes::Nothing,
-            "Only the machine lines on standard output, the rest on standard error.",
-        ),
-    ],
+    options: options! {
+        /// Microseconds for which an instance may wait for what it is owed, because a decision
+        /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
+        /// by sched_ext, 100000 where nothing is preempted, else 1000.
+        "bound-us": Takes::number(0..=1_000_000_000);
+        /// Breaches of a run to be shown; all are counted.
+        "show": Takes::number(0..=u64::MAX), or "20";
+        /// Only the chains that begin with this subtask; with --to.
+        "from": Takes::Text("DAG/SUBTASK");
+        /// Only the chains that end with this subtask; with --from.
+        "to": Takes::Text("DAG/SUBTASK");
+        /// Only the machine lines on standard output, the rest on standard error.
+        "json": Takes::Nothing;
+    },
     notes: "\
 rules:
   R1 release              nothing of a job before O + kT

@@ -22,7 +22,7 @@ use std::process::ExitCode;
 
 use super::plots;
 use crate::files;
-use crate::options::{Command, Opt, Takes};
+use crate::options::{Command, Takes, options};
 use curves::{Point, measure};
 
 static TABLE: Command = Command {
@@ -30,21 +30,16 @@ static TABLE: Command = Command {
     about: "Counts the random sets of DAGs that the analysis proves, with the multi-path bound \
             and by the forms before it.",
     positional: None,
-    options: &[
-        Opt::new("cores", Takes::numbers(1..=64), "The numbers of cores.").or("4,8,16"),
-        Opt::new(
-            "sets",
-            Takes::number(1..=1_000_000),
-            "Random sets for each number of cores and load.",
-        )
-        .or("200"),
-        Opt::new("seed", Takes::number(0..=u64::MAX), "Seed of the sets.").or("1"),
-        Opt::new(
-            "out",
-            Takes::File("DIR"),
-            "Write the table as DIR/bounds.csv, too, and draw DIR/plots/bounds.svg.",
-        ),
-    ],
+    options: options! {
+        /// The numbers of cores.
+        "cores": Takes::numbers(1..=64), or "4,8,16";
+        /// Random sets for each number of cores and load.
+        "sets": Takes::number(1..=1_000_000), or "200";
+        /// Seed of the sets.
+        "seed": Takes::number(0..=u64::MAX), or "1";
+        /// Write the table as DIR/bounds.csv, too, and draw DIR/plots/bounds.svg.
+        "out": Takes::File("DIR");
+    },
     notes: "\
 A set has 2 to 2 m DAGs of 5 to 20 subtasks with D = T and deadline-monotonic priorities;
 its load is the sum of volume / T over the cores. A small set has 2 to 5 DAGs of 2 to 8

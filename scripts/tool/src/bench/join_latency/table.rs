@@ -1,6 +1,6 @@
 //! What `bench join-latency` accepts: the one table behind its parser and its help.
 
-use crate::options::{Command, Opt, Takes};
+use crate::options::{Command, Takes, options};
 use crate::qemu::{MOST_CORES, Mode};
 
 /// The table of `bench join-latency`.
@@ -8,109 +8,33 @@ pub(super) static TABLE: Command = Command {
     invocation: "./scripts/bench join-latency",
     about: "Reproduces the paper's evaluation: joins by a DAG, by equal and by close stamps.",
     positional: None,
-    options: &[
-        Opt {
-            name: "out",
-            short: Some('o'),
-            takes: Takes::File("DIR"),
-            default: "target/join-latency",
-            help: "The folder for all results; what is there already is not measured again.",
-        },
-        Opt {
-            name: "jobs",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 100_000,
-            },
-            default: "2000",
-            help: "Jobs of each condition.",
-        },
-        Opt {
-            name: "subtasks",
-            short: None,
-            takes: Takes::Numbers { least: 1, most: 16 },
-            default: "2,4,6",
-            help: "Parallel subtasks N.",
-        },
-        Opt {
-            name: "policies",
-            short: None,
-            takes: Takes::Text("LIST"),
-            default: "fass,exact,approximate-10,approximate-30,approximate-50",
-            help: "What joins: fass, exact, approximate-MS with the longest interval.",
-        },
-        Opt {
-            name: "seed",
-            short: None,
-            takes: Takes::Number {
-                least: 0,
-                most: u64::MAX,
-            },
-            default: "1",
-            help: "Seed of the execution times, the same for every policy.",
-        },
-        Opt {
-            name: "repeat",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 1000,
-            },
-            default: "1",
-            help: "Runs of each condition, with this seed and the ones after it.",
-        },
-        Opt {
-            name: "on",
-            short: None,
-            takes: Takes::OneOf(&["machine", "linux"]),
-            default: "machine",
-            help: "Where: on the machine in QEMU, or on this computer's processors, which cores \
-                   share if there are fewer; then DIR is target/join-latency-on-linux.",
-        },
-        Opt {
-            name: "cores",
-            short: None,
-            takes: Takes::Number {
-                least: 3,
-                most: MOST_CORES,
-            },
-            default: "",
-            help: "Processors of the guest, at least N + 2; two more than the largest N.",
-        },
-        Opt {
-            name: "queue",
-            short: None,
-            takes: Takes::Number {
-                least: 1,
-                most: 100_000,
-            },
-            default: "1000",
-            help: "Queue size of the synchronizers.",
-        },
-        Opt {
-            name: "mode",
-            short: None,
-            takes: Takes::OneOf(Mode::NAMES),
-            default: "",
-            help: "What time means, see ./scripts/run --help; kvm where it works, else \
-                   deterministic.",
-        },
-        Opt {
-            name: "deterministic",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "The same as --mode deterministic.",
-        },
-        Opt {
-            name: "once",
-            short: None,
-            takes: Takes::Nothing,
-            default: "",
-            help: "Boot each deterministic condition once, not until two boots agree.",
-        },
-    ],
+    options: options! {
+        /// The folder for all results; what is there already is not measured again.
+        "out" 'o': Takes::File("DIR"), or "target/join-latency";
+        /// Jobs of each condition.
+        "jobs": Takes::number(1..=100_000), or "2000";
+        /// Parallel subtasks N.
+        "subtasks": Takes::numbers(1..=16), or "2,4,6";
+        /// What joins: fass, exact, approximate-MS with the longest interval.
+        "policies": Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+        /// Seed of the execution times, the same for every policy.
+        "seed": Takes::number(0..=u64::MAX), or "1";
+        /// Runs of each condition, with this seed and the ones after it.
+        "repeat": Takes::number(1..=1000), or "1";
+        /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
+        /// there are fewer; then DIR is target/join-latency-on-linux.
+        "on": Takes::OneOf(&["machine", "linux"]), or "machine";
+        /// Processors of the guest, at least N + 2; two more than the largest N.
+        "cores": Takes::number(3..=MOST_CORES);
+        /// Queue size of the synchronizers.
+        "queue": Takes::number(1..=100_000), or "1000";
+        /// What time means, see ./scripts/run --help; kvm where it works, else deterministic.
+        "mode": Takes::OneOf(Mode::NAMES);
+        /// The same as --mode deterministic.
+        "deterministic": Takes::Nothing;
+        /// Boot each deterministic condition once, not until two boots agree.
+        "once": Takes::Nothing;
+    },
     notes: "\
 writes into DIR:
   summary.json        counts, median, mean, p99, max of each condition

@@ -29,39 +29,24 @@ use workload::Graph;
 
 use replay::shown::quoted;
 
-use crate::options::{Command, Opt, Parsed, Takes};
+use crate::options::{Command, Parsed, Takes, options};
 use crate::progress::Progress;
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench native",
     about: "Measures the scheduler on this host's own processors, with empty bodies.",
     positional: None,
-    options: &[
-        Opt::new(
-            "workers",
-            Takes::numbers(1..=64),
-            "The numbers of workers, each a thread with a processor of its own.",
-        )
-        .or("1,2"),
-        Opt::new(
-            "rounds",
-            Takes::number(10..=100_000),
-            "How many rounds of about 20,000 instances each figure has.",
-        )
-        .or("300"),
-        Opt::new(
-            "jobs",
-            Takes::number(100..=10_000_000),
-            "The jobs whose joins across cores are measured.",
-        )
-        .or("20000"),
-        Opt::new(
-            "only",
-            Takes::Text("NAMES"),
-            "The workloads, with commas between: chain-64, fork-join-2, fork-join-4, \
-             fork-join-6, layered-1000, dags-1000, join, clusters; all.",
-        ),
-    ],
+    options: options! {
+        /// The numbers of workers, each a thread with a processor of its own.
+        "workers": Takes::numbers(1..=64), or "1,2";
+        /// How many rounds of about 20,000 instances each figure has.
+        "rounds": Takes::number(10..=100_000), or "300";
+        /// The jobs whose joins across cores are measured.
+        "jobs": Takes::number(100..=10_000_000), or "20000";
+        /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
+        /// layered-1000, dags-1000, join, clusters; all.
+        "only": Takes::Text("NAMES");
+    },
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under
 the scheduler, without values; `typed` are functions with a u64 on each edge (not of

@@ -7,7 +7,7 @@ use replay::Case;
 use replay::lines::Malformed;
 
 use super::{Deviation, Judged, Settings, run};
-use crate::options::{Command, Opt, Parsed, Takes};
+use crate::options::{Command, Parsed, Takes, options};
 use crate::oracle::{read, schedules};
 use crate::qemu::{MOST_CORES, Machine, Mode};
 
@@ -18,61 +18,29 @@ static IN_KERNEL: Command = Command {
         Takes::File("FILE..."),
         "Reference schedules, as in tests/oracle.",
     )),
-    options: &[
-        Opt::new(
-            "in-kernel",
-            Takes::Nothing,
-            "On the machine, not in virtual time on the host.",
-        ),
-        Opt::new(
-            "cores-up-to",
-            Takes::number(1..=MOST_CORES),
-            "Leave out the cases for more cores.",
-        )
-        .or("64"),
-        Opt::new(
-            "unit-us",
-            Takes::number(100..=10_000_000),
-            "The length of a unit of time in microseconds.",
-        )
-        .or("10000"),
-        Opt::new(
-            "window-us",
-            Takes::number(0..=2_500_000),
-            "Events less than this apart count as one instant; a 100th of a unit, with --work \
-             compute a 40th.",
-        ),
-        Opt::new(
-            "guard-us",
-            Takes::number(0..=2_500_000),
-            "How much before a unit's end execution in it ends; a 500th of a unit, with --work \
-             compute a 40th.",
-        ),
-        Opt::new(
-            "tolerance",
-            Takes::number(1..=49),
-            "How far starts and finishes may be from the reference, in percent of a unit; 2, with \
-             --work compute 5.",
-        ),
-        Opt::new(
-            "work",
-            Takes::OneOf(&["simulate", "compute"]),
-            "Whether execution is simulated, or cores also compute, for half of each unit in all.",
-        )
-        .or("simulate"),
-        Opt::new(
-            "mode",
-            Takes::OneOf(Mode::NAMES),
-            "What time means; see ./scripts/run --help.",
-        )
-        .or("deterministic"),
-        Opt::new(
-            "machine",
-            Takes::OneOf(Machine::NAMES),
-            "The board that QEMU imitates.",
-        )
-        .or("microvm"),
-    ],
+    options: options! {
+        /// On the machine, not in virtual time on the host.
+        "in-kernel": Takes::Nothing;
+        /// Leave out the cases for more cores.
+        "cores-up-to": Takes::number(1..=MOST_CORES), or "64";
+        /// The length of a unit of time in microseconds.
+        "unit-us": Takes::number(100..=10_000_000), or "10000";
+        /// Events less than this apart count as one instant; a 100th of a unit, with --work compute
+        /// a 40th.
+        "window-us": Takes::number(0..=2_500_000);
+        /// How much before a unit's end execution in it ends; a 500th of a unit, with --work
+        /// compute a 40th.
+        "guard-us": Takes::number(0..=2_500_000);
+        /// How far starts and finishes may be from the reference, in percent of a unit; 2, with
+        /// --work compute 5.
+        "tolerance": Takes::number(1..=49);
+        /// Whether execution is simulated, or cores also compute, for half of each unit in all.
+        "work": Takes::OneOf(&["simulate", "compute"]), or "simulate";
+        /// What time means; see ./scripts/run --help.
+        "mode": Takes::OneOf(Mode::NAMES), or "deterministic";
+        /// The board that QEMU imitates.
+        "machine": Takes::OneOf(Machine::NAMES), or "microvm";
+    },
     notes: "\
 Each case runs with its number of cores, its policy, and preemption as it says.
 Compared are start, finish and preemptions of every instance, and release, finish

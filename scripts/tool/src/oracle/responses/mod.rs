@@ -15,7 +15,7 @@ use std::sync::Arc;
 use sched_dag::analysis::{Settings, answer, fix_orders};
 use sched_dag::{CommitOptions, ConstructionPolicy, verify};
 
-use crate::options::{Command, Opt, Takes as Value};
+use crate::options::{Command, Takes as Value, options};
 use crate::progress::Progress;
 use crate::random::Random;
 use draw::{Sample, sample};
@@ -26,20 +26,12 @@ static TABLE: Command = Command {
     about: "Runs random sets that the analysis accepts, in virtual time with the overheads that \
             it charges, and holds every response against its bound.",
     positional: None,
-    options: &[
-        Opt::new(
-            "sets",
-            Value::number(1..=100_000_000),
-            "Accepted sets to run.",
-        )
-        .or("1000"),
-        Opt::new(
-            "seed",
-            Value::number(0..=u64::MAX),
-            "Seed of the first set; each has the next one.",
-        )
-        .or("1"),
-    ],
+    options: options! {
+        /// Accepted sets to run.
+        "sets": Value::number(1..=100_000_000), or "1000";
+        /// Seed of the first set; each has the next one.
+        "seed": Value::number(0..=u64::MAX), or "1";
+    },
     notes: "\
 A set has up to 4 DAGs of up to 8 subtasks on up to 5 cores. Each runs twice for 12 of its longest
 periods: with WCETs and all that is charged, and with drawn parts of both: late interrupts, decisions,

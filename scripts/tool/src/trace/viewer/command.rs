@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use super::convert;
 use crate::files::{self, Named};
-use crate::options::{Command, Opt, Parsed, Takes};
+use crate::options::{Command, Parsed, Takes, options};
 use crate::trace::bound;
 use crate::trace::command::read_file;
 
@@ -19,24 +19,14 @@ pub static TRACE: Command = Command {
         "A serial log, or another file of JSON lines, with traces: \
          `./scripts/run --trace FILE` makes one.",
     )),
-    options: &[
-        Opt::new(
-            "out",
-            Takes::File("FILE"),
-            "Write to this file; else to standard output.",
-        )
-        .short('o'),
-        Opt::new(
-            "run",
-            Takes::number(0..=u64::MAX),
-            "Only the run of this number; else all of them, side by side from time 0.",
-        ),
-        Opt::new(
-            "bound-us",
-            Takes::number(0..=1_000_000_000),
-            "As for ./scripts/check-trace, whose breaches are shown as markers.",
-        ),
-    ],
+    options: options! {
+        /// Write to this file; else to standard output.
+        "out" 'o': Takes::File("FILE");
+        /// Only the run of this number; else all of them, side by side from time 0.
+        "run": Takes::number(0..=u64::MAX);
+        /// As for ./scripts/check-trace, whose breaches are shown as markers.
+        "bound-us": Takes::number(0..=1_000_000_000);
+    },
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
 chrome://tracing, or at https://www.speedscope.app. docs/seeing.md explains the picture.
