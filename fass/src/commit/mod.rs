@@ -29,10 +29,12 @@ use alloc::rc::Rc;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::cell::Ref;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
 use sched_dag::{Policy, TaskSet, Verified, Warning, analysis, sorted_by_key, wcets};
 
 use crate::api::dag::Dag;
+use crate::draft::Draft;
 use crate::platform;
 use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
@@ -327,9 +329,10 @@ fn verify(
     observed: Option<&str>,
 ) -> Result<Verified, CommitError> {
     let mut faults = Vec::new();
+    let drafts: Vec<Ref<'_, Draft>> = dags.iter().map(|dag| dag.draft.borrow()).collect();
     let mut specs = Vec::with_capacity(dags.len());
-    for ((number, dag), is_repeated) in dags.iter().enumerate().zip(repeated(dags)) {
-        let draft = dag.draft.borrow();
+    let all = dags.iter().zip(&drafts).enumerate();
+    for ((number, (dag, draft)), is_repeated) in all.zip(repeated(dags)) {
         let label = DagLabel {
             id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
             name: draft.spec.name.clone(),
@@ -345,20 +348,20 @@ fn verify(
         let mut spec = draft.spec_with_known_types();
         if specs.len() < number && spec.name.is_empty() {
             // DAGs were left out before it, so the model counts differently.
-            spec.name = number.to_string();
+            spec.to_mut().name = number.to_string();
         }
         let label = DagLabel {
             id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
             name: spec.name.clone(),
         };
         faults.extend((draft.flaws.iter()).map(|flaw| Fault::of(flaw.clone(), label.clone())));
-        if let Some(Err(fault)) = observed.map(|file| wcets::apply(file, &mut spec)) {
+        if let Some(Err(fault)) = observed.map(|file| wcets::apply(file, spec.to_mut())) {
             let dag = label.clone();
             faults.push(Fault::WcetsRefused { dag, fault });
         }
         faults.extend(missing::others(dags, dag, &label));
-        faults.extend(replaceable::check(&draft, &label));
-        faults.extend(inputs::check(&draft, &label));
+        faults.extend(replaceable::check(draft, &label));
+        faults.extend(inputs::check(draft, &label));
         specs.push(spec);
     }
     modes::check(dags, &mut faults);

@@ -12,6 +12,7 @@ pub(crate) mod flaw;
 pub(crate) mod modes;
 pub(crate) mod recorded;
 
+use alloc::borrow::Cow;
 use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::string::String;
@@ -262,14 +263,15 @@ impl Draft {
 
     /// Returns the spec with every [`Unknown`] end replaced by its other end's
     /// type, where that is known.
-    pub(crate) fn spec_with_known_types(&self) -> DagSpec {
-        let mut spec = self.spec.clone();
-        spec.latest = (self.latest.iter())
-            .map(|latest| LatestSpec {
+    pub(crate) fn spec_with_known_types(&self) -> Cow<'_, DagSpec> {
+        let mut spec = Cow::Borrowed(&self.spec);
+        if !self.latest.is_empty() {
+            let latest = self.latest.iter().map(|latest| LatestSpec {
                 port: latest.port(),
                 samplers: latest.samplers(),
-            })
-            .collect();
+            });
+            spec.to_mut().latest = latest.collect();
+        }
         let unknown = MessageType::of::<Unknown>().id();
         let is_of_arity =
             |flaw: &Flaw| matches!(flaw, Flaw::InputArity { .. } | Flaw::OutputArity { .. });
@@ -282,7 +284,7 @@ impl Draft {
             .cloned()
             .chain(self.latest.iter().map(|latest| latest.port()))
             .collect();
-        for subtask in &mut spec.subtasks {
+        for subtask in &mut spec.to_mut().subtasks {
             for port in subtask.inputs.iter_mut().chain(&mut subtask.outputs) {
                 if port.type_id == unknown
                     && let Some(other_end) = known.iter().find(|other| other.topic == port.topic)

@@ -377,6 +377,7 @@ impl<B: Body, P> Engine<B, P> {
         let (decisions, log) = self.scheduler.decided();
         for decision in decisions {
             let (core, instance) = (decision.core(), decision.instance());
+            port.retarget(core);
             if let Decision::Preempt { .. } = decision {
                 self.placement.set_target(core, None);
                 preempted = Some(core);
@@ -387,7 +388,6 @@ impl<B: Body, P> Engine<B, P> {
                     log.on_core(core, What::Request, port.now_ns(), instance);
                 }
             }
-            port.retarget(core);
         }
     }
 }

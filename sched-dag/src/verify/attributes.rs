@@ -17,7 +17,7 @@ use crate::policy::{OnFault, Policy, Priority};
 use crate::spec::{DagSpec, STACK_BYTES};
 
 /// Checks the numbers of the whole commit.
-pub(super) fn check(specs: &[DagSpec], options: &CommitOptions, findings: &mut Findings) {
+pub(super) fn check(specs: &[&DagSpec], options: &CommitOptions, findings: &mut Findings) {
     if specs.is_empty() {
         findings.fault(0, Fault::NoDags);
     }
@@ -63,8 +63,8 @@ pub(super) fn in_flight(spec: &DagSpec) -> u64 {
     enough.min(spec.jobs.unwrap_or(u64::MAX))
 }
 
-fn check_instances(specs: &[DagSpec], options: &CommitOptions, findings: &mut Findings) {
-    let of = |spec: &DagSpec| u128::from(in_flight(spec)) * spec.subtasks.len() as u128;
+fn check_instances(specs: &[&DagSpec], options: &CommitOptions, findings: &mut Findings) {
+    let of = |spec: &&DagSpec| u128::from(in_flight(spec)) * spec.subtasks.len() as u128;
     let instances: u128 = specs.iter().map(of).sum();
     if instances <= u128::from(options.instance_limit) {
         return;
@@ -74,7 +74,7 @@ fn check_instances(specs: &[DagSpec], options: &CommitOptions, findings: &mut Fi
             most,
             Fault::TooManyInstances {
                 dag: DagLabel::new(specs, most),
-                in_flight: in_flight(&specs[most]),
+                in_flight: in_flight(specs[most]),
                 instances,
                 limit: options.instance_limit,
             },
@@ -83,7 +83,7 @@ fn check_instances(specs: &[DagSpec], options: &CommitOptions, findings: &mut Fi
 }
 
 #[inline(never)]
-fn check_counts(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
+fn check_counts(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
     let count = spec.subtasks.len();
@@ -116,7 +116,7 @@ fn check_counts(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
 }
 
 #[inline(never)]
-fn check_times(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
+fn check_times(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
     // An app that registers subtasks states both with them.
@@ -158,7 +158,7 @@ fn deadline_of(spec: &DagSpec, job: u64) -> Option<u64> {
 }
 
 #[inline(never)]
-fn check_subtasks(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
+fn check_subtasks(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     for (index, subtask) in spec.subtasks.iter().enumerate() {
         let label = || (DagLabel::new(specs, dag), SubtaskLabel::new(spec, index));
@@ -218,7 +218,7 @@ fn check_subtasks(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
 
 /// Checks what a subtask states of its own deadline. That it is a sink's is checked with
 /// the graph.
-fn check_sink_deadline(specs: &[DagSpec], dag: usize, index: usize, findings: &mut Findings) {
+fn check_sink_deadline(specs: &[&DagSpec], dag: usize, index: usize, findings: &mut Findings) {
     let spec = &specs[dag];
     let Some(relative_deadline_ns) = spec.subtasks[index].relative_deadline_ns else {
         return;
@@ -242,7 +242,7 @@ fn check_sink_deadline(specs: &[DagSpec], dag: usize, index: usize, findings: &m
     }
 }
 
-fn check_priorities_given(specs: &[DagSpec], dag: usize, findings: &mut Findings) {
+fn check_priorities_given(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
     let subtasks = &specs[dag].subtasks;
     let missing = subtasks
         .iter()
@@ -253,7 +253,7 @@ fn check_priorities_given(specs: &[DagSpec], dag: usize, findings: &mut Findings
     }
     let without = (0..subtasks.len())
         .filter(|&index| subtasks[index].priority.is_none())
-        .map(|index| SubtaskLabel::new(&specs[dag], index))
+        .map(|index| SubtaskLabel::new(specs[dag], index))
         .collect();
     let label = DagLabel::new(specs, dag);
     findings.fault(
@@ -265,7 +265,7 @@ fn check_priorities_given(specs: &[DagSpec], dag: usize, findings: &mut Findings
     );
 }
 
-fn warn_of_equal_priorities(specs: &[DagSpec], findings: &mut Findings) {
+fn warn_of_equal_priorities(specs: &[&DagSpec], findings: &mut Findings) {
     let mut given: Vec<(u32, usize, usize)> = Vec::new();
     for (dag, spec) in specs.iter().enumerate() {
         for (index, subtask) in spec.subtasks.iter().enumerate() {
@@ -281,7 +281,7 @@ fn warn_of_equal_priorities(specs: &[DagSpec], findings: &mut Findings) {
             let label = |&(_, dag, index): &_| {
                 (
                     DagLabel::new(specs, dag),
-                    SubtaskLabel::new(&specs[dag], index),
+                    SubtaskLabel::new(specs[dag], index),
                 )
             };
             findings.warnings.push(Warning::EqualPriorities {

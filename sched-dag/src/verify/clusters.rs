@@ -9,7 +9,7 @@ use crate::spec::DagSpec;
 
 /// Checks the clusters of the whole commit.
 #[inline(never)]
-pub(super) fn check(specs: &[DagSpec], options: &CommitOptions, findings: &mut Findings) {
+pub(super) fn check(specs: &[&DagSpec], options: &CommitOptions, findings: &mut Findings) {
     let sizes = options.clusters.sizes();
     for (cluster, _) in (0..)
         .map(ClusterId)

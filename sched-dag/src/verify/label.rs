@@ -29,7 +29,7 @@ pub struct SubtaskLabel {
 }
 
 impl DagLabel {
-    pub(super) fn new(specs: &[DagSpec], dag: usize) -> Self {
+    pub(super) fn new(specs: &[&DagSpec], dag: usize) -> Self {
         Self {
             id: DagId(saturating_u32(dag)),
             name: specs[dag].name.clone(),

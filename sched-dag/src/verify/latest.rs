@@ -13,7 +13,7 @@ use super::topics::Topology;
 use crate::spec::{DagSpec, LatestSpec};
 
 /// Checks all latest values, and takes their topics out of the unread ones.
-pub(super) fn check(specs: &[DagSpec], topologies: &mut [Topology<'_>], findings: &mut Findings) {
+pub(super) fn check(specs: &[&DagSpec], topologies: &mut [Topology<'_>], findings: &mut Findings) {
     for (dag, topology) in topologies.iter_mut().enumerate() {
         for latest in &specs[dag].latest {
             topology
@@ -25,7 +25,7 @@ pub(super) fn check(specs: &[DagSpec], topologies: &mut [Topology<'_>], findings
 }
 
 #[inline(never)]
-fn check_one(specs: &[DagSpec], dag: usize, latest: &LatestSpec, findings: &mut Findings) {
+fn check_one(specs: &[&DagSpec], dag: usize, latest: &LatestSpec, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = DagLabel::new(specs, dag);
     let topic = latest.port.topic.clone();

@@ -16,7 +16,7 @@ use crate::spec::{DagSpec, SubtaskSpec};
 
 /// Adds to the first faults which topic was probably meant.
 #[inline(never)]
-pub(super) fn suggest(specs: &[DagSpec], faults: &mut [Fault]) {
+pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [Fault]) {
     for index in 0..faults.len().min(MOST_FAULTS) {
         let found = match &faults[index] {
             Fault::UnwrittenTopic {
@@ -27,12 +27,12 @@ pub(super) fn suggest(specs: &[DagSpec], faults: &mut [Fault]) {
                 nearest(topic, &written(spec, &own))
             }
             Fault::LatestUnwritten { dag, topic, .. } => {
-                nearest(topic, &written(&specs[dag.id.index()], &[]))
+                nearest(topic, &written(specs[dag.id.index()], &[]))
             }
             Fault::UnreadTopic {
                 dag, topic, writer, ..
             } => {
-                let own = own_topics(&specs[dag.id.index()], writer.id);
+                let own = own_topics(specs[dag.id.index()], writer.id);
                 let unwritten = faults.iter().filter_map(|fault| match fault {
                     Fault::UnwrittenTopic {
                         dag: other, topic, ..

@@ -29,6 +29,7 @@ mod warning;
 mod worded;
 
 use alloc::vec::Vec;
+use core::borrow::Borrow;
 use core::fmt;
 
 pub use fault::{Direction, Fault, Time};
@@ -65,7 +66,15 @@ pub struct Rejected {
 /// # Errors
 ///
 /// All faults of all DAGs, in the order of the DAGs.
-pub fn verify(specs: &[DagSpec], options: &CommitOptions) -> Result<Verified, Rejected> {
+pub fn verify<S: Borrow<DagSpec>>(
+    specs: &[S],
+    options: &CommitOptions,
+) -> Result<Verified, Rejected> {
+    let specs: Vec<&DagSpec> = specs.iter().map(Borrow::borrow).collect();
+    verify_all(&specs, options)
+}
+
+fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<Verified, Rejected> {
     let mut findings = Findings::default();
     attributes::check(specs, options, &mut findings);
     clusters::check(specs, options, &mut findings);

@@ -26,7 +26,7 @@ use crate::wcets::{WcetSource, graph_hash};
 ///
 /// If the specs have a fault that an earlier check finds.
 pub(super) fn build(
-    specs: &[DagSpec],
+    specs: &[&DagSpec],
     options: &CommitOptions,
     shapes: Vec<Shape>,
     findings: &mut Findings,
@@ -79,7 +79,7 @@ impl TaskSet {
 /// Returns for each DAG without priorities the number of its first one:
 /// deadline monotonic, after all that are given.
 #[inline(never)]
-fn priority_bases(specs: &[DagSpec], findings: &mut Findings) -> Vec<u32> {
+fn priority_bases(specs: &[&DagSpec], findings: &mut Findings) -> Vec<u32> {
     let given = specs
         .iter()
         .filter(|spec| has_priorities(spec))
@@ -91,7 +91,7 @@ fn priority_bases(specs: &[DagSpec], findings: &mut Findings) -> Vec<u32> {
     let mut next = largest.map_or(0, |number| u64::from(number) + 1);
 
     let mut order: Vec<usize> = (0..specs.len())
-        .filter(|&dag| !has_priorities(&specs[dag]))
+        .filter(|&dag| !has_priorities(specs[dag]))
         .collect();
     sort_by_key(&mut order, |dag| specs[dag].relative_deadline_ns);
     let mut bases = alloc::vec![0; specs.len()];

@@ -13,7 +13,7 @@ use super::warning::Warning;
 use crate::spec::DagSpec;
 
 /// Checks the names of the whole commit.
-pub(super) fn check(specs: &[DagSpec], findings: &mut Findings) {
+pub(super) fn check(specs: &[&DagSpec], findings: &mut Findings) {
     let dag_names = specs.iter().map(|spec| spec.name.as_str());
     for_each_duplicate(specs.len(), dag_names, |first, second| {
         findings.warnings.push(Warning::DuplicateDagName {

@@ -38,7 +38,7 @@ impl Shape {
 /// Checks the graph of DAG number `dag`.
 #[inline(never)]
 pub(super) fn check(
-    specs: &[DagSpec],
+    specs: &[&DagSpec],
     dag: usize,
     mut topology: Topology<'_>,
     options: &CommitOptions,
@@ -88,7 +88,7 @@ pub(super) fn check(
 
 /// Adds the edges that are given without a topic.
 fn add_plain_edges(
-    specs: &[DagSpec],
+    specs: &[&DagSpec],
     dag: usize,
     edges: &mut Vec<(u32, u32)>,
     findings: &mut Findings,
@@ -118,7 +118,7 @@ fn add_plain_edges(
 }
 
 struct Check<'a> {
-    specs: &'a [DagSpec],
+    specs: &'a [&'a DagSpec],
     dag: usize,
     policy: ConstructionPolicy,
     graph: &'a Graph,
@@ -136,8 +136,8 @@ impl Check<'_> {
                 Fault::NotConnected {
                     dag: self.dag_label(),
                     parts,
-                    one: SubtaskLabel::new(&self.specs[self.dag], 0),
-                    other: SubtaskLabel::new(&self.specs[self.dag], other),
+                    one: SubtaskLabel::new(self.specs[self.dag], 0),
+                    other: SubtaskLabel::new(self.specs[self.dag], other),
                 },
             );
         }
@@ -258,7 +258,7 @@ impl Check<'_> {
     }
 
     fn label(&self, subtask: SubtaskId) -> SubtaskLabel {
-        SubtaskLabel::new(&self.specs[self.dag], subtask.index())
+        SubtaskLabel::new(self.specs[self.dag], subtask.index())
     }
 
     fn labels(&self, subtasks: &[SubtaskId]) -> Vec<SubtaskLabel> {

@@ -40,7 +40,7 @@ pub(super) fn is_shared(state: &StateSpec) -> bool {
 }
 
 /// Checks the states of all DAGs.
-pub(super) fn check(specs: &[DagSpec], findings: &mut Findings) {
+pub(super) fn check(specs: &[&DagSpec], findings: &mut Findings) {
     for (dag, spec) in specs.iter().enumerate() {
         for (position, state) in spec.states.iter().enumerate() {
             let is_repeated = |other: &StateSpec| other.name == state.name;
@@ -54,7 +54,7 @@ pub(super) fn check(specs: &[DagSpec], findings: &mut Findings) {
 }
 
 #[inline(never)]
-fn check_users(specs: &[DagSpec], dag: usize, state: &StateSpec, findings: &mut Findings) {
+fn check_users(specs: &[&DagSpec], dag: usize, state: &StateSpec, findings: &mut Findings) {
     let spec = &specs[dag];
     let label = || DagLabel::new(specs, dag);
     let user = |user: usize| SubtaskLabel::new(spec, user);

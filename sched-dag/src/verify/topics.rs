@@ -60,7 +60,7 @@ impl<'a> Sides<'a> {
 
 /// Checks all topics and returns what they say, one entry a DAG.
 pub(super) fn check<'a>(
-    specs: &'a [DagSpec],
+    specs: &[&'a DagSpec],
     options: &CommitOptions,
     findings: &mut Findings,
 ) -> Vec<Topology<'a>> {
@@ -88,7 +88,7 @@ pub(super) fn check<'a>(
 /// Returns all ends grouped by topic, within a topic in the order of DAGs and
 /// subtasks, and where each group starts.
 #[inline(never)]
-fn ends_by_topic(specs: &[DagSpec]) -> (Vec<End<'_>>, Vec<usize>) {
+fn ends_by_topic<'a>(specs: &[&'a DagSpec]) -> (Vec<End<'a>>, Vec<usize>) {
     let mut unordered: Vec<End<'_>> = Vec::new();
     for (dag, spec) in specs.iter().enumerate() {
         for (subtask, ports) in spec.subtasks.iter().enumerate() {
@@ -127,7 +127,7 @@ fn ends_by_topic(specs: &[DagSpec]) -> (Vec<End<'_>>, Vec<usize>) {
     (ends, starts)
 }
 
-fn report_shared(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Findings) {
+fn report_shared(specs: &[&DagSpec], ends: &[End<'_>], findings: &mut Findings) {
     let dags = ends.chunk_by(|one, other| one.dag == other.dag);
     findings.fault(
         ends[0].dag,
@@ -141,7 +141,7 @@ fn report_shared(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Findings) {
 /// Checks the ends that one topic has in one DAG.
 #[inline(never)]
 fn check_topic<'a>(
-    specs: &'a [DagSpec],
+    specs: &[&'a DagSpec],
     options: &CommitOptions,
     sides: &Sides<'a>,
     shared: bool,
@@ -154,7 +154,7 @@ fn check_topic<'a>(
     };
     let topic = &port.topic;
     let dag_label = || DagLabel::new(specs, dag);
-    let label = |end: &End<'_>| SubtaskLabel::new(&specs[dag], end.subtask);
+    let label = |end: &End<'_>| SubtaskLabel::new(specs[dag], end.subtask);
 
     if writers.len() > 1 && options.construction.writers.is_one() {
         findings.fault(
@@ -203,7 +203,7 @@ fn check_topic<'a>(
 
 /// Reports a topic that stands twice among the inputs, or among the outputs,
 /// of a subtask: in `ends` such ends are neighbours.
-fn report_duplicates(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Findings) {
+fn report_duplicates(specs: &[&DagSpec], ends: &[End<'_>], findings: &mut Findings) {
     for same in
         ends.chunk_by(|one, other| one.subtask == other.subtask && one.direction == other.direction)
     {
@@ -212,7 +212,7 @@ fn report_duplicates(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Finding
                 first.dag,
                 Fault::DuplicateTopic {
                     dag: DagLabel::new(specs, first.dag),
-                    subtask: SubtaskLabel::new(&specs[first.dag], first.subtask),
+                    subtask: SubtaskLabel::new(specs[first.dag], first.subtask),
                     topic: first.port.topic.clone(),
                     direction: first.direction,
                 },
@@ -224,7 +224,7 @@ fn report_duplicates(specs: &[DagSpec], ends: &[End<'_>], findings: &mut Finding
 /// Compares every reader with the first writer, and every further writer with
 /// the first reader: linear, and no wrong end stays unnamed.
 fn report_mismatches(
-    specs: &[DagSpec],
+    specs: &[&DagSpec],
     writers: &[End<'_>],
     readers: &[End<'_>],
     findings: &mut Findings,
@@ -250,7 +250,7 @@ fn report_mismatches(
 }
 
 fn add_edges(
-    specs: &[DagSpec],
+    specs: &[&DagSpec],
     options: &CommitOptions,
     writers: &[End<'_>],
     readers: &[End<'_>],
@@ -267,7 +267,7 @@ fn add_edges(
                     writer.dag,
                     Fault::SelfEdge {
                         dag: DagLabel::new(specs, writer.dag),
-                        subtask: SubtaskLabel::new(&specs[writer.dag], writer.subtask),
+                        subtask: SubtaskLabel::new(specs[writer.dag], writer.subtask),
                         topic: Some(writer.port.topic.clone()),
                     },
                 );
