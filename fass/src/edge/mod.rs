@@ -12,6 +12,7 @@
 
 mod drain;
 mod echo;
+mod excerpt;
 mod guard;
 mod latest;
 mod lost;
@@ -33,6 +34,7 @@ use sched_dag::{DagId, Instance, Notice, TaskSet};
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
 
+pub use excerpt::Excerpt;
 pub use replay::{Divergence, Outcome, Replay};
 
 /// What a platform is to do with what crosses.

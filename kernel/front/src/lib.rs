@@ -5,8 +5,8 @@
 //!
 //! # Rooms, from top to bottom
 //!
-//! `app` judges runs and serves what an app offers to people, `report` tells of a run when it is
-//! over, `options` reads the command line, `text` makes lines. Where text goes is bound when a
+//! `app` judges runs and serves what an app offers to people, `shell` talks with a person during a
+//! run, `report` tells of a run when it is over, `options` reads the command line, `text` makes lines. Where text goes is bound when a
 //! program is linked: its entry names its platform's function by [`output!`], once.
 //!
 //! # What is guaranteed
@@ -29,6 +29,7 @@ extern crate alloc;
 pub mod app;
 pub mod options;
 pub mod report;
+pub mod shell;
 pub mod text;
 
 pub use text::{console, graph, json};

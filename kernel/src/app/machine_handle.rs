@@ -10,7 +10,7 @@ use sched_dag::DagId;
 
 use crate::options::Options;
 use crate::report::{self, Ns};
-use crate::watch::background::{Background, LINE, Wishes, session};
+use crate::watch::background::{Background, LINE, Wishes};
 use executive::machine;
 use executive::machine::interrupts_off;
 use executive::memory::heap;
@@ -263,7 +263,7 @@ impl Machine {
             report::trace::dump(&run, self.runs.replace(self.runs.get() + 1));
         }
         if shuts_down {
-            return Err(shutdown(&run));
+            return Err(Ending::after_shutdown(&run));
         }
         Ok(run)
     }
@@ -314,14 +314,6 @@ impl Machine {
     pub fn set_heartbeat(&self, period: Duration) {
         heartbeat::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
     }
-}
-
-/// Reports a run that a person has ended, and returns how its app ends.
-fn shutdown(run: &Run) -> Ending {
-    for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-        session::counts(run.snapshot(dag)).show(dag, model);
-    }
-    Ending::after_shutdown(run.violations().count())
 }
 
 /// Prints the longest section of a run without interrupts.

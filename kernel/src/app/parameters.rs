@@ -5,7 +5,7 @@ use alloc::boxed::Box;
 use fass::Tunable;
 
 use super::machine_handle::Machine;
-use crate::watch::background::more::PARAMETERS;
+use crate::watch::background::live_run::PARAMETERS;
 use front::app::ending::Ending;
 use front::app::offered::Parameters;
 

@@ -1,9 +1,9 @@
 //! Letting people look at an app's topics.
 
 use super::machine_handle::Machine;
-use crate::watch::background::more;
-use crate::watch::background::topics::Topics;
+use crate::watch::background::live_run::{Kernel, TOPICS};
 use executive::run::edge;
+use front::shell::topics::Topics;
 
 impl Machine {
     /// Lets people look at topics at the console: `echo TOPIC` shows values of those that are
@@ -20,11 +20,11 @@ impl Machine {
     /// }
     /// ```
     pub fn show_topics(&self) {
-        static ALL: Topics = Topics::new();
+        static ALL: Topics<Kernel> = Topics::new();
         if self.has_console() {
             edge::let_look();
             // Once is enough.
-            let _ = more::TOPICS.set(&ALL);
+            let _ = TOPICS.set(&ALL);
         }
     }
 }

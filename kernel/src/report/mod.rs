@@ -9,4 +9,4 @@ pub(crate) mod left;
 pub(crate) mod stacks;
 
 pub use front::report::{Distribution, Ns};
-pub(crate) use front::report::{counts, times, trace, wire};
+pub(crate) use front::report::{times, trace, wire};

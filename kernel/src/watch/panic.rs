@@ -19,7 +19,7 @@ use executive::run::containment;
 use executive::run::execution;
 use executive::text::backtrace::Spot;
 use executive::text::console::{write_in_emergency, write_line_in_emergency};
-use executive::text::excerpt::Excerpt;
+use fass::edge::Excerpt;
 use front::json;
 
 /// The most recent events of this core that a report shows.

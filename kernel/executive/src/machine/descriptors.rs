@@ -6,7 +6,7 @@ use core::arch::asm;
 use alloc::boxed::Box;
 
 use super::once::Once;
-use super::vector::OTHER;
+use super::vector::{OTHER, TIMER};
 
 /// The code segment's selector.
 pub(super) const CODE: u16 = 0x08;
@@ -120,13 +120,18 @@ pub(super) fn load_segments(task_state: *mut TaskState) {
 
 static INTERRUPT_TABLE: Once<Box<[[u64; 2]; 256]>> = Once::new();
 
-/// Loads the interrupt table for this core: vector v at `stubs + 16 v`, and those above
-/// [`OTHER`] where that is.
+/// Loads the interrupt table for this core. From `stubs` on, 16 bytes each, lie those of exceptions,
+/// those of the vectors in use, and one for all others.
 pub(crate) fn load_interrupts(stubs: u64) {
     let table = INTERRUPT_TABLE.get().unwrap_or_else(|| {
         // Only the boot processor gets here, before it starts any other.
         let table = Box::new(core::array::from_fn(|vector| {
-            gate(stubs + 16 * vector.min(usize::from(OTHER)) as u64, vector)
+            let place = match u8::try_from(vector) {
+                Ok(exception @ 0..32) => exception,
+                Ok(used @ TIMER..OTHER) => 32 + used - TIMER,
+                _ => 32 + OTHER - TIMER,
+            };
+            gate(stubs + 16 * u64::from(place), vector)
         }));
         INTERRUPT_TABLE
             .set(table)

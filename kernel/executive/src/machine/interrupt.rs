@@ -23,6 +23,7 @@ global_asm!(
     handle_exception = sym handle_exception,
     handler_stack = const this_core::HANDLER_STACK_OFFSET,
     vector_bytes = const VECTOR_BYTES,
+    timer = const vector::TIMER,
     other = const vector::OTHER,
 );
 

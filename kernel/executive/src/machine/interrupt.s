@@ -23,8 +23,11 @@
 .global interrupt_stubs
 interrupt_stubs:
 .set vector, 0
-.rept {other} + 1
+.rept 32 + {other} - {timer} + 1
     .balign 16
+    .if vector == 32
+    .set vector, {timer}
+    .endif
     # The processor pushes an error code for these alone (Intel SDM 3, 6.13).
     .if (vector == 8) || ((vector >= 10) && (vector <= 14)) || (vector == 17) || (vector == 21) || (vector == 29) || (vector == 30)
     .else

@@ -1,13 +1,13 @@
-//! The interrupt vectors in use.
+//! The interrupt vectors in use, one after the other.
 
 /// The local timer.
-pub const TIMER: u8 = 0x40;
+pub const TIMER: u8 = 0x4c;
 /// Another core has work for this one.
-pub const WAKE: u8 = 0x41;
+pub const WAKE: u8 = 0x4d;
 /// The code that this core runs asks for its own end, by an instruction.
-pub const END: u8 = 0x42;
+pub const END: u8 = 0x4e;
 /// The local APIC withdrew an interrupt; needs no acknowledgement. The low four bits of its
 /// number are ones, as early processors have no others (Intel SDM 3, 11.9).
 pub const SPURIOUS: u8 = 0x4f;
-/// Any interrupt of a higher number; nobody asked for one.
+/// Stands for any other interrupt; nobody asked for one.
 pub const OTHER: u8 = 0x50;

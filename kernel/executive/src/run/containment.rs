@@ -27,7 +27,7 @@ use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{cpu, interrupt_flag, this_core};
 use crate::text::backtrace::Spot;
-use crate::text::excerpt::Excerpt;
+use fass::edge::Excerpt;
 use front::json;
 
 /// How much of a panic's message is shown, and of a name, in bytes. With these a

@@ -1,8 +1,6 @@
 //! What goes in and out as text: the serial line, and machine lines.
 //!
-//! `console` takes text without disturbing what is measured; `excerpt` keeps a text that may not
-//! fit. Of the run, nothing is known here.
+//! `console` takes text without disturbing what is measured. Of the run, nothing is known here.
 
 pub mod backtrace;
 pub mod console;
-pub mod excerpt;

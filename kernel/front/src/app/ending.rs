@@ -6,8 +6,11 @@ use alloc::format;
 use alloc::string::String;
 
 use fass::CommitError;
+use sched_dag::DagId;
+use sched_dag::engine::Run;
 
 use crate::options::UsageError;
+use crate::report::counts::Counts;
 use crate::text::json;
 
 /// Why an app ends other than by success.
@@ -32,9 +35,12 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// Returns how an app ends whose run a person has ended and broke so many rules.
-    pub fn after_shutdown(violations: usize) -> Self {
-        match violations {
+    /// Tells of a run that a person has ended, and returns how its app ends.
+    pub fn after_shutdown(run: &Run) -> Self {
+        for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
+            Counts::of(run.snapshot(dag)).show(dag, model);
+        }
+        match run.violations().count() {
             0 => Self::Shutdown,
             count => Self::Failure(format!("shut down before its end, with {count} violations")),
         }

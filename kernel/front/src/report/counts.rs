@@ -1,6 +1,6 @@
 //! How a DAG does, or did in a run: a line for people, and a machine line of kind `dag_status`.
 
-use sched_dag::{Dag, DagId, DagStatistics};
+use sched_dag::{Dag, DagId, DagStatistics, Snapshot};
 
 use crate::text::json;
 
@@ -18,6 +18,17 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// Returns what is told of a DAG that does, or has ended, so.
+    #[must_use]
+    pub const fn of(snapshot: &Snapshot) -> Self {
+        Self {
+            state: snapshot.word(),
+            statistics: snapshot.statistics,
+            in_flight: snapshot.in_flight,
+            waiting: snapshot.waiting,
+        }
+    }
+
     /// Prints the lines of a DAG with its counts.
     pub fn show(&self, dag: DagId, model: &Dag) {
         self.show_by(dag, model, Self::print);

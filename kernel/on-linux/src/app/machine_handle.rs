@@ -19,7 +19,6 @@ use front::app::wcet_notes;
 use front::json;
 use front::options::{Options, UsageError};
 use front::report;
-use front::report::counts::Counts;
 use sched_dag::engine::Run;
 
 /// The machine, lent to the app's function for the time of the run.
@@ -204,7 +203,7 @@ impl Machine {
         }
         match self.signals.count() {
             0 => Ok(run),
-            _ => Err(shutdown(&run)),
+            _ => Err(Ending::after_shutdown(&run)),
         }
     }
 
@@ -249,20 +248,6 @@ impl Machine {
     pub(crate) fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
         self.bound_verdict.judge(self.fault_verdict.judge(result))
     }
-}
-
-/// Reports a run that a signal has ended, and returns how its app ends.
-fn shutdown(run: &Run) -> Ending {
-    for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-        let counts = Counts {
-            state: "over",
-            statistics: *run.statistics(dag),
-            in_flight: 0,
-            waiting: 0,
-        };
-        counts.show(dag, model);
-    }
-    Ending::after_shutdown(run.violations().count())
 }
 
 /// Says which faults there were, as the kernel does at once.

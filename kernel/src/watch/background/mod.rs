@@ -14,19 +14,14 @@
 //! does the slices instead. The heartbeat also notices that an instance keeps its core for
 //! long ([`stall`]).
 
-mod command;
-mod input;
 mod listener;
+pub(crate) mod live_run;
 mod load;
-pub(crate) mod more;
-mod parameters;
 mod patience;
 mod progress;
-pub(crate) mod session;
 mod stall;
 mod status;
 mod stop;
-pub(crate) mod topics;
 pub(crate) mod watchdog;
 pub(crate) mod wire;
 
@@ -37,10 +32,11 @@ use executive::machine::once::Once;
 use executive::machine::spinlock::SpinLock;
 use executive::run::heartbeat;
 use executive::text::console;
+use front::shell::{self, Session};
 use listener::Listener;
+use live_run::Kernel;
 use progress::Progress;
 use sched_dag::DagId;
-use session::Session;
 use status::Status;
 
 /// What the command line says about the background.
@@ -101,7 +97,7 @@ const STARVED_NS: u64 = 200_000_000;
 #[derive(Debug)]
 struct Sliced {
     status: Option<Status>,
-    session: Option<Session>,
+    session: Option<Session<Kernel>>,
 }
 
 static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {
@@ -155,7 +151,7 @@ impl Background {
     pub(crate) fn begin(wishes: Wishes, total: u64) -> Self {
         let before_ns = heartbeat::own_heartbeat_ns();
         let periods = [
-            (wishes.console.is_some() || wishes.input.is_some()).then_some(session::PERIOD_NS),
+            (wishes.console.is_some() || wishes.input.is_some()).then_some(shell::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
             LINE.get().map(|_| wire::PERIOD_NS),
         ];

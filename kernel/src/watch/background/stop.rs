@@ -8,13 +8,11 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use executive::machine::serial;
 use executive::run::execution;
+use front::shell::END;
 use sched_dag::DagId;
 use sched_dag::lifecycle::Request;
 
 use crate::println;
-
-/// The byte.
-pub(super) const BYTE: u8 = 3;
 
 /// The most bytes that a look takes: what the port's FIFO holds.
 const MOST_BYTES: usize = 16;
@@ -40,7 +38,7 @@ pub(super) fn end() -> bool {
 pub(super) fn beat() {
     let is_watched = IS_WATCHED.load(Ordering::Relaxed);
     let mut bytes = (0..MOST_BYTES).map_while(|_| serial::FIRST.receive());
-    if is_watched && bytes.any(|byte| byte == BYTE) {
+    if is_watched && bytes.any(|byte| byte == END) {
         shut_down();
     }
 }

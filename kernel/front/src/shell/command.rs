@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::more;
+use super::Extra;
 
 /// What a person wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,22 +78,21 @@ pub(super) fn parse(line: &str) -> Result<Command<'_>, Refusal<'_>> {
     }
 }
 
-impl fmt::Display for Refusal<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
+impl<'a> Refusal<'a> {
+    /// Returns what is told, where there are these commands besides.
+    pub(super) fn told(self, extra: Extra) -> impl fmt::Display + 'a {
+        fmt::from_fn(move |f| match self {
             Self::Unknown(name) => {
                 write!(f, "`{name}` is no command; there are ")?;
                 for (index, (command, _)) in HELP.iter().enumerate() {
                     let separator = if index == 0 { "" } else { ", " };
                     write!(f, "{separator}{command}")?;
                 }
-                for (command, _) in more::all().flat_map(more::Commands::help) {
-                    write!(f, ", {command}")?;
-                }
-                Ok(())
+                let mut others = extra.iter().flatten().flat_map(|extra| extra.help());
+                others.try_for_each(|(command, _)| write!(f, ", {command}"))
             }
             Self::Wants(name, what) => write!(f, "`{name}` wants {what}"),
-        }
+        })
     }
 }
 
@@ -127,7 +126,7 @@ mod tests {
 
     #[test]
     fn what_is_no_command_is_told_the_commands() {
-        let message = |line| parse(line).expect_err(line).to_string();
+        let message = |line| parse(line).expect_err(line).told([None; 2]).to_string();
         assert_eq!(
             message("stpo vision"),
             "`stpo` is no command; there are help, dags, stats [DAG], stop DAG, start DAG, \

@@ -1,40 +1,99 @@
-//! The conversation with a person during a run.
+//! The shell: the conversation with a person during a run, on whatever platform.
 //!
-//! It goes on in slices, each of a few microseconds, in core 0's background, so that
-//! it keeps no instance waiting; or in its heartbeat, if the background does not come
-//! to run. Nothing is allocated. (Only a shutdown takes longer: a step of the
-//! scheduler for each DAG.)
+//! It goes on in slices, each of a few microseconds, whenever the platform has time for one, so
+//! that it keeps no instance waiting. Nothing is allocated. (Only a shutdown takes longer: a step
+//! of the scheduler for each DAG.) What it asks of the run is a [`LiveRun`]. Some commands are there
+//! only where the app has called for them: they are reached through [`Commands`], so that another
+//! image has no code for them.
 //!
 //! Each command is answered by lines for people and by one machine line of kind
 //! `console`; `dags` and `stats` print a line of kind `dag_status` for each DAG.
 
+mod command;
+mod input;
+mod parameters;
+pub mod topics;
+
+use alloc::sync::Arc;
 use core::fmt::Display;
+use core::marker::PhantomData;
 
+use fass::edge::Seen;
 use sched_dag::lifecycle::Request;
-use sched_dag::{Dag, DagId, Snapshot, TaskSet};
+use sched_dag::{Dag, DagId, Journal, Snapshot, TaskSet};
 
-use super::command::{Command, HELP, parse};
-use super::input::{Input, Typed};
-use super::{more, stop};
+use crate::options::whole_number;
 use crate::println;
 use crate::report::counts::Counts;
-use executive::machine::serial;
-use executive::run::execution;
-use front::json;
-use front::options::whole_number;
+use crate::text::json;
+use command::{Command, HELP, parse};
+use input::{Input, Typed};
 
-/// How often core 0 looks for bytes, at least.
-pub(crate) const PERIOD_NS: u64 = 20_000_000;
+/// How often a platform looks for bytes, at least.
+pub const PERIOD_NS: u64 = 20_000_000;
+
+/// The byte that ends a run in order: what ctrl-C is on a serial line (ETX in ASCII).
+pub const END: u8 = 3;
 
 /// The most bytes that a slice takes: what the port's FIFO holds.
 const MOST_BYTES: usize = 16;
 
+/// A run that goes on, as the shell sees it: what a platform has for it.
+pub trait LiveRun {
+    /// Returns the model of the run, if one goes on.
+    fn task_set() -> Option<Arc<TaskSet>>;
+
+    /// Returns how a DAG does, if a run goes on that has it.
+    fn snapshot(dag: DagId) -> Option<Snapshot>;
+
+    /// Makes a change to a DAG.
+    fn control(dag: DagId, change: fn(DagId) -> Request);
+
+    /// Returns the number of clusters.
+    fn clusters() -> usize;
+
+    /// Looks at the journal of a cluster, shortly, or changes what it records.
+    fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R>;
+
+    /// Takes a byte that a person has typed.
+    fn receive() -> Option<u8>;
+
+    /// Has nothing more released, and what is in flight go on to its end.
+    fn shut_down();
+
+    /// Has the values of a topic kept to be seen, or none; reports whether it is recorded.
+    fn watch(topic: Option<&str>) -> bool;
+
+    /// Takes the latest value that is to be seen, if there is a new one.
+    fn take_seen(into: &mut [u8]) -> Option<Seen>;
+
+    /// Returns the commands that the app has called for.
+    fn extra() -> Extra;
+}
+
+/// The commands that an app can call for: those about its parameters, and about topics.
+pub type Extra = [Option<&'static dyn Commands>; 2];
+
+/// Some commands of the shell.
+pub trait Commands: Sync {
+    /// Returns them for people: how each is typed, and what it does.
+    fn help(&self) -> &'static [(&'static str, &'static str)];
+
+    /// Does what a line says, of its first word and the rest, or tells why not; `false`: it is
+    /// none of these commands. Allocates nothing.
+    fn answer(&self, name: &str, rest: &str, refuse: &mut dyn FnMut(&dyn Display)) -> bool;
+
+    /// Does a little of what a command has begun.
+    fn step(&self) {}
+}
+
 /// A conversation.
 #[derive(Debug)]
-pub(crate) struct Session {
+pub struct Session<R> {
     input: Input,
     echoes: bool,
     listing: Option<Listing>,
+    run: PhantomData<fn() -> R>,
 }
 
 /// DAGs that are still to be listed, each in a slice of its own.
@@ -46,36 +105,38 @@ struct Listing {
     print: fn(&Counts, &Dag),
 }
 
-impl Session {
+impl<R: LiveRun> Session<R> {
     /// Begins a conversation; `echoes`: what is typed is sent back.
-    pub(crate) const fn new(echoes: bool) -> Self {
+    #[must_use]
+    pub const fn new(echoes: bool) -> Self {
         Self {
             input: Input::new(),
             echoes,
             listing: None,
+            run: PhantomData,
         }
     }
 
     /// Does a little: prints one DAG's line, or takes a few bytes and answers what
     /// they complete. Reports whether there is more to do at once.
-    pub(crate) fn slice(&mut self) -> bool {
-        let Some(task_set) = execution::task_set() else {
+    pub fn slice(&mut self) -> bool {
+        let Some(task_set) = R::task_set() else {
             return false;
         };
         if let Some(listing) = self.listing {
-            self.listing = listing.print_one(&task_set);
+            self.listing = listing.print_one::<R>(&task_set);
             if self.listing.is_none() {
                 accept(self.input.line());
             }
             return true;
         }
-        more::all().for_each(more::Commands::step);
+        R::extra().iter().flatten().for_each(|extra| extra.step());
         for _ in 0..MOST_BYTES {
-            let Some(byte) = serial::FIRST.receive() else {
+            let Some(byte) = R::receive() else {
                 return false;
             };
-            if byte == stop::BYTE {
-                stop::shut_down();
+            if byte == END {
+                R::shut_down();
                 break;
             }
             if self.echoes {
@@ -83,7 +144,7 @@ impl Session {
             }
             match self.input.take(byte) {
                 Typed::Nothing => continue,
-                Typed::Line(line) => match answer(line, &task_set) {
+                Typed::Line(line) => match answer::<R>(line, &task_set) {
                     Answer::Given => {}
                     Answer::List(listing) => self.listing = Some(listing),
                 },
@@ -98,10 +159,10 @@ impl Session {
 
 impl Listing {
     /// Prints the next DAG's lines and returns what is left to be listed.
-    fn print_one(self, task_set: &TaskSet) -> Option<Listing> {
+    fn print_one<R: LiveRun>(self, task_set: &TaskSet) -> Option<Listing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
-        if let Some(snapshot) = execution::snapshot(dag) {
-            counts(&snapshot).show_by(dag, model, self.print);
+        if let Some(snapshot) = R::snapshot(dag) {
+            Counts::of(&snapshot).show_by(dag, model, self.print);
         }
         let next = DagId(dag.0 + 1);
         (next < self.end).then_some(Listing { next, ..self })
@@ -117,7 +178,7 @@ enum Answer {
 }
 
 /// Answers a line.
-fn answer(line: &str, task_set: &TaskSet) -> Answer {
+fn answer<R: LiveRun>(line: &str, task_set: &TaskSet) -> Answer {
     let command = match parse(line) {
         Ok(command) => command,
         Err(refusal) => {
@@ -127,8 +188,10 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
                 is_refused = true;
                 refuse(line, why);
             };
-            if !more::all().any(|commands| commands.answer(name, rest.trim(), refuse)) {
-                refuse(&refusal);
+            let extra = R::extra();
+            let mut others = extra.iter().flatten();
+            if !others.any(|commands| commands.answer(name, rest.trim(), refuse)) {
+                refuse(&refusal.told(extra));
             }
             if !is_refused {
                 accept(line);
@@ -138,8 +201,9 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
     };
     match command {
         Command::Help => {
-            let more = more::all().flat_map(more::Commands::help);
-            for (command, what) in HELP.iter().chain(more) {
+            let extra = R::extra();
+            let extra = extra.iter().flatten().flat_map(|extra| extra.help());
+            for (command, what) in HELP.iter().chain(extra) {
                 println!("  {command:15}{what}");
             }
             accept(line);
@@ -147,21 +211,21 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
         Command::Dags => return list(line, task_set, None, describe),
         Command::Stats(name) => return list(line, task_set, name, Counts::print),
         Command::Trace(true)
-            if !execution::with_journal(0, |journal| journal.has_room()).unwrap_or(false) =>
+            if !R::with_journal(0, |journal| journal.has_room()).unwrap_or(false) =>
         {
             let why = "there is no room for events; boot without `trace_events=0`";
             refuse(line, &why);
         }
         Command::Trace(on) => {
-            for cluster in 0..execution::clusters() {
-                execution::with_journal(cluster, |journal| journal.record_events(on));
+            for cluster in 0..R::clusters() {
+                R::with_journal(cluster, |journal| journal.record_events(on));
             }
             let what = if on { "events" } else { "no events" };
             println!("{what} are recorded");
             accept(line);
         }
         Command::Stop(name) => {
-            change(
+            change::<R>(
                 line,
                 task_set,
                 name,
@@ -169,9 +233,9 @@ fn answer(line: &str, task_set: &TaskSet) -> Answer {
                 "releases no more jobs",
             );
         }
-        Command::Start(name) => change(line, task_set, name, Request::Resume, "releases jobs"),
+        Command::Start(name) => change::<R>(line, task_set, name, Request::Resume, "releases jobs"),
         Command::Shutdown => {
-            stop::shut_down();
+            R::shut_down();
             accept(line);
         }
     }
@@ -208,26 +272,22 @@ fn describe(counts: &Counts, dag: &Dag) {
     );
 }
 
-/// Returns what is told of a DAG that does so.
-pub(crate) const fn counts(snapshot: &Snapshot) -> Counts {
-    Counts {
-        state: snapshot.word(),
-        statistics: snapshot.statistics,
-        in_flight: snapshot.in_flight,
-        waiting: snapshot.waiting,
-    }
-}
-
 /// Makes a change to the DAG that is named.
-fn change(line: &str, task_set: &TaskSet, name: &str, how: fn(DagId) -> Request, what: &str) {
+fn change<R: LiveRun>(
+    line: &str,
+    task_set: &TaskSet,
+    name: &str,
+    how: fn(DagId) -> Request,
+    what: &str,
+) {
     let Some(dag) = find(task_set, name) else {
         return unknown(line, name);
     };
-    if execution::snapshot(dag).is_some_and(|snapshot| snapshot.is_final()) {
+    if R::snapshot(dag).is_some_and(|snapshot| snapshot.is_final()) {
         let of = task_set.dag(dag).name();
         return refuse(line, &format_args!("dag `{of}` has ended and stays so"));
     }
-    execution::control(dag, how);
+    R::control(dag, how);
     println!("dag `{}` {what}", task_set.dag(dag).name());
     accept(line);
 }

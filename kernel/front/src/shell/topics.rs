@@ -5,17 +5,17 @@
 //! knows how often any topic is written.
 
 use core::fmt::{self, Display};
+use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::journal::{Event, What};
 use sched_dag::{DagId, Journal, SubtaskId, TaskSet, Topic, nearest_of};
 
-use super::more::Commands;
+use fass::edge::Excerpt;
+
+use super::{Commands, LiveRun};
 use crate::println;
-use executive::machine::clock;
-use executive::run::{edge, execution};
-use executive::text::excerpt::Excerpt;
-use front::json;
+use crate::text::json;
 
 /// The least time between two values that are shown.
 const BETWEEN_NS: u64 = 100_000_000;
@@ -36,18 +36,24 @@ const AT_ONCE: usize = 64;
 const NONE: u64 = u64::MAX;
 
 /// The commands, and the topic that is echoed. Only the session uses it, a slice at a time.
-pub(crate) struct Topics {
+#[derive(Debug)]
+pub struct Topics<R> {
     /// The topic: its DAG, and its place there in the lower half; or [`NONE`].
     echoed: AtomicU64,
     /// When a value was shown last.
     shown_ns: AtomicU64,
+    run: PhantomData<fn() -> R>,
 }
 
-impl Topics {
-    pub(crate) const fn new() -> Self {
+impl<R: LiveRun> Topics<R> {
+    /// Makes them; no topic is echoed.
+    #[must_use]
+    #[allow(clippy::new_without_default, reason = "it is for a static")]
+    pub const fn new() -> Self {
         Self {
             echoed: AtomicU64::new(NONE),
             shown_ns: AtomicU64::new(0),
+            run: PhantomData,
         }
     }
 
@@ -56,7 +62,7 @@ impl Topics {
         let Some((dag, place)) = find(name, task_set, refuse) else {
             return;
         };
-        if !edge::watch(Some(name)) {
+        if !R::watch(Some(name)) {
             return refuse(&format_args!(
                 "topic `{name}` is not recorded; let the app name it by `Dag::record`"
             ));
@@ -69,13 +75,13 @@ impl Topics {
 
     /// Shows the latest value of a topic, if there is one and it is time.
     fn show(&self, topic: &Topic) {
-        let now_ns = clock::now_ns();
+        let now_ns = fass::now_ns();
         let shown_ns = self.shown_ns.load(Ordering::Relaxed);
         if now_ns.saturating_sub(shown_ns) < BETWEEN_NS {
             return;
         }
         let mut buffer = [0; MOST_BYTES];
-        let Some(seen) = edge::take_seen(&mut buffer) else {
+        let Some(seen) = R::take_seen(&mut buffer) else {
             return;
         };
         self.shown_ns.store(now_ns, Ordering::Relaxed);
@@ -96,7 +102,7 @@ impl Topics {
     }
 }
 
-impl Commands for Topics {
+impl<R: LiveRun> Commands for Topics<R> {
     fn help(&self) -> &'static [(&'static str, &'static str)] {
         &[
             (
@@ -109,18 +115,18 @@ impl Commands for Topics {
     }
 
     fn answer(&self, name: &str, rest: &str, refuse: &mut dyn FnMut(&dyn Display)) -> bool {
-        let Some(task_set) = execution::task_set() else {
+        let Some(task_set) = R::task_set() else {
             return false;
         };
         match (name, rest) {
             ("echo", "") => refuse(&"`echo` wants the name of a topic, or `off`"),
             ("echo", "off") => {
-                edge::watch(None);
+                R::watch(None);
                 self.echoed.store(NONE, Ordering::Relaxed);
             }
             ("echo", topic) => self.echo(topic, &task_set, refuse),
             ("hz", "") => refuse(&"`hz` wants the name of a topic"),
-            ("hz", topic) => hz(topic, &task_set, refuse),
+            ("hz", topic) => hz::<R>(topic, &task_set, refuse),
             _ => return false,
         }
         true
@@ -131,7 +137,7 @@ impl Commands for Topics {
         if echoed == NONE {
             return;
         }
-        let Some(task_set) = execution::task_set() else {
+        let Some(task_set) = R::task_set() else {
             return;
         };
         let (dag, place) = (echoed >> 32, echoed & u64::from(u32::MAX));
@@ -144,12 +150,12 @@ impl Commands for Topics {
 }
 
 /// Says how often a topic was written lately, or why it cannot.
-fn hz(name: &str, task_set: &TaskSet, refuse: &mut dyn FnMut(&dyn Display)) {
+fn hz<R: LiveRun>(name: &str, task_set: &TaskSet, refuse: &mut dyn FnMut(&dyn Display)) {
     let Some((dag, topic)) = find(name, task_set, refuse) else {
         return;
     };
     let writer = task_set.dag(dag).topics()[topic].writer;
-    let rate = Rate::look(dag, writer);
+    let rate = Rate::look::<R>(dag, writer);
     let Some(mean_ns) = rate.mean_ns() else {
         return refuse(&format_args!(
             "of topic `{name}` there are {} values among the latest {MOST_EVENTS} events; \
@@ -194,17 +200,17 @@ struct Rate {
 
 impl Rate {
     /// Looks at the latest events of the journal.
-    fn look(dag: DagId, writer: SubtaskId) -> Self {
+    fn look<R: LiveRun>(dag: DagId, writer: SubtaskId) -> Self {
         let mut rate = Self::default();
         let cluster = |task_set: &TaskSet| task_set.dag(dag).cluster().index();
-        let cluster = execution::task_set().map_or(0, |task_set| cluster(&task_set));
-        let written = execution::with_journal(cluster, |journal| journal.written());
+        let cluster = R::task_set().map_or(0, |task_set| cluster(&task_set));
+        let written = R::with_journal(cluster, |journal| journal.written());
         let mut end = written.unwrap_or(0);
         let last = end.saturating_sub(MOST_EVENTS);
         while end > last {
             let mut buffer = [None; AT_ONCE];
             let look = |journal: &mut Journal| journal.copy_back(end, &mut buffer);
-            let copied = execution::with_journal(cluster, look);
+            let copied = R::with_journal(cluster, look);
             let events = buffer.iter().flatten();
             events.for_each(|event| rate.take(event, dag, writer));
             match copied {

@@ -4,9 +4,9 @@ use core::fmt::Display;
 
 use fass::Tunable;
 
-use super::more::Commands;
+use super::Commands;
+use crate::app::offered::Parameters;
 use crate::println;
-use front::app::offered::Parameters;
 
 impl Commands for Parameters {
     fn help(&self) -> &'static [(&'static str, &'static str)] {

@@ -1,0 +1,65 @@
+//! The run that goes on, as the shell sees it, and the commands that the app has called for.
+
+use alloc::sync::Arc;
+
+use executive::machine::once::Once;
+use executive::machine::serial;
+use executive::run::{edge, execution};
+use fass::edge::Seen;
+use front::shell::{Commands, Extra, LiveRun};
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, Journal, Snapshot, TaskSet};
+
+use super::stop;
+
+/// The kernel's run.
+#[derive(Debug)]
+pub(crate) struct Kernel;
+
+/// Commands about parameters.
+pub(crate) static PARAMETERS: Once<&'static dyn Commands> = Once::new();
+
+/// Commands about topics.
+pub(crate) static TOPICS: Once<&'static dyn Commands> = Once::new();
+
+impl LiveRun for Kernel {
+    fn task_set() -> Option<Arc<TaskSet>> {
+        execution::task_set()
+    }
+
+    fn snapshot(dag: DagId) -> Option<Snapshot> {
+        execution::snapshot(dag)
+    }
+
+    fn control(dag: DagId, change: fn(DagId) -> Request) {
+        execution::control(dag, change);
+    }
+
+    fn clusters() -> usize {
+        execution::clusters()
+    }
+
+    fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+        execution::with_journal(cluster, look)
+    }
+
+    fn receive() -> Option<u8> {
+        serial::FIRST.receive()
+    }
+
+    fn shut_down() {
+        stop::shut_down();
+    }
+
+    fn watch(topic: Option<&str>) -> bool {
+        edge::watch(topic)
+    }
+
+    fn take_seen(into: &mut [u8]) -> Option<Seen> {
+        edge::take_seen(into)
+    }
+
+    fn extra() -> Extra {
+        [&PARAMETERS, &TOPICS].map(|once| once.get().copied())
+    }
+}
