@@ -59,34 +59,18 @@ mod watch;
 #[doc(hidden)]
 pub use boot::memory_functions;
 
+pub use app::bare_machine::Machine;
 pub use app::event::Event;
 pub use app::lock::Lock;
-pub use app::machine_handle::Machine;
-pub use app::resources::Resources;
 pub use executive::memory::heap::KernelHeap;
 pub use front::app::ending::Ending;
+#[doc(inline)]
+pub use front::named::{console, json, options};
+pub use front::report::memory::Resources;
 pub use front::{print, println};
 #[doc(inline)]
 pub use sched_dag::engine::Run;
 pub use start::CLOCK;
-
-/// Text on the serial line, which [`print!`] and [`println!`] write.
-pub mod console {
-    #[doc(inline)]
-    pub use front::console::write;
-}
-
-/// The words of the command line.
-pub mod options {
-    #[doc(inline)]
-    pub use front::options::{Options, UsageError};
-}
-
-/// Machine lines: lines of JSON on the serial line, for programs that read it.
-pub mod json {
-    #[doc(inline)]
-    pub use front::json::{Object, emit, line, quoted};
-}
 
 /// Returns the number of timer interrupts that all cores have taken since boot.
 ///
@@ -98,6 +82,17 @@ pub mod json {
 #[must_use]
 pub fn timer_interrupts() -> u64 {
     executive::interrupts::timer_interrupts()
+}
+
+/// Interrupts every core each `period` from now on, besides what scheduling needs; back to normal
+/// if 0. For tests of the kernel's own robustness.
+///
+/// ```no_run
+/// kernel::set_heartbeat(core::time::Duration::from_micros(50));
+/// ```
+pub fn set_heartbeat(period: core::time::Duration) {
+    let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
+    executive::run::heartbeat::set_heartbeats(period_ns);
 }
 
 /// Reports whether functions may use AVX: the processor has it, and the word `avx=off` is

@@ -18,10 +18,11 @@ const FOLDERS: [&str; 6] = [
     "fass/src/run",
     "fass/virtual-time/src",
 ];
-const FILES: [&str; 11] = [
+const FILES: [&str; 12] = [
     "kernel/src/lib.rs",
-    "kernel/src/app/machine_handle.rs",
-    "kernel/src/app/overheads.rs",
+    "kernel/front/src/app/division.rs",
+    "kernel/front/src/app/machine.rs",
+    "kernel/front/src/app/services.rs",
     "sched-dag/src/engine/run.rs",
     "kernel/front/src/options.rs",
     "kernel/front/src/text/json.rs",

@@ -29,12 +29,10 @@ use alloc::rc::Rc;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::cell::Ref;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
 use sched_dag::{Policy, TaskSet, Verified, Warning, analysis, sorted_by_key, wcets};
 
 use crate::api::dag::Dag;
-use crate::draft::Draft;
 use crate::platform;
 use crate::run::staleness::Staleness;
 use answer::{Answer, Answers};
@@ -157,9 +155,14 @@ pub fn finish_create_dags_with(
     if !faults.is_empty() {
         return Err(CommitError { faults, warnings });
     }
-    let staleness = staleness::of_all(dags, &task_set, &answers.of_dags);
+    let staleness = Arc::new(staleness::of_all(dags, &task_set, &answers.of_dags));
     let task_set = Arc::new(task_set);
-    let plan = tie(dags, Arc::clone(&task_set), &answers, staleness.clone());
+    let plan = tie(
+        dags,
+        Arc::clone(&task_set),
+        &answers,
+        Arc::clone(&staleness),
+    );
     match platform.launch(plan) {
         Ok(()) => Ok(Commit {
             warnings,
@@ -198,7 +201,7 @@ pub fn finish_create_dags_with(
 pub struct Commit {
     warnings: Vec<Warning>,
     answers: Answers,
-    staleness: Vec<Staleness>,
+    staleness: Arc<Vec<Staleness>>,
     task_set: Arc<TaskSet>,
 }
 
@@ -315,7 +318,7 @@ fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
 /// Reports for each DAG whether it stands in the list before, too.
 fn repeated(dags: &[Dag]) -> Vec<bool> {
     let address = |number: usize| Rc::as_ptr(&dags[number].draft);
-    let mut is_repeated: Vec<bool> = dags.iter().map(|_| false).collect();
+    let mut is_repeated = alloc::vec![false; dags.len()];
     for pair in sorted_by_key(dags.len(), address).windows(2) {
         is_repeated[pair[1]] = address(pair[0]) == address(pair[1]);
     }
@@ -329,7 +332,7 @@ fn verify(
     observed: Option<&str>,
 ) -> Result<Verified, CommitError> {
     let mut faults = Vec::new();
-    let drafts: Vec<Ref<'_, Draft>> = dags.iter().map(|dag| dag.draft.borrow()).collect();
+    let drafts: Vec<_> = dags.iter().map(|dag| dag.draft.borrow()).collect();
     let mut specs = Vec::with_capacity(dags.len());
     let all = dags.iter().zip(&drafts).enumerate();
     for ((number, (dag, draft)), is_repeated) in all.zip(repeated(dags)) {
@@ -372,10 +375,7 @@ fn verify(
     }
     match sched_dag::verify(&specs, &options) {
         Ok(verified) if faults.is_empty() => Ok(verified),
-        Ok(verified) => Err(CommitError {
-            faults,
-            warnings: verified.warnings,
-        }),
+        Ok(Verified { warnings, .. }) => Err(CommitError { faults, warnings }),
         Err(rejected) => {
             let (mut news, warnings) = rejected.into_parts();
             news.retain(|fault| !is_consequence(fault, &faults));

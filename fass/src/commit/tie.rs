@@ -31,7 +31,7 @@ pub(crate) fn tie(
     dags: &[Dag],
     task_set: Arc<TaskSet>,
     answers: &Answers,
-    staleness: Vec<Staleness>,
+    staleness: Arc<Vec<Staleness>>,
 ) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
     let recorded = dags

@@ -263,7 +263,7 @@ mod tests {
             proven: sched_dag::engine::Proven::default(),
             after_fault: Vec::new(),
             lifecycle: None,
-            staleness: Vec::new(),
+            staleness: Arc::default(),
             lines: Vec::new(),
         };
         latest.launch(&mut plan).expect("it refuses nothing");

@@ -50,7 +50,7 @@ pub struct Plan {
     pub lifecycle: Option<Box<dyn Lifecycle>>,
     /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
     /// passes between DAGs, for platforms that show it.
-    pub staleness: Vec<Staleness>,
+    pub staleness: Arc<Vec<Staleness>>,
     /// The ways of recorded values, by channel.
     pub(crate) lines: Vec<LineOf>,
 }

@@ -5,8 +5,9 @@
 //!
 //! # Rooms, from top to bottom
 //!
-//! `app` judges runs and serves what an app offers to people, `shell` talks with a person during a
-//! run, `report` tells of a run when it is over, `options` reads the command line, `text` makes lines. Where text goes is bound when a
+//! `shell` talks with a person during a run, `app` is the machine as an app sees it, and judges runs,
+//! `report` tells of a run when it is over, `options` reads the command line, `text` makes lines.
+//! Where text goes is bound when a
 //! program is linked: its entry names its platform's function by [`output!`], once.
 //!
 //! # What is guaranteed
@@ -33,3 +34,25 @@ pub mod shell;
 pub mod text;
 
 pub use text::{console, graph, json};
+
+/// The modules that apps know by these names, with what is theirs in them.
+pub mod named {
+    /// Text on the serial line, or the standard output, which [`print!`](crate::print) and
+    /// [`println!`](crate::println) write.
+    pub mod console {
+        #[doc(inline)]
+        pub use crate::text::console::write;
+    }
+
+    /// The words of the command line.
+    pub mod options {
+        #[doc(inline)]
+        pub use crate::options::{Options, UsageError};
+    }
+
+    /// Machine lines: lines of JSON among the text, for programs that read it.
+    pub mod json {
+        #[doc(inline)]
+        pub use crate::text::json::{Object, emit, line, quoted};
+    }
+}

@@ -1,5 +1,6 @@
 //! The program's way to the app's function, and its end.
 
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
@@ -8,9 +9,10 @@ use linux::EndSignals;
 pub use crate::output::write_as;
 pub use front::output;
 
-use crate::app::machine_handle::{Machine, memory_kib};
+use crate::app::linux_system::{LinuxSystem, Machine, memory_kib};
 use crate::app::words;
 use crate::options::Options;
+use front::app::bound_verdict::BoundVerdict;
 use front::app::ending::{self, Ending, Told};
 use front::json;
 
@@ -60,7 +62,7 @@ fn run(
     // Who sees the first line may ask for an end.
     let signals = EndSignals::catch_first();
     let options = Options::parse(line)?;
-    let (linux, words) = words::apply(&options)?;
+    let (linux, terms, module) = words::apply(&options)?;
     json::report("boot", |object| {
         object
             .text("version", env!("CARGO_PKG_VERSION"))
@@ -74,12 +76,13 @@ fn run(
     for warning in linux.warnings() {
         crate::println!("fass-linux: {warning}");
     }
-    let machine = Machine::new(options, linux, &words, signals);
-    let result = app(&machine);
-    if result.is_ok() && machine.has_spare_module() {
-        crate::println!(
-            "warning: the app takes no file, and has not looked at the one it was given"
-        );
-    }
-    machine.judge(result)
+    let system = LinuxSystem {
+        linux,
+        overheads: terms.overheads,
+        wire: RefCell::new(None),
+        refusal: RefCell::new(None),
+        signals,
+    };
+    let bounds = BoundVerdict::new(false, false);
+    Machine::serve(system, options, &terms, module, bounds, app)
 }

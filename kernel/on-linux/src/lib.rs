@@ -38,33 +38,18 @@ mod heap;
 mod output;
 
 pub use app::event::Event;
+pub use app::linux_system::Machine;
 pub use app::lock::Lock;
-pub use app::machine_handle::{Machine, Resources};
 pub use front::app::ending::Ending;
+#[doc(inline)]
+pub use front::named::{console, json, options};
 pub use front::report;
+pub use front::report::memory::Resources;
 pub use front::{print, println};
 #[doc(hidden)]
 pub use heap::Heap;
 #[doc(inline)]
 pub use sched_dag::engine::Run;
-
-/// Text on the standard output.
-pub mod console {
-    #[doc(inline)]
-    pub use front::console::write;
-}
-
-/// The words of the command line.
-pub mod options {
-    #[doc(inline)]
-    pub use front::options::{Options, UsageError};
-}
-
-/// Machine lines: lines of JSON on the standard output, for programs that read it.
-pub mod json {
-    #[doc(inline)]
-    pub use front::json::{Object, emit, line, quoted};
-}
 
 /// Reports whether functions may use AVX: the processor has it.
 #[must_use]

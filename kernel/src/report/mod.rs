@@ -8,5 +8,5 @@ pub(crate) mod latest;
 pub(crate) mod left;
 pub(crate) mod stacks;
 
+pub(crate) use front::report::wire;
 pub use front::report::{Distribution, Ns};
-pub(crate) use front::report::{times, trace, wire};

@@ -2,7 +2,6 @@
 
 use alloc::format;
 use alloc::vec::Vec;
-use core::cell::Cell;
 use core::ops::Range;
 
 use boot::acpi::{self, MAX_IO_APICS, Platform};
@@ -11,8 +10,8 @@ use boot::{BootInfo, Framebuffer, List, MAX_PROCESSORS, MAX_REGIONS, Module};
 
 use super::announcement::announce;
 use super::{probe, selection, settings};
-use crate::app::machine_handle::Machine;
-use crate::options::Options;
+use crate::app::bare_machine::{BareMachine, Machine};
+use crate::options::{Options, UsageError};
 use crate::println;
 use crate::watch::{self, panic};
 use executive::interrupts;
@@ -30,7 +29,7 @@ use executive::run::{containment, contexts, edge, heartbeat, worker};
 use executive::text::console;
 use front::app::bound_verdict::BoundVerdict;
 use front::app::ending::{self, Ending, Told};
-use front::app::fault_verdict::FaultVerdict;
+use front::app::terms;
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -337,7 +336,7 @@ fn run_app(
     app: App,
     processors: usize,
 ) -> Result<(), Ending> {
-    let usage = |message: &str| Ending::Usage(crate::options::UsageError::new(message));
+    let usage = |message: &str| Ending::from(UsageError::new(message));
     if info.is_command_line_cut {
         return Err(usage(&format!(
             "the command line is longer than {} bytes and was cut; give fewer words",
@@ -349,39 +348,28 @@ fn run_app(
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = Options::parse(line)?;
     let settings = settings::apply(&options, processors)?;
-    KERNEL.set_most_events(settings.events);
-    let mut module = module_bytes(info);
-    if settings.wcet_bytes > 0 {
-        let parts = module.and_then(|bytes| bytes.split_at_checked(settings.wcet_bytes));
-        let wcets = parts.and_then(|(wcets, _)| core::str::from_utf8(wcets).ok());
-        KERNEL.set_wcets(wcets.ok_or_else(|| usage("`wcets`: the module is no such text"))?);
-        module = parts.map(|(_, rest)| rest).filter(|rest| !rest.is_empty());
+    let (wcets, module) = terms::split_wcets(&options, module_bytes(info))?;
+    if let Some(wcets) = wcets {
+        KERNEL.set_wcets(wcets);
     }
-    module = settings.set_wish(name, module)?;
-    let machine = Machine {
+    let module = settings.set_wish(name, module)?;
+    let mode = info.value("mode");
+    let bounds = BoundVerdict::new(
+        settings.terms.judges_bounds && mode != Some("threads"),
+        mode == Some("deterministic") && this_core::all().len() > 1,
+    );
+    let wishes = settings.wishes;
+    let result = Machine::serve(
+        BareMachine::new(wishes),
         options,
-        module: Cell::new(module),
-        has_asked: Cell::new(false),
-        dumps_trace: settings.dump,
-        dumps_times: settings.dumps_times,
-        wishes: settings.wishes,
-        input: Cell::new(None),
-        runs: Cell::new(0),
-        fault_verdict: FaultVerdict::default(),
-        bound_verdict: BoundVerdict::new(
-            settings.judges_bounds,
-            info.value("mode") == Some("deterministic") && this_core::all().len() > 1,
-        ),
-    };
-    let result = app(&machine);
+        &settings.terms,
+        module,
+        bounds,
+        app,
+    );
     if let Some(refusal) = edge::refusal() {
         return Err(usage(refusal));
     }
-    if result.is_ok() && machine.module.get().is_some() && !machine.has_asked.get() {
-        println!("warning: the app takes no file, and has not looked at the one it was given");
-    }
-    let result = machine.fault_verdict.judge(result);
-    let result = machine.bound_verdict.judge(result);
     Ending::or_complaint(result, edge::complaint())
 }
 

@@ -35,38 +35,21 @@ use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
 use executive::run::{edge, stacks, worker};
-use front::app::terms::Terms;
-use front::graph;
+use front::app::terms::{self, Terms};
 
-/// The values of `times`: whether statistics are printed, and whether bounds are judged.
-const TIMES: [(&str, (bool, bool)); 3] = [
-    ("keep", (false, true)),
-    ("dump", (true, true)),
-    ("observe", (true, false)),
-];
-
-/// What the words say about tracing and the background; all else is set where it
-/// belongs.
+/// What the words say about runs to come; all else is set where it belongs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// The most events that a journal keeps.
-    pub(crate) events: u64,
-    /// Whether each run's trace is printed after it.
-    pub(crate) dump: bool,
-    /// Whether each run's statistics are printed after it.
-    pub(crate) dumps_times: bool,
-    /// How many bytes of the loader's module are WCETs.
-    pub(crate) wcet_bytes: usize,
-    /// How many bytes after them are a recording to replay.
-    pub(crate) replay_bytes: usize,
-    /// How many bytes of memory a recording may wait in; 0: nothing is recorded.
-    pub(crate) record_bytes: usize,
+    /// What they say everywhere.
+    pub(crate) terms: Terms,
+    /// How many bytes of the loader's module, behind the WCETs, are a recording to replay.
+    replay_bytes: u64,
+    /// How many KiB of memory a recording may wait in; 0: nothing is recorded.
+    record_kib: u64,
     /// Of how many jobs the inputs are kept, where nothing is recorded or replayed.
-    pub(crate) latest_jobs: u32,
+    latest_jobs: u64,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
-    /// Whether a response time beyond its bound is the app's fault.
-    pub(crate) judges_bounds: bool,
 }
 
 impl Settings {
@@ -78,17 +61,16 @@ impl Settings {
         mut module: Option<&'static [u8]>,
     ) -> Result<Option<&'static [u8]>, UsageError> {
         if self.replay_bytes > 0 {
-            let parts = module.and_then(|bytes| bytes.split_at_checked(self.replay_bytes));
             let shorter = || UsageError::new("`replay`: the module is shorter than that");
-            let (recording, rest) = parts.ok_or_else(shorter)?;
+            let (recording, rest) = terms::split(module, self.replay_bytes).ok_or_else(shorter)?;
             edge::set_wish(Wish::Replay(recording)).map_err(UsageError::new)?;
-            module = Some(rest).filter(|rest| !rest.is_empty());
+            module = rest;
         }
-        if self.record_bytes > 0 {
-            let bytes = self.record_bytes;
+        if self.record_kib > 0 {
+            let bytes = usize::try_from(self.record_kib * 1024).unwrap_or(0);
             edge::set_wish(Wish::Record { app, bytes }).map_err(UsageError::new)?;
         } else if self.replay_bytes == 0 && self.latest_jobs > 0 {
-            let jobs = self.latest_jobs;
+            let jobs = u32::try_from(self.latest_jobs).unwrap_or(0);
             edge::set_wish(Wish::Latest { app, jobs }).map_err(UsageError::new)?;
         }
         Ok(module)
@@ -104,9 +86,6 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
     KERNEL.set_preemption(terms.preemption);
     KERNEL.set_budget_factor(terms.budget_factor);
     KERNEL.set_overheads(terms.overheads);
-    if options.choice("graph", &[("keep", false), ("dump", true)])? {
-        graph::enable();
-    }
     if options.choice("idle", &[("halt", false), ("poll", true)])? {
         worker::watch_when_idle();
     }
@@ -134,7 +113,7 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
     }
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;
-    let events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
+    KERNEL.set_most_events(options.number("trace_events", 0..=u64::MAX, u64::MAX)?);
     let status_s = options.number("status", 0..=86_400, 0)?;
     let consoles = [
         ("off", (None, false)),
@@ -143,7 +122,6 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
         ("echo", (Some(Echo::On), true)),
     ];
     let (console, stops) = options.choice("console", &consoles)?;
-    let wcet_bytes = options.number("wcets", 0..=1 << 32, 0)?;
     let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
     let record_kib = options.number("record", 0..=1 << 20, 0)?;
     let latest_jobs = options.number("latest", 0..=64, 16)?;
@@ -152,21 +130,15 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
             "`record` and `replay` exclude each other; give one",
         ));
     }
-    let (dumps_times, judges_bounds) = options.choice("times", &TIMES)?;
     Ok(Settings {
-        events,
-        replay_bytes: usize::try_from(replay_bytes).unwrap_or(0),
-        record_bytes: usize::try_from(record_kib * 1024).unwrap_or(0),
-        latest_jobs: u32::try_from(latest_jobs).unwrap_or(0),
-        wcet_bytes: usize::try_from(wcet_bytes).unwrap_or(0),
-        dump: options.choice("trace", &[("keep", false), ("dump", true)])?,
-        dumps_times,
+        terms,
+        replay_bytes,
+        record_kib,
+        latest_jobs,
         wishes: Wishes {
-            input: None,
             console,
             stops,
             status_ns: status_s * 1_000_000_000,
         },
-        judges_bounds: judges_bounds && options.text("mode") != Some("threads"),
     })
 }

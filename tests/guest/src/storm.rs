@@ -39,9 +39,9 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let findings = Arc::new(Findings::default());
     let first = kernel::timer_interrupts();
     finish_create_dags(&[storm_dag(machine.cores(), first + interrupts, &findings)])?;
-    machine.set_heartbeat(INTERRUPT_PERIOD);
+    kernel::set_heartbeat(INTERRUPT_PERIOD);
     let run = machine.run()?;
-    machine.set_heartbeat(Duration::ZERO);
+    kernel::set_heartbeat(Duration::ZERO);
 
     let diverged = findings.diverged.load(Ordering::Relaxed);
     json::emit("storm", |line| {

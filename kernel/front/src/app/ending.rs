@@ -10,7 +10,7 @@ use sched_dag::DagId;
 use sched_dag::engine::Run;
 
 use crate::options::UsageError;
-use crate::report::counts::Counts;
+use crate::report::counts;
 use crate::text::json;
 
 /// Why an app ends other than by success.
@@ -38,7 +38,7 @@ impl Ending {
     /// Tells of a run that a person has ended, and returns how its app ends.
     pub fn after_shutdown(run: &Run) -> Self {
         for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-            Counts::of(run.snapshot(dag)).show(dag, model);
+            counts::show(run.snapshot(dag), dag, model, counts::print);
         }
         match run.violations().count() {
             0 => Self::Shutdown,

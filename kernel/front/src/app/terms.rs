@@ -1,16 +1,26 @@
-//! The words that say how DAGs are scheduled, and what a commit reckons with. They are the same
-//! wherever an app runs.
+//! The words that say how DAGs are scheduled, what a commit reckons with and what of a run is
+//! printed. They are the same wherever an app runs.
 
 use alloc::format;
 
 use fass::{Overheads, Policy, Preemption};
 
 use crate::options::{Options, UsageError};
+use crate::text::graph;
 
 const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
 
 const PREEMPTIONS: [(&str, Preemption); 2] =
     [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
+
+const KEEP_OR_DUMP: [(&str, bool); 2] = [("keep", false), ("dump", true)];
+
+/// The values of `times`: whether statistics are printed, and whether bounds are judged.
+const TIMES: [(&str, (bool, bool)); 3] = [
+    ("keep", (false, true)),
+    ("dump", (true, true)),
+    ("observe", (true, false)),
+];
 
 /// What these words say.
 #[derive(Clone, Copy, Debug)]
@@ -23,18 +33,55 @@ pub struct Terms {
     pub budget_factor: u64,
     /// What a commit charges.
     pub overheads: Overheads,
+    /// Whether each run's trace is printed after it.
+    pub dumps_trace: bool,
+    /// Whether each run's statistics are printed after it.
+    pub dumps_times: bool,
+    /// Whether a response time beyond its bound is the app's fault.
+    pub judges_bounds: bool,
 }
 
 impl Terms {
-    /// Takes the words.
+    /// Takes the words. If they say so, commits print their DAGs from now on.
     pub fn read(options: &Options<'_>) -> Result<Self, UsageError> {
+        if options.choice("graph", &KEEP_OR_DUMP)? {
+            graph::enable();
+        }
+        let (dumps_times, judges_bounds) = options.choice("times", &TIMES)?;
         Ok(Self {
             policy: options.choice("policy", &POLICIES)?,
             preemption: options.choice("preemption", &PREEMPTIONS)?,
             budget_factor: options.number("budget_factor", 0..=1_000_000, 10)?,
             overheads: overheads(options)?,
+            dumps_trace: options.choice("trace", &KEEP_OR_DUMP)?,
+            dumps_times,
+            judges_bounds,
         })
     }
+}
+
+/// Takes the WCETs that the word `wcets` says the app's file begins with. Returns them, if there
+/// are any, and the rest of the file.
+pub fn split_wcets<'a>(
+    options: &Options<'_>,
+    module: Option<&'a [u8]>,
+) -> Result<(Option<&'a str>, Option<&'a [u8]>), UsageError> {
+    let bytes = options.number("wcets", 0..=1 << 32, 0)?;
+    if bytes == 0 {
+        return Ok((None, module));
+    }
+    let parts =
+        split(module, bytes).and_then(|(wcets, rest)| Some((str::from_utf8(wcets).ok()?, rest)));
+    let (wcets, rest) =
+        parts.ok_or_else(|| UsageError::new("`wcets`: the module is no such text"))?;
+    Ok((Some(wcets), rest))
+}
+
+/// Returns the first `bytes` of an app's file, and the rest if there is one; `None`: it is
+/// shorter.
+pub fn split(module: Option<&[u8]>, bytes: u64) -> Option<(&[u8], Option<&[u8]>)> {
+    let (first, rest) = module?.split_at_checked(usize::try_from(bytes).ok()?)?;
+    Some((first, Some(rest).filter(|rest| !rest.is_empty())))
 }
 
 fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {

@@ -14,7 +14,7 @@ use sched_dag::engine::Run;
 
 /// Names the subtasks of a run that took longer than their WCET and these overheads, which are
 /// those of the commit.
-pub fn note(run: &Run, overheads: Overheads) {
+pub(super) fn note(run: &Run, overheads: Overheads) {
     let set = run.task_set();
     let mut subtasks = set.dags().iter().flat_map(|dag| dag.subtasks());
     if !subtasks.any(|subtask| subtask.wcet_ns().is_some()) {

@@ -3,6 +3,7 @@
 
 pub mod counts;
 mod distribution;
+pub mod memory;
 mod time;
 pub mod times;
 pub mod trace;

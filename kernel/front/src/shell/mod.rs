@@ -24,7 +24,7 @@ use sched_dag::{Dag, DagId, Journal, Snapshot, TaskSet};
 
 use crate::options::whole_number;
 use crate::println;
-use crate::report::counts::Counts;
+use crate::report::counts;
 use crate::text::json;
 use command::{Command, HELP, parse};
 use input::{Input, Typed};
@@ -102,7 +102,7 @@ struct Listing {
     next: DagId,
     /// The first one that is not to be listed.
     end: DagId,
-    print: fn(&Counts, &Dag),
+    print: fn(&Snapshot, &Dag),
 }
 
 impl<R: LiveRun> Session<R> {
@@ -162,7 +162,7 @@ impl Listing {
     fn print_one<R: LiveRun>(self, task_set: &TaskSet) -> Option<Listing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
         if let Some(snapshot) = R::snapshot(dag) {
-            Counts::of(&snapshot).show_by(dag, model, self.print);
+            counts::show(&snapshot, dag, model, self.print);
         }
         let next = DagId(dag.0 + 1);
         (next < self.end).then_some(Listing { next, ..self })
@@ -209,7 +209,7 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet) -> Answer {
             accept(line);
         }
         Command::Dags => return list(line, task_set, None, describe),
-        Command::Stats(name) => return list(line, task_set, name, Counts::print),
+        Command::Stats(name) => return list(line, task_set, name, counts::print),
         Command::Trace(true)
             if !R::with_journal(0, |journal| journal.has_room()).unwrap_or(false) =>
         {
@@ -243,7 +243,7 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet) -> Answer {
 }
 
 /// Begins a list of all DAGs, or of the one that is named.
-fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Counts, &Dag)) -> Answer {
+fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Snapshot, &Dag)) -> Answer {
     let chosen = match name.map(|name| find(task_set, name).ok_or(name)) {
         None => None,
         Some(Ok(dag)) => Some(dag),
@@ -260,11 +260,11 @@ fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Counts, &
     })
 }
 
-fn describe(counts: &Counts, dag: &Dag) {
+fn describe(snapshot: &Snapshot, dag: &Dag) {
     println!(
         "`{}`: {}; {} subtasks, {}T = {} us, D = {} us",
         dag.name(),
-        counts.state,
+        snapshot.word(),
         dag.subtasks().len(),
         if dag.is_sporadic() { "sporadic, " } else { "" },
         dag.period_ns() / 1000,

@@ -1,12 +1,8 @@
-//! What an app sees: the machine, how it may end, and what its instances may share and wait for
-//! outside their DAGs. How a run is judged is the front's.
+//! What Linux does for an app: for its machine, and for what its instances may share and wait for
+//! outside their DAGs. The machine as an app sees it, and how a run is judged, is the front's.
 
-mod clusters;
 pub(crate) mod ends;
 pub(crate) mod event;
+pub(crate) mod linux_system;
 pub(crate) mod lock;
-pub(crate) mod machine_handle;
-mod overheads;
-mod parameters;
-mod wires;
 pub(crate) mod words;

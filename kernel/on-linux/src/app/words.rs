@@ -19,8 +19,7 @@ use std::time::Duration;
 
 use linux::{Linux, Mechanism};
 
-use front::app::ending::Ending;
-use front::app::terms::Terms;
+use front::app::terms::{self, Terms};
 use front::graph;
 use front::options::{Options, UsageError};
 
@@ -46,22 +45,17 @@ const FOREIGN: [(&str, &str); 15] = [
     ("latest", "recordings are made on the machine"),
 ];
 
-/// What the words say, besides what the machine was made with.
-pub(crate) struct Words {
-    pub(crate) terms: Terms,
-    pub(crate) module: Option<&'static [u8]>,
-    pub(crate) dumps_trace: bool,
-    pub(crate) dumps_times: bool,
-}
-
-/// Takes the words, and makes the machine that they describe.
-pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending> {
+/// Takes the words, and makes the machine that they describe. Returns what they say besides, and
+/// the app's file.
+pub(crate) fn apply(
+    options: &Options<'static>,
+) -> Result<(Linux, Terms, Option<&'static [u8]>), UsageError> {
     if let Some((word, why)) = FOREIGN
         .iter()
         .find(|(word, _)| options.text(word).is_some())
     {
         let line = format!("`{word}` is for the bare machine: on Linux {why}; leave it out");
-        return Err(UsageError::new(line).into());
+        return Err(UsageError::new(line));
     }
     let terms = Terms::read(options)?;
     let mechanisms = [
@@ -73,28 +67,8 @@ pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending
     let mechanism = options.choice("mechanism", &mechanisms)?;
     let cores = options.number("cores", 1..=1024, u64::from(linux::processors()))?;
     let limit_ms = options.number("limit_ms", 0..=86_400_000, 0)?;
-    let wcet_bytes = options.number("wcets", 0..=1 << 32, 0)?;
-    if options.choice("graph", &[("keep", false), ("dump", true)])? {
-        graph::enable();
-    }
-    let words = Words {
-        terms,
-        module: None,
-        dumps_trace: options.choice("trace", &[("keep", false), ("dump", true)])?,
-        dumps_times: options.choice(
-            "times",
-            &[("keep", false), ("dump", true), ("observe", true)],
-        )?,
-    };
-    let mut module = options.text("module").map(read).transpose()?;
-    let mut wcets = None;
-    if wcet_bytes > 0 {
-        let bytes = usize::try_from(wcet_bytes).unwrap_or(usize::MAX);
-        let parts = module.and_then(|file| file.split_at_checked(bytes));
-        let text = parts.and_then(|(wcets, _)| str::from_utf8(wcets).ok());
-        wcets = Some(text.ok_or_else(|| UsageError::new("`wcets`: the module is no such text"))?);
-        module = parts.map(|(_, rest)| rest).filter(|rest| !rest.is_empty());
-    }
+    let module = options.text("module").map(read).transpose()?;
+    let (wcets, module) = terms::split_wcets(options, module)?;
     let cores = u32::try_from(cores).unwrap_or(u32::MAX);
     let make = options.choice(
         "share",
@@ -118,7 +92,7 @@ pub(crate) fn apply(options: &Options<'static>) -> Result<(Linux, Words), Ending
         let limited = machine.limit_real_time(Duration::from_millis(limit_ms));
         limited.map_err(|why| UsageError::new(format!("`limit_ms={limit_ms}`: {why}")))?;
     }
-    Ok((machine, Words { module, ..words }))
+    Ok((machine, terms, module))
 }
 
 /// Reads the file for the app. It stays as long as the program, as the loader's does.

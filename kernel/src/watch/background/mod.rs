@@ -48,15 +48,6 @@ pub(crate) struct Wishes {
     pub(crate) stops: bool,
     /// The time between two lines of kind `status`; 0: none.
     pub(crate) status_ns: u64,
-    /// What each byte of input raises: a plan's number and a sporadic DAG of it.
-    pub(crate) input: Option<(u64, DagId)>,
-}
-
-impl Wishes {
-    /// Adds what bytes of input raise.
-    pub(crate) const fn with_input(self, input: Option<(u64, DagId)>) -> Self {
-        Self { input, ..self }
-    }
 }
 
 /// Whether the console sends back what is typed.
@@ -147,11 +138,12 @@ pub(crate) struct Background {
 }
 
 impl Background {
-    /// Begins the background of a run of `total` jobs; 0 if their number is not known.
-    pub(crate) fn begin(wishes: Wishes, total: u64) -> Self {
+    /// Begins the background of a run of `total` jobs; 0 if their number is not known. Each byte
+    /// of input raises a sporadic DAG of a plan.
+    pub(crate) fn begin(wishes: Wishes, input: Option<(u64, DagId)>, total: u64) -> Self {
         let before_ns = heartbeat::own_heartbeat_ns();
         let periods = [
-            (wishes.console.is_some() || wishes.input.is_some()).then_some(shell::PERIOD_NS),
+            (wishes.console.is_some() || input.is_some()).then_some(shell::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
             LINE.get().map(|_| wire::PERIOD_NS),
         ];
@@ -167,7 +159,7 @@ impl Background {
         }
         stall::begin();
         // What a person says to the console is no event.
-        let input = wishes.input.filter(|_| wishes.console.is_none());
+        let input = input.filter(|_| wishes.console.is_none());
         let listener = input.map(|input| Listener::new(input, wishes.stops));
         stop::begin(wishes.stops && wishes.console.is_none() && listener.is_none());
         if let Some(line) = LINE.get() {

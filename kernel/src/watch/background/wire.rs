@@ -11,30 +11,25 @@
 //! made it, and so what is no entry is its end.
 
 use alloc::boxed::Box;
+use alloc::format;
 
 use fass::Wire;
 
 use super::{LINE, Line};
+use crate::options::UsageError;
 use crate::report;
 use executive::machine::serial::{Port, SECOND};
 use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core;
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
+use front::app::ending::Ending;
 
 /// The time between two looks at the port.
 pub(super) const PERIOD_NS: u64 = 1_000_000;
 
 /// What the port's FIFO holds.
 const FIFO_BYTES: usize = 16;
-
-/// Why a wire is not connected.
-pub(crate) enum Refusal {
-    /// There is no second serial port.
-    NoPort,
-    /// It is another wire's.
-    Taken,
-}
 
 struct Connection {
     wire: Wire,
@@ -47,16 +42,24 @@ struct Connection {
 static REST: SpinLock<Option<&'static [u8]>> = SpinLock::new(None);
 
 /// Connects the wire to the port, or its way in to the script.
-pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), Refusal> {
+pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), Ending> {
+    let name = wire.name();
     if !SECOND.is_there() {
-        return Err(Refusal::NoPort);
+        return Err(Ending::Usage(UsageError::new(format!(
+            "wire `{name}` has no device, as there is no second serial port; give --input FILE or \
+             --output FILE"
+        ))));
     }
     let connection = Box::leak(Box::new(Connection {
         wire: wire.clone(),
         port: &SECOND,
         script,
     }));
-    LINE.set(connection).map(drop).map_err(|_| Refusal::Taken)
+    LINE.set(connection).map(drop).map_err(|_| {
+        Ending::Failure(format!(
+            "wire `{name}` finds the second serial port taken; connect one wire"
+        ))
+    })
 }
 
 /// Returns the first entry of a script, its time before its bytes, and the entries after it.

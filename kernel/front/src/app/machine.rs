@@ -1,28 +1,81 @@
-//! The machine as an app sees it.
+//! The machine as an app sees it, on whatever system it runs.
+//!
+//! What an app may ask of it, how a run is judged and what is told of it are the same everywhere.
+//! What a system does itself is in its [`System`], by which each crate that apps know as `kernel`
+//! names its own `Machine`.
 
-use core::cell::Cell;
-use core::fmt;
-use core::panic::Location;
+use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
-use fass::{Platform, Policy, Preemption, Signal};
-use sched_dag::DagId;
+use fass::{Overheads, Policy, Preemption, Signal, Wire};
+use sched_dag::engine::Run;
 
+use super::bound_verdict::BoundVerdict;
+use super::ending::Ending;
+use super::fault_verdict::FaultVerdict;
+use super::offered::Parameters;
+use super::terms::Terms;
+use super::wcet_notes;
 use crate::options::Options;
-use crate::report::{self, Ns};
-use crate::watch::background::{Background, LINE, Wishes};
-use executive::machine;
-use executive::machine::interrupts_off;
-use executive::memory::heap;
-use executive::run::platform::KERNEL;
-use executive::run::{edge, execution, heartbeat, worker};
-use executive::text::console;
-use front::app::bound_verdict::BoundVerdict;
-use front::app::ending::Ending;
-use front::app::fault_verdict::FaultVerdict;
-use front::app::wcet_notes;
-use front::json;
-use sched_dag::engine::{Counts, Run};
+use crate::report::memory::Memory;
+use crate::report::{times, trace};
+
+/// What an app's machine is made of: the bare machine, or Linux.
+///
+/// See [`Machine`].
+pub trait System: Sized {
+    /// Reports whether a person can talk to a run.
+    fn has_console(&self) -> bool {
+        false
+    }
+
+    /// Returns the number of cores that run subtasks.
+    fn cores(&self) -> u32;
+
+    /// Chooses policy and preemption of the commits to come.
+    fn configure(&self, policy: Policy, preemption: Preemption);
+
+    /// Returns what a commit charges.
+    fn overheads(&self) -> Overheads;
+
+    /// Makes events that are less than `window` apart count as one instant.
+    fn set_coincidence(&self, window: Duration);
+
+    /// Runs the committed DAGs, from `epoch_ns` on or as soon as may be, and tells what is its
+    /// own of the run.
+    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, Ending>;
+
+    /// Reports whether a person has ended the latest run.
+    fn is_shut_down(&self) -> bool;
+
+    /// Connects a wire to the device that the words name. The script of a device is taken from
+    /// the end of the app's file.
+    fn connect(
+        &self,
+        wire: &Wire,
+        options: &Options<'static>,
+        module: &Cell<Option<&'static [u8]>>,
+    ) -> Result<(), Ending>;
+
+    /// Lets people set parameters during runs, too.
+    fn offer(_parameters: Parameters) -> Result<(), Ending> {
+        Ok(())
+    }
+
+    /// Lets people look at topics during runs.
+    fn show_topics(&self) {}
+
+    /// Measures what it takes itself, and charges that with so many hundredths more.
+    fn measure_overheads(margin_percent: u32) -> Result<(), Ending>;
+
+    /// Returns how many contexts there are for instances, and how many of these can be taken.
+    fn contexts() -> (usize, usize) {
+        (0, 0)
+    }
+
+    /// Returns what memory is needed.
+    fn memory() -> Memory;
+}
 
 /// The machine, lent to the app's function for the time of the run.
 ///
@@ -42,28 +95,62 @@ use sched_dag::engine::{Counts, Run};
 /// }
 /// ```
 #[derive(Debug)]
-pub struct Machine {
-    pub(crate) options: Options<'static>,
-    pub(crate) module: Cell<Option<&'static [u8]>>,
+pub struct Machine<S> {
+    pub(super) system: S,
+    pub(super) options: Options<'static>,
+    pub(super) module: Cell<Option<&'static [u8]>>,
     /// Whether the app has asked for that.
-    pub(crate) has_asked: Cell<bool>,
+    has_asked: Cell<bool>,
     /// Whether each run's trace is printed after it.
-    pub(crate) dumps_trace: bool,
+    dumps_trace: bool,
     /// Whether each run's statistics are printed after it.
-    pub(crate) dumps_times: bool,
-    /// What people want to see, and say, during a run.
-    pub(crate) wishes: Wishes,
-    /// What bytes of input raise during a run: a plan and a DAG of it.
-    pub(crate) input: Cell<Option<(u64, DagId)>>,
+    dumps_times: bool,
+    /// What bytes of input raise during a run.
+    input: RefCell<Option<Signal>>,
     /// How many runs have ended.
-    pub(crate) runs: Cell<u64>,
+    runs: Cell<u64>,
     /// Whether faults in them make the app fail.
-    pub(crate) fault_verdict: FaultVerdict,
+    fault_verdict: FaultVerdict,
     /// Whether response times beyond their bounds do.
-    pub(crate) bound_verdict: BoundVerdict,
+    bound_verdict: BoundVerdict,
 }
 
-impl Machine {
+impl<S: System> Machine<S> {
+    /// Lends `app` the machine that a system makes, and returns how the app ends. `module` is the
+    /// app's file.
+    ///
+    /// See [`Machine`].
+    #[doc(hidden)]
+    pub fn serve(
+        system: S,
+        options: Options<'static>,
+        terms: &Terms,
+        module: Option<&'static [u8]>,
+        bound_verdict: BoundVerdict,
+        app: fn(&Self) -> Result<(), Ending>,
+    ) -> Result<(), Ending> {
+        let machine = Self {
+            system,
+            options,
+            module: Cell::new(module),
+            has_asked: Cell::new(false),
+            dumps_trace: terms.dumps_trace,
+            dumps_times: terms.dumps_times,
+            input: RefCell::new(None),
+            runs: Cell::new(0),
+            fault_verdict: FaultVerdict::default(),
+            bound_verdict,
+        };
+        let result = app(&machine);
+        if result.is_ok() && machine.module.get().is_some() && !machine.has_asked.get() {
+            crate::println!(
+                "warning: the app takes no file, and has not looked at the one it was given"
+            );
+        }
+        let result = machine.fault_verdict.judge(result);
+        machine.bound_verdict.judge(result)
+    }
+
     /// Returns the words of the command line that the kernel left to the app.
     ///
     /// See [`Options`].
@@ -97,8 +184,8 @@ impl Machine {
     /// }
     /// ```
     #[must_use]
-    pub const fn has_console(&self) -> bool {
-        self.wishes.console.is_some()
+    pub fn has_console(&self) -> bool {
+        self.system.has_console()
     }
 
     /// Returns the number of cores that run subtasks.
@@ -106,7 +193,7 @@ impl Machine {
     /// See [`Machine`].
     #[must_use]
     pub fn cores(&self) -> u32 {
-        KERNEL.cores()
+        self.system.cores()
     }
 
     /// Chooses policy and preemption of the commits to come, instead of what the
@@ -125,8 +212,7 @@ impl Machine {
     /// }
     /// ```
     pub fn configure(&self, policy: Policy, preemption: Preemption) {
-        KERNEL.set_policy(policy);
-        KERNEL.set_preemption(preemption);
+        self.system.configure(policy, preemption);
     }
 
     /// Makes events that are less than `window` apart count as one instant in the
@@ -147,7 +233,7 @@ impl Machine {
     /// }
     /// ```
     pub fn set_coincidence(&self, window: Duration) {
-        KERNEL.set_coincidence_ns(u64::try_from(window.as_nanos()).unwrap_or(u64::MAX));
+        self.system.set_coincidence(window);
     }
 
     /// Leaves it to the app to judge faults. Unless it says so, at any time before its
@@ -198,9 +284,7 @@ impl Machine {
     ///
     /// See [`Run`].
     pub fn run(&self) -> Result<Run, Ending> {
-        /// Time for the cores to get ready between now and the first release.
-        const LEAD_NS: u64 = 100_000;
-        self.run_from(machine::clock::now_ns() + LEAD_NS)
+        self.run_when(None)
     }
 
     /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on
@@ -217,52 +301,23 @@ impl Machine {
     /// }
     /// ```
     pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
-        let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
-        let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
-        let mut outgoing = edge::begin(epoch_ns);
-        let allocations_before = heap::usage().allocations;
-        let locks_before = execution::lock_acquisitions();
-        console::defer();
-        execution::arm_all();
-        let mut background = Background::begin(self.wishes.with_input(self.input.get()), total);
-        // What was measured before, while booting and printing, does not count.
-        let _ = interrupts_off::take_longest();
-        worker::wait_in_background(|| edge::send(&mut outgoing) | background.step());
-        let shuts_down = background.end();
-        let longest = interrupts_off::take_longest();
-        let allocations = heap::usage().allocations - allocations_before;
-        let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
-        let dropped = console::resume();
-        if dropped > 0 {
-            // What was cut off has most likely lost the end of its line.
-            crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
-        }
-        let run = execution::end().ok_or_else(nothing)?;
-        edge::end(outgoing, !shuts_down);
-        let run = run.with_counts(Counts {
-            epoch_ns,
-            allocations,
-            lock_acquisitions: locks,
-        });
-        report::left::dump(&run);
+        self.run_when(Some(epoch_ns))
+    }
+
+    #[inline(never)]
+    fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, Ending> {
+        let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
         let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
-        wcet_notes::note(&run, KERNEL.overheads());
-        if let Some(line) = LINE.get() {
-            line.report();
-        }
-        if let Some((ticks, place)) = longest {
-            report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
-        }
-        report::stacks::dump(&run);
+        wcet_notes::note(&run, self.system.overheads());
         if self.dumps_times {
-            report::times::dump(&run);
+            times::dump(&run);
         }
         if self.dumps_trace {
-            report::trace::dump(&run, self.runs.replace(self.runs.get() + 1));
+            trace::dump(&run, self.runs.replace(self.runs.get() + 1));
         }
-        if shuts_down {
+        if self.system.is_shut_down() {
             return Err(Ending::after_shutdown(&run));
         }
         Ok(run)
@@ -295,35 +350,10 @@ impl Machine {
     /// }
     /// ```
     pub fn raise_on_input(&self, signal: &Signal) {
-        let target = signal.target();
         assert!(
-            target.is_some(),
+            signal.target().is_some(),
             "a signal is connected before its DAG is committed; commit that first"
         );
-        self.input.set(target);
+        self.input.replace(Some(signal.clone()));
     }
-
-    /// Interrupts every core each `period` from now on, besides what scheduling
-    /// needs; back to normal if 0. For tests of the kernel's own robustness.
-    ///
-    /// ```no_run
-    /// fn disturb(machine: &kernel::Machine) {
-    ///     machine.set_heartbeat(core::time::Duration::from_micros(50));
-    /// }
-    /// ```
-    pub fn set_heartbeat(&self, period: Duration) {
-        heartbeat::set_heartbeats(u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
-    }
-}
-
-/// Prints the longest section of a run without interrupts.
-fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
-    let place = fmt::from_fn(|f| write!(f, "{}:{}", place.file(), place.line()));
-    crate::println!(
-        "longest section without interrupts: {}, from {place}",
-        Ns(longest_ns)
-    );
-    json::emit("interrupts_off", |line| {
-        line.number("longest_ns", longest_ns).text("place", &place);
-    });
 }

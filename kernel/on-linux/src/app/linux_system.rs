@@ -1,0 +1,190 @@
+//! What Linux does for an app's machine: so many cores of this computer.
+
+use std::cell::{Cell, RefCell};
+use std::fs;
+use std::io;
+use std::time::Duration;
+
+use fass::{Clusters, Overheads, Policy, Preemption, Signal, Wire};
+use linux::{EndSignals, Linux};
+
+use super::ends::Ends;
+use crate::heap;
+use front::app::division::Divisible;
+use front::app::ending::Ending;
+use front::app::machine::System;
+use front::json;
+use front::options::{Options, UsageError};
+use front::report;
+use front::report::memory::Memory;
+use sched_dag::engine::Run;
+
+/// The machine, lent to the app's function for the time of the run.
+pub type Machine = front::app::machine::Machine<LinuxSystem>;
+
+/// Linux, as an app's machine knows it.
+#[derive(Debug)]
+pub struct LinuxSystem {
+    pub(crate) linux: Linux,
+    pub(crate) overheads: Overheads,
+    pub(crate) wire: RefCell<Option<Ends>>,
+    /// What the app has asked for that Linux does not have.
+    pub(crate) refusal: RefCell<Option<UsageError>>,
+    /// The reasons that end a run before its time.
+    pub(crate) signals: EndSignals,
+}
+
+impl System for LinuxSystem {
+    fn cores(&self) -> u32 {
+        self.linux.cores()
+    }
+
+    /// Without the right to use SCHED_FIFO nothing is preempted.
+    fn configure(&self, policy: Policy, preemption: Preemption) {
+        self.linux.configure(policy, preemption);
+    }
+
+    fn overheads(&self) -> Overheads {
+        self.overheads
+    }
+
+    /// Is refused, at the next run, unless it is 0: on Linux events are as far apart as they are.
+    fn set_coincidence(&self, window: Duration) {
+        if window > Duration::ZERO {
+            let line = "events are taken together on the machine only; choose a window of 0";
+            self.refusal.replace(Some(UsageError::new(line)));
+        }
+    }
+
+    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, Ending> {
+        if let Some(refusal) = self.refusal.take() {
+            return Err(refusal.into());
+        }
+        let failure = |why: String| Ending::Failure(why);
+        let ends = self.wire.borrow();
+        let connection = ends.as_ref().map(|ends| ends.connect(&self.linux));
+        let connection = connection.transpose()?;
+        if let Some(signal) = input {
+            let watched = self.linux.raise_on_input(signal, &io::stdin());
+            watched.map_err(|why| failure(format!("standard input cannot be watched: {why}")))?;
+        }
+        if let Some(control) = self.linux.control() {
+            let watched = control.close_when_asked(&self.signals);
+            watched.map_err(|why| failure(format!("no signal can be waited for: {why}")))?;
+        }
+        let run = match epoch_ns {
+            Some(epoch_ns) => self.linux.run_from(epoch_ns),
+            None => self.linux.run(),
+        };
+        let run = run.map_err(|why| failure(why.to_string()))?;
+        drop(connection);
+        tell_faults(&run);
+        if let Some(ends) = &*ends {
+            report::wire::report(&ends.wire);
+        }
+        Ok(run.into_run())
+    }
+
+    fn is_shut_down(&self) -> bool {
+        self.signals.count() > 0
+    }
+
+    fn connect(
+        &self,
+        wire: &Wire,
+        options: &Options<'static>,
+        _module: &Cell<Option<&'static [u8]>>,
+    ) -> Result<(), Ending> {
+        let input = options.text("input");
+        let output = options.text("output");
+        if input.is_some_and(|input| input != "-") {
+            let line = "`input`: a script of times is for the machine; on Linux give `input=-`";
+            return Err(UsageError::new(line).into());
+        }
+        if input.is_none() && output.is_none() {
+            let line = "has no ends; give --input - or --output FILE";
+            return Err(UsageError::new(format!("wire `{}` {line}", wire.name())).into());
+        }
+        let ends = Ends {
+            wire: wire.clone(),
+            is_live: input.is_some(),
+            output,
+        };
+        match self.wire.replace(Some(ends)) {
+            None => Ok(()),
+            Some(_) => Err(Ending::Failure(format!(
+                "wire `{}` finds its ends taken; connect one wire",
+                wire.name()
+            ))),
+        }
+    }
+
+    fn measure_overheads(_margin_percent: u32) -> Result<(), Ending> {
+        let line = "`overheads`: what Linux costs is not measured; state it by `overheads_ns=`, \
+                    or run the app on the machine";
+        Err(UsageError::new(line).into())
+    }
+
+    fn memory() -> Memory {
+        Memory {
+            in_use_bytes: heap::in_use_bytes(),
+            peak_bytes: heap::peak_bytes() as u64,
+            bytes: memory_kib() * 1024,
+            allocations: heap::allocations(),
+        }
+    }
+}
+
+impl Divisible for LinuxSystem {
+    fn divide(&self, sizes: Option<Vec<u32>>) {
+        match sizes {
+            Some(sizes) => self.linux.divide(&sizes),
+            None => self.linux.divide_by_commit(),
+        }
+    }
+
+    fn clusters(&self) -> Clusters {
+        self.linux.division()
+    }
+}
+
+/// Says which faults there were, as the kernel does at once.
+fn tell_faults(run: &linux::Run) {
+    for fault in run.faults() {
+        let instance = fault.instance;
+        let cause = if fault.is_overrun {
+            "budget overrun"
+        } else {
+            "panic"
+        };
+        let dag = run.task_set().dag(instance.dag);
+        let subtask = dag.subtask(instance.subtask).name();
+        crate::println!(
+            "fault: {cause} in subtask `{subtask}` of dag `{}`, job {}: {}; {}",
+            dag.name(),
+            instance.job,
+            fault.cause,
+            fault.cost.consequence()
+        );
+        json::report("fault", |line| {
+            line.text("cause", cause)
+                .number("dag", instance.dag.0)
+                .text("dag_name", dag.name())
+                .number("subtask", instance.subtask.0)
+                .text("subtask_name", subtask)
+                .number("job", instance.job)
+                .text("cost", fault.cost.word())
+                .number("cpu", 0_u32)
+                .text("place", "unknown")
+                .text("message", &fault.cause);
+        });
+    }
+}
+
+/// Returns how much memory the computer has.
+pub(crate) fn memory_kib() -> u64 {
+    let text = fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let line = text.lines().find(|line| line.starts_with("MemTotal:"));
+    let number = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
+    number.unwrap_or(0)
+}

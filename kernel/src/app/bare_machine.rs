@@ -1,0 +1,199 @@
+//! What the kernel does for an app's machine.
+
+use core::cell::Cell;
+use core::fmt;
+use core::panic::Location;
+use core::time::Duration;
+
+use alloc::boxed::Box;
+
+use fass::{Overheads, Platform, Policy, Preemption, Signal, Wire};
+
+use super::overheads;
+use crate::options::{Options, UsageError};
+use crate::report::{self, Ns};
+use crate::watch::background::live_run::{Kernel, PARAMETERS, TOPICS};
+use crate::watch::background::{Background, LINE, Wishes, wire};
+use executive::machine::{self, interrupts_off, this_core};
+use executive::memory::heap;
+use executive::run::platform::KERNEL;
+use executive::run::{contexts, edge, execution, worker};
+use executive::text::console;
+use front::app::ending::Ending;
+use front::app::machine::System;
+use front::app::offered::Parameters;
+use front::json;
+use front::report::memory::Memory;
+use front::shell::topics::Topics;
+use sched_dag::engine::{Counts, Run};
+
+/// The machine, lent to the app's function for the time of the run.
+pub type Machine = front::app::machine::Machine<BareMachine>;
+
+/// The kernel, as an app's machine knows it.
+#[derive(Debug)]
+pub struct BareMachine {
+    /// What people want to see, and say, during a run.
+    wishes: Wishes,
+    /// Whether a person has ended the latest run.
+    is_shut_down: Cell<bool>,
+}
+
+impl BareMachine {
+    pub(crate) const fn new(wishes: Wishes) -> Self {
+        Self {
+            wishes,
+            is_shut_down: Cell::new(false),
+        }
+    }
+}
+
+impl System for BareMachine {
+    fn has_console(&self) -> bool {
+        self.wishes.console.is_some()
+    }
+
+    fn cores(&self) -> u32 {
+        KERNEL.cores()
+    }
+
+    fn configure(&self, policy: Policy, preemption: Preemption) {
+        KERNEL.set_policy(policy);
+        KERNEL.set_preemption(preemption);
+    }
+
+    fn overheads(&self) -> Overheads {
+        KERNEL.overheads()
+    }
+
+    fn set_coincidence(&self, window: Duration) {
+        KERNEL.set_coincidence_ns(u64::try_from(window.as_nanos()).unwrap_or(u64::MAX));
+    }
+
+    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, Ending> {
+        /// Time for the cores to get ready between now and the first release.
+        const LEAD_NS: u64 = 100_000;
+        let epoch_ns = epoch_ns.unwrap_or_else(|| machine::clock::now_ns() + LEAD_NS);
+        let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
+        let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
+        let mut outgoing = edge::begin(epoch_ns);
+        let allocations_before = heap::usage().allocations;
+        let locks_before = execution::lock_acquisitions();
+        console::defer();
+        execution::arm_all();
+        let mut background = Background::begin(self.wishes, input.and_then(Signal::target), total);
+        // What was measured before, while booting and printing, does not count.
+        let _ = interrupts_off::take_longest();
+        worker::wait_in_background(|| edge::send(&mut outgoing) | background.step());
+        self.is_shut_down.set(background.end());
+        let longest = interrupts_off::take_longest();
+        let allocations = heap::usage().allocations - allocations_before;
+        let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
+        let dropped = console::resume();
+        if dropped > 0 {
+            // What was cut off has most likely lost the end of its line.
+            crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
+        }
+        let run = execution::end().ok_or_else(nothing)?;
+        edge::end(outgoing, !self.is_shut_down());
+        let run = run.with_counts(Counts {
+            epoch_ns,
+            allocations,
+            lock_acquisitions: locks,
+        });
+        report::left::dump(&run);
+        if let Some(line) = LINE.get() {
+            line.report();
+        }
+        if let Some((ticks, place)) = longest {
+            report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
+        }
+        report::stacks::dump(&run);
+        Ok(run)
+    }
+
+    fn is_shut_down(&self) -> bool {
+        self.is_shut_down.get()
+    }
+
+    fn connect(
+        &self,
+        wire: &Wire,
+        options: &Options<'static>,
+        module: &Cell<Option<&'static [u8]>>,
+    ) -> Result<(), Ending> {
+        let bytes = options.number("input", 0..=1 << 32, 0)?;
+        let file = module.get().unwrap_or_default();
+        let own = usize::try_from(bytes)
+            .ok()
+            .and_then(|bytes| file.len().checked_sub(bytes));
+        let own = own.ok_or_else(|| UsageError::new("`input`: the module is shorter"))?;
+        let [own, script] = <[_; 2]>::from(file.split_at(own))
+            .map(|part| Some(part).filter(|part| !part.is_empty()));
+        module.set(own);
+        wire::connect(wire, script)
+    }
+
+    fn offer(parameters: Parameters) -> Result<(), Ending> {
+        let offered = PARAMETERS.set(Box::leak(Box::new(parameters)));
+        let twice = |_| Ending::Failure("parameters are offered twice; offer all at once".into());
+        offered.map(drop).map_err(twice)
+    }
+
+    fn show_topics(&self) {
+        static ALL: Topics<Kernel> = Topics::new();
+        if self.has_console() {
+            edge::let_look();
+            // Once is enough.
+            let _ = TOPICS.set(&ALL);
+        }
+    }
+
+    fn measure_overheads(margin_percent: u32) -> Result<(), Ending> {
+        overheads::charge(margin_percent)
+    }
+
+    fn contexts() -> (usize, usize) {
+        let (contexts, in_stock) = contexts::count();
+        let spare = this_core::all().iter().filter(|core| core.has_spare());
+        (contexts, in_stock + spare.count())
+    }
+
+    fn memory() -> Memory {
+        let usage = heap::usage();
+        Memory {
+            in_use_bytes: usage.in_use_bytes,
+            peak_bytes: usage.peak_bytes as u64,
+            bytes: usage.capacity_bytes as u64,
+            allocations: usage.allocations,
+        }
+    }
+}
+
+#[cfg(feature = "clusters")]
+impl front::app::division::Divisible for BareMachine {
+    fn divide(&self, sizes: Option<alloc::vec::Vec<u32>>) {
+        use execution::{Division, set_division};
+        set_division(match sizes {
+            None => Division::ByCommit,
+            Some(sizes) if sizes.is_empty() => Division::Into(fass::Clusters::Undivided),
+            Some(sizes) => Division::Into(fass::Clusters::Of(sizes)),
+        });
+    }
+
+    fn clusters(&self) -> fass::Clusters {
+        KERNEL.clusters()
+    }
+}
+
+/// Prints the longest section of a run without interrupts.
+fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
+    let place = fmt::from_fn(|f| write!(f, "{}:{}", place.file(), place.line()));
+    crate::println!(
+        "longest section without interrupts: {}, from {place}",
+        Ns(longest_ns)
+    );
+    json::emit("interrupts_off", |line| {
+        line.number("longest_ns", longest_ns).text("place", &place);
+    });
+}
