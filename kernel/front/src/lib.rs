@@ -5,10 +5,10 @@
 //!
 //! # Rooms, from top to bottom
 //!
-//! `shell` talks with a person during a run, `app` is the machine as an app sees it, and judges runs,
-//! `report` tells of a run when it is over, `options` reads the command line, `text` makes lines.
-//! Where text goes is bound when a
-//! program is linked: its entry names its platform's function by [`output!`], once.
+//! `shell` talks with a person during a run, `app` is the machine as an app sees it and judges
+//! runs, `report` tells of a run when it is over, `options` reads the command line, `text` makes
+//! lines. Where text goes is bound when a program is linked: its entry names its platform's
+//! function by [`output!`], once.
 //!
 //! # What is guaranteed
 //!
