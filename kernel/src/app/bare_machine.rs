@@ -12,7 +12,7 @@ use fass::{Overheads, Platform, Policy, Preemption, Signal, Wire};
 use super::overheads;
 use crate::options::{Options, UsageError};
 use crate::report::{self, Ns};
-use crate::watch::background::live_run::{Kernel, PARAMETERS, TOPICS};
+use crate::watch::background::live_run::{KernelRun, PARAMETERS, TOPICS};
 use crate::watch::background::{Background, LINE, Wishes, wire};
 use executive::machine::{self, interrupts_off, this_core};
 use executive::memory::heap;
@@ -141,7 +141,7 @@ impl System for BareMachine {
     }
 
     fn show_topics(&self) {
-        static ALL: Topics<Kernel> = Topics::new();
+        static ALL: Topics<KernelRun> = Topics::new();
         if self.has_console() {
             edge::let_look();
             // Once is enough.

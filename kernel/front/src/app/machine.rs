@@ -159,10 +159,10 @@ impl<S: System> Machine<S> {
         &self.options
     }
 
-    /// Returns the file that the loader left in memory (`qemu -initrd FILE`), if
-    /// there is one. It is not copied: memory and the boot's time are the same
-    /// for files of any size. If there is one and the app never asks for it, the
-    /// kernel says so at the end.
+    /// Returns the file that the loader left in memory (`qemu -initrd FILE`), or on Linux the one
+    /// that the word `module=` names, if there is one. The loader's is not copied: memory and the
+    /// boot's time are the same for files of any size. If there is one and the app never asks for
+    /// it, a line says so at the end.
     ///
     /// ```no_run
     /// fn size(machine: &kernel::Machine) -> usize {
@@ -176,7 +176,7 @@ impl<S: System> Machine<S> {
     }
 
     /// Reports whether a person can talk to the kernel during a run (`console=on`), and
-    /// so end one that would not end by itself.
+    /// so end one that would not end by itself. On Linux nobody can.
     ///
     /// ```no_run
     /// fn least_jobs(machine: &kernel::Machine) -> u64 {
@@ -197,7 +197,7 @@ impl<S: System> Machine<S> {
     }
 
     /// Chooses policy and preemption of the commits to come, instead of what the
-    /// command line says.
+    /// command line says. On Linux nothing is preempted without the right to use SCHED_FIFO.
     ///
     /// ```no_run
     /// use fass::{Policy, Preemption};
@@ -225,7 +225,7 @@ impl<S: System> Machine<S> {
     /// however close, and a decision between two of them starts or preempts what
     /// the model would not. To compare the machine with the model, they have to
     /// be taken together again. The price is that every decision comes `window`
-    /// later.
+    /// later. On Linux the next run is refused, unless `window` is 0.
     ///
     /// ```no_run
     /// fn compare_with_model(machine: &kernel::Machine) {
@@ -257,7 +257,7 @@ impl<S: System> Machine<S> {
 
     /// Leaves it to the app to judge response times beyond their proven bounds. Unless
     /// it says so, at any time before its function returns, one in any of its runs makes
-    /// it fail (not in the tool's mode `threads`). A line says so in any case.
+    /// it fail (neither in the tool's mode `threads` nor on Linux). A line says so in any case.
     ///
     /// ```no_run
     /// fn measures_wcets(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
@@ -278,8 +278,8 @@ impl<S: System> Machine<S> {
     /// # Errors
     ///
     /// [`Ending::Failure`] if nothing has been committed since the last run.
-    /// [`Ending::Shutdown`] if a person has ended the run, at the console or by ctrl-C: then each
-    /// DAG has ended the jobs that it had in flight and released no more. If that
+    /// [`Ending::Shutdown`] if a person has ended the run, at the console, by ctrl-C, or on Linux by
+    /// SIGTERM: then each DAG has ended the jobs that it had in flight and released no more. If that
     /// run broke a rule of the model, it is a failure instead.
     ///
     /// See [`Run`].
@@ -304,6 +304,7 @@ impl<S: System> Machine<S> {
         self.run_when(Some(epoch_ns))
     }
 
+    // Within an app's function it would make the image larger.
     #[inline(never)]
     fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, Ending> {
         let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
@@ -325,7 +326,7 @@ impl<S: System> Machine<S> {
 
     /// Makes each byte that the serial port receives during runs raise a signal, in
     /// place of the signal named before. With `console=on` bytes are the console's
-    /// and raise nothing.
+    /// and raise nothing. On Linux it is whatever arrives on standard input.
     ///
     /// Core 0 looks for bytes when it has nothing else to do, so one may count up to
     /// 20 ms late, and later where that core is busy.

@@ -21,11 +21,13 @@ impl<S: System> Machine<S> {
     /// otherwise refuses that word, and before [`module`](Self::module).
     ///
     /// The port is looked at every millisecond. Core 0 sends when it has nothing else to do.
-    /// After each run a line says what the wire has counted.
+    /// After each run a line says what the wire has counted. On Linux the wire's ends are standard
+    /// input (`input=-`) and a file (`output=FILE`).
     ///
     /// # Errors
     ///
-    /// [`Ending::Usage`] if there is no such port, [`Ending::Failure`] if it has a wire already.
+    /// [`Ending::Usage`] if there is no such port, or neither end is named; [`Ending::Failure`] if
+    /// it has a wire already.
     ///
     /// ```no_run
     /// use fass::{Received, SubtaskAttributes, Wire, create_dag, finish_create_dags};
@@ -103,7 +105,7 @@ impl<S: System> Machine<S> {
     /// # Errors
     ///
     /// If the words are wrong, or `overheads_ns` states the overheads besides; if there is no
-    /// memory for it.
+    /// memory for it; on Linux, where what it costs is not measured.
     ///
     /// ```no_run
     /// fn take_part(machine: &kernel::Machine) -> Result<(), kernel::Ending> {

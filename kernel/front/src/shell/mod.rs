@@ -35,7 +35,7 @@ pub const PERIOD_NS: u64 = 20_000_000;
 /// The byte that ends a run in order: what ctrl-C is on a serial line (ETX in ASCII).
 pub const END: u8 = 3;
 
-/// The most bytes that a slice takes: what the port's FIFO holds.
+/// The most bytes that a slice takes: what the FIFO of a serial port holds.
 const MOST_BYTES: usize = 16;
 
 /// A run that goes on, as the shell sees it: what a platform has for it.
@@ -48,6 +48,10 @@ pub trait LiveRun {
 
     /// Makes a change to a DAG.
     fn control(dag: DagId, change: fn(DagId) -> Request);
+
+    /// Returns the time, in nanoseconds. Not what functions are told of it ([`fass::now_ns`]): that
+    /// may be written down for them, and the shell speaks in the middle of theirs.
+    fn now_ns() -> u64;
 
     /// Returns the number of clusters.
     fn clusters() -> usize;
@@ -325,3 +329,6 @@ fn refuse(line: &str, why: &dyn Display) {
             .text("reason", why);
     });
 }
+
+#[cfg(test)]
+mod tests;

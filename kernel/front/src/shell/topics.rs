@@ -75,7 +75,7 @@ impl<R: LiveRun> Topics<R> {
 
     /// Shows the latest value of a topic, if there is one and it is time.
     fn show(&self, topic: &Topic) {
-        let now_ns = fass::now_ns();
+        let now_ns = R::now_ns();
         let shown_ns = self.shown_ns.load(Ordering::Relaxed);
         if now_ns.saturating_sub(shown_ns) < BETWEEN_NS {
             return;

@@ -3,7 +3,7 @@
 use alloc::sync::Arc;
 
 use executive::machine::once::Once;
-use executive::machine::serial;
+use executive::machine::{clock, serial};
 use executive::run::{edge, execution};
 use fass::edge::Seen;
 use front::shell::{Commands, Extra, LiveRun};
@@ -14,7 +14,7 @@ use super::stop;
 
 /// The kernel's run.
 #[derive(Debug)]
-pub(crate) struct Kernel;
+pub(crate) struct KernelRun;
 
 /// Commands about parameters.
 pub(crate) static PARAMETERS: Once<&'static dyn Commands> = Once::new();
@@ -22,7 +22,7 @@ pub(crate) static PARAMETERS: Once<&'static dyn Commands> = Once::new();
 /// Commands about topics.
 pub(crate) static TOPICS: Once<&'static dyn Commands> = Once::new();
 
-impl LiveRun for Kernel {
+impl LiveRun for KernelRun {
     fn task_set() -> Option<Arc<TaskSet>> {
         execution::task_set()
     }
@@ -33,6 +33,10 @@ impl LiveRun for Kernel {
 
     fn control(dag: DagId, change: fn(DagId) -> Request) {
         execution::control(dag, change);
+    }
+
+    fn now_ns() -> u64 {
+        clock::now_ns()
     }
 
     fn clusters() -> usize {

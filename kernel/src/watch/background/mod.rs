@@ -34,7 +34,7 @@ use executive::run::heartbeat;
 use executive::text::console;
 use front::shell::{self, Session};
 use listener::Listener;
-use live_run::Kernel;
+use live_run::KernelRun;
 use progress::Progress;
 use sched_dag::DagId;
 use status::Status;
@@ -88,7 +88,7 @@ const STARVED_NS: u64 = 200_000_000;
 #[derive(Debug)]
 struct Sliced {
     status: Option<Status>,
-    session: Option<Session<Kernel>>,
+    session: Option<Session<KernelRun>>,
 }
 
 static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {

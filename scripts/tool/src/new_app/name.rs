@@ -134,54 +134,22 @@ mod tests {
     use super::{check, names};
     use crate::system::workspace;
 
+    /// Names, and why they are refused.
+    const BAD: &str = " | the name is empty; give one, such as `brake-assist`
+Brake_Assist | `Brake_Assist` cannot be an app's name: 'B' is in it; use small letters, digits and hyphens, as in `brake-assist`
+../fork | `../fork` cannot be an app's name: '.' is in it; use small letters, digits and hyphens
+2nd | `2nd` cannot be an app's name: it does not begin with a letter; put one first
+brake- | `brake-` cannot be an app's name: a hyphen in it joins nothing; write each between two words
+a-name-that-has-more-letters-than-32 | `a-name-that-has-more-letters-than-32` cannot be an app's name: it has 36 letters; give at most 32
+struct | `struct` cannot be an app's name: Rust or cargo use the word themselves; add another, such as `my-`
+fork-join | there is an app `fork-join` already; choose another name, or edit apps/fork-join
+virtual-time | `virtual-time` cannot be an app's name: the package in fass/virtual-time has it; choose another
+tool | `tool` cannot be an app's name: the package in scripts/tool has it; choose another";
+
     #[test]
     fn each_bad_name_is_refused_with_what_is_possible() {
-        let long = "a-name-that-has-more-letters-than-32";
-        for (name, line) in [
-            ("", "the name is empty; give one, such as `brake-assist`"),
-            (
-                "Brake_Assist",
-                "`Brake_Assist` cannot be an app's name: 'B' is in it; use small letters, digits \
-                 and hyphens, as in `brake-assist`",
-            ),
-            (
-                "../fork",
-                "`../fork` cannot be an app's name: '.' is in it; use small letters, digits and \
-                 hyphens",
-            ),
-            (
-                "2nd",
-                "`2nd` cannot be an app's name: it does not begin with a letter; put one first",
-            ),
-            (
-                "brake-",
-                "`brake-` cannot be an app's name: a hyphen in it joins nothing; write each \
-                 between two words",
-            ),
-            (
-                long,
-                "`a-name-that-has-more-letters-than-32` cannot be an app's name: it has 36 letters; \
-                 give at most 32",
-            ),
-            (
-                "struct",
-                "`struct` cannot be an app's name: Rust or cargo use the word themselves; add \
-                 another, such as `my-`",
-            ),
-            (
-                "fork-join",
-                "there is an app `fork-join` already; choose another name, or edit apps/fork-join",
-            ),
-            (
-                "virtual-time",
-                "`virtual-time` cannot be an app's name: the package in fass/virtual-time has it; \
-                 choose another",
-            ),
-            (
-                "tool",
-                "`tool` cannot be an app's name: the package in scripts/tool has it; choose another",
-            ),
-        ] {
+        for row in BAD.lines() {
+            let (name, line) = row.split_once(" | ").expect(row);
             assert_eq!(check(workspace(), name), Err(line.to_string()));
         }
         assert_eq!(check(workspace(), "brake-assist-2"), Ok(()));

@@ -25,6 +25,17 @@ r 2 0 0
 end
 ";
 
+/// Returns each row of tables, with the case that it is about.
+fn rows<'a>(tables: &'a [(&'a str, &'a str)]) -> impl Iterator<Item = (&'a str, &'a str)> {
+    (tables.iter()).flat_map(|(text, table)| table.lines().map(move |row| (*text, row)))
+}
+
+/// Splits a row of a table.
+fn split<const N: usize>(row: &str) -> [&str; N] {
+    let cells: Vec<&str> = row.split(" | ").collect();
+    cells.try_into().expect(row)
+}
+
 #[test]
 fn all_public_traces_agree() {
     let cases = parse(PUBLIC).unwrap();
@@ -34,54 +45,21 @@ fn all_public_traces_agree() {
     }
 }
 
+/// What stands in a case, what is put in its place, and the difference that makes.
+const EXACT_WRONG: &str = r"s 2 8 4 | s 2 7 4 | arrival 2 (topic 1, message 4): set 0: expected 7 4, emitted 8 4
+s 2 8 4\n |  | arrival 2 (topic 1, message 4): set 0: expected none, emitted 8 4
+s 2 8 4 | s 2 8 4\ns 2 8 999 | arrival 2 (topic 1, message 4): set 1: expected 8 999, emitted none
+s 2 8 4 | s 1 8 4 | arrival 1 (topic 0, message 8): set 0: expected 8 4, emitted none";
+const APPROXIMATE_WRONG: &str = r"r 2 0 0\n |  | arrival 2 (topic 0, message 1): message 0 of topic 0: dropped, but expected not to leave
+r 2 0 0 | r 1 0 0 | arrival 1 (topic 1, message 0): message 0 of topic 0: expected to leave, but was not dropped
+a 0 1 19 | a 0 1 20 | arrival 2 (topic 0, message 1): set 0: expected 1 0, emitted 0 0";
+
 #[test]
 fn the_first_difference_is_named() {
-    for (text, from, to, difference) in [
-        (
-            EXACT,
-            "s 2 8 4",
-            "s 2 7 4",
-            "arrival 2 (topic 1, message 4): set 0: expected 7 4, emitted 8 4",
-        ),
-        (
-            EXACT,
-            "s 2 8 4\n",
-            "",
-            "arrival 2 (topic 1, message 4): set 0: expected none, emitted 8 4",
-        ),
-        (
-            EXACT,
-            "s 2 8 4",
-            "s 2 8 4\ns 2 8 999",
-            "arrival 2 (topic 1, message 4): set 1: expected 8 999, emitted none",
-        ),
-        (
-            EXACT,
-            "s 2 8 4",
-            "s 1 8 4",
-            "arrival 1 (topic 0, message 8): set 0: expected 8 4, emitted none",
-        ),
-        (
-            APPROXIMATE,
-            "r 2 0 0\n",
-            "",
-            "arrival 2 (topic 0, message 1): message 0 of topic 0: \
-             dropped, but expected not to leave",
-        ),
-        (
-            APPROXIMATE,
-            "r 2 0 0",
-            "r 1 0 0",
-            "arrival 1 (topic 1, message 0): message 0 of topic 0: \
-             expected to leave, but was not dropped",
-        ),
-        (
-            APPROXIMATE,
-            "a 0 1 19",
-            "a 0 1 20",
-            "arrival 2 (topic 0, message 1): set 0: expected 1 0, emitted 0 0",
-        ),
-    ] {
+    let tables = [(EXACT, EXACT_WRONG), (APPROXIMATE, APPROXIMATE_WRONG)];
+    for (text, row) in rows(&tables) {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, difference] = split(&row);
         assert!(text.contains(from), "{from}");
         let cases = parse(&text.replacen(from, to, 1)).expect("still well formed");
         assert_eq!(check(&cases[0]), Err(difference.to_owned()));
@@ -107,55 +85,47 @@ fn a_queue_of_any_size_costs_no_more_than_the_arrivals() {
     assert_eq!(check(&parse(&unlimited).unwrap()[0]), Ok(()));
 }
 
+/// The same of what is refused: with its line and the reason.
+const EXACT_MALFORMED: &str = r"case e | kase e | 1 | expected a `case` record
+exact 2 5 | exact 2 | 1 | takes 4 words, found 3
+exact 2 5 | exactly 2 5 | 1 | found `exactly`
+exact 2 5 | exact 0 5 | 1 | 1 to 1024 topics
+exact 2 5 | exact 1025 5 | 1 | 1 to 1024 topics
+exact 2 5 | exact 2 -5 | 1 | not a whole number
+a 0 7 1 | a 2 7 1 | 2 | there is no topic 2
+a 0 8 2 | a 0 7 2 | 3 | message 7 of topic 0 arrives twice
+a 1 4 2 | a 1 4 2.5 | 4 | not a whole number
+a 1 4 2 | a 1 4 | 4 | takes 3 words, found 2
+a 1 4 2 | a 1 4 18446744073709551616 | 4 | too large
+s 2 8 4 | s 3 8 4 | 5 | there is no arrival 3
+s 2 8 4 | s 2 8 | 5 | takes 3 words, found 2
+s 2 8 4 | s 2 8 x | 5 | not a whole number
+s 2 8 4 | t 2 8 4 | 5 | expected `a`, `s`, `r` or `end`
+r 2 0 7 | r 2 2 7 | 6 | there is no topic 2
+r 2 0 7 | r 9 0 7 | 6 | there is no arrival 9
+r 2 0 7 | r 2 0 7\nr 2 0 7 | 7 | leaves twice
+end | end 1 | 7 | takes 0 words, found 1
+end\n |  | 7 | the file ends where `end` should be";
+const APPROXIMATE_MALFORMED: &str = r"approximate 2 5 | approximate 2 0 | 1 | at least 1
+approximate 2 5 | exact 2 5 | 2 | found `approximate`
+100 1 0 0 0 | 100 1 0 0 | 2 | takes 5 words, found 4
+100 1 0 0 0 | 1e2 1 0 0 0 | 2 | not a whole number
+100 1 0 0 0 | 100 0 0 0 0 | 2 | out of range
+100 1 0 0 0 | 100 1 128 0 0 | 2 | out of range
+approximate 100 1 0 0 0\n |  | 2 | expected a `approximate` record";
+
 #[test]
 fn malformed_files_are_refused_with_their_line() {
-    let exact = [
-        ("case e", "kase e", 1, "expected a `case` record"),
-        ("exact 2 5", "exact 2", 1, "takes 4 words, found 3"),
-        ("exact 2 5", "exactly 2 5", 1, "found `exactly`"),
-        ("exact 2 5", "exact 0 5", 1, "1 to 1024 topics"),
-        ("exact 2 5", "exact 1025 5", 1, "1 to 1024 topics"),
-        ("exact 2 5", "exact 2 -5", 1, "not a whole number"),
-        ("a 0 7 1", "a 2 7 1", 2, "there is no topic 2"),
-        (
-            "a 0 8 2",
-            "a 0 7 2",
-            3,
-            "message 7 of topic 0 arrives twice",
-        ),
-        ("a 1 4 2", "a 1 4 2.5", 4, "not a whole number"),
-        ("a 1 4 2", "a 1 4", 4, "takes 3 words, found 2"),
-        ("a 1 4 2", "a 1 4 18446744073709551616", 4, "too large"),
-        ("s 2 8 4", "s 3 8 4", 5, "there is no arrival 3"),
-        ("s 2 8 4", "s 2 8", 5, "takes 3 words, found 2"),
-        ("s 2 8 4", "s 2 8 x", 5, "not a whole number"),
-        ("s 2 8 4", "t 2 8 4", 5, "expected `a`, `s`, `r` or `end`"),
-        ("r 2 0 7", "r 2 2 7", 6, "there is no topic 2"),
-        ("r 2 0 7", "r 9 0 7", 6, "there is no arrival 9"),
-        ("r 2 0 7", "r 2 0 7\nr 2 0 7", 7, "leaves twice"),
-        ("end", "end 1", 7, "takes 0 words, found 1"),
-        ("end\n", "", 7, "the file ends where `end` should be"),
+    let tables = [
+        (EXACT, EXACT_MALFORMED),
+        (APPROXIMATE, APPROXIMATE_MALFORMED),
     ];
-    let approximate = [
-        ("approximate 2 5", "approximate 2 0", 1, "at least 1"),
-        ("approximate 2 5", "exact 2 5", 2, "found `approximate`"),
-        ("100 1 0 0 0", "100 1 0 0", 2, "takes 5 words, found 4"),
-        ("100 1 0 0 0", "1e2 1 0 0 0", 2, "not a whole number"),
-        ("100 1 0 0 0", "100 0 0 0 0", 2, "out of range"),
-        ("100 1 0 0 0", "100 1 128 0 0", 2, "out of range"),
-        (
-            "approximate 100 1 0 0 0\n",
-            "",
-            2,
-            "expected a `approximate` record",
-        ),
-    ];
-    let exact = exact.map(|case| (EXACT, case));
-    let approximate = approximate.map(|case| (APPROXIMATE, case));
-    for (text, (from, to, line, reason)) in exact.into_iter().chain(approximate) {
+    for (text, row) in rows(&tables) {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, line, reason] = split(&row);
         assert!(text.contains(from), "{from}");
         let malformed = parse(&text.replacen(from, to, 1)).expect_err(to);
-        assert_eq!(malformed.line, line, "{to}: {malformed}");
+        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
         assert!(malformed.reason.contains(reason), "{to}: {malformed}");
     }
     assert_eq!(parse("").expect_err("no case").line, 1);
