@@ -25,6 +25,7 @@ mod occupation;
 mod overrun;
 mod preemption;
 mod recorded;
+mod scenarios;
 mod sharing;
 mod stacks;
 mod stalled;
@@ -44,7 +45,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 46] = [
+const TESTS: [(&str, Test); 47] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -86,6 +87,7 @@ const TESTS: [(&str, Test); 46] = [
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),
     ("recorded_long", recorded::long),
+    ("scenarios", scenarios::run),
     ("sharing", sharing::run),
     ("stacks", stacks::run),
     ("stacks_of_chain", stacks::chain),

@@ -1,0 +1,29 @@
+//! The suite of scenarios on the machine: those for as many cores as it has.
+
+use alloc::vec::Vec;
+
+use kernel::{Ending, Machine, json};
+use scenarios::Scenario;
+
+/// Runs the scenarios, and prints of each what is wrong.
+pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    machine.options().finish(&["test"])?;
+    machine.accept_faults();
+    machine.accept_exceeded_bounds();
+    let read = |(_, text): &(_, &str)| Scenario::read_all(text).map_err(Ending::Failure);
+    let all = scenarios::SUITE.iter().map(read);
+    let all = all.collect::<Result<Vec<_>, _>>()?.into_iter().flatten();
+    for scenario in all.filter(|scenario| scenario.cores == machine.cores()) {
+        machine.configure(scenario.policy, scenario.preemption);
+        machine.divide(&scenario.clusters);
+        let wrong = match scenario.commit() {
+            Err(refusal) => scenario.judge_refusal(&refusal),
+            Ok(_) => scenario.judge_run(&machine.run()?),
+        };
+        json::emit("scenario", |line| {
+            line.text("title", &scenario.title)
+                .text("wrong", &wrong.join("; "));
+        });
+    }
+    Ok(())
+}

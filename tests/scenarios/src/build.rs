@@ -1,0 +1,349 @@
+//! The DAGs of a scenario, of real functions on real topics.
+//!
+//! Each subtask writes a topic of its own name, with the number of the call in which the source
+//! has begun the job. A join of one source's values panics if they are not of one job, so that a
+//! platform that mixes jobs fails by a fault that no scenario expects.
+
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use core::time::Duration;
+
+use fass::{
+    Commit, CommitError, ConstructionPolicy, Dag, Latest, Mode, Modes, Occupation, Signal, State,
+    SubtaskAttributes, Uses, VecToPubs, VecToSubs, create_dag, execute_for,
+    finish_create_dags_with, shutting_down,
+};
+
+use crate::dag::{DagText, Replaced, SubtaskText, Use};
+use crate::{Scenario, UNIT_NS};
+
+/// Tuples that a subtask takes.
+trait Inputs: VecToSubs {
+    fn values(self) -> Vec<u64>;
+}
+
+/// Tuples that a subtask returns.
+trait Outputs: VecToPubs {
+    fn of(value: u64) -> Self;
+}
+
+impl Outputs for () {
+    fn of(_: u64) -> Self {}
+}
+
+impl Outputs for (u64,) {
+    fn of(value: u64) -> Self {
+        (value,)
+    }
+}
+
+macro_rules! inputs {
+    ($(($($value:ident)*))*) => {$(
+        impl Inputs for ($(inputs!(@ $value),)*) {
+            fn values(self) -> Vec<u64> {
+                let ($($value,)*) = self;
+                Vec::from([$($value),*])
+            }
+        }
+    )*};
+    (@ $value:ident) => { u64 };
+}
+
+inputs!(()(a)(a b)(a b c)(a b c d));
+
+/// What a subtask's function does in a call.
+#[derive(Clone)]
+struct Step {
+    takes: Vec<u64>,
+    fails: Vec<u64>,
+    when: Vec<u64>,
+    /// How often it has been called, whichever function followed a failed one.
+    calls: Arc<AtomicU64>,
+    /// Whether all that it gets began in one call of one source.
+    joins: bool,
+}
+
+impl Step {
+    fn new(dag: &DagText, subtask: &SubtaskText) -> Self {
+        let sources = dag.subtasks.iter().filter(|of| of.after.is_empty());
+        Self {
+            takes: subtask.takes.clone(),
+            fails: subtask.fails.clone(),
+            when: subtask.when.clone(),
+            calls: Arc::default(),
+            joins: sources.count() == 1,
+        }
+    }
+
+    /// Does it, where `act` is what else it may do.
+    fn call<I: Inputs, O: Outputs>(&self, inputs: I, act: impl FnOnce()) -> O {
+        let call = self.calls.fetch_add(1, Relaxed);
+        let takes = usize::try_from(call)
+            .ok()
+            .and_then(|call| self.takes.get(call));
+        let takes = takes.or(self.takes.last()).copied().unwrap_or(0);
+        execute_for(Duration::from_nanos(takes * UNIT_NS), Occupation::Hold);
+        if self.when.contains(&call) {
+            act();
+        }
+        assert!(
+            !self.fails.contains(&call),
+            "call {call} fails, as it is to"
+        );
+        let values = inputs.values();
+        let first = values.first().copied().unwrap_or(call);
+        assert!(
+            !self.joins || values.iter().all(|value| *value == first),
+            "a join got values of different jobs: {values:?}"
+        );
+        O::of(first)
+    }
+}
+
+/// A DAG that is being built, and what its subtasks use.
+struct Building<'a> {
+    dag: &'a Dag,
+    text: &'a DagText,
+    signals: &'a BTreeMap<String, Signal>,
+    dags: &'a BTreeMap<String, Dag>,
+    modes: &'a BTreeMap<String, Mode>,
+    latest: &'a BTreeMap<String, Latest<u64>>,
+    states: BTreeMap<String, State<u64>>,
+}
+
+impl Building<'_> {
+    fn register<I: Inputs, O: Outputs>(&mut self, subtask: &SubtaskText, writes: bool) {
+        let step = Step::new(self.text, subtask);
+        let inputs: Vec<&str> = subtask.after.iter().map(String::as_str).collect();
+        let outputs = Vec::from_iter(writes.then_some(subtask.name.as_str()));
+        let attributes = attributes(subtask);
+        let dag = self.dag;
+        if subtask.replaced != Replaced::Never {
+            let make = move || {
+                let step = step.clone();
+                move |inputs: I| step.call::<I, O>(inputs, || ())
+            };
+            let anew = make.clone();
+            let functions = match subtask.replaced {
+                Replaced::ByFallback => dag.falling_back(make(), anew()),
+                _ => dag.restarting(anew),
+            };
+            return functions.register_subtask(inputs, outputs, attributes);
+        }
+        let place = (inputs, outputs, attributes);
+        match &subtask.uses {
+            Use::Nothing if subtask.due.is_some() => {
+                let due = Duration::from_millis(subtask.due.unwrap_or_default());
+                let call = move |inputs: I| step.call::<I, ()>(inputs, || ());
+                dag.register_sink_subtask(call, place.0, due, place.2);
+            }
+            Use::Nothing => {
+                let call = move |inputs: I| step.call::<I, O>(inputs, || ());
+                dag.register_subtask(call, place.0, place.1, place.2);
+            }
+            Use::Updates(name) => {
+                let state = self.state(name).update();
+                using::<_, I, O>(dag, state, place, step, |value, _| **value += 1);
+            }
+            Use::Reads(name) => {
+                let state = self.state(name).read();
+                using::<_, I, O>(dag, state, place, step, |_, _| ());
+            }
+            Use::Samples(name) => {
+                let latest = self.latest[name].sample();
+                using::<_, I, O>(dag, latest, place, step, |_, _| ());
+            }
+            Use::Raises(name) => {
+                let raising = self.signals[name].raising();
+                using::<_, I, O>(dag, raising, place, step, |raiser, acts| {
+                    if acts {
+                        raiser.raise();
+                    }
+                });
+            }
+            Use::Pauses(name) | Use::Resumes(name) => {
+                let pauses = matches!(subtask.uses, Use::Pauses(_));
+                let switching = self.dags[name].switching();
+                using::<_, I, O>(dag, switching, place, step, move |switch, acts| {
+                    match (acts, pauses) {
+                        (false, _) => {}
+                        (true, true) => switch.pause(),
+                        (true, false) => switch.resume(),
+                    }
+                });
+            }
+            Use::Enters(name) => {
+                let entering = self.modes[name].entering();
+                using::<_, I, O>(dag, entering, place, step, |entrance, acts| {
+                    if acts {
+                        entrance.at_once();
+                    }
+                });
+            }
+            Use::EndsRun => {
+                using::<_, I, O>(dag, shutting_down(), place, step, |shutdown, acts| {
+                    if acts {
+                        shutdown.request();
+                    }
+                });
+            }
+        }
+    }
+
+    fn state(&mut self, name: &str) -> &State<u64> {
+        let make = || self.dag.state(name, 0);
+        self.states.entry(name.into()).or_insert_with(make)
+    }
+}
+
+/// Registers a subtask that uses something: `act` gets it in each call, and whether this is one in
+/// which it acts.
+fn using<U: Uses + 'static, I: Inputs, O: Outputs>(
+    dag: &Dag,
+    uses: U,
+    (inputs, outputs, attributes): (Vec<&str>, Vec<&str>, SubtaskAttributes),
+    step: Step,
+    act: impl for<'a> Fn(&mut U::Borrowed<'a>, bool) + Send + 'static,
+) {
+    let call = move |mut used: U::Borrowed<'_>, inputs: I| -> O {
+        act(&mut used, false);
+        step.call(inputs, || act(&mut used, true))
+    };
+    dag.using(uses)
+        .register_subtask(call, inputs, outputs, attributes);
+}
+
+fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
+    let ms = Duration::from_millis;
+    let mut attributes = SubtaskAttributes::named(&subtask.name);
+    if let Some(priority) = subtask.priority {
+        attributes = attributes.priority(priority);
+    }
+    if let Some(wcet) = subtask.wcet {
+        attributes = attributes.wcet(ms(wcet));
+    }
+    if let Some(budget) = subtask.budget {
+        attributes = attributes.budget(ms(budget));
+    }
+    if subtask.is_non_preemptive {
+        attributes = attributes.non_preemptive();
+    }
+    attributes
+}
+
+impl DagText {
+    /// Begins the DAG. Returns its signal, too, if it is sporadic.
+    fn begin(&self) -> (Dag, Option<Signal>) {
+        let ms = Duration::from_millis;
+        let dag = create_dag();
+        dag.name(&self.name).overrun(self.overrun).order(self.order);
+        dag.offset(ms(self.offset));
+        dag.relative_deadline(ms(self.deadline.unwrap_or(self.period)));
+        if self.jobs > 0 {
+            let all = u32::try_from(self.jobs).unwrap_or(u32::MAX);
+            dag.jobs(self.jobs).in_flight(self.in_flight.unwrap_or(all));
+        } else if let Some(in_flight) = self.in_flight {
+            dag.in_flight(in_flight);
+        }
+        if let Some(limit) = self.survives {
+            dag.survive_faults(limit);
+        }
+        if let Some(cluster) = self.cluster {
+            dag.cluster(cluster);
+        }
+        if self.is_paused {
+            dag.starts_paused();
+        }
+        let signal = self.is_sporadic.then(|| dag.sporadic(ms(self.period)));
+        if signal.is_none() {
+            dag.period(ms(self.period));
+        }
+        (dag, signal)
+    }
+}
+
+impl Scenario {
+    /// Builds the DAGs and commits them, in the order of the text.
+    ///
+    /// # Errors
+    ///
+    /// What the commit refuses.
+    ///
+    /// # Panics
+    ///
+    /// If the text names what it does not state.
+    pub fn commit(&self) -> Result<Commit, CommitError> {
+        let (mut dags, mut signals) = (BTreeMap::new(), BTreeMap::new());
+        for text in &self.dags {
+            let (dag, signal) = text.begin();
+            dags.insert(text.name.clone(), dag);
+            signals.extend(signal.map(|signal| (text.name.clone(), signal)));
+        }
+        let set = Modes::new();
+        let mode = |(name, names): &(String, Vec<String>)| {
+            let named: Vec<&Dag> = names.iter().map(|name| &dags[name]).collect();
+            (name.clone(), set.mode(name, &named))
+        };
+        let modes = self.modes.iter().map(mode).collect();
+        let sampled: Vec<&str> = self.dags.iter().flat_map(DagText::samples).collect();
+        let mut latest = BTreeMap::new();
+        for text in &self.dags {
+            for subtask in &text.subtasks {
+                if sampled.contains(&subtask.name.as_str()) {
+                    latest.insert(subtask.name.clone(), dags[&text.name].latest(&subtask.name));
+                }
+            }
+        }
+        for text in &self.dags {
+            let dag = &dags[&text.name];
+            if let Some(handler) = &text.on_fault {
+                dag.on_fault(&signals[handler]);
+            }
+            let mut building = Building {
+                dag,
+                text,
+                signals: &signals,
+                dags: &dags,
+                modes: &modes,
+                latest: &latest,
+                states: BTreeMap::new(),
+            };
+            for subtask in &text.subtasks {
+                let (inputs, is_read) = text.shape(subtask);
+                let writes = is_read || latest.contains_key(&subtask.name);
+                building.register_shaped(subtask, inputs, writes);
+            }
+        }
+        let all: Vec<Dag> = (self.dags.iter())
+            .map(|text| dags[&text.name].clone())
+            .collect();
+        finish_create_dags_with(&all, ConstructionPolicy::any_graph())
+    }
+}
+
+impl Building<'_> {
+    fn register_shaped(&mut self, subtask: &SubtaskText, inputs: usize, writes: bool) {
+        type One = u64;
+        match (inputs, writes) {
+            (0, false) => self.register::<(), ()>(subtask, false),
+            (0, true) => self.register::<(), (One,)>(subtask, true),
+            (1, false) => self.register::<(One,), ()>(subtask, false),
+            (1, true) => self.register::<(One,), (One,)>(subtask, true),
+            (2, false) => self.register::<(One, One), ()>(subtask, false),
+            (2, true) => self.register::<(One, One), (One,)>(subtask, true),
+            (3, false) => self.register::<(One, One, One), ()>(subtask, false),
+            (3, true) => self.register::<(One, One, One), (One,)>(subtask, true),
+            (4, writes) => match writes {
+                false => self.register::<(One, One, One, One), ()>(subtask, false),
+                true => self.register::<(One, One, One, One), (One,)>(subtask, true),
+            },
+            (more, _) => panic!(
+                "subtask `{}` has {more} inputs; 4 are the most",
+                subtask.name
+            ),
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! A DAG of a scenario, as it is stated.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use alloc::{format, vec};
+
+use fass::{FaultLimit, Order, OverrunPolicy};
+
+use crate::number;
+
+/// A DAG: `NAME`, then any of
+/// `period T` or `sporadic T`, `deadline T`, `offset T`, `jobs N`, `in-flight N`,
+/// `overrun queue|skip|abort`, `order fixed`, `survives FAULTS/WINDOW/ALL`, `cluster N`, `paused`,
+/// `on-fault DAG`.
+///
+/// It has one job, unless that is said (`jobs 0`: no end), and room for all of its jobs.
+#[derive(Clone, Debug, Default)]
+pub struct DagText {
+    pub(crate) name: String,
+    pub(crate) period: u64,
+    pub(crate) is_sporadic: bool,
+    pub(crate) deadline: Option<u64>,
+    pub(crate) offset: u64,
+    pub(crate) jobs: u64,
+    pub(crate) in_flight: Option<u32>,
+    pub(crate) overrun: OverrunPolicy,
+    pub(crate) order: Order,
+    pub(crate) survives: Option<FaultLimit>,
+    pub(crate) cluster: Option<u32>,
+    pub(crate) is_paused: bool,
+    /// The DAG that a fault releases.
+    pub(crate) on_fault: Option<String>,
+    pub(crate) subtasks: Vec<SubtaskText>,
+}
+
+/// A subtask: `NAME TIMES`, then any of
+/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `non-preemptive`,
+/// `fails N,N` (in these of its calls, from 0), `restarts` or `falls-back` (what replaces it after
+/// a fault), `updates STATE`, `reads STATE`, `samples NAME` (a subtask of another DAG), and with
+/// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N`, `resumes DAG N`,
+/// `enters MODE N`, `ends-run N`.
+///
+/// `TIMES` are how long its first calls take, separated by `/`; the last of them is that of all
+/// others.
+#[derive(Clone, Debug, Default)]
+pub struct SubtaskText {
+    pub(crate) name: String,
+    pub(crate) takes: Vec<u64>,
+    pub(crate) after: Vec<String>,
+    pub(crate) priority: Option<u32>,
+    pub(crate) wcet: Option<u64>,
+    pub(crate) budget: Option<u64>,
+    pub(crate) due: Option<u64>,
+    pub(crate) is_non_preemptive: bool,
+    pub(crate) fails: Vec<u64>,
+    pub(crate) replaced: Replaced,
+    pub(crate) uses: Use,
+    /// The calls in which it does what it may.
+    pub(crate) when: Vec<u64>,
+}
+
+/// Which function follows one that has failed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Replaced {
+    /// None: the DAG ends.
+    #[default]
+    Never,
+    /// One made anew.
+    Anew,
+    /// Another one.
+    ByFallback,
+}
+
+/// What a subtask uses besides its inputs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Use {
+    #[default]
+    Nothing,
+    Updates(String),
+    Reads(String),
+    Samples(String),
+    Raises(String),
+    Pauses(String),
+    Resumes(String),
+    Enters(String),
+    EndsRun,
+}
+
+/// The words of a line, from left to right.
+type Words<'a> = core::iter::Peekable<core::str::SplitWhitespace<'a>>;
+
+fn value<'a>(words: &mut Words<'a>) -> Result<&'a str, String> {
+    words.next().ok_or_else(|| "a value is missing".into())
+}
+
+fn numbers(words: &mut Words<'_>) -> Result<Vec<u64>, String> {
+    value(words)?.split([',', '/']).map(number).collect()
+}
+
+impl DagText {
+    pub(crate) fn read(line: &str) -> Result<Self, String> {
+        let mut words = line.split_whitespace().peekable();
+        let mut dag = Self {
+            name: value(&mut words)?.into(),
+            jobs: 1,
+            ..Self::default()
+        };
+        while let Some(key) = words.next() {
+            let words = &mut words;
+            match key {
+                "period" => dag.period = number(value(words)?)?,
+                "sporadic" => (dag.is_sporadic, dag.period) = (true, number(value(words)?)?),
+                "deadline" => dag.deadline = Some(number(value(words)?)?),
+                "offset" => dag.offset = number(value(words)?)?,
+                "jobs" => dag.jobs = number(value(words)?)?,
+                "in-flight" => dag.in_flight = Some(number(value(words)?)?),
+                "overrun" => {
+                    dag.overrun = match value(words)? {
+                        "skip" => OverrunPolicy::Skip,
+                        "abort" => OverrunPolicy::Abort,
+                        _ => OverrunPolicy::Queue,
+                    }
+                }
+                "order" => dag.order = value(words).map(|_| Order::Fixed)?,
+                "survives" => {
+                    let limit: Vec<u64> = numbers(words)?;
+                    let [faults, window, in_all] = limit[..] else {
+                        return Err("`survives` takes FAULTS/WINDOW/ALL".into());
+                    };
+                    let narrow = |number| u32::try_from(number).unwrap_or(u32::MAX);
+                    dag.survives = Some(FaultLimit {
+                        faults: narrow(faults),
+                        window,
+                        in_all: narrow(in_all),
+                    });
+                }
+                "cluster" => dag.cluster = Some(number(value(words)?)?),
+                "paused" => dag.is_paused = true,
+                "on-fault" => dag.on_fault = Some(value(words)?.into()),
+                _ => return Err(format!("`{key}` is no word of a dag")),
+            }
+        }
+        Ok(dag)
+    }
+
+    pub(crate) fn take_subtask(&mut self, line: &str) -> Result<(), String> {
+        let mut words = line.split_whitespace().peekable();
+        let mut subtask = SubtaskText {
+            name: value(&mut words)?.into(),
+            takes: numbers(&mut words)?,
+            ..SubtaskText::default()
+        };
+        let of_others: Vec<String> = self.subtasks.iter().map(|of| of.name.clone()).collect();
+        while let Some(key) = words.next() {
+            let words = &mut words;
+            let mut acts = |make: fn(String) -> Use| -> Result<(Use, Vec<u64>), String> {
+                Ok((make(value(words)?.into()), numbers(words)?))
+            };
+            match key {
+                "raises" => (subtask.uses, subtask.when) = acts(Use::Raises)?,
+                "pauses" => (subtask.uses, subtask.when) = acts(Use::Pauses)?,
+                "resumes" => (subtask.uses, subtask.when) = acts(Use::Resumes)?,
+                "enters" => (subtask.uses, subtask.when) = acts(Use::Enters)?,
+                "ends-run" => (subtask.uses, subtask.when) = (Use::EndsRun, numbers(words)?),
+                "updates" => subtask.uses = Use::Updates(value(words)?.into()),
+                "reads" => subtask.uses = Use::Reads(value(words)?.into()),
+                "samples" => subtask.uses = Use::Samples(value(words)?.into()),
+                "after" => {
+                    while let Some(name) =
+                        words.next_if(|name| of_others.iter().any(|of| of == name))
+                    {
+                        subtask.after.push(name.into());
+                    }
+                    if subtask.after.is_empty() {
+                        return Err("`after` names no subtask that stands before".into());
+                    }
+                }
+                "priority" => subtask.priority = Some(number(value(words)?)?),
+                "wcet" => subtask.wcet = Some(number(value(words)?)?),
+                "budget" => subtask.budget = Some(number(value(words)?)?),
+                "due" => subtask.due = Some(number(value(words)?)?),
+                "non-preemptive" => subtask.is_non_preemptive = true,
+                "fails" => subtask.fails = numbers(words)?,
+                "restarts" => subtask.replaced = Replaced::Anew,
+                "falls-back" => subtask.replaced = Replaced::ByFallback,
+                _ => return Err(format!("`{key}` is no word of a subtask")),
+            }
+        }
+        self.subtasks.push(subtask);
+        Ok(())
+    }
+
+    /// Returns how many predecessors a subtask has, and whether it has successors.
+    pub(crate) fn shape(&self, subtask: &SubtaskText) -> (usize, bool) {
+        let mut all = self.subtasks.iter();
+        let is_read = all.any(|other| other.after.contains(&subtask.name));
+        (subtask.after.len(), is_read)
+    }
+
+    /// Returns the subtasks of other DAGs that are sampled.
+    pub(crate) fn samples(&self) -> Vec<&str> {
+        let mut names = vec![];
+        for subtask in &self.subtasks {
+            if let Use::Samples(name) = &subtask.uses {
+                names.push(name.as_str());
+            }
+        }
+        names
+    }
+}

@@ -1,0 +1,117 @@
+//! Whether a run was as its scenario says.
+
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use alloc::{format, vec};
+
+use fass::CommitError;
+use sched_dag::engine::Run;
+use sched_dag::{DagStatistics, TaskSet};
+
+use crate::{Scenario, UNIT_NS};
+
+impl Scenario {
+    /// Holds the statistics of DAGs against what is said of them; `is_exact`: also against what is
+    /// said of virtual time. Returns what differs, a line each.
+    pub fn judge_counts<'a>(
+        &self,
+        task_set: &TaskSet,
+        statistics: impl Fn(sched_dag::DagId) -> &'a DagStatistics,
+        is_exact: bool,
+    ) -> Vec<String> {
+        let exactly = self.exactly.iter().filter(|_| is_exact);
+        let mut wrong = vec![];
+        for line in self.everywhere.iter().chain(exactly) {
+            let (name, counts) = line.split_once(": ").unwrap_or((line, ""));
+            let Some(dag) = task_set.dags().iter().position(|dag| dag.name() == name) else {
+                wrong.push(format!("`{line}`: there is no dag `{name}`"));
+                continue;
+            };
+            let dag = sched_dag::DagId(u32::try_from(dag).unwrap_or(u32::MAX));
+            let all = format!("{:?},", statistics(dag)).replace(" }", ",");
+            for count in counts.split_whitespace() {
+                let (counter, expected) = count.split_once('=').unwrap_or((count, ""));
+                let found = all.split_once(&format!(" {counter}: "));
+                let found = found.map(|(_, rest)| rest.split(',').next().unwrap_or_default());
+                if found != Some(expected) {
+                    let found = found.unwrap_or("unknown");
+                    wrong.push(format!("{name}: {counter} is {found}, and not {expected}"));
+                }
+            }
+        }
+        wrong
+    }
+
+    /// Holds a run in real time against what is said of every platform, and against R1 to R4.
+    #[must_use]
+    pub fn judge_run(&self, run: &Run) -> Vec<String> {
+        let mut wrong = self.judge_counts(run.task_set(), |dag| run.statistics(dag), false);
+        wrong.extend(run.violations().map(|it| format!("{it:?}")));
+        wrong
+    }
+
+    /// Holds the events of a run in virtual time, by the lines of its report, against the
+    /// timeline. Returns both if they differ.
+    #[must_use]
+    pub fn judge_events(&self, lines: &[String]) -> Vec<String> {
+        let mut expected = vec![];
+        for line in &self.timeline {
+            let (time, events) = line.split_once(' ').unwrap_or((line, ""));
+            let events = events.split(", ");
+            expected.extend(events.map(|event| format!("{time} {event}")));
+        }
+        let is_meant = |line: &str| {
+            let same = |of: &String| kind(of) == kind(line);
+            expected.iter().any(same) || self.never.iter().any(|never| never == kind(line))
+        };
+        let happened: Vec<String> = lines.iter().map(|line| in_units(line)).collect();
+        let happened: Vec<&String> = happened.iter().filter(|line| is_meant(line)).collect();
+        let is_same = |(told, of): (&&String, &String)| {
+            *told == of
+                || told
+                    .split_once(" core ")
+                    .is_some_and(|(told, _)| told == of)
+        };
+        let is_right =
+            happened.len() == expected.len() && happened.iter().zip(&expected).all(is_same);
+        match is_right {
+            true => vec![],
+            false => vec![
+                format!("expected:\n  {}", expected.join("\n  ")),
+                format!(
+                    "happened:\n  {}",
+                    happened
+                        .iter()
+                        .map(ToString::to_string)
+                        .collect::<Vec<_>>()
+                        .join("\n  ")
+                ),
+            ],
+        }
+    }
+
+    /// Holds what a commit has refused against what it is to refuse.
+    #[must_use]
+    pub fn judge_refusal(&self, refusal: &CommitError) -> Vec<String> {
+        let codes: Vec<&str> = refusal.faults().iter().map(fass::Fault::code).collect();
+        match codes == self.refused {
+            true => vec![],
+            false => vec![format!("the commit is refused: {codes:?}: {refusal}")],
+        }
+    }
+}
+
+/// Returns which kind of event a line is of.
+fn kind(line: &str) -> &str {
+    line.split(' ').nth(1).unwrap_or_default()
+}
+
+/// Returns a line with its time in units, in words of one form for a number.
+fn in_units(line: &str) -> String {
+    let (time_ns, event) = line.split_once(' ').unwrap_or((line, ""));
+    let time_ns: u64 = time_ns.parse().unwrap_or(u64::MAX);
+    match time_ns.is_multiple_of(UNIT_NS) {
+        true => format!("{} {event}", time_ns / UNIT_NS),
+        false => line.into(),
+    }
+}

@@ -1,0 +1,168 @@
+//! Scenarios: runs that are stated as text, once for all platforms.
+//!
+//! A scenario has DAGs, what their functions do, and what the record must show. It is built with
+//! `fass` and run by whatever platform is installed. In virtual time the record is compared event
+//! by event; in real time, on Linux and on the machine, by what holds however long anything
+//! takes: counts, and the laws R1 to R4. `tests/scenarios/*.txt` are the suite.
+//!
+//! ```text
+//! scenario A join waits for all its predecessors
+//! cores 2
+//! dag fork period 100
+//!   source 1
+//!   left 2 after source
+//!   right 7 after source
+//!   join 1 after left right
+//! 1 ready left[0], ready right[0]
+//! 8 ready join[0]
+//! everywhere fork: completed=1
+//! ```
+//!
+//! A time is a whole number of milliseconds. `#` begins a comment. The lines of a scenario:
+//!
+//! | line | meaning |
+//! | --- | --- |
+//! | `scenario TITLE` | begins one |
+//! | `cores N` | on so many; 1 if not said |
+//! | `clusters N,N` | which are divided so |
+//! | `policy edf` | instead of static priorities |
+//! | `preemption off` | nobody loses its core |
+//! | `mode NAME DAG DAG` | a mode, in which these DAGs run |
+//! | `dag NAME WORDS` | a DAG, see [`dag::DagText`] |
+//! | `  NAME TIMES WORDS` | a subtask of it, see [`dag::SubtaskText`] |
+//! | `TIME EVENT, EVENT` | what happens then, in virtual time. Only events of the kinds that are named somewhere in the scenario are compared; `core N` may be left out. |
+//! | `never KIND` | no such event happens, in virtual time |
+//! | `DAG: COUNTER=N ...` | a DAG's statistics, in virtual time |
+//! | `everywhere DAG: COUNTER=N ...` | its statistics, on every platform |
+//! | `refused CODE CODE` | the commit is refused, for these faults |
+
+#![no_std]
+
+extern crate alloc;
+
+pub mod build;
+pub mod dag;
+pub mod judge;
+
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use alloc::{format, vec};
+
+use dag::DagText;
+
+/// What the functions of a run do is in milliseconds.
+pub const UNIT_NS: u64 = 1_000_000;
+
+/// The suite: each text with its name.
+pub const SUITE: &[(&str, &str)] = &[("rules", include_str!("../rules.txt"))];
+
+/// A run as it is stated.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// What it shows.
+    pub title: String,
+    /// On how many cores it runs.
+    pub cores: u32,
+    /// The sizes of clusters, if it has several.
+    pub clusters: Vec<u32>,
+    /// How ready instances are ordered.
+    pub policy: fass::Policy,
+    /// Whether a started instance may lose its core.
+    pub preemption: fass::Preemption,
+    /// Modes, with the names of their DAGs.
+    pub modes: Vec<(String, Vec<String>)>,
+    /// Its DAGs.
+    pub dags: Vec<DagText>,
+    /// What happens in virtual time, an instant a line.
+    pub timeline: Vec<String>,
+    /// Kinds of events that do not happen.
+    pub never: Vec<String>,
+    /// Statistics of DAGs in virtual time.
+    pub exactly: Vec<String>,
+    /// Statistics of DAGs on every platform.
+    pub everywhere: Vec<String>,
+    /// The faults of its commit.
+    pub refused: Vec<String>,
+}
+
+impl Scenario {
+    /// Reads all scenarios of a text.
+    ///
+    /// # Errors
+    ///
+    /// The line that is none, and what is wrong with it.
+    pub fn read_all(text: &str) -> Result<Vec<Self>, String> {
+        let mut all: Vec<Self> = Vec::new();
+        for (number, line) in (1..).zip(text.lines()) {
+            let line = line.split('#').next().unwrap_or_default().trim_end();
+            if line.is_empty() {
+                continue;
+            }
+            let told = |why: String| format!("line {number}: `{line}`: {why}");
+            match (line.strip_prefix("scenario "), all.last_mut()) {
+                (Some(title), _) => all.push(Self::new(title)),
+                (None, Some(scenario)) => scenario.take(line).map_err(told)?,
+                (None, None) => return Err(told("stands before the first scenario".into())),
+            }
+        }
+        Ok(all)
+    }
+
+    fn new(title: &str) -> Self {
+        Self {
+            title: title.into(),
+            cores: 1,
+            clusters: vec![],
+            policy: fass::Policy::StaticPriority,
+            preemption: fass::Preemption::Enabled,
+            modes: vec![],
+            dags: vec![],
+            timeline: vec![],
+            never: vec![],
+            exactly: vec![],
+            everywhere: vec![],
+            refused: vec![],
+        }
+    }
+
+    fn take(&mut self, line: &str) -> Result<(), String> {
+        if line.starts_with(' ') {
+            let dag = self.dags.last_mut().ok_or("no dag is above it")?;
+            return dag.take_subtask(line);
+        }
+        if line.starts_with(|first: char| first.is_ascii_digit()) {
+            self.timeline.push(line.into());
+            return Ok(());
+        }
+        let (first, rest) = line.split_once(' ').unwrap_or((line, ""));
+        let words = || rest.split_whitespace().map(ToString::to_string);
+        match (first, rest) {
+            ("cores", _) => self.cores = number(rest)?,
+            ("clusters", _) => {
+                let sizes = rest.split(',').map(number);
+                self.clusters = sizes.collect::<Result<_, _>>()?;
+                self.cores = self.clusters.iter().sum();
+            }
+            ("policy", "edf") => self.policy = fass::Policy::Edf,
+            ("preemption", "off") => self.preemption = fass::Preemption::Disabled,
+            ("mode", _) => {
+                let (name, dags) = rest.split_once(' ').unwrap_or((rest, ""));
+                let dags = dags.split_whitespace().map(ToString::to_string);
+                self.modes.push((name.into(), dags.collect()));
+            }
+            ("dag", _) => self.dags.push(DagText::read(rest)?),
+            ("never", _) => self.never.extend(words()),
+            ("refused", _) => self.refused.extend(words()),
+            ("everywhere", _) => self.everywhere.push(rest.into()),
+            _ if first.ends_with(':') => self.exactly.push(line.into()),
+            _ => return Err("is no line of a scenario".into()),
+        }
+        Ok(())
+    }
+}
+
+/// Reads a number.
+pub(crate) fn number<N: core::str::FromStr>(word: &str) -> Result<N, String> {
+    let number = word.trim().parse();
+    number.map_err(|_| format!("`{word}` is no such number"))
+}

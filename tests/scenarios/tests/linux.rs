@@ -1,0 +1,31 @@
+//! The suite on Linux by each mechanism that every computer has: counts, and R1 to R4.
+
+use linux::{Linux, Mechanism};
+use scenarios::Scenario;
+
+fn judge(scenario: &Scenario, mechanism: Mechanism) -> Vec<String> {
+    let machine = Linux::sharing(scenario.cores, mechanism).expect("a machine");
+    let machine = machine
+        .policy(scenario.policy)
+        .preemption(scenario.preemption)
+        .clusters(&scenario.clusters);
+    match scenario.commit() {
+        Err(refusal) => scenario.judge_refusal(&refusal),
+        Ok(_) => scenario.judge_run(&machine.run().expect("it is committed")),
+    }
+}
+
+#[test]
+fn each_scenario_is_as_it_says() {
+    let mut wrong = String::new();
+    for (name, text) in scenarios::SUITE {
+        for scenario in Scenario::read_all(text).expect("scenarios") {
+            for mechanism in [Mechanism::Fifo, Mechanism::Normal, Mechanism::Poll] {
+                for line in judge(&scenario, mechanism) {
+                    wrong += &format!("{name}: {}: {mechanism:?}: {line}\n", scenario.title);
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}
