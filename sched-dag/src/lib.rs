@@ -20,7 +20,7 @@
 //!
 //! # The rules
 //!
-//! Each rule has tests that bear its number, in `tests/rules.rs`.
+//! Each rule has scenarios that bear its number, in `tests/scenarios/rules.txt`.
 //!
 //! - **R1, release.** No instance of job k runs before r. The release times are
 //!   those of the nominal grid, whatever delayed the driver or the jobs before.
@@ -49,13 +49,13 @@
 //! `tests/sporadic.rs`. From its release on its job is a job like others.
 //!
 //! What happens to a release that finds as many jobs in flight as the DAG may
-//! have is the DAG's [`OverrunPolicy`]; its tests are in `tests/overrun.rs`.
+//! have is the DAG's [`OverrunPolicy`]; its scenarios are in `tests/scenarios/overrun.txt`.
 //!
 //! A DAG can be *ended* before its time, by an instance that [fails](Moment::fail)
 //! or by a [stop](Moment::stop): it starts nothing any more, and the others are
 //! scheduled on. The rules E1 to E8 for that stand in `scheduler/ending.rs`,
 //! their tests in `tests/ending.rs`; those for a fault that costs only its job, D1 to D7,
-//! in `scheduler/dropping.rs` and `tests/dropping.rs`.
+//! in `scheduler/dropping.rs` and `tests/scenarios/faults.txt`.
 //!
 //! # The parts, in the order of their use
 //!

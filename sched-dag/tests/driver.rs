@@ -4,6 +4,7 @@
 mod support;
 
 use sched_dag::CoreId;
+use sched_dag::OverrunPolicy::{Abort, Queue, Skip};
 use support::hand::Hand;
 use support::{PREEMPTIVE, Spec, TWO_CORES, cores, dag, instance};
 
@@ -117,5 +118,32 @@ fn an_idle_core_that_the_driver_prefers_is_taken_first() {
         preempted_at_2(3).must(&format!(
             "2 prefer {preferred}: released 1.0, start 1.0.0 on {taken}"
         ));
+    }
+}
+
+#[test]
+fn r1_releases_follow_the_nominal_grid_and_not_the_drivers_delay() {
+    Hand::new(&[dag(10, 10, 3, &[0], &[])], PREEMPTIVE)
+        .must("4: released 0.0, start 0.0.0 on 0, next=10");
+}
+
+#[test]
+fn a_driver_that_comes_late_finds_every_release_and_every_miss_in_order() {
+    let aborted = "released 0.0, missed 0.0, aborted 0.0, cancelled 0.0.0, completed 0.0 Aborted, \
+                   released 0.1, missed 0.1, aborted 0.1, cancelled 0.1.0, completed 0.1 Aborted, \
+                   released 0.2, start 0.2.0 on 0";
+    for (overrun, events) in [
+        (
+            Queue,
+            "released 0.0, missed 0.0, queued 0.1, missed 0.1, queued 0.2, start 0.0.0 on 0",
+        ),
+        (
+            Skip,
+            "released 0.0, missed 0.0, skipped 0.1, skipped 0.2, start 0.0.0 on 0",
+        ),
+        (Abort, aborted),
+    ] {
+        let one = dag(10, 10, 3, &[0], &[]).overrunning(1, overrun);
+        Hand::new(&[one], PREEMPTIVE).must(&format!("25: {events}"));
     }
 }

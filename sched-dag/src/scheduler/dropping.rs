@@ -3,7 +3,7 @@
 //! A robot cannot do without its DAG because one frame was broken. So a DAG may say that it
 //! *survives* faults ([`OnFault::DropJob`]): the job is *cut*, which is to say that it starts
 //! no further instance, and the subtask that failed goes on with another function, which
-//! the driver has. The rules, whose tests in `tests/dropping.rs` bear their numbers:
+//! the driver has. The rules, whose scenarios in `tests/scenarios/faults.txt` bear their numbers:
 //!
 //! - **D1, which faults.** A fault in job k is survived if the DAG says so and is not ended,
 //!   the driver has another function for the subtask, fewer than A faults were survived

@@ -22,7 +22,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         };
         json::emit("scenario", |line| {
             line.text("title", &scenario.title)
-                .text("wrong", &wrong.join("; "));
+                .text("wrong", wrong.join("; "));
         });
     }
     Ok(())

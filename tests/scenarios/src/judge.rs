@@ -106,12 +106,13 @@ fn kind(line: &str) -> &str {
     line.split(' ').nth(1).unwrap_or_default()
 }
 
-/// Returns a line with its time in units, in words of one form for a number.
+/// Returns a line with its time in units; a deadline is missed a nanosecond later, `N+`.
 fn in_units(line: &str) -> String {
     let (time_ns, event) = line.split_once(' ').unwrap_or((line, ""));
     let time_ns: u64 = time_ns.parse().unwrap_or(u64::MAX);
-    match time_ns.is_multiple_of(UNIT_NS) {
-        true => format!("{} {event}", time_ns / UNIT_NS),
-        false => line.into(),
+    match (time_ns / UNIT_NS, time_ns % UNIT_NS) {
+        (time, 0) => format!("{time} {event}"),
+        (time, 1) => format!("{time}+ {event}"),
+        _ => line.into(),
     }
 }

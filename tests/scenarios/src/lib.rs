@@ -54,7 +54,11 @@ use dag::DagText;
 pub const UNIT_NS: u64 = 1_000_000;
 
 /// The suite: each text with its name.
-pub const SUITE: &[(&str, &str)] = &[("rules", include_str!("../rules.txt"))];
+pub const SUITE: &[(&str, &str)] = &[
+    ("faults", include_str!("../faults.txt")),
+    ("overrun", include_str!("../overrun.txt")),
+    ("rules", include_str!("../rules.txt")),
+];
 
 /// A run as it is stated.
 #[derive(Clone, Debug)]
