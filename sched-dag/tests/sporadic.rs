@@ -100,17 +100,6 @@ fn s3_skip_and_abort_act_on_sporadic_jobs() {
 }
 
 #[test]
-fn s3_a_completion_may_signal_at_its_own_instant() {
-    let sender = dag(20, 20, 3, &[0], &[]).wcets(&[4]);
-    let receiver = dag(5, 5, 3, &[1], &[]).sporadic();
-    run(&[sender, receiver], PREEMPTIVE, [], Some((0, 1))).must_be(
-        "4 due 1.0
-         24 due 1.1
-         44 due 1.2",
-    );
-}
-
-#[test]
 fn s3_the_deadline_counts_from_the_nominal_release() {
     let spec = dag(10, 3, 4, &[0], &[]).wcets(&[3]).sporadic();
     let long = dag(100, 100, 1, &[0], &[]).wcets(&[50]);

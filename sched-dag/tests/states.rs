@@ -7,7 +7,7 @@ use sched_dag::{
     SubtaskId, SubtaskSpec, TopicPort, verify,
 };
 use support::random::Random;
-use support::{PREEMPTIVE, commit, cores, dag, run};
+use support::{PREEMPTIVE, commit, cores, dag};
 
 fn state(name: &str, users: &[(usize, bool)]) -> StateSpec {
     let user = |&(subtask, updates)| StateUser { subtask, updates };
@@ -131,31 +131,6 @@ fn several_states_never_close_a_cycle() {
             }
         }
     }
-}
-
-#[test]
-fn users_take_turns_within_a_job_and_from_job_to_job() {
-    let mut spec = with_state(&FORK, 5, &[(1, true), (2, false), (3, true)]);
-    spec.relative_deadline_ns = Some(30);
-    // 4 ns each: 1, 2 and 3 one after the other, and job 1 after job 0.
-    run(&[spec], cores(4), 4).must_be(
-        "0 start 0.0.0 on 0
-         4 start 0.0.1 on 0
-         8 start 0.0.2 on 0
-         12 start 0.0.3 on 0
-         16 start 0.0.4 on 0
-         20 start 0.1.0 on 0
-         24 start 0.1.1 on 0
-         28 start 0.1.2 on 0
-         32 start 0.1.3 on 0
-         36 start 0.1.4 on 0
-         40 start 0.2.0 on 0
-         44 start 0.2.1 on 0
-         48 start 0.2.2 on 0
-         52 start 0.2.3 on 0
-         56 start 0.2.4 on 0
-         queued=2",
-    );
 }
 
 #[test]

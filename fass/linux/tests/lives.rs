@@ -13,45 +13,6 @@ use sched_dag::DagId;
 use support::{ALL, alone, ms, ticking};
 
 #[test]
-fn a_panic_ends_its_dag_alone() {
-    for mechanism in ALL {
-        let alone = alone(2, mechanism);
-        let faulty = create_dag();
-        faulty
-            .name("faulty")
-            .jobs(20)
-            .period(ms(2))
-            .relative_deadline(ms(2));
-        let function = |job| assert!(job < 5, "out of numbers");
-        faulty.register_untyped_subtask(function, SubtaskAttributes::named("counts"));
-        let healthy = ticking("healthy", 20, ms(2), 1, 100);
-        let safe = create_dag();
-        safe.name("safe").relative_deadline(ms(2));
-        safe.register_untyped_subtask(|_| (), SubtaskAttributes::named("holds"));
-        faulty.on_fault(&safe.sporadic(ms(2)));
-        finish_create_dags(&[faulty, healthy, safe]).unwrap();
-        let run = alone.machine.run().unwrap();
-        assert_eq!(run.violations().count(), 0);
-        assert_eq!(run.statistics(DagId(2)).completed, 1);
-        let [fault] = run.faults() else {
-            panic!("one fault is meant, not {:?}", run.faults());
-        };
-        assert_eq!((fault.instance.job, &*fault.cause), (5, "out of numbers"));
-        assert_eq!(run.statistics(DagId(0)).completed, 5);
-        assert_eq!(run.statistics(DagId(1)).completed, 20);
-    }
-}
-
-#[test]
-fn a_dag_in_a_cluster_is_refused() {
-    let _alone = alone(2, Mechanism::Normal);
-    let dag = ticking("odometry", 1, ms(1), 1, 100);
-    dag.cluster(1);
-    let error = finish_create_dags(&[dag]).unwrap_err();
-    assert_eq!(error.faults()[0].code(), "unknown_cluster");
-}
-
-#[test]
 fn a_fault_costs_a_job_and_the_dag_goes_on() {
     for mechanism in ALL {
         let alone = alone(1, mechanism);

@@ -94,22 +94,6 @@ fn each_fault_costs_one_job_and_makes_the_function_anew() {
 }
 
 #[test]
-fn a_fault_too_many_ends_the_dag() {
-    let machine = VirtualTime::new().contain_panics();
-    let dag = counting(12);
-    let make = || |(job,): (u64,)| assert!(![2, 5, 7].contains(&job), "job {job}");
-    dag.restarting(make)
-        .register_sink_subtask(vec!["job"], ms(10), named("sink"));
-    let report = run(&machine, &[dag]);
-    let counted = report.statistics[0];
-    assert_eq!(counts(&counted), [3, 2, 5]);
-    assert_eq!(
-        (counted.released, counted.cut_short, counted.restarts),
-        (8, 1, 2)
-    );
-}
-
-#[test]
 fn a_fault_while_the_next_function_is_made_ends_the_dag() {
     let machine = VirtualTime::new().contain_panics();
     let dag = counting(12);

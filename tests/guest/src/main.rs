@@ -18,9 +18,7 @@ mod exceeded;
 mod kernel_crimes;
 mod large;
 mod left;
-mod lifecycle;
 mod limits;
-mod modes;
 mod occupation;
 mod overrun;
 mod preemption;
@@ -45,7 +43,7 @@ kernel::entry!(main);
 /// A test: it prints its findings and fails by its ending, or by a panic.
 type Test = fn(&Machine) -> Result<(), Ending>;
 
-const TESTS: [(&str, Test); 47] = [
+const TESTS: [(&str, Test); 43] = [
     ("attack", attacks::run),
     ("commit_faults", commit_faults),
     ("panic", crime),
@@ -79,10 +77,6 @@ const TESTS: [(&str, Test); 47] = [
     ("exceeded", exceeded::run),
     ("flood", limits::flood),
     ("large", large::run),
-    ("lifecycle", lifecycle::run),
-    ("lifecycle_divided", lifecycle::divided),
-    ("modes", modes::run),
-    ("modes_divided", modes::divided),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_crash", recorded::crash),

@@ -16,9 +16,9 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     for scenario in all.filter(|scenario| scenario.cores == machine.cores()) {
         machine.configure(scenario.policy, scenario.preemption);
         machine.divide(&scenario.clusters);
-        let wrong = match scenario.commit() {
-            Err(refusal) => scenario.judge_refusal(&refusal),
-            Ok(_) => scenario.judge_run(&machine.run()?),
+        let wrong = match scenario.judge_commit(scenario.commit()) {
+            Some(judged) => judged,
+            None => scenario.judge_run(&machine.run()?),
         };
         json::emit("scenario", |line| {
             line.text("title", &scenario.title)

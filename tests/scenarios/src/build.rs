@@ -22,7 +22,8 @@ use crate::{Scenario, UNIT_NS};
 
 /// Tuples that a subtask takes.
 trait Inputs: VecToSubs {
-    fn values(self) -> Vec<u64>;
+    /// Returns the first value, and whether the others are the same.
+    fn first(self) -> Option<(u64, bool)>;
 }
 
 /// Tuples that a subtask returns.
@@ -43,9 +44,11 @@ impl Outputs for (u64,) {
 macro_rules! inputs {
     ($(($($value:ident)*))*) => {$(
         impl Inputs for ($(inputs!(@ $value),)*) {
-            fn values(self) -> Vec<u64> {
+            fn first(self) -> Option<(u64, bool)> {
                 let ($($value,)*) = self;
-                Vec::from([$($value),*])
+                let all: &[u64] = &[$($value),*];
+                let first = *all.first()?;
+                Some((first, all.iter().all(|value| *value == first)))
             }
         }
     )*};
@@ -54,28 +57,27 @@ macro_rules! inputs {
 
 inputs!(()(a)(a b)(a b c)(a b c d));
 
-/// What a subtask's function does in a call.
-#[derive(Clone)]
+/// What a subtask's functions do in a call; one follows another that has failed.
 struct Step {
     takes: Vec<u64>,
     fails: Vec<u64>,
     when: Vec<u64>,
-    /// How often it has been called, whichever function followed a failed one.
-    calls: Arc<AtomicU64>,
+    /// How often they have been called.
+    calls: AtomicU64,
     /// Whether all that it gets began in one call of one source.
     joins: bool,
 }
 
 impl Step {
-    fn new(dag: &DagText, subtask: &SubtaskText) -> Self {
+    fn new(dag: &DagText, subtask: &SubtaskText) -> Arc<Self> {
         let sources = dag.subtasks.iter().filter(|of| of.after.is_empty());
-        Self {
+        Arc::new(Self {
             takes: subtask.takes.clone(),
             fails: subtask.fails.clone(),
             when: subtask.when.clone(),
-            calls: Arc::default(),
+            calls: AtomicU64::new(0),
             joins: sources.count() == 1,
-        }
+        })
     }
 
     /// Does it, where `act` is what else it may do.
@@ -93,11 +95,10 @@ impl Step {
             !self.fails.contains(&call),
             "call {call} fails, as it is to"
         );
-        let values = inputs.values();
-        let first = values.first().copied().unwrap_or(call);
+        let (first, are_same) = inputs.first().unwrap_or((call, true));
         assert!(
-            !self.joins || values.iter().all(|value| *value == first),
-            "a join got values of different jobs: {values:?}"
+            are_same || !self.joins,
+            "a join got values of different jobs"
         );
         O::of(first)
     }
@@ -123,7 +124,7 @@ impl Building<'_> {
         let dag = self.dag;
         if subtask.replaced != Replaced::Never {
             let make = move || {
-                let step = step.clone();
+                let step = Arc::clone(&step);
                 move |inputs: I| step.call::<I, O>(inputs, || ())
             };
             let anew = make.clone();
@@ -205,7 +206,7 @@ fn using<U: Uses + 'static, I: Inputs, O: Outputs>(
     dag: &Dag,
     uses: U,
     (inputs, outputs, attributes): (Vec<&str>, Vec<&str>, SubtaskAttributes),
-    step: Step,
+    step: Arc<Step>,
     act: impl for<'a> Fn(&mut U::Borrowed<'a>, bool) + Send + 'static,
 ) {
     let call = move |mut used: U::Borrowed<'_>, inputs: I| -> O {

@@ -4,7 +4,7 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use alloc::{format, vec};
 
-use fass::CommitError;
+use fass::{Commit, CommitError};
 use sched_dag::engine::Run;
 use sched_dag::{DagStatistics, TaskSet};
 
@@ -42,11 +42,15 @@ impl Scenario {
         wrong
     }
 
-    /// Holds a run in real time against what is said of every platform, and against R1 to R4.
+    /// Holds a run in real time against what is said of every platform, against R1 to R4, and for
+    /// allocations after the commit.
     #[must_use]
     pub fn judge_run(&self, run: &Run) -> Vec<String> {
         let mut wrong = self.judge_counts(run.task_set(), |dag| run.statistics(dag), false);
         wrong.extend(run.violations().map(|it| format!("{it:?}")));
+        if run.allocations() > 0 {
+            wrong.push(format!("{} allocations", run.allocations()));
+        }
         wrong
     }
 
@@ -90,13 +94,19 @@ impl Scenario {
         }
     }
 
-    /// Holds what a commit has refused against what it is to refuse.
+    /// Holds a commit against what is to be refused of it. `None`: it is accepted, as it should,
+    /// and the run follows.
     #[must_use]
-    pub fn judge_refusal(&self, refusal: &CommitError) -> Vec<String> {
-        let codes: Vec<&str> = refusal.faults().iter().map(fass::Fault::code).collect();
-        match codes == self.refused {
-            true => vec![],
-            false => vec![format!("the commit is refused: {codes:?}: {refusal}")],
+    pub fn judge_commit(&self, commit: Result<Commit, CommitError>) -> Option<Vec<String>> {
+        let refusal = commit.err();
+        let faults = refusal.iter().flat_map(CommitError::faults);
+        let codes: Vec<&str> = faults.map(fass::Fault::code).collect();
+        match &refusal {
+            _ if codes != self.refused => {
+                Some(vec![format!("the commit is refused for {codes:?}")])
+            }
+            None => None,
+            Some(_) => Some(vec![]),
         }
     }
 }

@@ -55,9 +55,13 @@ pub const UNIT_NS: u64 = 1_000_000;
 
 /// The suite: each text with its name.
 pub const SUITE: &[(&str, &str)] = &[
+    ("clusters", include_str!("../clusters.txt")),
+    ("ending", include_str!("../ending.txt")),
     ("faults", include_str!("../faults.txt")),
+    ("lifecycle", include_str!("../lifecycle.txt")),
     ("overrun", include_str!("../overrun.txt")),
     ("rules", include_str!("../rules.txt")),
+    ("sharing", include_str!("../sharing.txt")),
 ];
 
 /// A run as it is stated.

@@ -9,10 +9,8 @@ fn judge(scenario: &Scenario, mechanism: Mechanism) -> Vec<String> {
         .policy(scenario.policy)
         .preemption(scenario.preemption)
         .clusters(&scenario.clusters);
-    match scenario.commit() {
-        Err(refusal) => scenario.judge_refusal(&refusal),
-        Ok(_) => scenario.judge_run(&machine.run().expect("it is committed")),
-    }
+    let judged = scenario.judge_commit(scenario.commit());
+    judged.unwrap_or_else(|| scenario.judge_run(&machine.run().expect("it is committed")))
 }
 
 #[test]

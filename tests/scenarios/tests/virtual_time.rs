@@ -15,8 +15,8 @@ fn judge(scenario: &Scenario) -> Vec<String> {
     if !scenario.clusters.is_empty() {
         machine = machine.clusters(&scenario.clusters);
     }
-    if let Err(refusal) = scenario.commit() {
-        return scenario.judge_refusal(&refusal);
+    if let Some(judged) = scenario.judge_commit(scenario.commit()) {
+        return judged;
     }
     let report = machine.run();
     let mut wrong = scenario.judge_events(&report.event_lines());
