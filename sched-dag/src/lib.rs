@@ -54,7 +54,7 @@
 //! A DAG can be *ended* before its time, by an instance that [fails](Moment::fail)
 //! or by a [stop](Moment::stop): it starts nothing any more, and the others are
 //! scheduled on. The rules E1 to E8 for that stand in `scheduler/ending.rs`,
-//! their tests in `tests/ending.rs`; those for a fault that costs only its job, D1 to D7,
+//! their scenarios in `tests/scenarios/ending.txt`; those for a fault that costs only its job, D1 to D7,
 //! in `scheduler/dropping.rs` and `tests/scenarios/faults.txt`.
 //!
 //! # The parts, in the order of their use

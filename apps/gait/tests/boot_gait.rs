@@ -3,11 +3,13 @@
 mod support;
 
 use std::fs;
+use std::process::Command;
 
 use fass::{Policy, finish_create_dags};
 use gait::build;
 use harness::Guest;
 use support::{File, walk};
+use tool::protocol::Transcript;
 use tool::{recordings, system};
 use virtual_time::VirtualTime;
 
@@ -75,5 +77,48 @@ fn a_walk_that_the_machine_recorded_is_replayed_on_the_machine_and_on_the_host()
         let report = machine.run();
         assert_eq!((report.compared, report.divergence), (7_022, None));
         assert_eq!(walk.digest(), wanted);
+    }
+}
+
+/// Two seconds of the walk, in real time.
+#[test]
+fn a_walk_that_linux_recorded_is_replayed_on_linux_on_the_machine_and_on_the_host() {
+    let all = concat!(env!("CARGO_MANIFEST_DIR"), "/data/walking.csv");
+    let all = fs::read_to_string(all).expect("the table");
+    let [table, run] = ["csv", "rec"].map(|extension| {
+        let log = system::new_log("short-walk").expect("a folder for logs");
+        log.with_extension(extension)
+    });
+    let rows: Vec<&str> = all.lines().take(241).collect();
+    fs::write(&table, rows.join("\n") + "\n").expect("it is our file");
+    let file = File::of(&table.to_string_lossy());
+    let [recorded, module] = [&run, &file.0].map(|path| path.to_string_lossy().into_owned());
+    let digest = |words: &str| {
+        let mut command = Command::new(system::workspace().join("scripts/run"));
+        command.args(["--app", "gait", "--module", &module]);
+        let output = command.args(words.split_whitespace()).output();
+        let said = output.expect("the command can be run").stdout;
+        let transcript = Transcript::read(&String::from_utf8_lossy(&said));
+        let number = |kind, name| {
+            let line = transcript.of_kind(kind).next()?;
+            line.number_at(name)
+        };
+        let compared = number("replayed", "compared");
+        (number("gait", "digest").expect("the app's line"), compared)
+    };
+    let (wanted, _) = digest(&format!("--on linux --cores 2 --record {recorded}"));
+    for place in ["--on linux --cores 1", "--cores 1", "--cores 4"] {
+        let found = digest(&format!("{place} --replay {recorded}"));
+        assert_eq!(found, (wanted, Some(480)), "{place}");
+    }
+    let bytes = fs::read(&run).expect("the recording");
+    let machine = VirtualTime::new().replay(&bytes).expect("it is whole");
+    let (dag, walk) = build(&file.read()).expect("it has the samples");
+    finish_create_dags(&[dag]).expect("it is the DAG that was recorded");
+    let report = machine.run();
+    assert_eq!((report.compared, report.divergence), (480, None));
+    assert_eq!(walk.digest(), wanted);
+    for path in [&table, &run] {
+        let _ = fs::remove_file(path);
     }
 }

@@ -38,6 +38,7 @@
 
 mod clusters;
 mod control;
+mod edge;
 mod end_signals;
 mod lead;
 mod level;
@@ -46,6 +47,7 @@ mod machine;
 mod office;
 mod parked;
 mod platform;
+mod recording;
 mod release;
 mod run;
 mod seats;

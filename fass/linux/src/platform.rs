@@ -4,12 +4,15 @@ use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
+use fass::edge::Begin;
 use fass::{
-    Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Runner,
+    Channel, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
+    Recorded, Runner,
 };
 use sched_dag::lifecycle::{self, Parts, Request, Requests};
 use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions, TaskSet};
 
+use crate::edge;
 use crate::level::Levels;
 use crate::office::Office;
 use crate::run::Launched;
@@ -164,7 +167,31 @@ impl Platform for Host {
         }
     }
 
-    fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
+    fn crosses(&self) -> bool {
+        edge::get().is_wished()
+    }
+
+    fn results_cross(&self) -> bool {
+        edge::get().has_results()
+    }
+
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
+        edge::get().open(dag, graph, channels, begin)
+    }
+
+    fn record(&self, value: &Recorded<'_>) {
+        edge::record(value);
+    }
+
+    fn replays(&self) -> bool {
+        edge::get().is_replay()
+    }
+
+    fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        edge::get().lend(channel, job, take);
+    }
+
+    fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
         let Some(terms) = self.terms().clone() else {
             let line = "there is no `Linux` yet; make one before the commit";
             return Err(LaunchError::new(line));
@@ -179,6 +206,7 @@ impl Platform for Host {
             preemption: terms.preemption,
             cores: self.cores(),
         };
+        edge::launch(&mut plan)?;
         (terms.look_at_commit)(&plan, options, terms.overheads);
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;

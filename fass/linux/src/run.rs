@@ -8,6 +8,7 @@ use std::thread::{self, JoinHandle};
 use sched_dag::SchedulerOptions;
 use sched_dag::engine::{self, Proven};
 
+use crate::edge::{self, Sending};
 use crate::office::Office;
 use crate::release::Budgets;
 use crate::state::{Fault, Number, RunTime};
@@ -84,10 +85,12 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for team in teams {
         team.lock().time = RunTime::beginning(epoch_ns);
     }
+    let sending = edge::begin_run(epoch_ns);
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();
     let allocations = (launched.allocations)() - allocations;
     releases.into_iter().for_each(join);
+    sending.into_iter().for_each(Sending::end);
     let mut states: Vec<_> = teams.iter().map(|team| team.lock()).collect();
     let abandoned: Vec<Vec<Number>> = states.iter().map(|state| state.abandoned.clone()).collect();
     let cores = launched.options.cores;

@@ -13,8 +13,9 @@ use sched_dag::engine::{Cost, Engine, Port};
 use sched_dag::journal::What;
 use sched_dag::lifecycle::{Letters, Request, Requests};
 use sched_dag::placement::Next;
-use sched_dag::{ClusterId, CoreId, DagId, Instance, Journal, Moment, Scheduler, Vertex};
+use sched_dag::{ClusterId, CoreId, DagId, Instance, Journal, Moment, Notice, Scheduler, Vertex};
 
+use crate::edge;
 use crate::level::{Levels, Role};
 use crate::office::Office;
 use crate::sys;
@@ -119,6 +120,13 @@ pub(crate) struct ThreadPort<'s> {
 }
 
 impl Port<Box<Runner>> for ThreadPort<'_> {
+    /// The edge tells of these, where a topic is recorded.
+    const HEARS: &'static [What] = fass::edge::HEARS;
+
+    fn hear(&mut self, notice: &Notice) {
+        edge::happened(notice);
+    }
+
     fn now_ns(&self) -> u64 {
         self.time.of_run(sys::now_ns())
     }
@@ -260,6 +268,7 @@ impl State {
         (cause, is_overrun): (String, bool),
     ) {
         let instance = self.engine.scheduler.instance_of(vertex);
+        edge::failed(instance);
         let (engine, mut port) = self.parts(workers);
         let now_ns = port.now_ns();
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);

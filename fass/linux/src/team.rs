@@ -12,6 +12,7 @@ use fass::Runner;
 use sched_dag::ClusterId;
 use sched_dag::engine::{Continuation, Port as _};
 
+use crate::edge;
 use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
@@ -186,8 +187,11 @@ impl Team {
     /// Calls the function; the error is a panic's message.
     #[inline]
     fn execute(&self, runner: &mut Runner) -> Result<(), String> {
+        edge::note_running(Some(runner.instance));
         let body = AssertUnwindSafe(|| runner.run());
-        catch_unwind(body).map_err(|panic| message(&*panic))
+        let outcome = catch_unwind(body).map_err(|panic| message(&*panic));
+        edge::note_running(None);
+        outcome
     }
 
     /// Reports that a worker's instance has ended, and finds what it does next.

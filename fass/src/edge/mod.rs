@@ -17,6 +17,7 @@ mod guard;
 mod latest;
 mod lost;
 mod machine;
+mod of_run;
 mod replay;
 mod ring;
 mod signals;
@@ -35,6 +36,7 @@ use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
 
 pub use excerpt::Excerpt;
+pub use of_run::{Edge, Outgoing, send_rest};
 pub use replay::{Divergence, Outcome, Replay};
 
 /// What a platform is to do with what crosses.

@@ -4,14 +4,14 @@ use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
-use linux::EndSignals;
+use linux::{EndSignals, Linux};
 
 pub use crate::output::write_as;
 pub use front::output;
 
 use crate::app::linux_system::{LinuxSystem, Machine, memory_kib};
 use crate::app::words;
-use crate::options::Options;
+use crate::options::{Options, UsageError};
 use front::app::bound_verdict::BoundVerdict;
 use front::app::ending::{self, Ending, Told};
 use front::json;
@@ -62,7 +62,7 @@ fn run(
     // Who sees the first line may ask for an end.
     let signals = EndSignals::catch_first();
     let options = Options::parse(line)?;
-    let (linux, terms, module) = words::apply(&options)?;
+    let (linux, terms, module) = words::apply(name, &options)?;
     json::report("boot", |object| {
         object
             .text("version", env!("CARGO_PKG_VERSION"))
@@ -84,5 +84,10 @@ fn run(
         signals,
     };
     let bounds = BoundVerdict::new(false, false);
-    Machine::serve(system, options, &terms, module, bounds, app)
+    let result = Machine::serve(system, options, &terms, module, bounds, app);
+    let [refusal, complaint] = Linux::objections();
+    match refusal {
+        Some(refusal) => Err(UsageError::new(refusal).into()),
+        None => Ending::or_complaint(result, complaint),
+    }
 }

@@ -26,7 +26,7 @@
 //!
 //! - Bounds are not judged (`bound_exceeded` is said, and the verdict leaves it): Linux states
 //!   no worst case for what it does itself.
-//! - Nothing is recorded and nothing replayed; there is no console.
+//! - There is no console.
 
 #![deny(unsafe_code)]
 

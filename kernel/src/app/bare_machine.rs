@@ -76,7 +76,7 @@ impl System for BareMachine {
         let epoch_ns = epoch_ns.unwrap_or_else(|| machine::clock::now_ns() + LEAD_NS);
         let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
-        let mut outgoing = edge::begin(epoch_ns);
+        let mut outgoing = edge::get().begin_run(epoch_ns);
         let allocations_before = heap::usage().allocations;
         let locks_before = execution::lock_acquisitions();
         console::defer();
@@ -143,7 +143,7 @@ impl System for BareMachine {
     fn show_topics(&self) {
         static ALL: Topics<KernelRun> = Topics::new();
         if self.has_console() {
-            edge::let_look();
+            edge::get().let_look();
             // Once is enough.
             let _ = TOPICS.set(&ALL);
         }

@@ -367,10 +367,11 @@ fn run_app(
         bounds,
         app,
     );
-    if let Some(refusal) = edge::refusal() {
-        return Err(usage(refusal));
+    let [refusal, complaint] = edge::objections();
+    if let Some(refusal) = refusal {
+        return Err(usage(&refusal));
     }
-    Ending::or_complaint(result, edge::complaint())
+    Ending::or_complaint(result, complaint)
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.

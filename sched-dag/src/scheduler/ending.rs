@@ -4,7 +4,7 @@
 //! return. A DAG is *ended* by the first instance of it that fails, unless
 //! that costs the job only (the module `dropping`), or by a *stop*, which needs no fault; it
 //! stays ended. It is *over* when nothing of it
-//! is in flight or to come. The rules, whose tests in `tests/ending.rs` bear
+//! is in flight or to come. The rules, whose scenarios in `tests/scenarios/ending.txt` bear
 //! their numbers:
 //!
 //! - **E1, failure.** A failing instance has started. It ends at that instant:

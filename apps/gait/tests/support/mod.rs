@@ -15,9 +15,13 @@ pub(crate) struct File(pub(crate) PathBuf);
 impl File {
     /// Makes it.
     pub(crate) fn new() -> File {
+        Self::of(concat!(env!("CARGO_MANIFEST_DIR"), "/data/walking.csv"))
+    }
+
+    /// Makes it of another table.
+    pub(crate) fn of(table: &str) -> File {
         let name = format!("walking-{:?}.rec", std::thread::current().id());
         let out = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
-        let table = concat!(env!("CARGO_MANIFEST_DIR"), "/data/walking.csv");
         let schema = Sample::schema().to_string();
         let words = [
             "--from-csv",

@@ -120,8 +120,10 @@ impl Kernel {
 /// Tells functions the time where that is recorded or replayed.
 static TOLD: Clock = || {
     let clock_ns = clock::now_ns();
-    let running = || execution::running(this_core::get());
-    edge::tell_time(running, clock_ns, execution::since_epoch(clock_ns))
+    let mut edge = edge::get();
+    // Interrupts are off, so it stays here.
+    let running = execution::running(this_core::get());
+    edge.tell_time(running, clock_ns, execution::since_epoch(clock_ns))
 };
 
 impl Platform for Kernel {
@@ -209,15 +211,15 @@ impl Platform for Kernel {
     }
 
     fn crosses(&self) -> bool {
-        edge::is_wished()
+        edge::get().is_wished()
     }
 
     fn results_cross(&self) -> bool {
-        edge::has_results()
+        edge::get().has_results()
     }
 
     fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
-        edge::open(dag, graph, channels, begin)
+        edge::get().open(dag, graph, channels, begin)
     }
 
     fn record(&self, value: &Recorded<'_>) {
@@ -225,11 +227,11 @@ impl Platform for Kernel {
     }
 
     fn replays(&self) -> bool {
-        edge::is_replay()
+        edge::get().is_replay()
     }
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        edge::lend(channel, job, take);
+        edge::get().lend(channel, job, take);
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

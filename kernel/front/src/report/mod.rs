@@ -2,6 +2,7 @@
 //! samples. All of it is computed from the journal.
 
 pub mod counts;
+pub mod crossing;
 mod distribution;
 pub mod memory;
 mod time;

@@ -79,6 +79,14 @@ impl System for LinuxSystem {
         let run = run.map_err(|why| failure(why.to_string()))?;
         drop(connection);
         tell_faults(&run);
+        let crossed = self.linux.end_recording(!self.is_shut_down());
+        let crossed = crossed.map_err(|why| failure(format!("the recording: {why}")))?;
+        if let Some(outcome) = &crossed.0 {
+            report::crossing::replayed(outcome);
+        }
+        if let Some(drained) = &crossed.1 {
+            report::crossing::recorded(drained);
+        }
         if let Some(ends) = &*ends {
             report::wire::report(&ends.wire);
         }

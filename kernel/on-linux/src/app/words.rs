@@ -9,12 +9,15 @@
 //! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
 //! | `input=-` | what comes on standard input arrives on the app's wire | |
 //! | `output=FILE` | what the app sends on its wire goes there | |
+//! | `record=FILE` | what crosses the edge of the run is recorded there |
+//! | `replay=FILE` | the run replays that recording |
 //! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
 //!
 //! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `trace`, `times` and `graph`
 //! mean what they mean on the machine.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::BufWriter;
 use std::time::Duration;
 
 use linux::{Linux, Mechanism};
@@ -24,7 +27,7 @@ use front::graph;
 use front::options::{Options, UsageError};
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
-const FOREIGN: [(&str, &str); 15] = [
+const FOREIGN: [(&str, &str); 13] = [
     ("trace_events", "the journal takes what memory it needs"),
     ("measure", "interrupts are Linux's"),
     ("idle", "idle cores are Linux's"),
@@ -37,17 +40,16 @@ const FOREIGN: [(&str, &str); 15] = [
     ("avx", "Linux saves all registers"),
     ("x2apic", "interrupts are Linux's"),
     ("smt", "processors are Linux's"),
-    ("record", "recordings are made on the machine"),
     (
-        "replay",
-        "recordings are replayed on the machine and in virtual time",
+        "latest",
+        "a run is recorded from its begin, by `record=FILE`",
     ),
-    ("latest", "recordings are made on the machine"),
 ];
 
 /// Takes the words, and makes the machine that they describe. Returns what they say besides, and
 /// the app's file.
 pub(crate) fn apply(
+    app: &'static str,
     options: &Options<'static>,
 ) -> Result<(Linux, Terms, Option<&'static [u8]>), UsageError> {
     if let Some((word, why)) = FOREIGN
@@ -67,7 +69,8 @@ pub(crate) fn apply(
     let mechanism = options.choice("mechanism", &mechanisms)?;
     let cores = options.number("cores", 1..=1024, u64::from(linux::processors()))?;
     let limit_ms = options.number("limit_ms", 0..=86_400_000, 0)?;
-    let module = options.text("module").map(read).transpose()?;
+    let module = options.text("module").map(|path| read("module", path));
+    let module = module.transpose()?;
     let (wcets, module) = terms::split_wcets(options, module)?;
     let cores = u32::try_from(cores).unwrap_or(u32::MAX);
     let make = options.choice(
@@ -88,6 +91,19 @@ pub(crate) fn apply(
     if let Some(wcets) = wcets {
         machine = machine.wcets(wcets);
     }
+    match (options.text("record"), options.text("replay")) {
+        (Some(_), Some(_)) => {
+            let line = "`record` and `replay` exclude each other; give one";
+            return Err(UsageError::new(line));
+        }
+        (Some(path), None) => {
+            let file = File::create(path);
+            let file = file.map_err(|why| UsageError::new(format!("`record={path}`: {why}")))?;
+            machine.record(app, BufWriter::new(file));
+        }
+        (None, Some(path)) => machine.replay(read("replay", path)?),
+        (None, None) => {}
+    }
     if limit_ms > 0 {
         let limited = machine.limit_real_time(Duration::from_millis(limit_ms));
         limited.map_err(|why| UsageError::new(format!("`limit_ms={limit_ms}`: {why}")))?;
@@ -95,9 +111,9 @@ pub(crate) fn apply(
     Ok((machine, terms, module))
 }
 
-/// Reads the file for the app. It stays as long as the program, as the loader's does.
-fn read(path: &str) -> Result<&'static [u8], UsageError> {
+/// Reads the file that a word names. It stays as long as the program, as the loader's does.
+fn read(word: &str, path: &str) -> Result<&'static [u8], UsageError> {
     let bytes = fs::read(path);
-    let bytes = bytes.map_err(|why| UsageError::new(format!("`module={path}`: {why}")))?;
+    let bytes = bytes.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
     Ok(bytes.leak())
 }

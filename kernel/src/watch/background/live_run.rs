@@ -56,11 +56,11 @@ impl LiveRun for KernelRun {
     }
 
     fn watch(topic: Option<&str>) -> bool {
-        edge::watch(topic)
+        edge::get().watch(topic)
     }
 
     fn take_seen(into: &mut [u8]) -> Option<Seen> {
-        edge::take_seen(into)
+        edge::get().take_seen(into)
     }
 
     fn extra() -> Extra {

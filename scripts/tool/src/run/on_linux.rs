@@ -2,6 +2,7 @@
 //! a guest is. With `--on debian` it is a program of Debian's Linux, in QEMU.
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
@@ -15,15 +16,16 @@ use crate::qemu::{Ending, Mode};
 
 use super::handed::Handed;
 use super::log::Log;
+use super::recording::Recorded;
 use super::screen::Screen;
 
 /// The options that are about QEMU, its guest, or what the kernel alone does.
-const FOREIGN: [&str; 10] = [
-    "boot", "console", "gdb", "image", "latest", "machine", "memory", "qemu", "record", "replay",
+const FOREIGN: [&str; 8] = [
+    "boot", "console", "gdb", "image", "latest", "machine", "memory", "qemu",
 ];
 
 /// Those of the rest that a guest has no way for, and those that only a guest has.
-const NOT_IN_GUEST: [&str; 2] = ["input", "output"];
+const NOT_IN_GUEST: [&str; 4] = ["input", "output", "record", "replay"];
 const ONLY_IN_GUEST: [&str; 2] = ["mode", "busy"];
 
 /// How much longer a guest may take: Linux has to start.
@@ -56,8 +58,8 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
         return Err(Refusal::Usage(line));
     }
     let (others, place) = match is_in_guest(options) {
-        true => (&NOT_IN_GUEST, "linux"),
-        false => (&ONLY_IN_GUEST, "debian"),
+        true => (&NOT_IN_GUEST[..], "linux"),
+        false => (&ONLY_IN_GUEST[..], "debian"),
     };
     if let Some(name) = given(others) {
         let line =
@@ -103,6 +105,16 @@ pub(super) fn run_app(
         let mut word = OsString::from("module=");
         word.push(path);
         words.push(word);
+    }
+    let recorded = Recorded::new(options, app).map_err(Refusal::Failure)?;
+    let raw = recorded.raw().filter(|_| options.is_given("record"));
+    let replayed = options.path("replay").map(Path::to_path_buf);
+    for (name, path) in [("record=", raw), ("replay=", replayed)] {
+        if let Some(path) = path {
+            let mut word = OsString::from(name);
+            word.push(path);
+            words.push(word);
+        }
     }
     let log = Log::choose(options, app).map_err(Refusal::Failure)?;
     let built = image::build_linux(app);
@@ -164,6 +176,10 @@ pub(super) fn run_app(
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
     written::say_trace(&screen, options);
+    let said = recorded.write(options, &outcome);
+    if let Some(line) = said.map_err(Refusal::Failure)? {
+        screen.say(&line);
+    }
     Ok(Booted {
         outcome,
         log,
@@ -242,8 +258,8 @@ mod tests {
                 "`--console` is for the bare machine; ",
             ),
             (
-                "--on linux --replay x",
-                "`--replay` is for the bare machine; ",
+                "--on linux --latest 3",
+                "`--latest` is for the bare machine; ",
             ),
             (
                 "--on debian --output x",

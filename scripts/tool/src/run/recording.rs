@@ -117,7 +117,8 @@ impl Recorded {
     }
 }
 
-/// Reads the recording that `--replay` names, if it does, and makes sure that it is one.
+/// Reads the recording that `--replay` names for a guest, if it does, and makes sure that it is
+/// one. A program of Linux reads it itself.
 pub(super) fn read(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path("replay") else {
         return Ok(Vec::new());
@@ -125,5 +126,8 @@ pub(super) fn read(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     let refused = |why| Refusal::Usage(format!("`--replay` {why}"));
     let bytes = recordings::read(path).map_err(refused)?;
     recordings::parse(path, &bytes).map_err(refused)?;
-    Ok(bytes)
+    match options.is_given("on") {
+        true => Ok(Vec::new()),
+        false => Ok(bytes),
+    }
 }

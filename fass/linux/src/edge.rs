@@ -1,0 +1,142 @@
+//! What crosses the edge of runs: recorded into a file, or replayed.
+//!
+//! The edge has a lock of its own, which is taken under a cluster's lock, and for a moment by a
+//! function that is told the time or a source that is replayed. A thread of no level sends what
+//! waits, so that no instance waits for a file.
+
+use std::cell::Cell;
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use fass::edge::{Edge, Outgoing};
+use fass::{Clock, LaunchError, Plan, Recorded};
+use sched_dag::{Instance, Notice};
+
+use crate::sys;
+
+/// The time between two looks for what waits.
+const LOOK: Duration = Duration::from_millis(1);
+
+static EDGE: Mutex<Edge> = Mutex::new(Edge::new());
+
+/// Whether a plan has been launched with it, so that events are of interest.
+static IS_ON: AtomicBool = AtomicBool::new(false);
+
+/// When the run's time begins, on the clock.
+static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
+
+/// Where a recording goes.
+pub(crate) static FILE: Mutex<Option<File>> = Mutex::new(None);
+
+/// What is left to send of the latest run.
+pub(crate) static LEFT: Mutex<Outgoing> = Mutex::new(None);
+
+thread_local! {
+    /// What this thread runs.
+    static RUNNING: Cell<Option<Instance>> = const { Cell::new(None) };
+}
+
+pub(crate) struct File {
+    pub(crate) writer: Box<dyn Write + Send>,
+    /// Why it could not be written, if it could not.
+    pub(crate) failure: Option<io::Error>,
+}
+
+pub(crate) fn unpoisoned<T>(lock: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    lock.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns the edge.
+pub(crate) fn get() -> MutexGuard<'static, Edge> {
+    unpoisoned(&EDGE)
+}
+
+pub(crate) fn send(bytes: &[u8]) {
+    if let Some(file) = &mut *unpoisoned(&FILE)
+        && file.failure.is_none()
+    {
+        file.failure = file.writer.write_all(bytes).err();
+    }
+}
+
+fn of_run(clock_ns: u64) -> u64 {
+    clock_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
+}
+
+/// Tells functions the time where that is recorded or replayed.
+static TOLD: Clock = || {
+    let clock_ns = sys::now_ns();
+    get().tell_time(RUNNING.get(), clock_ns, of_run(clock_ns))
+};
+
+/// Makes a plan one that is recorded or replayed, if that is wished.
+pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
+    let mut edge = get();
+    if edge.launch(plan, &mut send).map_err(LaunchError::new)? {
+        fass::set_clock(&TOLD);
+    }
+    IS_ON.store(edge.is_on(), Ordering::Relaxed);
+    Ok(())
+}
+
+/// Takes note of what this thread runs from now on.
+pub(crate) fn note_running(instance: Option<Instance>) {
+    if IS_ON.load(Ordering::Relaxed) {
+        RUNNING.set(instance);
+    }
+}
+
+/// Takes note that an instance has failed. The cluster's lock is held.
+pub(crate) fn failed(instance: Instance) {
+    if IS_ON.load(Ordering::Relaxed) {
+        let clock_ns = sys::now_ns();
+        get().failed(instance, of_run(clock_ns), clock_ns);
+    }
+}
+
+/// Takes a value that is not read where it was written. The cluster's lock is held.
+pub(crate) fn record(value: &Recorded<'_>) {
+    get().record(value, of_run(value.completed_ns));
+}
+
+/// Takes what became of a job or an instance. The cluster's lock is held.
+pub(crate) fn happened(notice: &Notice) {
+    if IS_ON.load(Ordering::Relaxed) {
+        get().happened(notice);
+    }
+}
+
+/// A thread that sends what waits, as long as a run goes on.
+pub(crate) struct Sending {
+    is_over: Arc<AtomicBool>,
+    thread: JoinHandle<Outgoing>,
+}
+
+/// Begins to send, if there is anything.
+pub(crate) fn begin_run(epoch_ns: u64) -> Option<Sending> {
+    EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
+    let mut outgoing = get().begin_run(epoch_ns)?;
+    let is_over = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&is_over);
+    let work = move || {
+        while !seen.load(Ordering::Acquire) {
+            while outgoing.step(&mut send) {}
+            thread::sleep(LOOK);
+        }
+        Some(outgoing)
+    };
+    let thread = thread::Builder::new().name("fass-recording".into());
+    let thread = thread.spawn(work).expect("the system has a thread to send");
+    Some(Sending { is_over, thread })
+}
+
+impl Sending {
+    /// Leaves the rest to [`Linux::end_recording`].
+    pub(crate) fn end(self) {
+        self.is_over.store(true, Ordering::Release);
+        *unpoisoned(&LEFT) = self.thread.join().unwrap_or(None);
+    }
+}
