@@ -102,6 +102,7 @@ mod fnv;
 mod ids;
 pub mod journal;
 mod kept;
+mod key;
 pub mod law;
 pub mod lifecycle;
 mod nearest;
@@ -121,6 +122,7 @@ pub mod wcets;
 pub use clusters::{Clusters, Why};
 pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};
 pub use kept::Journal;
+pub use key::{DagKey, SubtaskKey};
 pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;
 pub use policy::{

@@ -6,9 +6,6 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use sched_dag::law::Record;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
-const LIDAR: DagId = DagId(0);
-const BEHAVIOUR: DagId = DagId(5);
-
 /// The latencies of one run, in nanoseconds.
 #[derive(Clone, Debug, Default)]
 pub struct Latencies {
@@ -29,15 +26,16 @@ impl Latencies {
     /// Measures a run of the system.
     #[must_use]
     pub fn of(task_set: &TaskSet, record: &Record, acted_on: &[AtomicU64]) -> Self {
+        let [lidar, behaviour] = ["lidar", "behaviour"].map(|dag| task_set.find(dag));
         let finish_ns = |dag, job, name| {
             let subtask = find(task_set, dag, name)?;
             let instance = Instance { dag, job, subtask };
             record.instance(instance)?.finish_ns
         };
-        let release_ns = |job| record.job(LIDAR, job)?.release_ns;
+        let release_ns = |job| record.job(lidar, job)?.release_ns;
         let mut latencies = Self::default();
-        for (job, _) in record.numbered(LIDAR) {
-            let finish_ns = finish_ns(LIDAR, job, "ObjectCollisionEstimator");
+        for (job, _) in record.numbered(lidar) {
+            let finish_ns = finish_ns(lidar, job, "ObjectCollisionEstimator");
             let (Some(release_ns), Some(finish_ns)) = (release_ns(job), finish_ns) else {
                 continue;
             };
@@ -48,7 +46,7 @@ impl Latencies {
         let mut last = None;
         for (job, seen) in (0u64..).zip(acted_on) {
             let seen = seen.load(Ordering::Relaxed);
-            let finish_ns = finish_ns(BEHAVIOUR, job, "VehicleDBWSystem");
+            let finish_ns = finish_ns(behaviour, job, "VehicleDBWSystem");
             let (Some(release_ns), Some(finish_ns)) = (release_ns(seen), finish_ns) else {
                 continue;
             };

@@ -62,8 +62,8 @@ fn a_decoder_that_trusts_its_input_ends_its_dag_alone() {
     assert_eq!(report.panics.len(), 1);
     assert_eq!(
         (
-            report.statistics[0].completed,
-            report.statistics[1].completed
+            report.dag("cruise").statistics().completed,
+            report.dag("clock").statistics().completed
         ),
         (2, 10)
     );

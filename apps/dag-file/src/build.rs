@@ -176,7 +176,7 @@ mod tests {
         finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
         let report = machine.run();
         assert_eq!(report.violations(), []);
-        let misses = report.statistics.iter().map(|of| of.misses);
+        let misses = report.dags().map(|dag| dag.statistics().misses);
         assert_eq!(misses.collect::<Vec<_>>(), [3, 0]);
     }
 

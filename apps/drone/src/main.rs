@@ -16,11 +16,6 @@ use sched_dag::{DagId, Vertex};
 
 kernel::entry!(main);
 
-/// The DAGs of which more is told, by their places in `System::dags`.
-const ATTITUDE: DagId = DagId(0);
-const CAMERA: DagId = DagId(1);
-const DESCENT: DagId = DagId(5);
-
 fn main(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let seconds = options.number("seconds", 1..=100_000, 8)?;
@@ -94,9 +89,9 @@ fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
         line.number("waypoints", flight.waypoints())
             .number("landed", u64::from(flight.has_landed()))
             .number("deadline_misses", misses)
-            .number("attitude_misses", run.statistics(ATTITUDE).misses)
-            .number("frames_skipped", run.statistics(CAMERA).skips)
-            .number("descents", run.statistics(DESCENT).completed)
+            .number("attitude_misses", run.statistics("attitude").misses)
+            .number("frames_skipped", run.statistics("camera").skips)
+            .number("descents", run.statistics("descent").completed)
             .number("violations", violations)
             .number("allocations", run.allocations());
     });

@@ -197,7 +197,7 @@ mod tests {
         ])
         .unwrap();
         let report = machine.run();
-        let misses: u64 = report.statistics.iter().map(|of_dag| of_dag.misses).sum();
+        let misses: u64 = report.dags().map(|dag| dag.statistics().misses).sum();
         assert_eq!((report.jobs.len(), misses), (60, 0));
     }
 }

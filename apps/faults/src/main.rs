@@ -12,12 +12,8 @@ use fass::finish_create_dags;
 use faults::crimes::{CRIMES, Crime};
 use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy, restless};
 use kernel::{Ending, Machine, Run, json, println};
-use sched_dag::DagId;
 
 kernel::entry!(main);
-
-const HEALTHY: DagId = DagId(0);
-const DOOMED: DagId = DagId(1);
 
 /// The jobs of the healthy DAG that overlap the fault: from the fatal job on as
 /// long as an endless loop may take to be ended.
@@ -79,7 +75,7 @@ fn endure(machine: &Machine, times: u32) -> Result<(), Ending> {
         finish_create_dags(&restless(faults))?;
         let run = machine.run()?;
         let held_bytes = machine.resources().heap_bytes;
-        let (healthy, restless) = (*run.statistics(HEALTHY), *run.statistics(DOOMED));
+        let (healthy, restless) = (*run.statistics("healthy"), *run.statistics("restless"));
         let violations = run.violations().count();
         drop(run);
         let now = machine.resources();
@@ -129,9 +125,9 @@ fn commit_crime(
     ];
     let totals = parts.clone().map(|part| part.count());
     let [before, during, after] = parts.map(on_time);
-    let healthy_jobs = run.statistics(HEALTHY).completed;
-    let doomed_jobs = run.statistics(DOOMED).completed;
-    let lost_jobs = run.statistics(DOOMED).failed;
+    let healthy_jobs = run.statistics("healthy").completed;
+    let doomed_jobs = run.statistics("doomed").completed;
+    let lost_jobs = run.statistics("doomed").failed;
     let expected = match policy {
         Policy::End => (FATAL_JOB, 0),
         Policy::Restart | Policy::FallBack => (JOBS - 1, 1),
@@ -167,9 +163,10 @@ fn commit_crime(
 
 /// Reports whether a job of the healthy DAG met its deadline.
 fn is_on_time(run: &Run, job: u64) -> bool {
-    let deadline_ns = run.task_set().dag(HEALTHY).relative_deadline_ns();
-    let release = run.record().job(HEALTHY, job);
+    let healthy = run.task_set().find("healthy");
+    let deadline_ns = run.task_set().dag(healthy).relative_deadline_ns();
+    let release = run.record().job(healthy, job);
     release
-        .and_then(|release| Some(run.record().completion_ns(HEALTHY, job)? - release.release_ns?))
+        .and_then(|release| Some(run.record().completion_ns(healthy, job)? - release.release_ns?))
         .is_some_and(|response_ns| response_ns <= deadline_ns)
 }

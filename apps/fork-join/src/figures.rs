@@ -3,12 +3,11 @@
 use alloc::format;
 use alloc::string::String;
 
+use fass::Dag;
 use fork_join::Joins;
 use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
-use sched_dag::{DagId, Instance, SubtaskId};
-
-const FORK_JOIN: DagId = DagId(0);
+use sched_dag::Instance;
 
 /// The figures of one run.
 pub(crate) struct Figures {
@@ -32,16 +31,12 @@ pub(crate) struct Figures {
 }
 
 impl Figures {
-    pub(crate) fn new(parallel: usize, run: &Run, joins: &Joins) -> Self {
-        let record = run.record();
-        let jobs = record.numbered(FORK_JOIN);
-        let sink = SubtaskId(u32::try_from(parallel + 1).unwrap_or(u32::MAX));
+    pub(crate) fn new(parallel: usize, run: &Run, dag: &Dag, joins: &Joins) -> Self {
+        let (record, dag) = (run.record(), run.task_set().find(dag));
+        let jobs = record.numbered(dag);
+        let subtask = run.task_set().dag(dag).sinks()[0];
         let sinks = jobs.clone().filter_map(|(job, _)| {
-            let instance = Instance {
-                dag: FORK_JOIN,
-                job,
-                subtask: sink,
-            };
+            let instance = Instance { dag, job, subtask };
             Some((
                 record.join_ns(run.task_set(), instance)?,
                 *record.instance(instance)?,
@@ -49,7 +44,7 @@ impl Figures {
         });
         let since = |later: Option<u64>, earlier: u64| Some(later?.saturating_sub(earlier));
         let releases = jobs;
-        let statistics = run.statistics(FORK_JOIN);
+        let statistics = run.statistics(dag);
         let found = run
             .violations()
             .inspect(|violation| println!("violation: {violation}"));
@@ -61,7 +56,7 @@ impl Figures {
             deadline_misses: statistics.misses,
             allocations: run.allocations(),
             first_release_ns: run.epoch_ns(),
-            first_recorded_job: record.first_job(FORK_JOIN),
+            first_recorded_job: record.first_job(dag),
             join_latency: Distribution::new(
                 sinks
                     .clone()
@@ -71,7 +66,7 @@ impl Figures {
                 sinks.filter_map(|(join, sink)| since(sink.start_ns, join)),
             ),
             response_time: Distribution::new(releases.clone().filter_map(|(job, times)| {
-                since(record.completion_ns(FORK_JOIN, job), times.release_ns?)
+                since(record.completion_ns(dag, job), times.release_ns?)
             })),
             release_jitter: Distribution::new(
                 releases.filter_map(|(_, times)| since(times.released_ns, times.release_ns?)),

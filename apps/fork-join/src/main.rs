@@ -8,6 +8,7 @@ extern crate alloc;
 mod figures;
 
 use alloc::vec::Vec;
+use core::slice;
 use core::time::Duration;
 
 use fass::{Occupation, finish_create_dags};
@@ -45,11 +46,11 @@ fn main(machine: &Machine) -> Result<(), Ending> {
             jobs => println!("N = {}: {jobs} jobs ...", workload.parallel),
         }
         let (dag, joins) = workload.build();
-        for answer in finish_create_dags(&[dag])?.answers() {
+        for answer in finish_create_dags(slice::from_ref(&dag))?.answers() {
             println!("  {answer}");
         }
         let run = machine.run()?;
-        let figures = Figures::new(workload.parallel, &run, &joins);
+        let figures = Figures::new(workload.parallel, &run, &dag, &joins);
         figures.emit();
         all.push(figures);
     }

@@ -10,12 +10,12 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use fass::finish_create_dags;
-use gait::{Walk, build};
+use gait::{DAG, Walk, build};
 use kernel::options::UsageError;
 use kernel::report::Ns;
 use kernel::{Ending, Machine, Run, json, println};
 use recording::Recording;
-use sched_dag::{DagId, Vertex};
+use sched_dag::Vertex;
 
 kernel::entry!(main);
 
@@ -41,7 +41,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 fn report(run: &Run, walk: &Walk) -> Result<(), Ending> {
-    let counts = run.statistics(DagId(0));
+    let counts = run.statistics(DAG);
     println!();
     println!(
         "{} jobs complete, {} deadlines missed",
@@ -49,7 +49,7 @@ fn report(run: &Run, walk: &Walk) -> Result<(), Ending> {
     );
     let task_set = run.task_set();
     for (subtask, vertex) in task_set
-        .dag(DagId(0))
+        .dag(task_set.find(DAG))
         .subtasks()
         .iter()
         .zip((0..).map(Vertex))

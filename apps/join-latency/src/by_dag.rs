@@ -4,11 +4,9 @@ use fork_join::Workload;
 use join_latency::{Joined, Samples, Span};
 use kernel::{Ending, Machine, Run};
 use sched_dag::law::InstanceRecord;
-use sched_dag::{DagId, Instance, SubtaskId};
+use sched_dag::{Instance, SubtaskId};
 
 use super::output::Outcome;
-
-const DAG: DagId = DagId(0);
 
 /// Runs all jobs.
 pub(crate) fn run(machine: &Machine, workload: &Workload) -> Result<Outcome, Ending> {
@@ -32,15 +30,12 @@ pub(crate) fn run(machine: &Machine, workload: &Workload) -> Result<Outcome, End
 /// Reads the times from the scheduler's record. Each join has the values of its own
 /// job, which `fork-join` checks and counts otherwise.
 fn samples(run: &Run, parallel: usize) -> Samples {
-    let jobs = run.record().numbered(DAG).map(|(job, _)| job);
+    let dag = run.task_set().find("fork-join");
+    let jobs = run.record().numbered(dag).map(|(job, _)| job);
     let instances = |subtask: usize| {
         jobs.clone().filter_map(move |job| {
             let subtask = SubtaskId(u32::try_from(subtask).ok()?);
-            let instance = Instance {
-                dag: DAG,
-                job,
-                subtask,
-            };
+            let instance = Instance { dag, job, subtask };
             Some((job, *run.record().instance(instance)?))
         })
     };

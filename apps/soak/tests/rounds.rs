@@ -47,7 +47,7 @@ fn judged(case: Case, plans: &[DagPlan], trouble: &Trouble) -> Account {
         .expect("a drawn set has no fault");
     let report = machine.run();
     assert_eq!(report.violations(), [], "{case:?}");
-    let statistics = |dag: sched_dag::DagId| &report.statistics[dag.index()];
+    let statistics = |dag: sched_dag::DagId| report.dag(dag).statistics();
     let (account, discrepancies) = Account::of_run(
         report.task_set(),
         &report.record(),

@@ -4,8 +4,8 @@ use std::io;
 use std::sync::{Arc, Barrier};
 use std::thread;
 
-use sched_dag::DagId;
 use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, DagKey};
 
 use crate::end_signals::{self, EndSignals};
 use crate::level::Role;
@@ -19,18 +19,17 @@ use crate::sys;
 /// use std::time::Duration;
 /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use linux::{Linux, Mechanism};
-/// use sched_dag::DagId;
 ///
 /// let machine = Linux::new(1, Mechanism::Normal).unwrap();
 /// let dag = create_dag(); // without a last job
 /// let period = Duration::from_millis(2);
-/// dag.period(period).relative_deadline(period);
+/// dag.name("endless").period(period).relative_deadline(period);
 /// dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
 /// finish_create_dags(&[dag]).unwrap();
 /// let control = machine.control().unwrap();
 /// std::thread::spawn(move || {
 ///     std::thread::sleep(Duration::from_millis(20));
-///     control.stop(DagId(0));
+///     control.stop("endless");
 /// });
 /// let run = machine.run().unwrap();
 /// assert_eq!(run.violations().count(), 0);
@@ -54,8 +53,9 @@ impl Control {
     /// # Panics
     ///
     /// If there is no such DAG.
-    pub fn pause(&self, dag: DagId) {
-        self.0.send(None, Request::Pause(dag));
+    #[track_caller]
+    pub fn pause(&self, dag: impl DagKey) {
+        self.change(dag, Request::Pause);
     }
 
     /// Has a paused DAG's jobs released again.
@@ -63,8 +63,9 @@ impl Control {
     /// # Panics
     ///
     /// If there is no such DAG.
-    pub fn resume(&self, dag: DagId) {
-        self.0.send(None, Request::Resume(dag));
+    #[track_caller]
+    pub fn resume(&self, dag: impl DagKey) {
+        self.change(dag, Request::Resume);
     }
 
     /// Ends a DAG for good: it starts no further instance.
@@ -72,8 +73,14 @@ impl Control {
     /// # Panics
     ///
     /// If there is no such DAG.
-    pub fn stop(&self, dag: DagId) {
-        self.0.send(None, Request::Stop(dag));
+    #[track_caller]
+    pub fn stop(&self, dag: impl DagKey) {
+        self.change(dag, Request::Stop);
+    }
+
+    #[track_caller]
+    fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
+        self.0.send(None, request(self.0.task_set.find(dag)));
     }
 
     /// Has the run end in order when a signal that is caught asks for it, or has: nothing more is

@@ -58,10 +58,10 @@ pub enum Mechanism {
 /// dag.register_periodic_subtask(|| (20u64,), vec!["number"], period, named("source"));
 /// let sink = |(number,): (u64,)| assert_eq!(number, 20);
 /// dag.register_sink_subtask(sink, vec!["number"], period, named("sink"));
-/// finish_create_dags(&[dag]).unwrap();
+/// finish_create_dags(&[dag.clone()]).unwrap();
 ///
 /// let run = machine.run().unwrap();
-/// assert_eq!(run.statistics(sched_dag::DagId(0)).completed, 3);
+/// assert_eq!(run.statistics(&dag).completed, 3);
 /// assert_eq!(run.violations().count(), 0);
 /// ```
 #[derive(Debug)]

@@ -27,7 +27,7 @@ pub(crate) struct Office {
     /// The number of the plan that runs.
     pub(crate) plan: u64,
     pub(crate) levels: Option<Levels>,
-    task_set: Arc<TaskSet>,
+    pub(crate) task_set: Arc<TaskSet>,
     pub(crate) letters: Letters,
     doors: Box<[Door]>,
     /// How many clusters do not rest, and how many have letters.

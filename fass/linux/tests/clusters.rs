@@ -11,7 +11,6 @@ use fass::{
     Entrance, Modes, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
 };
 use linux::{Linux, Mechanism, Run};
-use sched_dag::DagId;
 use sched_dag::journal::What;
 use support::{alone_on, breaches, ms};
 
@@ -53,19 +52,22 @@ fn a_cluster_that_never_ends_a_job_keeps_no_other_from_its_own() {
     finish_create_dags(&[waits, works]).unwrap();
     let run = alone.machine.run().unwrap();
     assert_lawful(&run);
-    assert_eq!(run.statistics(DagId(1)).completed, 20);
+    assert_eq!(run.statistics("works").completed, 20);
     let events: Vec<_> = run.journal().events().collect();
-    let last = |dag| events.iter().rposition(|event| event.dag == DagId(dag));
-    assert!(last(0) > last(1), "it has waited for that");
+    let last = |dag| {
+        let dag = run.task_set().find(dag);
+        events.iter().rposition(|event| event.dag == dag)
+    };
+    assert!(last("waits") > last("works"), "it has waited for that");
 }
 
 #[test]
 fn a_cluster_is_paused_and_stopped_from_outside_like_any() {
     let share = || Linux::sharing(2, Mechanism::Normal).expect("there is a processor");
     let alone = alone_on(|| share().clusters(&[1, 1]));
-    let dags = [0, 1].map(|cluster| {
+    let dags = [("first", 0), ("second", 1)].map(|(name, cluster)| {
         let dag = create_dag();
-        dag.name("endless")
+        dag.name(name)
             .cluster(cluster)
             .period(ms(1))
             .relative_deadline(ms(1));
@@ -76,10 +78,10 @@ fn a_cluster_is_paused_and_stopped_from_outside_like_any() {
     let control = alone.machine.control().expect("it is committed");
     let meddler = std::thread::spawn(move || {
         std::thread::sleep(ms(10));
-        control.pause(DagId(1));
+        control.pause("second");
         std::thread::sleep(ms(10));
-        control.stop(DagId(0));
-        control.stop(DagId(1));
+        control.stop("first");
+        control.stop("second");
     });
     let run = alone.machine.run().unwrap();
     meddler.join().expect("it does not panic");

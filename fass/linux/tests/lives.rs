@@ -9,7 +9,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 use fass::{FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
-use sched_dag::DagId;
 use support::{ALL, alone, ms, ticking};
 
 #[test]
@@ -33,7 +32,7 @@ fn a_fault_costs_a_job_and_the_dag_goes_on() {
         finish_create_dags(&[dag]).unwrap();
         let run = alone.machine.run().unwrap();
         assert_eq!(run.violations().count(), 0);
-        let statistics = run.statistics(DagId(0));
+        let statistics = run.statistics("camera");
         assert_eq!((statistics.completed, statistics.failed), (99, 1));
         assert_eq!((statistics.faults, statistics.restarts), (1, 1));
         assert_eq!(run.faults()[0].instance.job, 50);
@@ -62,8 +61,8 @@ fn an_endless_function_loses_its_core_after_its_budget() {
         assert_eq!(run.violations().count(), 0);
         assert_eq!(run.faults().len(), 1, "{:?}", run.faults());
         assert_eq!(run.faults()[0].instance.job, 2);
-        assert_eq!(run.statistics(DagId(0)).completed, 2);
-        assert_eq!(run.statistics(DagId(1)).completed, 20);
+        assert_eq!(run.statistics("endless").completed, 2);
+        assert_eq!(run.statistics("healthy").completed, 20);
     }
 }
 
@@ -95,7 +94,7 @@ fn s1_signals_come_from_other_threads_and_from_files() {
     });
     let run = alone.machine.run().unwrap();
     assert_eq!(run.violations().count(), 0);
-    assert_eq!(run.statistics(DagId(0)).completed, 2);
+    assert_eq!(run.statistics("answer").completed, 2);
     assert_eq!(heard.load(Relaxed), 2);
 }
 
@@ -123,15 +122,15 @@ fn a_dag_is_paused_resumed_and_stopped_from_outside() {
             }
         };
         wait_for(3);
-        control.pause(DagId(0));
+        control.pause("endless");
         std::thread::sleep(ms(20));
-        control.resume(DagId(0));
+        control.resume("endless");
         wait_for(3);
-        control.stop(DagId(0));
+        control.stop("endless");
     });
     let run = alone.machine.run().unwrap();
     assert_eq!(run.violations().count(), 0);
-    let statistics = run.statistics(DagId(0));
+    let statistics = run.statistics("endless");
     assert!(
         statistics.skips > 0 && statistics.completed >= 6,
         "{statistics:?}"
@@ -143,17 +142,11 @@ fn after_a_run_there_can_be_another() {
     for _ in 0..3 {
         let alone = alone(1, Mechanism::Normal);
         finish_create_dags(&[ticking("tick", 3, ms(1), 0, 10)]).unwrap();
-        assert_eq!(
-            alone.machine.run().unwrap().statistics(DagId(0)).completed,
-            3
-        );
+        assert_eq!(alone.machine.run().unwrap().statistics("tick").completed, 3);
         let error = alone.machine.run().unwrap_err();
         assert!(error.to_string().starts_with("nothing is committed"));
         finish_create_dags(&[ticking("tick", 2, ms(1), 0, 10)]).unwrap();
-        assert_eq!(
-            alone.machine.run().unwrap().statistics(DagId(0)).completed,
-            2
-        );
+        assert_eq!(alone.machine.run().unwrap().statistics("tick").completed, 2);
     }
 }
 
@@ -172,6 +165,6 @@ fn a_held_core_is_given_up_like_a_computing_one() {
     finish_create_dags(&[holds, ticking("tick", 30, ms(3), 0, 100)]).unwrap();
     let run = alone.machine.run().unwrap();
     assert_eq!(run.violations().count(), 0);
-    assert_eq!(run.statistics(DagId(0)).completed, 3);
+    assert_eq!(run.statistics("holds").completed, 3);
     assert_eq!(run.counts().preemptions > 0, is_preemptive);
 }

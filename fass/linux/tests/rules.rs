@@ -6,7 +6,6 @@ mod support;
 
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Run;
-use sched_dag::DagId;
 use support::{ALL, alone, breaches, ms, spin};
 
 fn assert_lawful(run: &Run) {
@@ -35,7 +34,7 @@ fn a_chain_on_one_core_wakes_nobody() {
         finish_create_dags(&[dag]).unwrap();
         let run = alone.machine.run().unwrap();
         assert_lawful(&run);
-        let completed = run.statistics(DagId(0)).completed;
+        let completed = run.statistics("chain").completed;
         let counts = run.counts();
         assert!(
             counts.calls <= completed,

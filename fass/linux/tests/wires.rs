@@ -10,7 +10,6 @@ use fass::{
     Dag, Received, Sender, SubtaskAttributes, Wire, WireOptions, create_dag, finish_create_dags,
 };
 use linux::Mechanism;
-use sched_dag::DagId;
 use support::{alone, ms};
 
 fn number(line: &[u8]) -> Option<u64> {
@@ -48,7 +47,7 @@ fn each_packet_is_answered_once_and_in_order() {
         attributes,
     );
     answer(&dag, &wire);
-    finish_create_dags(&[dag]).expect("it is sound");
+    finish_create_dags(std::slice::from_ref(&dag)).expect("it is sound");
     let (input, mut questions) = io::pipe().expect("a pipe");
     let (answers, output) = io::pipe().expect("a pipe");
     let connection = alone
@@ -67,7 +66,7 @@ fn each_packet_is_answered_once_and_in_order() {
     let run = alone.machine.run().expect("it is committed");
     drop(connection);
     asker.join().expect("all answers are right");
-    assert_eq!(run.statistics(DagId(0)).completed, 3);
+    assert_eq!(run.statistics(&dag).completed, 3);
     assert_eq!(run.violations().count(), 0);
     assert_eq!((wire.counts().packets, wire.counts().sent_bytes), (3, 9));
 }

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 use core::time::Duration;
 
-use sched_dag::{Activation, ClusterId, Order, OverrunPolicy};
+use sched_dag::{Activation, ClusterId, DagId, DagKey, Order, OverrunPolicy, TaskSet};
 
 use crate::draft::Draft;
 use crate::draft::attributes::SubtaskAttributes;
@@ -344,5 +344,39 @@ impl Dag {
             draft.spec.name
         );
         draft
+    }
+}
+
+/// After the commit a handle names its DAG, wherever one is asked for.
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let dag = create_dag();
+/// dag.jobs(2).relative_deadline(Duration::from_millis(5));
+/// let tick = SubtaskAttributes::named("tick");
+/// dag.register_periodic_subtask(|| (), vec![], Duration::from_millis(5), tick);
+/// finish_create_dags(&[dag.clone()]).unwrap();
+/// assert_eq!(machine.run().dag(&dag).statistics().completed, 2);
+/// ```
+impl DagKey for Dag {
+    #[track_caller]
+    fn find_in(&self, task_set: &TaskSet) -> DagId {
+        let draft = self.draft.borrow();
+        let id = draft.target.get().map(|(_, id)| id);
+        let is_it = |id: &DagId| {
+            let dag = task_set.dags().get(id.index());
+            dag.is_some_and(|dag| dag.name() == draft.spec.name)
+        };
+        match id.filter(is_it) {
+            Some(id) => id,
+            None => panic!(
+                "dag `{}` is none of this run; ask by a handle that was committed for it",
+                draft.spec.name
+            ),
+        }
     }
 }

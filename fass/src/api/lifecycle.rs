@@ -65,8 +65,8 @@ pub struct Switching {
 ///
 /// let report = machine.run();
 /// assert_eq!(report.violations(), []);
-/// assert_eq!(report.statistics[0].released, 5); // at 0, and from 60 ms on
-/// assert_eq!(report.statistics[0].skips, 5);
+/// assert_eq!(report.dag("camera").statistics().released, 5); // at 0, and from 60 ms on
+/// assert_eq!(report.dag("camera").statistics().skips, 5);
 /// ```
 #[derive(Debug)]
 pub struct Switch<'a> {
@@ -132,7 +132,7 @@ pub struct ShuttingDown(());
 ///     named("arrive"),
 /// );
 /// finish_create_dags(&[drive]).unwrap();
-/// assert_eq!(machine.run().statistics[0].completed, 5);
+/// assert_eq!(machine.run().dag("drive").statistics().completed, 5);
 /// ```
 #[derive(Debug)]
 pub struct Shutdown<'a> {
@@ -163,10 +163,9 @@ impl Dag {
     #[track_caller]
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn switching(&self) -> Switching {
-        let mut draft = self.open();
-        let target = draft.target.get_or_insert_with(|| Arc::new(Target::new()));
+        let draft = self.open();
         Switching {
-            target: Arc::clone(target),
+            target: Arc::clone(&draft.target),
         }
     }
 
@@ -181,8 +180,8 @@ impl Dag {
     /// let (dag, period) = (create_dag(), Duration::from_millis(10));
     /// dag.jobs(3).period(period).relative_deadline(period).starts_paused();
     /// dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
-    /// finish_create_dags(&[dag]).unwrap();
-    /// assert_eq!(machine.run().statistics[0].skips, 3);
+    /// finish_create_dags(&[dag.clone()]).unwrap();
+    /// assert_eq!(machine.run().dag(&dag).statistics().skips, 3);
     /// ```
     #[track_caller]
     pub fn starts_paused(&self) -> &Self {

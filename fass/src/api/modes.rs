@@ -59,8 +59,8 @@ use crate::run::request::{AT_ONCE, Of, WHEN_IDLE, Wish};
 /// finish_create_dags(&[cruise, descend, battery]).unwrap();
 /// let report = machine.run();
 /// assert_eq!(report.violations(), []);
-/// assert_eq!(report.statistics[0].released, 3); // at 0, 10 and 20 ms
-/// assert_eq!(report.statistics[1].released, 3); // at 30, 40 and 50 ms
+/// assert_eq!(report.dag("cruise").statistics().released, 3); // at 0, 10 and 20 ms
+/// assert_eq!(report.dag("descend").statistics().released, 3); // at 30, 40 and 50 ms
 /// ```
 #[derive(Clone, Default)]
 pub struct Modes {

@@ -64,7 +64,7 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 /// let report = machine.run();
 /// // Job 3 is lost, and what came before it is forgotten.
 /// assert_eq!(*sums.lock().unwrap(), [0, 1, 3, 4, 9]);
-/// assert_eq!((report.statistics[0].failed, report.statistics[0].completed), (1, 5));
+/// assert_eq!((report.dag("odometry").statistics().failed, report.dag("odometry").statistics().completed), (1, 5));
 /// ```
 #[must_use = "register a subtask with it"]
 pub struct Replaceable<'d, Args, Ret> {

@@ -64,8 +64,8 @@ use crate::run::tuple::VecToPubs;
 /// );
 /// finish_create_dags(&[brakes, vision]).unwrap();
 /// let report = machine.run();
-/// assert_eq!(report.statistics[0].released, 5); // at 0, 50, 100, 150 and 200 ms
-/// assert_eq!(report.statistics[0].signals, 20);
+/// assert_eq!(report.dag("brakes").statistics().released, 5); // at 0, 50, 100, 150 and 200 ms
+/// assert_eq!(report.dag("brakes").statistics().signals, 20);
 /// ```
 #[derive(Clone)]
 pub struct Signal {
@@ -225,7 +225,7 @@ impl Dag {
     /// let report = machine.run();
     /// assert_eq!(report.panics.len(), 1);
     /// assert_eq!(report.jobs.last().unwrap().release_ns, 30_000_000); // at the fault
-    /// assert_eq!(report.statistics[0].completed, 1);
+    /// assert_eq!(report.dag("brakes").statistics().completed, 1);
     /// ```
     #[track_caller]
     pub fn on_fault(&self, signal: &Signal) -> &Self {
@@ -235,10 +235,9 @@ impl Dag {
 
     #[track_caller]
     pub(super) fn signal(&self) -> Signal {
-        let mut draft = self.open();
-        let target = draft.target.get_or_insert_with(|| Arc::new(Target::new()));
+        let draft = self.open();
         Signal {
-            target: Arc::clone(target),
+            target: Arc::clone(&draft.target),
         }
     }
 }

@@ -21,11 +21,8 @@ pub(super) fn others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
         subtask: staleness::label_of(dag, *subtask),
         topic: latest.topic().into(),
     });
-    let is_target = |signal: &Arc<Target>, other: &Dag| {
-        let other = other.draft.borrow();
-        let own = other.target.as_ref();
-        own.is_some_and(|target| Arc::ptr_eq(signal, target))
-    };
+    let is_target =
+        |signal: &Arc<Target>, other: &Dag| Arc::ptr_eq(signal, &other.draft.borrow().target);
     // The fault of any subtask raises the DAG's; the first stands for them.
     let of_faults = draft.on_fault.iter().take(draft.spec.subtasks.len());
     let of_faults = of_faults.map(|signal| (0, Arc::clone(signal)));

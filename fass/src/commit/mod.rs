@@ -12,6 +12,7 @@
 //! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 5. *Launch.* The platform takes the plan.
 
+mod accepted;
 pub(crate) mod answer;
 pub(crate) mod assign;
 pub(crate) mod chains;
@@ -26,16 +27,16 @@ mod staleness;
 mod tie;
 
 use alloc::rc::Rc;
-use alloc::string::{String, ToString};
+use alloc::string::ToString;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
-use sched_dag::{Policy, TaskSet, Verified, Warning, analysis, sorted_by_key, wcets};
+use sched_dag::{Policy, Verified, Warning, analysis, sorted_by_key, wcets};
 
 use crate::api::dag::Dag;
 use crate::platform;
-use crate::run::staleness::Staleness;
-use answer::{Answer, Answers};
+pub use accepted::Commit;
+use answer::Answers;
 use error::CommitError;
 use fault::Fault;
 use tie::tie;
@@ -174,131 +175,6 @@ pub fn finish_create_dags_with(
             faults: Vec::from([Fault::NotLaunched(error)]),
             warnings,
         }),
-    }
-}
-
-/// An accepted commit.
-///
-/// # Examples
-///
-/// ```
-/// use core::time::Duration;
-/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-///
-/// # let machine = virtual_time::VirtualTime::new();
-/// let dag = create_dag();
-/// let period = Duration::from_millis(10);
-/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
-/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::named("sink"));
-///
-/// let commit = finish_create_dags(&[dag]).unwrap();
-/// for warning in commit.warnings() {
-///     println!("warning: {warning}");
-/// }
-/// ```
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Commit {
-    warnings: Vec<Warning>,
-    answers: Answers,
-    staleness: Arc<Vec<Staleness>>,
-    task_set: Arc<TaskSet>,
-}
-
-impl Commit {
-    /// Returns what the commit accepted although its author may not have meant it.
-    ///
-    /// ```
-    /// # use core::time::Duration;
-    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-    /// # let machine = virtual_time::VirtualTime::new();
-    /// # let dag = create_dag();
-    /// # let period = Duration::from_millis(10);
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
-    /// let unmeasured = SubtaskAttributes::named("source").wcet(Duration::ZERO);
-    /// dag.register_periodic_subtask(|| (1,), vec!["number"], period, unmeasured);
-    /// let commit = finish_create_dags(&[dag]).unwrap();
-    /// assert_eq!(commit.warnings()[0].code(), "zero_wcet");
-    /// ```
-    #[must_use]
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
-    }
-
-    /// Returns for each DAG, in the order of the commit, a bound of its response
-    /// time and the test that proves it, or why there is none.
-    ///
-    /// Bounds hold for the platform's policy, preemption and cores, with its
-    /// measured overheads added to the WCETs
-    /// ([`Platform::overheads`](crate::Platform::overheads)), and as long as no
-    /// instance executes for longer than its WCET. A DAG that is *not proven*
-    /// may meet its deadlines all the same.
-    ///
-    /// ```
-    /// # use core::time::Duration;
-    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-    /// # let machine = virtual_time::VirtualTime::new();
-    /// # let dag = create_dag();
-    /// # let period = Duration::from_millis(10);
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
-    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
-    /// let commit = finish_create_dags(&[dag]).unwrap();
-    /// for answer in commit.answers() {
-    ///     println!("{answer}");
-    /// }
-    /// ```
-    #[must_use]
-    pub fn answers(&self) -> &[Answer] {
-        &self.answers.of_dags
-    }
-
-    /// Returns what proves the bounds, for `./scripts/check-witness` to compute again.
-    ///
-    /// ```
-    /// # use core::time::Duration;
-    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-    /// # let machine = virtual_time::VirtualTime::new();
-    /// # let dag = create_dag();
-    /// # let period = Duration::from_millis(10);
-    /// # let taking = |name, ms| SubtaskAttributes::named(name).wcet(Duration::from_millis(ms));
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, taking("sink", 3));
-    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, taking("source", 2));
-    /// let commit = finish_create_dags(&[dag]).unwrap();
-    /// assert!(commit.witnesses().contains("bound 0 5000000 "));
-    /// ```
-    #[must_use]
-    pub fn witnesses(&self) -> String {
-        self.answers.witness(&self.task_set)
-    }
-
-    /// Returns for each subtask that samples a latest value, in the order of the
-    /// commit, how old that value can be; see [`Staleness`].
-    ///
-    /// See [`Latest`](crate::Latest) for an example.
-    #[must_use]
-    pub fn staleness(&self) -> &[Staleness] {
-        &self.staleness
-    }
-
-    /// Returns the first DAG that is not proven to meet its deadlines: one that
-    /// cannot be analysed, else one that is certain to miss them at its WCETs,
-    /// else the most urgent one for which no test gives a bound. `None` if every
-    /// DAG is proven.
-    ///
-    /// ```
-    /// # use core::time::Duration;
-    /// # use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-    /// # let machine = virtual_time::VirtualTime::new();
-    /// # let (dag, period) = (create_dag(), Duration::from_millis(10));
-    /// # dag.name("vision");
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
-    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
-    /// let commit = finish_create_dags(&[dag]).unwrap(); // without WCETs
-    /// assert_eq!(commit.first_unproven().unwrap().dag.name, "vision");
-    /// ```
-    #[must_use]
-    pub fn first_unproven(&self) -> Option<&Answer> {
-        self.answers.of_dags.get(self.answers.first_unproven?)
     }
 }
 

@@ -55,9 +55,7 @@ pub(crate) fn tie(
                 ..DagSpec::default()
             };
             let spec = core::mem::replace(&mut draft.spec, named);
-            if let Some(target) = &draft.target {
-                target.set(number, id);
-            }
+            draft.target.set(number, id);
             let effects = core::mem::take(&mut draft.effects);
             let make_bodies = core::mem::take(&mut draft.make_bodies);
             let resets = core::mem::take(&mut draft.resets);

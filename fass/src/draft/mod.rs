@@ -89,7 +89,7 @@ pub(crate) struct Draft {
     /// The states that are made anew after faults, and by what.
     pub(crate) resets: Vec<(usize, Reset)>,
     /// Which DAG it is, for others that send it signals, or pause it.
-    pub(crate) target: Option<Arc<Target>>,
+    pub(crate) target: Arc<Target>,
     /// The signal that is raised when a fault ends the DAG.
     pub(crate) on_fault: Option<Arc<Target>>,
 }

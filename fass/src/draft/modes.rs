@@ -117,13 +117,7 @@ fn place(drafts: &Drafts, dag: &Weak<RefCell<Draft>>) -> Option<usize> {
 /// Returns the DAG that a fault of another releases.
 fn handler(drafts: &Drafts, draft: &Draft) -> Option<DagId> {
     let target = draft.on_fault.as_ref()?;
-    let is_it = |other: &Rc<RefCell<Draft>>| {
-        let other = other.borrow();
-        other
-            .target
-            .as_ref()
-            .is_some_and(|own| Arc::ptr_eq(own, target))
-    };
+    let is_it = |other: &Rc<RefCell<Draft>>| Arc::ptr_eq(&other.borrow().target, target);
     (0..).map(DagId).nth(drafts.iter().position(is_it)?)
 }
 

@@ -9,7 +9,7 @@ use sched_dag::lifecycle::Request;
 use super::effect::Effect;
 
 /// Which DAG is meant, by a signal that releases it or a switch: known from the commit on.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Target {
     /// The plan's number, 0 before the commit.
     plan: AtomicU64,
@@ -17,13 +17,6 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    pub(crate) const fn new() -> Self {
-        Self {
-            plan: AtomicU64::new(0),
-            dag: AtomicU32::new(0),
-        }
-    }
-
     /// Returns the plan's number and the DAG, once there are any.
     pub(crate) fn get(&self) -> Option<(u64, DagId)> {
         let plan = self.plan.load(Ordering::Acquire);

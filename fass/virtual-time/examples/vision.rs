@@ -69,7 +69,7 @@ pub(crate) fn run() -> Result<String, CommitError> {
         let response_time_ns = job.response_time_ns().unwrap_or_default();
         text += &format!("a response time of {} ms\n", response_time_ns / 1_000_000);
     }
-    let misses: u64 = report.statistics.iter().map(|dag| dag.misses).sum();
+    let misses: u64 = report.dags().map(|dag| dag.statistics().misses).sum();
     let violations = report.violations().len();
     text += &format!("{misses} deadlines missed, {violations} semantic violations\n");
     Ok(text)

@@ -72,7 +72,7 @@ impl VirtualTime {
     /// finish_create_dags(&[dag]).unwrap();
     ///
     /// let report = machine.run();
-    /// assert_eq!(report.statistics[0].completed, 3);
+    /// assert_eq!(report.dag("clock").statistics().completed, 3);
     /// assert_eq!(report.panics[0].instance.job, 3);
     /// assert_eq!(report.end_ns, 32_000_000);
     /// ```

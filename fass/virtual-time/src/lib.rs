@@ -33,6 +33,7 @@
 
 mod arrival;
 mod command;
+mod dag_report;
 mod disturbed;
 mod edge;
 mod error;
@@ -56,6 +57,7 @@ pub use sched_dag::{
 };
 
 pub use command::replay_command;
+pub use dag_report::DagReport;
 pub use edge::Divergence;
 pub use error::RunError;
 use error::or_panic;
@@ -232,8 +234,8 @@ impl VirtualTime {
     ///
     /// let report = machine.run();
     /// assert_eq!(report.panics[0].message, "no sink");
-    /// assert_eq!(report.statistics[0].completed, 4);
-    /// assert_eq!(report.statistics[1].cut_short, 1);
+    /// assert_eq!(report.dag("healthy").statistics().completed, 4);
+    /// assert_eq!(report.dag("faulty").statistics().cut_short, 1);
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn contain_panics(self) -> Self {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sched_dag::chains::{Chain, Latencies};
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{self, Record, Terms, Violation};
-use sched_dag::{DagId, DagStatistics, Instance, SchedulerOptions, SubtaskId, TaskSet};
+use sched_dag::{DagStatistics, Instance, SchedulerOptions, TaskSet};
 
 use crate::edge::Divergence;
 use crate::record::{InstanceRecord, JobRecord, PanicRecord};
@@ -27,7 +27,7 @@ use crate::record::{InstanceRecord, JobRecord, PanicRecord};
 /// finish_create_dags(&[dag]).unwrap();
 ///
 /// let report = machine.run();
-/// let ticks = report.subtask("clock", "tick");
+/// let ticks = report.dag("clock").subtask("tick");
 /// assert_eq!(report.instance(ticks[1].instance), Some(&ticks[1]));
 /// assert_eq!(report.jobs[1].response_time_ns(), Some(1_000_000));
 /// assert_eq!(report.task_set().dags().len(), 1);
@@ -46,14 +46,14 @@ pub struct Report {
     /// the order in which their functions ran; none without containment.
     pub panics: Vec<PanicRecord>,
     /// For each DAG whether a subtask of it has fallen back on its second function.
-    pub degraded: Vec<bool>,
+    pub(crate) degraded: Vec<bool>,
     /// All events in the order in which they happened.
     pub events: Vec<Event>,
     /// The scheduler's counters, one set for each DAG.
-    pub statistics: Vec<DagStatistics>,
+    pub(crate) statistics: Vec<DagStatistics>,
     /// For each DAG, in how many jobs each of its sinks was late, in the order of
     /// [`Dag::sinks`](sched_dag::Dag::sinks).
-    pub sink_misses: Vec<Vec<u64>>,
+    pub(crate) sink_misses: Vec<Vec<u64>>,
     /// The time of the last event.
     pub end_ns: u64,
     /// In a replay, how many values were compared with recorded ones.
@@ -72,24 +72,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// Returns the records of one subtask, in the order of its jobs.
-    ///
-    /// # Panics
-    ///
-    /// If there is no DAG or no subtask of that name: a test that asks for a
-    /// name that does not exist is wrong.
-    ///
-    /// See [`Report`].
-    #[must_use]
-    pub fn subtask(&self, dag: &str, subtask: &str) -> Vec<InstanceRecord> {
-        let (dag, subtask) = self.find(dag, subtask);
-        let of_subtask = self
-            .instances
-            .iter()
-            .filter(|record| record.instance.dag == dag && record.instance.subtask == subtask);
-        of_subtask.copied().collect()
-    }
-
     /// Returns the record of one instance, if it became ready.
     ///
     /// See [`Report`].
@@ -244,18 +226,6 @@ impl Report {
                 }
                 _ => {}
             }
-        }
-    }
-
-    fn find(&self, dag: &str, subtask: &str) -> (DagId, SubtaskId) {
-        let mut dags = (0..).map(DagId).zip(self.task_set.dags());
-        let Some((id, model)) = dags.find(|(_, model)| model.name() == dag) else {
-            panic!("there is no dag `{dag}`");
-        };
-        let mut subtasks = (0..).map(SubtaskId).zip(model.subtasks());
-        match subtasks.find(|(_, model)| model.name() == subtask) {
-            Some((subtask, _)) => (id, subtask),
-            None => panic!("dag `{dag}` has no subtask `{subtask}`"),
         }
     }
 }

@@ -131,7 +131,7 @@ fn not_proven_is_accepted_and_says_why() {
     assert!(commit.warnings().is_empty(), "nothing is certain");
     // It does meet them: not proven is not infeasible.
     let report = machine.run();
-    assert!(report.statistics.iter().all(|dag| dag.misses == 0));
+    assert!(report.dags().all(|dag| dag.statistics().misses == 0));
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn a_demanded_proof_that_is_missing_refuses_the_commit() {
     // The handles are as they were: alone it is proven, and runs.
     let commit = finish_create_dags(&[late]).expect("nothing delays it");
     assert_eq!(commit.answers()[0].verdict.bound(), Some(ms(3)));
-    assert_eq!(machine.run().statistics[0].completed, 50);
+    assert_eq!(machine.run().dag("late").statistics().completed, 50);
 }
 
 #[test]
@@ -251,7 +251,7 @@ fn what_is_certain_to_miss_is_accepted_with_a_warning() {
         "dag `long` cannot keep its deadlines at its WCETs: its longest path alone takes 10ms, \
          which is more than its relative deadline; shorten the path or relax the deadline"
     );
-    assert_eq!(machine.run().statistics[0].misses, 50);
+    assert_eq!(machine.run().dag("long").statistics().misses, 50);
 }
 
 #[test]
@@ -314,7 +314,7 @@ fn a_wcet_of_zero_proves_nothing() {
         let commit = finish_create_dags(&[star([2, 2, 2, 1, 1, 1, 1], 1)]).expect("accepted");
         let bound = commit.answers()[0].verdict.bound();
         assert_eq!(bound, Some(ms(13)));
-        assert_eq!(machine.run().statistics[0].misses, 0);
+        assert_eq!(machine.run().dag("star").statistics().misses, 0);
     }
 }
 

@@ -143,7 +143,7 @@ fn ages_are_those_that_the_values_tell_and_stay_below_the_bounds() {
         let latencies = report.latencies(&chain.chain);
         // The last output may come after a DAG of the chain has ended, and does not count then.
         let camera = report.task_set().dag(sched_dag::DagId(0));
-        let outputs = report.subtask("motor", "leave");
+        let outputs = report.dag("motor").subtask("leave");
         let of_output = |(output, origin): (&InstanceRecord, &Origin)| {
             Some(output.finish_ns? - camera.grid_ns((*origin)?))
         };

@@ -30,9 +30,9 @@ fn an_overload_in_one_cluster_leaves_the_other_alone() {
         let commit = finish_create_dags(&[&[calm][..], &loads].concat()).unwrap();
         let report = machine.run();
         assert_eq!(report.violations(), []);
-        let calm = report.subtask("calm", "work");
+        let calm = report.dag("calm").subtask("work");
         assert!(calm.iter().all(|record| record.core == Some(CoreId(0))));
-        let misses = report.statistics.iter().map(|of_dag| of_dag.misses);
+        let misses = report.dags().map(|dag| dag.statistics().misses);
         let answers = commit.answers().iter().map(ToString::to_string);
         let (misses, answers) = (misses.collect::<Vec<_>>(), answers.collect::<Vec<_>>());
         (calm, misses, answers)
@@ -65,8 +65,8 @@ fn a_fault_in_one_cluster_ends_nothing_in_the_other() {
         .jobs(5)
         .register_untyped_subtask(|job| assert!(job < 2, "as meant"), named("panic"));
     let report = run(&machine, &[calm, faulty]);
-    assert_eq!(report.statistics[0].completed, 5);
-    assert_eq!(report.statistics[1].completed, 2);
+    assert_eq!(report.dag("calm").statistics().completed, 5);
+    assert_eq!(report.dag("faulty").statistics().completed, 2);
 }
 
 /// Offers its job's number as `count` after 4 ms.
@@ -127,7 +127,7 @@ fn a_signal_crosses_at_the_instant_of_its_completion() {
         // It keeps the other core busy, and ends where the signal comes.
         let beside = busy("beside", answers, 3, 3);
         let report = run(&machine, &[ask, answer, beside]);
-        let starts = report.subtask("answer", "answer");
+        let starts = report.dag("answer").subtask("answer");
         let starts = starts.iter().map(|record| record.start_ns.unwrap());
         let expected = [3_000_000, 13_000_000, 23_000_000];
         assert_eq!(starts.collect::<Vec<_>>(), expected);
@@ -168,7 +168,7 @@ fn the_commit_divides_the_cores_and_says_why() {
     assert!(commit.first_unproven().is_none());
     let report = machine.run();
     assert_eq!(report.violations(), []);
-    assert!(report.statistics.iter().all(|of_dag| of_dag.misses == 0));
+    assert!(report.dags().all(|dag| dag.statistics().misses == 0));
 }
 
 #[test]

@@ -71,7 +71,7 @@ fn a_contained_panic_ends_its_dag_at_the_time_of_the_panic() {
     assert_eq!((failed.failed_ns, failed.finish_ns), (Some(22 * MS), None));
     assert_eq!(failed.execution_ns, 2 * MS);
     assert_eq!(report.jobs[2].outcome, Some(JobOutcome::DagEnded));
-    let counted = report.statistics[0];
+    let counted = report.dag("faulty").statistics();
     assert_eq!((counted.released, counted.completed), (3, 2));
     assert_eq!((counted.faults, counted.cut_short), (1, 1));
 }
@@ -85,7 +85,7 @@ fn the_other_dags_go_on() {
     let report = run(&machine, &[healthy(), faulty()]);
     assert_eq!(report.panics.len(), 1);
     assert_eq!(schedule(&report, 0), schedule(&alone, 0));
-    let counted = report.statistics[0];
+    let counted = report.dag("healthy").statistics();
     assert_eq!((counted.completed, counted.misses), (30, 0));
 }
 /// A value that the sink of an aborted job leaves behind, and that cannot be dropped.
@@ -119,9 +119,7 @@ fn a_value_that_cannot_be_dropped_is_the_fault_of_the_subtask_that_replaces_it()
     };
     assert_eq!(panic.message, "it cannot be dropped");
     assert_eq!((panic.instance.subtask.0, panic.instance.job), (0, 1));
-    let [healthy, sharp] = report.statistics[..] else {
-        panic!("two DAGs");
-    };
+    let [healthy, sharp] = ["healthy", "sharp"].map(|dag| report.dag(dag).statistics());
     assert_eq!((healthy.completed, healthy.misses), (30, 0));
     assert_eq!((sharp.aborts, sharp.faults), (1, 1));
 }
@@ -142,10 +140,14 @@ fn values_that_wait_for_a_broken_body_do_no_harm() {
     commit(&[dag]);
     let first = machine.run_for(ms(12));
     assert_eq!(first.panics.len(), 1, "its function has run");
-    assert_eq!(first.statistics[0].faults, 0, "its time is not over");
+    assert_eq!(
+        first.dag("ahead").statistics().faults,
+        0,
+        "its time is not over"
+    );
     let report = machine.run();
     assert_eq!(report.end_ns, 25 * MS);
-    let counted = report.statistics[0];
+    let counted = report.dag("ahead").statistics();
     assert_eq!(
         (counted.released, counted.cut_short, counted.faults),
         (3, 3, 1)

@@ -66,9 +66,9 @@ fn each_fault_costs_one_job_and_makes_the_function_anew() {
     let jobs: Vec<u64> = kept.all().iter().map(|(job, _)| *job).collect();
     assert_eq!(jobs, [0, 1, 2, 3, 5, 6, 7, 8, 10, 11]);
     assert_eq!(kept.all()[4], (5, 1), "it is another function");
-    assert_eq!(counts(&report.statistics[0]), [2, 2, 10]);
-    assert_eq!(counts(&report.statistics[1]), [0, 0, 24]);
-    assert_eq!(report.statistics[1].misses, 0);
+    assert_eq!(counts(report.dag("counting").statistics()), [2, 2, 10]);
+    assert_eq!(counts(report.dag("healthy").statistics()), [0, 0, 24]);
+    assert_eq!(report.dag("healthy").statistics().misses, 0);
     let job = report
         .jobs
         .iter()
@@ -90,7 +90,7 @@ fn each_fault_costs_one_job_and_makes_the_function_anew() {
             "42000000 completed counting[4] failed",
         ]
     );
-    assert_eq!(report.degraded, [false, false]);
+    assert!(report.dags().all(|dag| !dag.is_degraded()));
 }
 
 #[test]
@@ -111,8 +111,8 @@ fn a_fault_while_the_next_function_is_made_ends_the_dag() {
         .register_sink_subtask(vec!["job"], ms(10), named("sink"));
     let report = run(&machine, &[dag]);
     // Jobs 2 and 4 are lost; the function for job 5 cannot be made.
-    assert_eq!(counts(&report.statistics[0]), [3, 2, 3]);
-    assert_eq!(report.statistics[0].restarts, 2);
+    assert_eq!(counts(report.dag("counting").statistics()), [3, 2, 3]);
+    assert_eq!(report.dag("counting").statistics().restarts, 2);
 }
 
 #[test]
@@ -132,8 +132,8 @@ fn the_second_function_is_fallen_back_on_once() {
     let kept = keeping::<u64>(&dag, "result");
     let report = run(&machine, &[dag]);
     assert_eq!(kept.all(), [0, 10, 20, 4, 5, 6, 7]);
-    assert_eq!(report.degraded, [true]);
-    assert_eq!(counts(&report.statistics[0]), [2, 1, 7]);
+    assert!(report.dags().all(|dag| dag.is_degraded()));
+    assert_eq!(counts(report.dag("counting").statistics()), [2, 1, 7]);
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn states_that_it_used_are_reset_and_others_are_not() {
         kept.all(),
         [(100, 1), (101, 2), (203, 3), (207, 4), (206, 5)]
     );
-    assert_eq!(counts(&report.statistics[0]), [2, 2, 5]);
+    assert_eq!(counts(report.dag("counting").statistics()), [2, 2, 5]);
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn what_waits_for_the_lost_function_is_for_the_next_one() {
         .register_sink_subtask(vec!["job"], ms(10), named("sink"));
     let report = run(&machine, &[dag]);
     assert_eq!(kept.all(), [0, 2, 3, 4, 5]);
-    assert_eq!(counts(&report.statistics[0]), [1, 1, 5]);
+    assert_eq!(counts(report.dag("ahead").statistics()), [1, 1, 5]);
 }
 
 #[test]

@@ -119,8 +119,8 @@ fn a_message_that_only_moves_has_one_sampler() {
         ms(10),
         named("read"),
     );
-    finish_create_dags(&[dag, read]).unwrap();
-    assert_eq!(machine.run().statistics[1].completed, 2);
+    finish_create_dags(&[dag, read.clone()]).unwrap();
+    assert_eq!(machine.run().dag(&read).statistics().completed, 2);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use fass::{Dag, Shutdown, Switch, create_dag, finish_create_dags, shutting_down}
 use support::lifecycle::{asking, events, ticking};
 use support::run;
 use support::sharing::{every, ms, named, work};
-use virtual_time::{DagId, VirtualTime, What};
+use virtual_time::{VirtualTime, What};
 
 #[test]
 fn l1_a_request_takes_effect_at_the_completion_before_the_releases_of_that_instant() {
@@ -40,7 +40,7 @@ fn l1_an_instance_that_fails_has_asked_for_nothing() {
     });
     let report = run(&machine, &[ticks, asks]);
     assert_eq!(report.panics.len(), 1);
-    assert_eq!(report.statistics[0].completed, 3);
+    assert_eq!(report.dag("ticks").statistics().completed, 3);
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn l2_requests_are_served_in_the_order_in_which_the_uses_are_stated() {
             .register_untyped_subtask(function, named("ask"));
         let report = run(&machine, &[ticks, asks]);
         let expected = if resumes_last { 0 } else { 2 };
-        assert_eq!(report.statistics[0].skips, expected);
+        assert_eq!(report.dag("ticks").statistics().skips, expected);
     }
 }
 
@@ -77,7 +77,7 @@ fn l2_of_one_switch_the_last_word_counts() {
         switch.resume();
     });
     let report = run(&machine, &[ticks, asks]);
-    assert_eq!(report.statistics[0].skips, 0);
+    assert_eq!(report.dag("ticks").statistics().skips, 0);
     assert_eq!(events(&report, &["off", "on"]), [""; 0]);
 }
 
@@ -123,7 +123,7 @@ fn l3_what_is_in_flight_goes_on_and_a_dag_may_pause_itself() {
     let last = dag.register_untyped_subtask(|_job| work(3), named("work"));
     dag.precede(&first, &last);
     let report = run(&machine, &[dag]);
-    let statistics = report.statistics[0];
+    let statistics = report.dag("once").statistics();
     assert_eq!((statistics.completed, statistics.skips), (1, 2));
     assert_eq!(report.jobs[0].ended_ns, Some(3_000_000));
 }
@@ -143,7 +143,7 @@ fn l3_a_signal_to_a_paused_dag_is_skipped() {
     machine.raise_at(&signal, ms(25));
     let report = machine.run();
     assert_eq!(report.violations(), []);
-    let statistics = report.statistics[0];
+    let statistics = report.dag("answers").statistics();
     assert_eq!((statistics.skips, statistics.completed), (1, 1));
 }
 
@@ -207,9 +207,12 @@ fn l5_a_shutdown_releases_nothing_more_and_waits_for_what_is_in_flight() {
         );
         // `slow` is in its job from 15 ms to 29 ms.
         assert_eq!(report.end_ns, 29_000_000);
-        let completed: Vec<u64> = report.statistics.iter().map(|dag| dag.completed).collect();
+        let completed: Vec<u64> = report
+            .dags()
+            .map(|dag| dag.statistics().completed)
+            .collect();
         assert_eq!(completed, [3, 2, 2]);
-        assert!(report.statistics.iter().all(|dag| dag.cut_short == 0));
+        assert!(report.dags().all(|dag| dag.statistics().cut_short == 0));
     }
 }
 
@@ -225,7 +228,7 @@ fn l5_of_what_is_asked_for_after_a_shutdown_nothing_comes() {
         }
     });
     let report = run(&machine, &[ticks, asks, ending()]);
-    assert_eq!(report.statistics[0].released, 0);
+    assert_eq!(report.dag("ticks").statistics().released, 0);
     assert_eq!(report.end_ns, 30_000_000);
     assert_eq!(events(&report, &["on"]), [""; 0]);
 }
@@ -267,7 +270,10 @@ fn l6_a_replay_passes_over_what_was_skipped_whatever_is_asked_for() {
     let machine = VirtualTime::new().cores(2);
     let report = run(&machine, &recorded());
     assert_eq!(
-        (report.statistics[0].skips, report.statistics[0].completed),
+        (
+            report.dag("sensor").statistics().skips,
+            report.dag("sensor").statistics().completed
+        ),
         (2, 4)
     );
     let recording = machine.recording();
@@ -277,7 +283,11 @@ fn l6_a_replay_passes_over_what_was_skipped_whatever_is_asked_for() {
         let report = run(&machine, &recorded());
         assert_eq!(report.divergence, None);
         assert_eq!((report.compared, report.uncompared), (4, 0));
-        assert_eq!(report.statistics[0].skips, 0, "they are passed over");
+        assert_eq!(
+            report.dag("sensor").statistics().skips,
+            0,
+            "they are passed over"
+        );
         assert_eq!(events(&report, &["off", "on"]), [""; 0]);
     }
 }
@@ -318,7 +328,7 @@ fn what_is_committed_is_not_paused_at_the_start_any_more() {
     finish_create_dags(std::slice::from_ref(&dag)).unwrap();
     let late = catch_unwind(AssertUnwindSafe(|| _ = dag.starts_paused()));
     assert!(late.is_err());
-    assert_eq!(machine.run().statistics[0].completed, 1);
+    assert_eq!(machine.run().dag("ticks").statistics().completed, 1);
 }
 
 #[test]
@@ -348,6 +358,12 @@ fn a_fault_releases_the_dag_that_brings_about_a_safe_state_and_that_ends_the_run
             "33 closed safe"
         ]
     );
-    assert!(report.statistics[0].completed == 4 && report.statistics[2].completed == 1);
-    assert_eq!(DagId(2), report.jobs.last().unwrap().dag);
+    assert!(
+        report.dag("ticks").statistics().completed == 4
+            && report.dag("safe").statistics().completed == 1
+    );
+    assert_eq!(
+        report.task_set().find("safe"),
+        report.jobs.last().unwrap().dag
+    );
 }

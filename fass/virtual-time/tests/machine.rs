@@ -75,7 +75,7 @@ fn a_panic_ends_at_once_however_many_jobs_are_to_come() {
             Err(error) => panic!("{error}"),
         };
         // Job 3 is the fourth.
-        let released = report.statistics.iter().map(|of_dag| of_dag.released);
+        let released = report.dags().map(|dag| dag.statistics().released);
         assert_eq!(released.collect::<Vec<_>>(), vec![4; dags]);
         assert!(report.events.len() < 80);
     }
@@ -113,7 +113,7 @@ fn an_endless_dag_runs_for_a_while_only() {
     );
     // The attempt has cost nothing.
     let report = machine.run_for(Duration::from_secs(60));
-    assert_eq!(report.statistics[0].completed, 6_000);
+    assert_eq!(report.dag("endless").statistics().completed, 6_000);
 }
 
 #[test]
@@ -194,8 +194,8 @@ fn a_commit_from_inside_a_subtask_is_refused_and_harmless() {
     );
     let sink = |(refused,): (bool,)| assert!(refused);
     dag.register_sink_subtask(sink, vec!["refused"], ms(10), named("sink"));
-    commit(&[dag]);
-    assert_eq!(machine.run().statistics[0].completed, 2);
+    commit(std::slice::from_ref(&dag));
+    assert_eq!(machine.run().dag(&dag).statistics().completed, 2);
 }
 
 #[test]

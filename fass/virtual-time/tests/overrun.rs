@@ -56,8 +56,8 @@ fn aborted_jobs_leave_at_most_a_value_an_edge() {
         ms(20),
         named("sink"),
     );
-    let report = run(&machine, &[dag]);
-    assert!(report.statistics[0].aborts > 5);
+    let report = run(&machine, std::slice::from_ref(&dag));
+    assert!(report.dag(&dag).statistics().aborts > 5);
     // A value that is given up stays until its place is written again. Each of the three
     // edges has one place besides the near one, which is written first.
     let left = alive.load(Ordering::Relaxed);

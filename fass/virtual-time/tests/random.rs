@@ -153,7 +153,7 @@ fn run(seed: u64, late_ns: u64) -> (Commit, Report) {
     let report = machine.run();
     let violations = report.violations();
     assert!(violations.is_empty(), "{}", violations[0]);
-    for statistics in &report.statistics {
+    for statistics in report.dags().map(|dag| dag.statistics()) {
         let ended = statistics.completed + statistics.aborts + statistics.skips;
         assert_eq!(ended, 25, "{statistics:?}");
     }
@@ -165,7 +165,8 @@ fn run(seed: u64, late_ns: u64) -> (Commit, Report) {
 fn case(seed: u64) -> (usize, [u64; 3]) {
     let (commit, report) = run(seed, 0);
     let (mut proven, mut overruns) = (0, [0; 3]);
-    for (statistics, answer) in report.statistics.iter().zip(commit.answers()) {
+    let statistics = report.dags().map(|dag| dag.statistics());
+    for (statistics, answer) in statistics.zip(commit.answers()) {
         overruns[0] += statistics.queued;
         overruns[1] += statistics.skips;
         overruns[2] += statistics.aborts;

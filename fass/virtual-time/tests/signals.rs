@@ -6,7 +6,7 @@ use support::run;
 
 use fass::{Dag, Raiser, create_dag, finish_create_dags};
 use support::sharing::{ms, named, work};
-use virtual_time::{DagId, VirtualTime};
+use virtual_time::VirtualTime;
 
 #[test]
 fn a_signal_takes_effect_at_the_completion_that_raises_it() {
@@ -26,11 +26,12 @@ fn a_signal_takes_effect_at_the_completion_that_raises_it() {
         named("ask"),
     );
     let report = run(&machine, &[answers, asks]);
-    let releases = report.jobs.iter().filter(|job| job.dag == DagId(0));
+    let answers = report.dag("answers");
+    let releases = answers.jobs();
     let releases: Vec<u64> = releases.map(|job| job.release_ns / 1_000_000).collect();
     // Raised at 3, 13, 23 and 33 ms; 13 waits for 18, and 23 for 33, which drops 33.
     assert_eq!(releases, [3, 18, 33]);
-    assert_eq!(report.statistics[0].dropped_signals, 1);
+    assert_eq!(report.dag("answers").statistics().dropped_signals, 1);
     let lines = report.event_lines();
     assert!(lines.contains(&"13000000 signalled answers[1]".to_owned()));
 }

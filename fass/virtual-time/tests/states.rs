@@ -48,7 +48,7 @@ fn updaters_take_turns_in_the_order_of_registration_and_keep_the_state_over_jobs
     let twice = [once, once].concat();
     let seen = seen.all();
     assert_eq!(seen[..], [(0, once.to_vec()), (1, twice)]);
-    let starts = |name| report.subtask("sharing", name)[0].start_ns.unwrap();
+    let starts = |name| report.dag("sharing").subtask(name)[0].start_ns.unwrap();
     assert_eq!(starts("middle"), 5_000_000);
     assert_eq!(starts("right"), 8_000_000);
 }
@@ -113,8 +113,8 @@ fn several_uses_are_a_tuple() {
         ms(10),
         named("check"),
     );
-    finish_create_dags(&[dag]).unwrap();
-    assert_eq!(machine.run().statistics[0].completed, 3);
+    finish_create_dags(std::slice::from_ref(&dag)).unwrap();
+    assert_eq!(machine.run().dag(&dag).statistics().completed, 3);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::{Body, Engine};
 use crate::chains::{Chain, Latencies};
 use crate::ids::{DagId, SubtaskId};
 use crate::kept::Journal;
+use crate::key::{DagKey, SubtaskKey};
 use crate::law::{Record, Tally, Violation};
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{DagStatistics, Scheduler, Snapshot};
@@ -208,8 +209,11 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn statistics(&self, dag: DagId) -> &DagStatistics {
-        &self.dags[dag.index()].snapshot.statistics
+    #[track_caller]
+    pub fn statistics(&self, dag: impl DagKey) -> &DagStatistics {
+        &self.dags[self.task_set.find(dag).index()]
+            .snapshot
+            .statistics
     }
 
     /// Returns how a DAG has ended.
@@ -220,8 +224,9 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn snapshot(&self, dag: DagId) -> &Snapshot {
-        &self.dags[dag.index()].snapshot
+    #[track_caller]
+    pub fn snapshot(&self, dag: impl DagKey) -> &Snapshot {
+        &self.dags[self.task_set.find(dag).index()].snapshot
     }
 
     /// Returns how many jobs a sink has missed its deadline in, those included that were not
@@ -233,7 +238,9 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
+    #[track_caller]
+    pub fn sink_misses(&self, dag: impl DagKey, sink: impl SubtaskKey) -> u64 {
+        let (dag, sink) = self.find(dag, sink);
         let place = self.place_of(dag, sink);
         let place = place.expect("misses are asked for of a subtask that is no sink");
         self.dags[dag.index()].misses[place]
@@ -251,17 +258,26 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn bound_ns(&self, dag: DagId) -> Option<u64> {
-        *self.proven.bounds_ns.get(dag.index())?
+    #[track_caller]
+    pub fn bound_ns(&self, dag: impl DagKey) -> Option<u64> {
+        *self.proven.bounds_ns.get(self.task_set.find(dag).index())?
     }
 
     /// Returns the response time that the commit has proven of a sink, if it has.
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn sink_bound_ns(&self, dag: DagId, sink: SubtaskId) -> Option<u64> {
+    #[track_caller]
+    pub fn sink_bound_ns(&self, dag: impl DagKey, sink: impl SubtaskKey) -> Option<u64> {
+        let (dag, sink) = self.find(dag, sink);
         let place = self.place_of(dag, sink)?;
         *self.proven.sink_bounds_ns.get(dag.index())?.get(place)?
+    }
+
+    #[track_caller]
+    fn find(&self, dag: impl DagKey, subtask: impl SubtaskKey) -> (DagId, SubtaskId) {
+        let dag = self.task_set.find(dag);
+        (dag, self.task_set.dag(dag).find(subtask))
     }
 
     fn place_of(&self, dag: DagId, sink: SubtaskId) -> Option<usize> {

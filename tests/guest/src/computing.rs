@@ -29,9 +29,6 @@ const ROUNDS: u64 = 120;
 /// Of what computes; of which it is to take up some three quarters.
 const COMPUTING_PERIOD: Duration = Duration::from_millis(5);
 
-/// The first DAG, whose function is empty.
-const QUICK: DagId = DagId(0);
-
 /// Runs them, and reports how long the quick one had to wait.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
@@ -57,19 +54,20 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     }
     let run = machine.run()?;
 
-    let times = (0_u64..).zip(run.record().jobs(QUICK));
+    let quick = run.task_set().find("quick");
+    let times = (0_u64..).zip(run.record().jobs(quick));
     let responses = times.filter_map(|(job, times)| {
-        Some(run.record().completion_ns(QUICK, job)? - times.release_ns?)
+        Some(run.record().completion_ns(quick, job)? - times.release_ns?)
     });
     let longest_ns = responses.max().unwrap_or(0);
-    let dags = (0..run.task_set().dags().len()).map(|dag| u32::try_from(dag).map_or(QUICK, DagId));
+    let dags = (0..run.task_set().dags().len()).map(|dag| u32::try_from(dag).map_or(quick, DagId));
     let misses: Vec<u64> = dags.map(|dag| run.statistics(dag).misses).collect();
     let wrong = wrong.load(Ordering::Relaxed);
     json::emit("computing", |line| {
         line.number("cpus", machine.cores())
             .number("alone_ns", alone_ns)
             .number("longest_response_ns", longest_ns)
-            .number("jobs", run.statistics(QUICK).completed)
+            .number("jobs", run.statistics(quick).completed)
             .number("misses", misses[0])
             .number("computing_misses", misses[1..].iter().sum::<u64>())
             .number("wrong", wrong)

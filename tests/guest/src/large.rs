@@ -14,7 +14,6 @@ use fass::{
 };
 use faults::{JOBS, healthy};
 use kernel::{Ending, Machine};
-use sched_dag::DagId;
 
 const PERIOD: Duration = Duration::from_millis(10);
 
@@ -37,7 +36,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     for doomed in doomed {
         finish_create_dags(&[healthy(), doomed()])?;
         let run = machine.run()?;
-        let [healthy, doomed] = [DagId(0), DagId(1)].map(|dag| *run.statistics(dag));
+        let [healthy, doomed] = ["healthy", "doomed"].map(|dag| *run.statistics(dag));
         let violations = run.violations().count();
         let is_unharmed = (healthy.completed, healthy.misses) == (JOBS, 0);
         if !is_unharmed || doomed.faults != 1 || violations != 0 {

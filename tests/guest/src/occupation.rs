@@ -11,7 +11,6 @@ use core::time::Duration;
 
 use fass::{Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
 use kernel::{Ending, Machine, json};
-use sched_dag::DagId;
 
 const LONG_NS: u64 = 1_200_000;
 const STEP_NS: u64 = 3_001;
@@ -48,16 +47,16 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     finish_create_dags(&[short, long])?;
     let run = machine.run()?;
 
-    let times = |of: DagId| {
+    let times = |of: &str| {
+        let of = run.task_set().find(of);
         let instances = run.record().all_instances(run.task_set());
         let of_dag = instances.filter(move |(instance, _)| instance.dag == of);
         of_dag
             .filter_map(|(instance, times)| Some((instance.job, times.start_ns?, times.finish_ns?)))
     };
     let mut too_short = 0_u64;
-    for (job, start_ns, finish_ns) in times(DagId(1)) {
-        let others =
-            times(DagId(0)).filter(|(_, start, end)| start_ns < *start && *end < finish_ns);
+    for (job, start_ns, finish_ns) in times("long") {
+        let others = times("short").filter(|(_, start, end)| start_ns < *start && *end < finish_ns);
         let others_ns: u64 = others.map(|(_, start, end)| end - start).sum();
         let own_ns = finish_ns - start_ns - others_ns;
         too_short += u64::from(own_ns < LONG_NS + job * STEP_NS);

@@ -15,7 +15,6 @@ use core::time::Duration;
 
 use fass::{Dag, Latest, Raiser, Sample, Signal, create_dag, finish_create_dags};
 use kernel::{Ending, Machine, json};
-use sched_dag::DagId;
 
 use crate::times::{hold, ms, taking};
 
@@ -68,8 +67,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
     let run = machine.run_from(epoch_ns)?;
     let apart_ns = u64::try_from(ANSWERS_APART.as_nanos()).unwrap_or(u64::MAX);
-    let of_answers = *run.statistics(DagId(0));
-    let of_input = button.map(|_| run.statistics(DagId(4)).completed);
+    let of_answers = *run.statistics("answers");
+    let of_input = button.map(|_| run.statistics("input").completed);
     json::emit("sharing", |line| {
         line.number("violations", run.violations().count() as u64)
             .number("allocations", run.allocations())

@@ -20,7 +20,7 @@ fn judge(scenario: &Scenario) -> Vec<String> {
     }
     let report = machine.run();
     let mut wrong = scenario.judge_events(&report.event_lines());
-    let statistics = |dag: sched_dag::DagId| &report.statistics[dag.index()];
+    let statistics = |dag: sched_dag::DagId| report.dag(dag).statistics();
     wrong.extend(scenario.judge_counts(report.task_set(), statistics, true));
     wrong.extend(report.violations().iter().map(|it| format!("{it:?}")));
     wrong

@@ -61,6 +61,6 @@ pub(crate) fn walk(recording: &Recording<'static>, cores: u32, policy: Policy) -
     assert!(commit.answers()[0].verdict.bound().is_some());
     let report = machine.run();
     assert_eq!(report.violations(), []);
-    assert_eq!(report.statistics[0].completed, 3_511);
+    assert_eq!(report.dag("gait").statistics().completed, 3_511);
     walk
 }

@@ -243,8 +243,7 @@ impl<S: System> Machine<S> {
     /// fn may_lose_a_camera(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
     ///     machine.accept_faults();
     ///     let run = machine.run()?;
-    ///     let cameras = [sched_dag::DagId(0), sched_dag::DagId(1)];
-    ///     let lost = cameras.map(|dag| run.statistics(dag).faults > 0);
+    ///     let lost = ["left", "right"].map(|camera| run.statistics(camera).faults > 0);
     ///     match lost {
     ///         [true, true] => Err(kernel::Ending::Failure("both cameras are lost".into())),
     ///         _ => Ok(()),

@@ -9,14 +9,14 @@ fn every_job_is_in_time_and_within_its_bound() {
     let machine = VirtualTime::new().cores(2).policy(Policy::Edf);
     let dag = app_template::build(200);
     let commit = finish_create_dags(&[dag]).expect("the DAG is sound");
-    let bound = commit.answers()[0].verdict.bound().expect("it is proven");
+    let bound = commit.answer("app-template").verdict.bound().expect("it is proven");
     assert!(bound <= app_template::PERIOD);
 
     let report = machine.run();
     assert_eq!(report.violations(), []);
-    assert_eq!(report.statistics[0].completed, 200);
-    assert_eq!(report.statistics[0].misses, 0);
-    for job in &report.jobs {
+    let ran = report.dag("app-template");
+    assert_eq!((ran.statistics().completed, ran.statistics().misses), (200, 0));
+    for job in ran.jobs() {
         let response_time_ns = job.response_time_ns().expect("it is complete");
         assert!(u128::from(response_time_ns) <= bound.as_nanos());
     }

@@ -13,10 +13,6 @@ use fass::finish_create_dags;
 use faults::crimes::Crime;
 use faults::{JOBS, Policy, doomed, doomed_at_leisure, healthy};
 use kernel::{Ending, Machine, json};
-use sched_dag::DagId;
-
-const HEALTHY: DagId = DagId(0);
-const DOOMED: DagId = DagId(1);
 
 /// Whether the crime has a budget.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -60,8 +56,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     };
     finish_create_dags(&[healthy(), attacker])?;
     let run = machine.run()?;
-    let of_healthy = run.statistics(HEALTHY);
-    let of_doomed = run.statistics(DOOMED);
+    let of_healthy = run.statistics("healthy");
+    let of_doomed = run.statistics("doomed");
     json::emit("attack", |line| {
         line.number("jobs", JOBS)
             .number("healthy_jobs", of_healthy.completed)

@@ -1,0 +1,131 @@
+//! What a DAG or a subtask is asked for by after the commit: its name, its number, or a handle.
+
+use crate::ids::{DagId, SubtaskId};
+use crate::nearest::nearest_of;
+use crate::task_set::{Dag, TaskSet};
+
+/// What names a DAG of a task set: a name, a [`DagId`], or a handle of the crate that built it.
+///
+/// ```
+/// use sched_dag::{CommitOptions, DagId, DagSpec, Policy, SubtaskSpec, verify};
+///
+/// let dag = DagSpec {
+///     name: "pump".into(),
+///     period_ns: Some(10),
+///     relative_deadline_ns: Some(10),
+///     subtasks: vec![SubtaskSpec { name: "turn".into(), ..SubtaskSpec::default() }],
+///     ..DagSpec::default()
+/// };
+/// let verified = verify(&[dag], &CommitOptions::new(Policy::Edf, 1)).unwrap();
+/// let task_set = verified.task_set;
+/// let pump = task_set.find("pump");
+/// assert_eq!(pump, task_set.find(DagId(0)));
+/// assert_eq!(task_set.dag(pump).find("turn"), task_set.dag(pump).sinks()[0]);
+/// ```
+pub trait DagKey {
+    /// Returns the DAG's number.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG: whoever asks is wrong.
+    fn find_in(&self, task_set: &TaskSet) -> DagId;
+}
+
+/// What names a subtask of a DAG: a name, or a [`SubtaskId`].
+///
+/// See [`DagKey`].
+pub trait SubtaskKey {
+    /// Returns the subtask's number.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such subtask: whoever asks is wrong.
+    fn find_in(&self, dag: &Dag) -> SubtaskId;
+}
+
+impl DagKey for DagId {
+    fn find_in(&self, _: &TaskSet) -> DagId {
+        *self
+    }
+}
+
+impl DagKey for str {
+    #[track_caller]
+    fn find_in(&self, task_set: &TaskSet) -> DagId {
+        let names = || task_set.dags().iter().map(Dag::name);
+        match (0..).zip(names()).find(|(_, name)| *name == self) {
+            Some((number, _)) => DagId(number),
+            None => refuse("dag", self, &mut names()),
+        }
+    }
+}
+
+impl<K: DagKey + ?Sized> DagKey for &K {
+    #[track_caller]
+    fn find_in(&self, task_set: &TaskSet) -> DagId {
+        (**self).find_in(task_set)
+    }
+}
+
+impl SubtaskKey for SubtaskId {
+    fn find_in(&self, _: &Dag) -> SubtaskId {
+        *self
+    }
+}
+
+impl SubtaskKey for str {
+    #[track_caller]
+    fn find_in(&self, dag: &Dag) -> SubtaskId {
+        let names = || dag.subtasks().iter().map(crate::task_set::Subtask::name);
+        match (0..).zip(names()).find(|(_, name)| *name == self) {
+            Some((number, _)) => SubtaskId(number),
+            None => refuse("subtask", self, &mut names()),
+        }
+    }
+}
+
+impl<K: SubtaskKey + ?Sized> SubtaskKey for &K {
+    #[track_caller]
+    fn find_in(&self, dag: &Dag) -> SubtaskId {
+        (**self).find_in(dag)
+    }
+}
+
+#[cold]
+#[track_caller]
+fn refuse(what: &str, name: &str, names: &mut dyn Iterator<Item = &str>) -> ! {
+    match nearest_of(name, names) {
+        Some(near) => panic!("there is no {what} `{name}`; did you mean `{near}`?"),
+        None => panic!("there is no {what} `{name}`; name one that was committed"),
+    }
+}
+
+impl TaskSet {
+    /// Returns the number of a DAG.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    ///
+    /// See [`DagKey`].
+    #[must_use]
+    #[track_caller]
+    pub fn find(&self, dag: impl DagKey) -> DagId {
+        dag.find_in(self)
+    }
+}
+
+impl Dag {
+    /// Returns the number of a subtask.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such subtask.
+    ///
+    /// See [`DagKey`].
+    #[must_use]
+    #[track_caller]
+    pub fn find(&self, subtask: impl SubtaskKey) -> SubtaskId {
+        subtask.find_in(self)
+    }
+}
