@@ -32,6 +32,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         .map_err(|malformed| usage(format!("the recording, {malformed}")))?;
     let (dag, walk) =
         build(&recording).map_err(|mismatch| usage(format!("the recording: {mismatch}")))?;
+    machine.show_topics();
     let commit = finish_create_dags(&[dag])?;
     for answer in commit.answers() {
         println!("{answer}");

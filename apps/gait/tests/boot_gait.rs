@@ -3,7 +3,8 @@
 mod support;
 
 use std::fs;
-use std::process::Command;
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, Stdio};
 
 use fass::{Policy, finish_create_dags};
 use gait::build;
@@ -121,4 +122,36 @@ fn a_walk_that_linux_recorded_is_replayed_on_linux_on_the_machine_and_on_the_hos
     for path in [&table, &run] {
         let _ = fs::remove_file(path);
     }
+}
+
+/// A person looks at a walk on Linux, and ends it.
+#[test]
+fn a_console_on_linux_shows_topics() {
+    let file = File::new();
+    let mut command = Command::new(system::workspace().join("scripts/run"));
+    command.args(["--app", "gait", "--on", "linux", "--console", "--module"]);
+    let child = command
+        .arg(&file.0)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped());
+    let mut child = child.spawn().expect("the command can be run");
+    let (mut input, output) = (child.stdin.take(), child.stdout.take());
+    let mut lines = BufReader::new(output.expect("a pipe")).lines();
+    let mut say = |words: &str| writeln!(input.as_mut().expect("a pipe"), "{words}");
+    let mut wait_for = |word: &str| {
+        let line = lines.find(|line| line.as_ref().is_ok_and(|line| line.contains(word)));
+        line.unwrap_or_else(|| panic!("no line has `{word}`"))
+            .expect("text")
+    };
+    wait_for("dag `gait` takes at most");
+    for (words, answer) in [
+        ("echo upper", "  upper["),
+        ("hz sample", " Hz of "),
+        ("stats", "dag 0 `gait`: running; "),
+        ("shutdown", "shut down before its end"),
+    ] {
+        say(words).expect("it is read");
+        wait_for(answer);
+    }
+    assert!(child.wait().expect("it ends").success());
 }

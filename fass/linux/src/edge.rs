@@ -134,7 +134,7 @@ pub(crate) fn begin_run(epoch_ns: u64) -> Option<Sending> {
 }
 
 impl Sending {
-    /// Leaves the rest to [`Linux::end_recording`].
+    /// Leaves the rest to who ends the recording.
     pub(crate) fn end(self) {
         self.is_over.store(true, Ordering::Release);
         *unpoisoned(&LEFT) = self.thread.join().unwrap_or(None);

@@ -9,6 +9,7 @@ use sched_dag::SchedulerOptions;
 use sched_dag::engine::{self, Proven};
 
 use crate::edge::{self, Sending};
+use crate::live::Live;
 use crate::office::Office;
 use crate::release::Budgets;
 use crate::state::{Fault, Number, RunTime};
@@ -86,8 +87,10 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
         team.lock().time = RunTime::beginning(epoch_ns);
     }
     let sending = edge::begin_run(epoch_ns);
+    Live::begin(office, teams);
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();
+    Live::end();
     let allocations = (launched.allocations)() - allocations;
     releases.into_iter().for_each(join);
     sending.into_iter().for_each(Sending::end);

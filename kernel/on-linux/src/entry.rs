@@ -1,6 +1,6 @@
 //! The program's way to the app's function, and its end.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
@@ -82,6 +82,8 @@ fn run(
         wire: RefCell::new(None),
         refusal: RefCell::new(None),
         signals,
+        has_console: options.choice("console", &[("off", false), ("on", true)])?,
+        is_closed: Cell::new(false),
     };
     let bounds = BoundVerdict::new(false, false);
     let result = Machine::serve(system, options, &terms, module, bounds, app);

@@ -26,7 +26,6 @@
 //!
 //! - Bounds are not judged (`bound_exceeded` is said, and the verdict leaves it): Linux states
 //!   no worst case for what it does itself.
-//! - There is no console.
 
 #![deny(unsafe_code)]
 

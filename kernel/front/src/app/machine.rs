@@ -176,7 +176,7 @@ impl<S: System> Machine<S> {
     }
 
     /// Reports whether a person can talk to the kernel during a run (`console=on`), and
-    /// so end one that would not end by itself. On Linux nobody can.
+    /// so end one that would not end by itself.
     ///
     /// ```no_run
     /// fn least_jobs(machine: &kernel::Machine) -> u64 {

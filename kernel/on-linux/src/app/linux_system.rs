@@ -8,11 +8,13 @@ use std::time::Duration;
 use fass::{Clusters, Overheads, Policy, Preemption, Signal, Wire};
 use linux::{EndSignals, Linux};
 
+use super::console;
 use super::ends::Ends;
 use crate::heap;
 use front::app::division::Divisible;
 use front::app::ending::Ending;
 use front::app::machine::System;
+use front::app::offered::Parameters;
 use front::json;
 use front::options::{Options, UsageError};
 use front::report;
@@ -32,9 +34,17 @@ pub struct LinuxSystem {
     pub(crate) refusal: RefCell<Option<UsageError>>,
     /// The reasons that end a run before its time.
     pub(crate) signals: EndSignals,
+    /// Whether a person can talk with a run.
+    pub(crate) has_console: bool,
+    /// Whether a person has ended the latest run at the console.
+    pub(crate) is_closed: Cell<bool>,
 }
 
 impl System for LinuxSystem {
+    fn has_console(&self) -> bool {
+        self.has_console
+    }
+
     fn cores(&self) -> u32 {
         self.linux.cores()
     }
@@ -64,7 +74,8 @@ impl System for LinuxSystem {
         let ends = self.wire.borrow();
         let connection = ends.as_ref().map(|ends| ends.connect(&self.linux));
         let connection = connection.transpose()?;
-        if let Some(signal) = input {
+        // What a person says at the console is no event.
+        if let Some(signal) = input.filter(|_| !self.has_console) {
             let watched = self.linux.raise_on_input(signal, &io::stdin());
             watched.map_err(|why| failure(format!("standard input cannot be watched: {why}")))?;
         }
@@ -72,10 +83,15 @@ impl System for LinuxSystem {
             let watched = control.close_when_asked(&self.signals);
             watched.map_err(|why| failure(format!("no signal can be waited for: {why}")))?;
         }
-        let run = match epoch_ns {
+        let run = || match epoch_ns {
             Some(epoch_ns) => self.linux.run_from(epoch_ns),
             None => self.linux.run(),
         };
+        let (run, is_closed) = match self.has_console {
+            true => console::talk_during(run),
+            false => (run(), false),
+        };
+        self.is_closed.set(is_closed);
         let run = run.map_err(|why| failure(why.to_string()))?;
         drop(connection);
         tell_faults(&run);
@@ -94,7 +110,7 @@ impl System for LinuxSystem {
     }
 
     fn is_shut_down(&self) -> bool {
-        self.signals.count() > 0
+        self.signals.count() > 0 || self.is_closed.get()
     }
 
     fn connect(
@@ -107,6 +123,10 @@ impl System for LinuxSystem {
         let output = options.text("output");
         if input.is_some_and(|input| input != "-") {
             let line = "`input`: a script of times is for the machine; on Linux give `input=-`";
+            return Err(UsageError::new(line).into());
+        }
+        if input.is_some() && self.has_console {
+            let line = "`input=-` and `console=on` both take standard input; give one";
             return Err(UsageError::new(line).into());
         }
         if input.is_none() && output.is_none() {
@@ -124,6 +144,19 @@ impl System for LinuxSystem {
                 "wire `{}` finds its ends taken; connect one wire",
                 wire.name()
             ))),
+        }
+    }
+
+    fn offer(parameters: Parameters) -> Result<(), Ending> {
+        let offered = console::PARAMETERS.set(Box::leak(Box::new(parameters)));
+        let twice = |_| Ending::Failure("parameters are offered twice; offer all at once".into());
+        offered.map_err(twice)
+    }
+
+    fn show_topics(&self) {
+        if self.has_console {
+            self.linux.let_look();
+            console::show_topics();
         }
     }
 

@@ -9,6 +9,7 @@
 //! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
 //! | `input=-` | what comes on standard input arrives on the app's wire | |
 //! | `output=FILE` | what the app sends on its wire goes there | |
+//! | `console=off\|on` | whether a person at standard input can talk with a run | `off` |
 //! | `record=FILE` | what crosses the edge of the run is recorded there |
 //! | `replay=FILE` | the run replays that recording |
 //! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
@@ -27,12 +28,11 @@ use front::graph;
 use front::options::{Options, UsageError};
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
-const FOREIGN: [(&str, &str); 13] = [
+const FOREIGN: [(&str, &str); 12] = [
     ("trace_events", "the journal takes what memory it needs"),
     ("measure", "interrupts are Linux's"),
     ("idle", "idle cores are Linux's"),
-    ("console", "there is no console"),
-    ("status", "there is no console"),
+    ("status", "the console tells it, by `stats`"),
     ("mode", "time is real"),
     ("probe", "there is no machine to look at"),
     ("end", "the program ends, and Linux goes on"),

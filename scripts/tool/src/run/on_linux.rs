@@ -20,12 +20,12 @@ use super::recording::Recorded;
 use super::screen::Screen;
 
 /// The options that are about QEMU, its guest, or what the kernel alone does.
-const FOREIGN: [&str; 8] = [
-    "boot", "console", "gdb", "image", "latest", "machine", "memory", "qemu",
+const FOREIGN: [&str; 7] = [
+    "boot", "gdb", "image", "latest", "machine", "memory", "qemu",
 ];
 
 /// Those of the rest that a guest has no way for, and those that only a guest has.
-const NOT_IN_GUEST: [&str; 4] = ["input", "output", "record", "replay"];
+const NOT_IN_GUEST: [&str; 5] = ["console", "input", "output", "record", "replay"];
 const ONLY_IN_GUEST: [&str; 2] = ["mode", "busy"];
 
 /// How much longer a guest may take: Linux has to start.
@@ -151,7 +151,7 @@ pub(super) fn run_app(
     let order = program::Order {
         program: &image.path,
         words: &words,
-        is_live: wire::is_live(options),
+        is_live: wire::is_live(options) || options.is_given("console"),
         stops: true,
         log: &log.path,
         limit,
@@ -230,6 +230,7 @@ fn words(options: &Parsed, dags: Option<&Prepared>) -> Vec<OsString> {
     words.extend(options.is_given("trace").then(|| "trace=dump".into()));
     words.extend(seeing::graph_word(options));
     words.extend(prove::guest_words(options));
+    words.extend(options.is_given("console").then(|| "console=on".into()));
     words.extend(wire::is_live(options).then(|| "input=-".into()));
     words.extend(options.text("output").map(|path| format!("output={path}")));
     let more = options.text("append").unwrap_or_default();
@@ -253,10 +254,7 @@ mod tests {
                 "--on linux --mode threads",
                 "`--mode` is not for `--on linux`; leave it out, or give `--on debian`",
             ),
-            (
-                "--on linux --console",
-                "`--console` is for the bare machine; ",
-            ),
+            ("--on linux --gdb", "`--gdb` is for the bare machine; "),
             (
                 "--on linux --latest 3",
                 "`--latest` is for the bare machine; ",

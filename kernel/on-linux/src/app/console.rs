@@ -1,0 +1,141 @@
+//! The console: a person at standard input talks with the run.
+
+use std::io::{self, BufReader, Read};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use fass::edge::Seen;
+use front::shell::topics::Topics;
+use front::shell::{Commands, END, Extra, LiveRun, PERIOD_NS, Session};
+use linux::Live;
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, Journal, Snapshot, TaskSet};
+
+/// What comes on standard input; the thread that reads it lasts as long as the program.
+static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
+
+/// Commands about parameters, and about topics.
+pub(crate) static PARAMETERS: OnceLock<&'static dyn Commands> = OnceLock::new();
+static TOPICS: OnceLock<&'static dyn Commands> = OnceLock::new();
+
+/// Whether a person has ended the run.
+static IS_SHUT_DOWN: AtomicBool = AtomicBool::new(false);
+
+/// The run of this program.
+#[derive(Debug)]
+struct LinuxRun;
+
+impl LiveRun for LinuxRun {
+    fn task_set() -> Option<Arc<TaskSet>> {
+        Some(Arc::clone(Live::get()?.task_set()))
+    }
+
+    fn snapshot(dag: DagId) -> Option<Snapshot> {
+        Live::get()?.snapshot(dag)
+    }
+
+    fn control(dag: DagId, change: fn(DagId) -> Request) {
+        if let Some(live) = Live::get() {
+            live.change(dag, change);
+        }
+    }
+
+    fn now_ns() -> u64 {
+        Live::now_ns()
+    }
+
+    fn clusters() -> usize {
+        Live::get().map_or(0, |live| live.clusters())
+    }
+
+    fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+        Live::get()?.with_journal(cluster, look)
+    }
+
+    fn receive() -> Option<u8> {
+        let input = INPUT.get()?.lock().unwrap_or_else(PoisonError::into_inner);
+        match input.try_recv() {
+            Ok(byte) => Some(byte),
+            // Nobody could end it any more.
+            Err(TryRecvError::Disconnected) if is_endless() => Some(END),
+            Err(_) => None,
+        }
+    }
+
+    fn shut_down() {
+        if let Some(live) = Live::get() {
+            front::println!("shutting down: nothing more is released; what is in flight goes on");
+            IS_SHUT_DOWN.store(true, Ordering::Relaxed);
+            live.close();
+        }
+    }
+
+    fn watch(topic: Option<&str>) -> bool {
+        Live::get().is_some_and(|live| live.watch(topic))
+    }
+
+    fn take_seen(into: &mut [u8]) -> Option<Seen> {
+        Live::get()?.take_seen(into)
+    }
+
+    fn extra() -> Extra {
+        [&PARAMETERS, &TOPICS].map(|once| once.get().copied())
+    }
+}
+
+/// Reports whether a run goes on that does not end by itself.
+fn is_endless() -> bool {
+    let has_end = |live: Live| {
+        live.task_set()
+            .dags()
+            .iter()
+            .all(|dag| dag.jobs().is_some())
+    };
+    !IS_SHUT_DOWN.load(Ordering::Relaxed) && !Live::get().is_none_or(has_end)
+}
+
+/// Lets people look at topics.
+pub(crate) fn show_topics() {
+    static ALL: Topics<LinuxRun> = Topics::new();
+    TOPICS.get_or_init(|| &ALL);
+}
+
+/// Talks, from another thread, as long as `run` takes. Reports whether the person has ended it.
+pub(crate) fn talk_during<R>(run: impl FnOnce() -> R) -> (R, bool) {
+    INPUT.get_or_init(|| {
+        let (bytes, input) = channel();
+        thread::spawn(move || {
+            let all = BufReader::new(io::stdin()).bytes().map_while(Result::ok);
+            // The last line may lack its end.
+            for byte in all.chain(*b"\n") {
+                if bytes.send(byte).is_err() {
+                    break;
+                }
+            }
+        });
+        Mutex::new(input)
+    });
+    IS_SHUT_DOWN.store(false, Ordering::Relaxed);
+    let is_over = AtomicBool::new(false);
+    let result = thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut session = Session::<LinuxRun>::new(false);
+            let mut is_raised = false;
+            while !is_over.load(Ordering::Acquire) {
+                if let Some(live) = Live::get().filter(|_| !is_raised) {
+                    live.raise();
+                    is_raised = true;
+                }
+                while session.slice() {}
+                thread::sleep(Duration::from_nanos(PERIOD_NS));
+            }
+        });
+        let result = run();
+        is_over.store(true, Ordering::Release);
+        result
+    });
+    (result, IS_SHUT_DOWN.load(Ordering::Relaxed))
+}
