@@ -14,7 +14,31 @@ pub mod guide;
 pub mod markdown;
 pub mod stick;
 
+use std::process::Command;
+
+use tool::protocol::Transcript;
+use tool::system;
+
 pub use guest::Guest;
+
+/// Runs an app by `./scripts/run` with these words, wherever they say, and returns what it said.
+///
+/// # Panics
+///
+/// Panics if it ends in a failure.
+#[must_use]
+pub fn run(app: &str, words: &[&str]) -> Transcript {
+    let mut command = Command::new(system::workspace().join("scripts/run"));
+    let output = command.args(["--app", app]).args(words).output();
+    let output = output.expect("the command can be run");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        output.status.success(),
+        "{said}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    Transcript::read(&said)
+}
 
 /// The guide's examples, compiled and run.
 #[cfg(doctest)]

@@ -36,16 +36,30 @@ fn a_camera_that_is_too_slow_skips_frames_and_the_control_loop_keeps_its_deadlin
 }
 
 #[test]
-fn when_the_camera_fails_the_drone_is_sent_down_and_stays_under_control() {
-    let guest = Guest::new("drone").cores(2);
-    let outcome = guest.word("seconds=2").word("fault_at=30").succeed();
-    assert_eq!(outcome.transcript.of_kind("fault").count(), 1);
-    let line = outcome.transcript.of_kind("drone").next();
-    let line = line.expect("the app's line");
-    let number = |name: &str| line.number_at(name).expect(name);
-    assert_eq!(number("landed"), 1, "{}", line.text);
-    assert!(number("descents") >= 5, "{}", line.text);
-    assert_eq!(number("attitude_misses"), 0, "{}", line.text);
+fn a_camera_that_fails_costs_a_frame_within_its_limit_and_beyond_it_the_drone_is_sent_down() {
+    for place in ["linux", "machine"] {
+        for (survived, costs) in [(0, ["dag"].as_slice()), (1, &["job"]), (1, &["job", "dag"])] {
+            let seconds = 2 * costs.len();
+            let words = format!("seconds={seconds} fault_at=30 survived={survived}");
+            let transcript = harness::run(
+                "drone",
+                &["--on", place, "--cores", "2", "--append", &words],
+            );
+            let faults = transcript.of_kind("fault");
+            let found: Vec<_> = faults.filter_map(|line| line.text_at("cost")).collect();
+            assert_eq!(found, costs, "{place}: {words}");
+            let line = transcript.of_kind("drone").next();
+            let line = line.expect("the app's line");
+            let number = |name: &str| line.number_at(name).expect(name);
+            let lands = costs.contains(&"dag");
+            assert_eq!(number("landed"), u64::from(lands), "{place}: {}", line.text);
+            assert_eq!(number("descents") >= 5, lands, "{place}: {}", line.text);
+            assert_eq!(number("violations"), 0, "{place}: {}", line.text);
+            if place == "machine" {
+                assert_eq!(number("attitude_misses"), 0, "{}", line.text);
+            }
+        }
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use alloc::vec;
 use core::time::Duration;
 
 use common::random::Random;
-use fass::{Dag, Entrance, Latest, Mode, Modes, Occupation, OverrunPolicy, Parameter};
+use fass::{Dag, Entrance, FaultLimit, Latest, Mode, Modes, Occupation, OverrunPolicy, Parameter};
 use fass::{Raiser, Sample, Signal, SubtaskAttributes, create_dag, execute_for};
 use maths::{acos, sqrt};
 
@@ -199,20 +199,33 @@ impl Workload {
 
         // Beyond its WCET, frames are skipped; beyond its budget the camera is at fault.
         let slow = taking("detect").budget(Duration::from_millis(100));
-        let mut frame = 0;
-        let find = move |(image,): (Image,)| {
-            self.spend("detect");
-            assert!(
-                self.fault_at != Some(frame),
-                "the camera fails, as was asked for"
-            );
-            frame += 1;
-            if !self.delay.is_zero() {
-                execute_for(self.delay, Occupation::Hold);
+        // Made anew, it counts its frames anew, and fails again when it has seen so many.
+        let make = move || {
+            let mut frame = 0;
+            move |(image,): (Image,)| {
+                self.spend("detect");
+                assert!(
+                    self.fault_at != Some(frame),
+                    "the camera fails, as was asked for"
+                );
+                frame += 1;
+                if !self.delay.is_zero() {
+                    execute_for(self.delay, Occupation::Hold);
+                }
+                (detect(&image),)
             }
-            (detect(&image),)
         };
-        dag.register_subtask(find, vec!["image"], vec!["beacon"], slow);
+        if self.survived > 0 {
+            dag.survive_faults(FaultLimit {
+                faults: 1,
+                window: 30,
+                in_all: self.survived,
+            });
+            dag.restarting(make)
+                .register_subtask(vec!["image"], vec!["beacon"], slow);
+        } else {
+            dag.register_subtask(make(), vec!["image"], vec!["beacon"], slow);
+        }
 
         let flight = flight.clone();
         let mut fix: Option<Fix> = None;

@@ -64,6 +64,8 @@ pub struct Workload {
     pub takes_wcet: bool,
     /// What `detect` takes longer than that, as it must not; zero in a sound flight.
     pub delay: Duration,
-    /// The frame in which `detect` panics; `None` in a sound flight.
+    /// After how many frames `detect` panics; `None` in a sound flight.
     pub fault_at: Option<u64>,
+    /// How many such faults cost a frame each, before one brings the drone down.
+    pub survived: u32,
 }

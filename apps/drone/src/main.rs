@@ -22,12 +22,14 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
     let delay_us = options.number("delay_us", 0..=1_000_000, 0)?;
     let fault_at = options.number("fault_at", 0..=1_000_000, 0)?;
+    let survived = options.number("survived", 0..=1000, 0)?;
     let workload = Workload {
         seconds,
         seed,
         takes_wcet: false,
         delay: Duration::from_micros(delay_us),
         fault_at: (fault_at > 0).then_some(fault_at),
+        survived: u32::try_from(survived).unwrap_or(u32::MAX),
     };
     if fault_at > 0 {
         machine.accept_faults();
@@ -38,7 +40,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 
     let system = workload.build();
     machine.offer(&[&system.reserve])?;
-    options.finish(&["seconds", "seed", "delay_us", "fault_at"])?;
+    options.finish(&["seconds", "seed", "delay_us", "fault_at", "survived"])?;
     let commit = finish_create_dags(&system.dags)?;
     for answer in commit.answers() {
         println!("{answer}");

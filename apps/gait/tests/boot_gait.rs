@@ -10,7 +10,6 @@ use fass::{Policy, finish_create_dags};
 use gait::build;
 use harness::Guest;
 use support::{File, walk};
-use tool::protocol::Transcript;
 use tool::{recordings, system};
 use virtual_time::VirtualTime;
 
@@ -95,15 +94,10 @@ fn a_walk_that_linux_recorded_is_replayed_on_linux_on_the_machine_and_on_the_hos
     let file = File::of(&table.to_string_lossy());
     let [recorded, module] = [&run, &file.0].map(|path| path.to_string_lossy().into_owned());
     let digest = |words: &str| {
-        let mut command = Command::new(system::workspace().join("scripts/run"));
-        command.args(["--app", "gait", "--module", &module]);
-        let output = command.args(words.split_whitespace()).output();
-        let said = output.expect("the command can be run").stdout;
-        let transcript = Transcript::read(&String::from_utf8_lossy(&said));
-        let number = |kind, name| {
-            let line = transcript.of_kind(kind).next()?;
-            line.number_at(name)
-        };
+        let words = words.split_whitespace();
+        let words: Vec<&str> = words.chain(["--module", &module]).collect();
+        let transcript = harness::run("gait", &words);
+        let number = |kind, name| transcript.of_kind(kind).next()?.number_at(name);
         let compared = number("replayed", "compared");
         (number("gait", "digest").expect("the app's line"), compared)
     };

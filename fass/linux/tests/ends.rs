@@ -113,7 +113,12 @@ fn a_stranger_is_told_what_it_may_not() {
             use std::os::unix::fs::MetadataExt as _;
             own.uid() == 0
         }) {
-            fs::copy(std::env::current_exe().expect("it is there"), &copy).expect("it fits");
+            // Written by a program of its own: a child that another test starts meanwhile would hold
+            // the file open, and what is open to be written cannot be started.
+            let mut cp = Command::new("cp");
+            cp.arg(std::env::current_exe().expect("it is there"));
+            let copied = cp.arg(&copy).status().expect("`cp` is there");
+            assert!(copied.success(), "it fits");
             *command = Command::new(&copy);
             command
                 .args(["--exact", "part", "--nocapture"])

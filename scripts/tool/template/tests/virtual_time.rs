@@ -9,13 +9,15 @@ fn every_job_is_in_time_and_within_its_bound() {
     let machine = VirtualTime::new().cores(2).policy(Policy::Edf);
     let dag = app_template::build(200);
     let commit = finish_create_dags(&[dag]).expect("the DAG is sound");
-    let bound = commit.answer("app-template").verdict.bound().expect("it is proven");
+    let answer = commit.answer("app-template");
+    let bound = answer.verdict.bound().expect("it is proven");
     assert!(bound <= app_template::PERIOD);
 
     let report = machine.run();
     assert_eq!(report.violations(), []);
     let ran = report.dag("app-template");
-    assert_eq!((ran.statistics().completed, ran.statistics().misses), (200, 0));
+    let counts = ran.statistics();
+    assert_eq!((counts.completed, counts.misses), (200, 0));
     for job in ran.jobs() {
         let response_time_ns = job.response_time_ns().expect("it is complete");
         assert!(u128::from(response_time_ns) <= bound.as_nanos());
