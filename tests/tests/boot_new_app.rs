@@ -92,15 +92,12 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
     golden.assert_is(&excerpt(&documented, &said, shown));
 
     // The same lines on Linux, whatever it takes there. Without preemption the bound is another.
-    let said = cargo(
-        &app,
-        "run --profile linux --example first-steps-linux -- jobs=20",
-    );
+    let said = cargo(&app, "run --quiet -- --on linux --jobs 20");
     assert!(said.contains("takes at most"), "{said}");
     let complete = "20 jobs complete, ";
     assert!(said.lines().any(|line| line.contains(complete)), "{said}");
     assert!(
-        said.ends_with("{\"kind\":\"verdict\",\"status\":\"success\"}\n"),
+        said.contains("{\"kind\":\"verdict\",\"status\":\"success\"}\n"),
         "{said}"
     );
 
@@ -116,10 +113,17 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
 fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
     let app = repository("replayed", NAME);
     let file = app.join("run.rec").display().to_string();
-    cargo(
-        &app,
-        &format!("run -- --mode deterministic --record {file}"),
-    );
+    let record = format!("run -- --mode deterministic --record {file}");
+    cargo(&app, &record);
+    let there = app.join("linux.rec").display().to_string();
+    let said = cargo(&app, &format!("run -- --on linux --record {there}"));
+    assert!(said.contains("on Linux, "), "{said}");
+    // What either has recorded, the other repeats.
+    for (place, file) in [("--on linux", &file), ("--mode deterministic", &there)] {
+        let said = cargo(&app, &format!("run -- {place} --replay {file}"));
+        let replayed = "\"kind\":\"replayed\",\"compared\":0,\"uncompared\":0";
+        assert!(said.contains(replayed), "{place}: {said}");
+    }
     let replay = format!("run --example replay -- {file}");
     let said = cargo(&app, &replay);
     assert_eq!(said, "0 values are compared: nothing differs\n");
@@ -133,11 +137,6 @@ fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
     fs::write(&library, careless).expect("it is ours");
     for (words, code, says) in [
         ("", 1, "`cargo run --profile host --example replay -- "),
-        (
-            " --on linux",
-            2,
-            "`cargo run --profile linux --example first-steps-linux`",
-        ),
         (" --prove --seeds 2", 1, "leave `--seeds` out"),
     ] {
         let output = try_cargo(&app, &format!("run -- --mode deterministic{words}"));

@@ -122,6 +122,26 @@ pub fn check_file(path: &Path) -> Result<Option<String>, String> {
     })
 }
 
+/// Makes sure that a file may be an app's program for Linux, and returns the app's name.
+///
+/// # Errors
+///
+/// As of [`check_file`].
+pub fn check_linux_file(path: &Path) -> Result<Option<String>, String> {
+    let name = path
+        .file_name()
+        .and_then(|name| name.to_str()?.strip_suffix("-linux"));
+    let is_image = |bytes: Vec<u8>| elf::check_bootable(&bytes).is_ok();
+    match (name, files::read(path).map(is_image)?) {
+        (Some(app), false) => Ok(Some(app.into())),
+        _ => Err(
+            "is no app's program for Linux; name what `cargo build --profile linux -p APP \
+                  --example APP-linux` leaves in target/linux/examples, or give --app instead"
+                .into(),
+        ),
+    }
+}
+
 /// How an image is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {
@@ -151,7 +171,7 @@ pub fn build_by(package: &str, profile: Profile) -> Result<Image, ImageError> {
         Profile::Release => "release",
         Profile::Gdb => "gdb",
     };
-    build_target(package, profile, ["--bin", package])
+    build_target(package, profile, ["--bin", package], None)
 }
 
 /// Makes sure that an app has a program for Linux.
@@ -181,13 +201,14 @@ fn linux_name(app: &str) -> String {
     format!("{app}-linux")
 }
 
-/// Builds an app's program for Linux, as [`build`] does its image.
+/// Builds an app's program for Linux, as [`build`] does its image. A folder is that of a package
+/// elsewhere.
 ///
 /// # Errors
 ///
 /// Cargo failed, or the package has no such program.
-pub fn build_linux(app: &str) -> Result<Image, ImageError> {
-    build_target(app, "linux", ["--example", &linux_name(app)])
+pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<Image, ImageError> {
+    build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
 /// How a whole image is compiled beyond what a profile can say, for size: it lies where the linker
@@ -203,7 +224,12 @@ const FOR_IMAGES: [&str; 4] = [
 const PLACED_BY_FIRMWARE: &str = "boot-efi";
 
 /// Builds one target of a package, of a kind and a name.
-fn build_target(package: &str, profile: &str, target: [&str; 2]) -> Result<Image, ImageError> {
+fn build_target(
+    package: &str,
+    profile: &str,
+    target: [&str; 2],
+    folder: Option<&Path>,
+) -> Result<Image, ImageError> {
     let [kind, name] = target;
     let (verb, flags) = match kind {
         "--bin" if package != PLACED_BY_FIRMWARE => ("rustc", &FOR_IMAGES[..]),
@@ -211,6 +237,7 @@ fn build_target(package: &str, profile: &str, target: [&str; 2]) -> Result<Image
     };
     let failed = |why: String| ImageError::Build(format!("cannot build `{name}`: {why}"));
     let mut command = system::cargo();
+    folder.map(|folder| command.current_dir(folder));
     command
         .args([verb, "--profile", profile, "--quiet", "-p", package])
         .args(target);

@@ -85,7 +85,7 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
                 Some(url) => Source::Git(url),
                 None => Source::Folder(system::workspace()),
             };
-            create_repository(out, name, source).map(|()| repository::next_steps(out, name, source))
+            create_repository(out, name, source).map(|()| repository::next_steps(out, source))
         }
     };
     match made {

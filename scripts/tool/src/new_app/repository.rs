@@ -121,7 +121,7 @@ fn from_git(url: &str) -> Box<dyn Fn(&str) -> String> {
 }
 
 /// Says what to do in the repository.
-pub(super) fn next_steps(out: &Path, name: &str, source: Source<'_>) -> String {
+pub(super) fn next_steps(out: &Path, source: Source<'_>) -> String {
     let install = match source {
         Source::Folder(_) => String::new(),
         Source::Git(url) => {
@@ -138,7 +138,7 @@ pub(super) fn next_steps(out: &Path, name: &str, source: Source<'_>) -> String {
 {install}cd {}
 cargo run               # boots it in QEMU
 cargo test              # tests it on the host
-cargo run --profile linux --example {name}-linux   # runs it on Linux, docs/linux.md
+cargo run -- --on linux # runs it on Linux, docs/linux.md
 git init                # docs/guide.md goes on from here
 ",
         out.display(),

@@ -2,12 +2,14 @@
 //!
 //! Cargo hands each program that it would start to a *runner*, images and tests alike. Here an
 //! image is booted, as by `run --image`; any other program takes this process over, so that it
-//! has its words, its streams and its exit code.
+//! has its words, its streams and its exit code. With `--on linux`, or `--on debian`, what runs is
+//! the app's program for Linux, which cargo builds first.
 
+use std::env;
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::process::CommandExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{self, ExitCode};
 
 use super::{RUN, on_linux, run};
@@ -49,11 +51,10 @@ pub fn boot(words: &[OsString]) -> ExitCode {
         if let Ok(Request::Work(options)) = RUN.parse(rest)
             && on_linux::is_asked_for(&options)
         {
-            return BOOT.refuse(&format!(
-                "`--on`: an image is for the bare machine; on Linux the app is another program: \
-                 `cargo run --profile linux --example {}-linux`",
-                app.as_deref().unwrap_or("NAME")
-            ));
+            return match for_linux(app.as_deref()) {
+                Ok(program) => run(&[&["--image".into(), program.into()], rest].concat()),
+                Err(why) => BOOT.fail(&why),
+            };
         }
         return run(&[&["--image".into(), file.clone()], rest].concat());
     }
@@ -62,4 +63,17 @@ pub fn boot(words: &[OsString]) -> ExitCode {
         "cannot start {}: {error}",
         files::place(Path::new(file))
     ))
+}
+
+/// Builds the program for Linux of the package whose image cargo has built.
+fn for_linux(app: Option<&str>) -> Result<PathBuf, String> {
+    // `scripts/tool/start` sets the former; without it cargo's own word is of that package.
+    let names = ["TOOL_PACKAGE", "CARGO_MANIFEST_DIR"];
+    let folder = names.into_iter().find_map(env::var_os);
+    let package = app.zip(folder.filter(|folder| !folder.is_empty()));
+    let (app, folder) = package.ok_or(
+        "`--on`: which package is the image of? say `cargo run -- --on linux` in the app's folder",
+    )?;
+    let built = image::build_linux(app, Some(Path::new(&folder)));
+    Ok(built.map_err(|error| error.to_string())?.path)
 }

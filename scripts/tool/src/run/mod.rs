@@ -255,8 +255,11 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
         return Ok(app.into());
     };
     let place = files::place(path);
-    let of_image = image::check_file(path)
-        .map_err(|why| Refusal::Usage(format!("`--image {place}`: {why}")))?;
+    let checked = match on_linux::is_asked_for(options) {
+        true => image::check_linux_file(path),
+        false => image::check_file(path),
+    };
+    let of_image = checked.map_err(|why| Refusal::Usage(format!("`--image {place}`: {why}")))?;
     let wanted = (is_dag_file || options.is_given("app")).then_some(app);
     match (of_image, wanted) {
         (Some(own), Some(wanted)) if own != wanted => Err(Refusal::Usage(format!(

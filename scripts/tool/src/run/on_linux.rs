@@ -20,9 +20,7 @@ use super::recording::Recorded;
 use super::screen::Screen;
 
 /// The options that are about QEMU, its guest, or what the kernel alone does.
-const FOREIGN: [&str; 7] = [
-    "boot", "gdb", "image", "latest", "machine", "memory", "qemu",
-];
+const FOREIGN: [&str; 6] = ["boot", "gdb", "latest", "machine", "memory", "qemu"];
 
 /// Those of the rest that a guest has no way for, and those that only a guest has.
 const NOT_IN_GUEST: [&str; 5] = ["console", "input", "output", "record", "replay"];
@@ -92,7 +90,10 @@ pub(super) fn run_app(
     mut dags: Option<&mut Prepared>,
     shows: bool,
 ) -> Result<Booted, Refusal> {
-    image::check_linux(app).map_err(Refusal::Usage)?;
+    let given = options.path("image");
+    if given.is_none() {
+        image::check_linux(app).map_err(Refusal::Usage)?;
+    }
     let handed = Handed::read(options, dags.is_none())?;
     if let Some(dags) = dags.as_deref_mut() {
         dags.write_module(handed.text()).map_err(Refusal::Failure)?;
@@ -117,14 +118,20 @@ pub(super) fn run_app(
         }
     }
     let log = Log::choose(options, app).map_err(Refusal::Failure)?;
-    let built = image::build_linux(app);
-    let image = built.map_err(|error| Refusal::Failure(error.to_string()))?;
-    let mut screen = Screen::new(options, &image.path);
+    let image = match given {
+        Some(path) => path.into(),
+        None => {
+            let built = image::build_linux(app, None);
+            let built = built.map_err(|error| Refusal::Failure(error.to_string()))?;
+            built.path
+        }
+    };
+    let mut screen = Screen::new(options, &image);
     let mode = options.text("mode").and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let guest = is_in_guest(options).then(|| {
         let order = Order {
-            program: &image.path,
+            program: &image,
             words: &words,
             with_policy: options.text("mechanism") == Some("sched_ext"),
             busy: options.number("busy").unwrap_or(0),
@@ -149,7 +156,7 @@ pub(super) fn run_app(
     };
     let limit = limit(options, dags);
     let order = program::Order {
-        program: &image.path,
+        program: &image,
         words: &words,
         is_live: wire::is_live(options) || options.is_given("console"),
         stops: true,

@@ -151,7 +151,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "quiet" 'q': Takes::Nothing;
         /// Wait for a debugger on TCP port 1234; no timeout.
         "gdb": Takes::Nothing;
-        /// Boot this image; build nothing.
+        /// Boot this image, or start this program for Linux; build nothing.
         "image": Takes::File("FILE");
         /// Use this QEMU; install nothing.
         "qemu": Takes::File("PROGRAM");

@@ -50,7 +50,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 /// Measures what is not there yet, and writes all results.
 fn measure_all(plan: &Plan) -> Result<(), String> {
     let built = match plan.on_linux {
-        true => image::build_linux("join-latency"),
+        true => image::build_linux("join-latency", None),
         false => {
             install::ensure_qemu()?;
             image::build("join-latency")
