@@ -1,7 +1,5 @@
 //! The suite of scenarios on the machine: those for as many cores as it has.
 
-use alloc::vec::Vec;
-
 use kernel::{Ending, Machine, json};
 use scenarios::Scenario;
 
@@ -10,9 +8,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();
     machine.accept_exceeded_bounds();
-    let read = |(_, text): &(_, &str)| Scenario::read_all(text).map_err(Ending::Failure);
-    let all = scenarios::SUITE.iter().map(read);
-    let all = all.collect::<Result<Vec<_>, _>>()?.into_iter().flatten();
+    let all = Scenario::suite().map_err(Ending::Failure)?.into_iter();
     for scenario in all.filter(|scenario| scenario.cores == machine.cores()) {
         machine.configure(scenario.policy, scenario.preemption);
         machine.divide(&scenario.clusters);

@@ -64,6 +64,9 @@ pub const SUITE: &[(&str, &str)] = &[
     ("sharing", include_str!("../sharing.txt")),
 ];
 
+/// The DAG that runs next to a scenario in a cluster.
+const BYSTANDER: &str = "bystander";
+
 /// A run as it is stated.
 #[derive(Clone, Debug)]
 pub struct Scenario {
@@ -114,6 +117,43 @@ impl Scenario {
             }
         }
         Ok(all)
+    }
+
+    /// Returns the scenarios of the suite, and of each that is undivided how it is [in a
+    /// cluster](Self::in_a_cluster).
+    ///
+    /// # Errors
+    ///
+    /// As [`read_all`](Self::read_all).
+    pub fn suite() -> Result<Vec<Self>, String> {
+        let mut all = vec![];
+        for (_, text) in SUITE {
+            for scenario in Self::read_all(text)? {
+                if scenario.dags.iter().all(|dag| dag.cluster.is_none()) {
+                    all.push(scenario.in_a_cluster()?);
+                }
+                all.push(scenario);
+            }
+        }
+        Ok(all)
+    }
+
+    /// Returns the scenario on a cluster of its own, next to one whose DAG neither disturbs it nor
+    /// is disturbed.
+    fn in_a_cluster(&self) -> Result<Self, String> {
+        let mut divided = self.clone();
+        divided.title += " (in a cluster)";
+        divided.clusters = vec![self.cores, 1];
+        divided.cores += 1;
+        for dag in &mut divided.dags {
+            dag.cluster = Some(0);
+        }
+        divided.take(&format!("dag {BYSTANDER} period 2 jobs 1 cluster 1"))?;
+        divided.take(&format!(" {BYSTANDER} 1"))?;
+        if self.refused.is_empty() {
+            divided.take(&format!("everywhere {BYSTANDER}: completed=1"))?;
+        }
+        Ok(divided)
     }
 
     fn new(title: &str) -> Self {
