@@ -1,20 +1,55 @@
-//! The suite of scenarios on the machine, by counts.
+//! The suite of scenarios on the machine, and by what only a guest's Linux has: by counts.
+
+use std::collections::BTreeSet;
 
 use harness::Guest;
 use scenarios::Scenario;
+use tool::image;
+use tool::protocol::Transcript;
 
-#[test]
-fn each_scenario_is_as_it_says() {
-    let mut ran = 0;
+/// Runs those for 1 to 5 cores, which are all.
+fn run(mut run: impl FnMut(u64) -> Transcript) {
+    let mut ran = BTreeSet::new();
     for cores in 1..=5 {
-        let guest = Guest::new("guest-tests").word("test=scenarios");
-        let outcome = guest.cores(cores).succeed();
-        for line in outcome.transcript.of_kind("scenario") {
-            ran += 1;
+        for line in run(cores).of_kind("scenario") {
             let [title, wrong] = ["title", "wrong"].map(|name| line.text_at(name));
             assert_eq!(wrong, Some(""), "{title:?} on {cores} cores");
+            ran.extend(title.map(str::to_owned));
         }
     }
     let stated = Scenario::suite().expect("scenarios");
-    assert_eq!(ran, stated.len(), "each scenario ran");
+    let stated: BTreeSet<_> = stated.into_iter().map(|scenario| scenario.title).collect();
+    assert_eq!(ran, stated);
+}
+
+#[test]
+fn each_scenario_is_as_it_says() {
+    run(|cores| {
+        let guest = Guest::new("guest-tests").word("test=scenarios");
+        guest.cores(cores).succeed().transcript
+    });
+}
+
+#[test]
+#[ignore = "fetches 145 MB of Debian's; `cargo test -p harness --test boot_scenarios -- --ignored` runs it"]
+fn on_debians_linux_each_scenario_is_as_it_says_by_both_mechanisms() {
+    let program = image::build_linux("guest-tests", None).expect("it is built");
+    let program = program.path.to_string_lossy();
+    for mechanism in ["fifo", "sched_ext"] {
+        run(|cores| {
+            let cores = cores.to_string();
+            let words = [
+                "--on",
+                "debian",
+                "--mechanism",
+                mechanism,
+                "--cores",
+                &cores,
+            ];
+            harness::run(
+                "guest-tests",
+                &[&words[..], &["--image", &program]].concat(),
+            )
+        });
+    }
 }
