@@ -81,3 +81,14 @@ fn a_reserve_that_is_set_at_boot_sends_it_down_early_in_the_mode_of_the_landing(
         .collect();
     assert_eq!(modes, [0, 1]);
 }
+
+#[test]
+fn a_reserve_that_is_set_on_linux_sends_it_down_early() {
+    let words = "seconds=2 set=reserve=95";
+    let transcript = harness::run("drone", &["--on", "linux", "--append", words]);
+    let line = transcript.of_kind("drone").next();
+    let line = line.expect("the app's line");
+    let number = |name: &str| line.number_at(name).expect(name);
+    assert_eq!(number("landed"), 1, "{}", line.text);
+    assert_eq!(number("violations"), 0, "{}", line.text);
+}

@@ -102,7 +102,12 @@ fn a_walk_that_linux_recorded_is_replayed_on_linux_on_the_machine_and_on_the_hos
         (number("gait", "digest").expect("the app's line"), compared)
     };
     let (wanted, _) = digest(&format!("--on linux --cores 2 --record {recorded}"));
-    for place in ["--on linux --cores 1", "--cores 1", "--cores 4"] {
+    for place in [
+        "--on linux --cores 1",
+        "--on linux --mechanism poll",
+        "--cores 1",
+        "--cores 4",
+    ] {
         let found = digest(&format!("{place} --replay {recorded}"));
         assert_eq!(found, (wanted, Some(480)), "{place}");
     }
@@ -121,9 +126,16 @@ fn a_walk_that_linux_recorded_is_replayed_on_linux_on_the_machine_and_on_the_hos
 /// A person looks at a walk on Linux, and ends it.
 #[test]
 fn a_console_on_linux_shows_topics() {
+    for mechanism in ["fifo", "poll"] {
+        talk(mechanism);
+    }
+}
+
+fn talk(mechanism: &str) {
     let file = File::new();
     let mut command = Command::new(system::workspace().join("scripts/run"));
-    command.args(["--app", "gait", "--on", "linux", "--console", "--module"]);
+    command.args("--app gait --on linux --console --mechanism".split(' '));
+    command.args([mechanism, "--module"]);
     let child = command
         .arg(&file.0)
         .stdin(Stdio::piped())

@@ -100,41 +100,43 @@ fn s1_signals_come_from_other_threads_and_from_files() {
 
 #[test]
 fn a_dag_is_paused_resumed_and_stopped_from_outside() {
-    let alone = alone(1, Mechanism::Fifo);
-    let endless = create_dag();
-    endless
-        .name("endless")
-        .period(ms(1))
-        .relative_deadline(ms(1));
-    let ticks = Arc::new(AtomicU64::new(0));
-    let count = Arc::clone(&ticks);
-    let function = move |_job| {
-        count.fetch_add(1, Relaxed);
-    };
-    endless.register_untyped_subtask(function, SubtaskAttributes::named("tick"));
-    finish_create_dags(&[endless]).unwrap();
-    let control = alone.machine.control().unwrap();
-    std::thread::spawn(move || {
-        let wait_for = |more: u64| {
-            let until = ticks.load(Relaxed) + more;
-            while ticks.load(Relaxed) < until {
-                std::thread::sleep(ms(1));
-            }
+    for mechanism in ALL {
+        let alone = alone(1, mechanism);
+        let endless = create_dag();
+        endless
+            .name("endless")
+            .period(ms(1))
+            .relative_deadline(ms(1));
+        let ticks = Arc::new(AtomicU64::new(0));
+        let count = Arc::clone(&ticks);
+        let function = move |_job| {
+            count.fetch_add(1, Relaxed);
         };
-        wait_for(3);
-        control.pause("endless");
-        std::thread::sleep(ms(20));
-        control.resume("endless");
-        wait_for(3);
-        control.stop("endless");
-    });
-    let run = alone.machine.run().unwrap();
-    assert_eq!(run.violations().count(), 0);
-    let statistics = run.statistics("endless");
-    assert!(
-        statistics.skips > 0 && statistics.completed >= 6,
-        "{statistics:?}"
-    );
+        endless.register_untyped_subtask(function, SubtaskAttributes::named("tick"));
+        finish_create_dags(&[endless]).unwrap();
+        let control = alone.machine.control().unwrap();
+        std::thread::spawn(move || {
+            let wait_for = |more: u64| {
+                let until = ticks.load(Relaxed) + more;
+                while ticks.load(Relaxed) < until {
+                    std::thread::sleep(ms(1));
+                }
+            };
+            wait_for(3);
+            control.pause("endless");
+            std::thread::sleep(ms(20));
+            control.resume("endless");
+            wait_for(3);
+            control.stop("endless");
+        });
+        let run = alone.machine.run().unwrap();
+        assert_eq!(run.violations().count(), 0);
+        let statistics = run.statistics("endless");
+        assert!(
+            statistics.skips > 0 && statistics.completed >= 6,
+            "{statistics:?}"
+        );
+    }
 }
 
 #[test]

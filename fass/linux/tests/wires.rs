@@ -10,7 +10,7 @@ use fass::{
     Dag, Received, Sender, SubtaskAttributes, Wire, WireOptions, create_dag, finish_create_dags,
 };
 use linux::Mechanism;
-use support::{alone, ms};
+use support::{ALL, alone, ms};
 
 fn number(line: &[u8]) -> Option<u64> {
     str::from_utf8(line).ok()?.parse().ok()
@@ -36,39 +36,41 @@ fn receive(numbers: Received<'_, u64>) -> (Vec<u64>,) {
 
 #[test]
 fn each_packet_is_answered_once_and_in_order() {
-    let alone = alone(2, Mechanism::Normal);
-    let (wire, dag) = (Wire::new("squares"), create_dag());
-    dag.jobs(3);
-    let attributes = SubtaskAttributes::named("receive");
-    let _raised = (dag.using(wire.receiving(number))).register_sporadic_subtask(
-        receive,
-        vec!["numbers"],
-        ms(1),
-        attributes,
-    );
-    answer(&dag, &wire);
-    finish_create_dags(std::slice::from_ref(&dag)).expect("it is sound");
-    let (input, mut questions) = io::pipe().expect("a pipe");
-    let (answers, output) = io::pipe().expect("a pipe");
-    let connection = alone
-        .machine
-        .connect(&wire, input, output)
-        .expect("threads");
-    // The next question comes when the answer is there, so each has a job.
-    let asker = thread::spawn(move || {
-        let mut answers = BufReader::new(answers).lines();
-        for question in [7_u64, 8, 9] {
-            writeln!(questions, "{question}").expect("it is read");
-            let answer = answers.next().expect("there is one").expect("it is text");
-            assert_eq!(answer, (question * question).to_string());
-        }
-    });
-    let run = alone.machine.run().expect("it is committed");
-    drop(connection);
-    asker.join().expect("all answers are right");
-    assert_eq!(run.statistics(&dag).completed, 3);
-    assert_eq!(run.violations().count(), 0);
-    assert_eq!((wire.counts().packets, wire.counts().sent_bytes), (3, 9));
+    for mechanism in ALL {
+        let alone = alone(2, mechanism);
+        let (wire, dag) = (Wire::new("squares"), create_dag());
+        dag.jobs(3);
+        let attributes = SubtaskAttributes::named("receive");
+        let _raised = (dag.using(wire.receiving(number))).register_sporadic_subtask(
+            receive,
+            vec!["numbers"],
+            ms(1),
+            attributes,
+        );
+        answer(&dag, &wire);
+        finish_create_dags(std::slice::from_ref(&dag)).expect("it is sound");
+        let (input, mut questions) = io::pipe().expect("a pipe");
+        let (answers, output) = io::pipe().expect("a pipe");
+        let connection = alone
+            .machine
+            .connect(&wire, input, output)
+            .expect("threads");
+        // The next question comes when the answer is there, so each has a job.
+        let asker = thread::spawn(move || {
+            let mut answers = BufReader::new(answers).lines();
+            for question in [7_u64, 8, 9] {
+                writeln!(questions, "{question}").expect("it is read");
+                let answer = answers.next().expect("there is one").expect("it is text");
+                assert_eq!(answer, (question * question).to_string());
+            }
+        });
+        let run = alone.machine.run().expect("it is committed");
+        drop(connection);
+        asker.join().expect("all answers are right");
+        assert_eq!(run.statistics(&dag).completed, 3);
+        assert_eq!(run.violations().count(), 0);
+        assert_eq!((wire.counts().packets, wire.counts().sent_bytes), (3, 9));
+    }
 }
 
 #[test]

@@ -119,8 +119,8 @@ impl Scenario {
         Ok(all)
     }
 
-    /// Returns the scenarios of the suite, and of each that is undivided how it is [in a
-    /// cluster](Self::in_a_cluster).
+    /// Returns the scenarios of the suite, and each that is undivided in a cluster next to
+    /// another one, too.
     ///
     /// # Errors
     ///

@@ -40,7 +40,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// has.
         "cores": Takes::number(1..=MOST_CORES), or "8";
         /// On Linux: what carries the order out, see docs/linux.md; fifo if nothing is said.
-        "mechanism": Takes::OneOf(&["fifo", "sched_ext", "normal"]);
+        "mechanism": Takes::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
         /// With --on debian: so many programs compute next to it.
         "busy": Takes::number(0..=64);
         /// Jobs that each DAG releases; the default is 200 for fork-join, 50 for --dag; 0, for
