@@ -6,14 +6,15 @@ use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::thread;
 
-use fass::{FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
-use linux::Mechanism;
-use support::{ALL, alone, ms, ticking};
+use fass::{FaultLimit, Parameter, SubtaskAttributes, create_dag, finish_create_dags};
+use linux::{Live, Mechanism};
+use support::{alone, mechanisms, ms, ticking};
 
 #[test]
 fn a_fault_costs_a_job_and_the_dag_goes_on() {
-    for mechanism in ALL {
+    for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
         let dag = create_dag();
         dag.name("camera").jobs(100).relative_deadline(ms(2));
@@ -41,7 +42,7 @@ fn a_fault_costs_a_job_and_the_dag_goes_on() {
 
 #[test]
 fn an_endless_function_loses_its_core_after_its_budget() {
-    for mechanism in ALL {
+    for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
         let may_end = Arc::new(AtomicBool::new(false));
         let endless = create_dag();
@@ -85,7 +86,7 @@ fn s1_signals_come_from_other_threads_and_from_files() {
     finish_create_dags(&[dag]).unwrap();
     alone.machine.raise_on_input(&signal, &far).unwrap();
     let (first, of_thread) = (Arc::clone(&heard), signal.clone());
-    std::thread::spawn(move || {
+    thread::spawn(move || {
         near.write_all(b"x").unwrap();
         while first.load(Relaxed) == 0 {
             std::thread::yield_now();
@@ -100,7 +101,7 @@ fn s1_signals_come_from_other_threads_and_from_files() {
 
 #[test]
 fn a_dag_is_paused_resumed_and_stopped_from_outside() {
-    for mechanism in ALL {
+    for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
         let endless = create_dag();
         endless
@@ -115,16 +116,16 @@ fn a_dag_is_paused_resumed_and_stopped_from_outside() {
         endless.register_untyped_subtask(function, SubtaskAttributes::named("tick"));
         finish_create_dags(&[endless]).unwrap();
         let control = alone.machine.control().unwrap();
-        std::thread::spawn(move || {
+        thread::spawn(move || {
             let wait_for = |more: u64| {
                 let until = ticks.load(Relaxed) + more;
                 while ticks.load(Relaxed) < until {
-                    std::thread::sleep(ms(1));
+                    thread::sleep(ms(1));
                 }
             };
             wait_for(3);
             control.pause("endless");
-            std::thread::sleep(ms(20));
+            thread::sleep(ms(20));
             control.resume("endless");
             wait_for(3);
             control.stop("endless");
@@ -169,4 +170,58 @@ fn a_held_core_is_given_up_like_a_computing_one() {
     assert_eq!(run.violations().count(), 0);
     assert_eq!(run.statistics("holds").completed, 3);
     assert_eq!(run.counts().preemptions > 0, is_preemptive);
+}
+
+#[test]
+fn a_topic_is_seen_and_what_is_set_is_for_the_jobs_to_come() {
+    for mechanism in mechanisms() {
+        let alone = alone(1, mechanism);
+        alone.machine.let_look();
+        let gain = Parameter::new("gain", 10, 1..=1000_u64);
+        let dag = create_dag();
+        dag.name("scaling").record::<u64>("scaled");
+        let mut count = 0;
+        let scale = move |gain: u64| {
+            count += 1;
+            (gain * count,)
+        };
+        let named = SubtaskAttributes::named;
+        dag.using(gain.reading()).register_periodic_subtask(
+            scale,
+            vec!["scaled"],
+            ms(2),
+            named("scale"),
+        );
+        dag.register_sink_subtask(|_: (u64,)| (), vec!["scaled"], ms(2), named("sink"));
+        finish_create_dags(&[dag]).unwrap();
+        let person = thread::spawn(move || {
+            let live = loop {
+                match Live::get() {
+                    Some(live) => break live,
+                    None => thread::sleep(ms(1)),
+                }
+            };
+            assert!(!live.watch(Some("gian")) && live.watch(Some("scaled")));
+            let wait_for = |gain: u64| {
+                let mut buffer = [0; 64];
+                loop {
+                    match live.take_seen(&mut buffer) {
+                        Some(seen) => {
+                            let expected = (gain * (seen.job + 1)).to_string();
+                            if seen.shown(&buffer).to_string() == expected {
+                                break;
+                            }
+                        }
+                        None => thread::sleep(ms(1)),
+                    }
+                }
+            };
+            wait_for(10);
+            gain.set(1000).expect("it is in range");
+            wait_for(1000);
+            live.close();
+        });
+        alone.machine.run().unwrap();
+        person.join().expect("it has seen both");
+    }
 }

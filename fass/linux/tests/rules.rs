@@ -6,7 +6,7 @@ mod support;
 
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Run;
-use support::{ALL, alone, breaches, ms, spin};
+use support::{alone, breaches, mechanisms, ms, spin};
 
 fn assert_lawful(run: &Run) {
     let found = breaches(run);
@@ -17,7 +17,7 @@ fn assert_lawful(run: &Run) {
 fn a_chain_on_one_core_wakes_nobody() {
     const LENGTH: u64 = 12;
     const JOBS: u64 = 40;
-    for mechanism in ALL {
+    for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
         let dag = create_dag();
         dag.name("chain")

@@ -10,7 +10,7 @@ use fass::{
     Dag, Received, Sender, SubtaskAttributes, Wire, WireOptions, create_dag, finish_create_dags,
 };
 use linux::Mechanism;
-use support::{ALL, alone, ms};
+use support::{alone, mechanisms, ms};
 
 fn number(line: &[u8]) -> Option<u64> {
     str::from_utf8(line).ok()?.parse().ok()
@@ -36,7 +36,7 @@ fn receive(numbers: Received<'_, u64>) -> (Vec<u64>,) {
 
 #[test]
 fn each_packet_is_answered_once_and_in_order() {
-    for mechanism in ALL {
+    for mechanism in mechanisms() {
         let alone = alone(2, mechanism);
         let (wire, dag) = (Wire::new("squares"), create_dag());
         dag.jobs(3);

@@ -211,6 +211,15 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<Image, ImageError
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
+/// Builds a test program, to be run on another Linux than this one.
+///
+/// # Errors
+///
+/// Cargo failed, or the package has no such test.
+pub fn build_test(package: &str, test: &str) -> Result<Image, ImageError> {
+    build_target(package, "linux", ["--test", test], None)
+}
+
 /// How a whole image is compiled beyond what a profile can say, for size: it lies where the linker
 /// script says, so addresses are constants; no loop is padded; a jump table pays from eight cases on.
 const FOR_IMAGES: [&str; 4] = [

@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test program uses its part of it")]
 
+use std::fs;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -9,8 +10,16 @@ use fass::{Dag, Occupation, Preemption, SubtaskAttributes, create_dag, execute_f
 use linux::{Linux, Mechanism, Run};
 use sched_dag::law::Violation;
 
-/// The mechanisms that every computer has.
-pub(crate) const ALL: [Mechanism; 3] = [Mechanism::Fifo, Mechanism::Normal, Mechanism::Poll];
+/// Returns the mechanisms that this computer has, and names them: with `sched_ext` if our policy
+/// is loaded.
+pub(crate) fn mechanisms() -> impl Iterator<Item = Mechanism> {
+    let mut all = vec![Mechanism::Fifo, Mechanism::Normal, Mechanism::Poll];
+    if fs::exists("/sys/kernel/sched_ext/root/ops").unwrap_or_default() {
+        all.push(Mechanism::SchedExt);
+    }
+    all.into_iter()
+        .inspect(|mechanism| println!("by {mechanism:?}"))
+}
 
 /// A machine, and the right to be the only one.
 pub(crate) struct Alone {
