@@ -38,8 +38,8 @@ fn a_panic_in_the_kernel_ends_in_failure_and_names_its_place() {
 
 /// Every fault that a subtask commits costs its DAG what its policy says, and no other
 /// anything.
-fn faults_are_contained(cores: u64) {
-    let outcome = Guest::new("faults").cores(cores).succeed();
+fn faults_are_contained(guest: Guest) {
+    let outcome = guest.succeed();
     let transcript = &outcome.transcript;
     let verdicts: Vec<_> = transcript.of_kind("containment").collect();
     assert_eq!(verdicts.len(), 3 * 18, "{}", outcome.tail());
@@ -87,9 +87,14 @@ fn faults_are_contained(cores: u64) {
 
 #[test]
 fn faults_of_a_subtask_end_its_dag_alone() {
-    faults_are_contained(1);
-    faults_are_contained(2);
-    faults_are_contained(4);
+    for cores in [1, 2, 4] {
+        faults_are_contained(Guest::new("faults").cores(cores));
+    }
+}
+
+#[test]
+fn faults_of_a_subtask_end_its_dag_alone_in_its_cluster() {
+    faults_are_contained(Guest::new("faults").cores(2).word("clusters=1,1"));
 }
 
 #[test]

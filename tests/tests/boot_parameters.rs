@@ -30,33 +30,35 @@ fn a_person_sets_what_the_next_jobs_find() {
         (said, "hlep"),
         (said, "shutdown"),
     ];
-    let guest = tuned().word("set=steps=4").conversation(&conversation);
-    let outcome = guest.succeed();
-    let found = found(&outcome);
-    let expected = [("0.5", 4), ("1.25", 4), ("1.25", 9)];
-    let expected = expected.map(|(gain, steps)| (gain.to_string(), steps));
-    assert_eq!(found, expected, "{}", outcome.tail());
-    for line in [
-        "  gain = 0.5 (f64 from 0 to 2, at first 0.5)",
-        "  steps = 4 (u32 from 1 to 9, at first 3)",
-        "`steps=10`: parameter `steps` takes u32 from 1 to 9",
-        "there is no parameter `gian`; did you mean `gain`?",
-        "`set` wants a name and a value; `params` lists them",
-        "  set NAME VALUE set a parameter, for the jobs to come",
-    ] {
-        let mut lines = outcome.serial.lines();
-        assert!(
-            lines.any(|found| found == line),
-            "{line}\n{}",
-            outcome.serial
-        );
+    let guest = tuned().word("set=steps=4").cores(2);
+    for guest in [guest.clone(), guest.word("clusters=1,1")] {
+        let outcome = guest.conversation(&conversation).succeed();
+        let found = found(&outcome);
+        let expected = [("0.5", 4), ("1.25", 4), ("1.25", 9)];
+        let expected = expected.map(|(gain, steps)| (gain.to_string(), steps));
+        assert_eq!(found, expected, "{}", outcome.tail());
+        for line in [
+            "  gain = 0.5 (f64 from 0 to 2, at first 0.5)",
+            "  steps = 4 (u32 from 1 to 9, at first 3)",
+            "`steps=10`: parameter `steps` takes u32 from 1 to 9",
+            "there is no parameter `gian`; did you mean `gain`?",
+            "`set` wants a name and a value; `params` lists them",
+            "  set NAME VALUE set a parameter, for the jobs to come",
+        ] {
+            let mut lines = outcome.serial.lines();
+            assert!(
+                lines.any(|found| found == line),
+                "{line}\n{}",
+                outcome.serial
+            );
+        }
+        assert!(outcome.serial.contains("shutdown, params, set NAME VALUE"));
+        let lines = outcome.transcript.of_kind("console");
+        let accepted = lines.map(|line| line.value.get("accepted").and_then(|it| it.as_bool()));
+        let accepted: Vec<bool> = accepted.map(|it| it.expect("a truth value")).collect();
+        let expected = [true, true, true, false, false, false, true, false, true];
+        assert_eq!(accepted, expected);
     }
-    assert!(outcome.serial.contains("shutdown, params, set NAME VALUE"));
-    let lines = outcome.transcript.of_kind("console");
-    let accepted = lines.map(|line| line.value.get("accepted").and_then(|it| it.as_bool()));
-    let accepted: Vec<bool> = accepted.map(|it| it.expect("a truth value")).collect();
-    let expected = [true, true, true, false, false, false, true, false, true];
-    assert_eq!(accepted, expected);
 }
 
 #[test]

@@ -89,6 +89,13 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     for (cores, policy) in [(1, "static"), (2, "edf"), (4, "static")] {
         assert_eq!(replay(cores, policy, &file.0), [100, 0], "{cores} {policy}");
     }
+
+    // A cluster records and replays the same.
+    let divided = guest(&["test=recorded", "clusters=2,2"]).cores(4);
+    record(divided, &file);
+    assert_eq!(replay(1, "static", &file.0), [100, 0]);
+    let divided = replay_with(&["clusters=2,2"], 4, "edf", &file.0);
+    assert_eq!(divided, [100, 0]);
 }
 
 #[test]

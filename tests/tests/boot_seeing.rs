@@ -33,6 +33,16 @@ fn answers(outcome: &Outcome) -> Vec<(String, bool)> {
 
 #[test]
 fn a_dag_is_stopped_started_and_the_machine_shut_down() {
+    talk(endless());
+}
+
+#[test]
+fn a_dag_of_one_cluster_is_stopped_and_started_and_the_other_goes_on() {
+    talk(endless().word("clusters=1,1"));
+}
+
+/// Stops and starts one of two endless DAGs, and ends both.
+fn talk(guest: Guest) {
     let said = "console\",\"command\"";
     let mut conversation = vec![("\"kind\":\"boot\"", "help"), (said, "dags")];
     conversation.push((said, "stop left"));
@@ -42,7 +52,7 @@ fn a_dag_is_stopped_started_and_the_machine_shut_down() {
     conversation.extend([(said, "stats"), (said, "start 0")]);
     conversation.extend(PAUSE);
     conversation.extend([(said, "stats left"), (said, "shutdown")]);
-    let outcome = endless().conversation(&conversation).succeed();
+    let outcome = guest.conversation(&conversation).succeed();
 
     let left = statuses(&outcome, "left");
     let [listed, first, second, third, last] = left[..] else {

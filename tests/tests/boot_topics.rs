@@ -5,7 +5,7 @@ use std::fs;
 use harness::Guest;
 use recording::Recording;
 use tool::protocol::MachineLine;
-use tool::{recordings, system};
+use tool::{Outcome, recordings, system};
 
 #[test]
 fn values_are_echoed_and_what_is_left_out_is_counted() {
@@ -24,14 +24,24 @@ fn values_are_echoed_and_what_is_left_out_is_counted() {
         (said, "shutdown"),
     ];
     let guest = Guest::new("guest-tests").word("test=tuned").cores(2);
-    let outcome = guest.conversation(&conversation).succeed();
+    let divided = guest.clone().word("clusters=1,1");
+    for guest in [guest, divided] {
+        is_echoed(&guest.conversation(&conversation).succeed());
+    }
+}
+
+fn is_echoed(outcome: &Outcome) {
+    let echoed = "\"kind\":\"echo\"";
     let lines = |kind: &'static str| outcome.transcript.of_kind(kind).collect::<Vec<_>>();
     let number = |line: &MachineLine, name| line.number_at(name).expect(name);
 
     let echoes = lines("echo");
     assert!(echoes.len() >= 2, "{}", outcome.serial);
     assert_eq!(echoes[0].text_at("value"), Some("0.5"));
-    assert_eq!(echoes.last().unwrap().text_at("value"), Some("1.5"));
+    assert_eq!(
+        echoes.last().expect("there are some").text_at("value"),
+        Some("1.5")
+    );
     for pair in echoes.windows(2) {
         // None is lost but those that are counted.
         let between = number(pair[1], "left_out") + 1;

@@ -22,13 +22,16 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let trusts = options.choice("decoder", &[("careful", false), ("trusting", true)])?;
     let wire = Wire::new("radar");
     machine.connect(&wire)?;
-    options.finish(&["jobs", "releases", "decoder", "input"])?;
+    machine.offer_clusters()?;
+    options.finish(&["jobs", "releases", "decoder", "input", "clusters"])?;
     if trusts {
         machine.accept_faults();
     }
 
     let decode = if trusts { trusting } else { careful };
-    let commit = finish_create_dags(&build(&wire, releases, decode, jobs))?;
+    let dags = build(&wire, releases, decode, jobs);
+    machine.spread(&dags);
+    let commit = finish_create_dags(&dags)?;
     for answer in commit.answers() {
         println!("{answer}");
     }

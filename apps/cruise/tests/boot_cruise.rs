@@ -57,8 +57,9 @@ fn a_run_sends_what_virtual_time_sends_on_any_cores_and_each_time() {
     ] {
         let (wanted, counts) = in_virtual_time(INPUT, releases);
         assert!(!wanted.is_empty());
-        for cores in [1, 4, 4] {
-            let (outcome, sent) = guest(INPUT).word(word).cores(cores).succeed_sending();
+        for (cores, clusters) in [(1, ""), (4, ""), (4, "clusters=2,2"), (4, "")] {
+            let guest = guest(INPUT).word(word).cores(cores);
+            let (outcome, sent) = guest.word(clusters).succeed_sending();
             let text = String::from_utf8_lossy(&sent);
             assert_eq!(
                 text,

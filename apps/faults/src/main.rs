@@ -23,7 +23,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let only = options.text("fault");
     let times = options.number("faults", 0..=1_000_000, 0)?;
-    options.finish(&["fault", "faults"])?;
+    machine.offer_clusters()?;
+    options.finish(&["fault", "faults", "clusters"])?;
     if let Ok(times @ 1..) = u32::try_from(times) {
         return endure(machine, times);
     }
@@ -72,7 +73,9 @@ fn endure(machine: &Machine, times: u32) -> Result<(), Ending> {
     machine.accept_faults(); // here they are what is wanted
     let mut before = None;
     for faults in [100, times] {
-        finish_create_dags(&restless(faults))?;
+        let dags = restless(faults);
+        machine.spread(&dags);
+        finish_create_dags(&dags)?;
         let run = machine.run()?;
         let held_bytes = machine.resources().heap_bytes;
         let (healthy, restless) = (*run.statistics("healthy"), *run.statistics("restless"));
@@ -115,7 +118,9 @@ fn commit_crime(
     (name, crime): (&str, Crime),
     (on_fault, policy): (&str, Policy),
 ) -> Result<Verdict, Ending> {
-    finish_create_dags(&[healthy(), doomed(crime, policy)])?;
+    let dags = [healthy(), doomed(crime, policy)];
+    machine.spread(&dags);
+    finish_create_dags(&dags)?;
     let run = machine.run()?;
     let on_time = |jobs: core::ops::Range<u64>| jobs.filter(|job| is_on_time(&run, *job)).count();
     let parts = [

@@ -14,8 +14,11 @@ const EXECUTION: Duration = Duration::from_micros(300);
 
 /// Runs both until the console ends them.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
-    machine.options().finish(&["test"])?;
-    finish_create_dags(&[left(), right()])?;
+    machine.offer_clusters()?;
+    machine.options().finish(&["test", "clusters"])?;
+    let dags = [left(), right()];
+    machine.spread(&dags);
+    finish_create_dags(&dags)?;
     machine.run()?;
     Err(Ending::Failure("the run has ended by itself".into()))
 }

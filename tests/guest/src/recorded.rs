@@ -4,6 +4,7 @@
 use alloc::string::ToString;
 use alloc::sync::Arc;
 use alloc::{format, vec};
+use core::slice;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
@@ -29,7 +30,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let dies_in = options.number("dies_in", 0..=1000, 1000)?;
     let step = options.number("step", 1..=1000, 1)?;
     let asks = options.choice("asks", &[("no", false), ("yes", true)])?;
-    options.finish(&["test", "asks", "cheats", "dies_in", "step"])?;
+    machine.offer_clusters()?;
+    options.finish(&["test", "clusters", "asks", "cheats", "dies_in", "step"])?;
     let named = SubtaskAttributes::named;
     let dag = create_dag();
     dag.name("counts").jobs(50);
@@ -63,6 +65,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         }
     };
     dag.register_sink_subtask(sink, vec!["first", "second"], PERIOD, named("sink"));
+    machine.spread(slice::from_ref(&dag));
     finish_create_dags(&[dag])?;
     machine.run().map(drop)
 }

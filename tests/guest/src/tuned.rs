@@ -1,6 +1,7 @@
 //! A DAG without a limit of jobs whose source reads parameters, for a person to set.
 
 use alloc::vec;
+use core::slice;
 use core::time::Duration;
 
 use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
@@ -12,7 +13,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let steps = Parameter::new("steps", 3_u32, 1..=9);
     machine.offer(&[&gain, &steps])?;
     machine.show_topics();
-    machine.options().finish(&["test"])?;
+    machine.offer_clusters()?;
+    machine.options().finish(&["test", "clusters"])?;
     let (dag, period) = (create_dag(), Duration::from_millis(5));
     dag.name("loop").record::<f64>("gain");
     let named = SubtaskAttributes::named;
@@ -30,6 +32,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         }
     };
     dag.register_sink_subtask(show, vec!["gain", "steps"], period, named("show"));
+    machine.spread(slice::from_ref(&dag));
     finish_create_dags(&[dag])?;
     machine.run()?;
     Err(Ending::Failure("the run has ended by itself".into()))

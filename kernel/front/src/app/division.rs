@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use fass::Clusters;
+use fass::{Clusters, Dag};
 
 use super::machine::{Machine, System};
 use crate::options::UsageError;
@@ -63,6 +63,23 @@ impl<S: Divisible> Machine<S> {
         self.system
             .divide(Some(sizes.filter_map(Result::ok).collect()));
         Ok(())
+    }
+
+    /// Gives each of these DAGs to one of the clusters that there are, in turn.
+    ///
+    /// ```no_run
+    /// fn take_part(machine: &kernel::Machine, dags: &[fass::Dag]) -> Result<(), kernel::Ending> {
+    ///     machine.offer_clusters()?;
+    ///     machine.spread(dags);
+    ///     fass::finish_create_dags(dags)?;
+    ///     machine.run().map(drop)
+    /// }
+    /// ```
+    pub fn spread(&self, dags: &[Dag]) {
+        let clusters = (0..).take(self.clusters().sizes().len());
+        for (cluster, dag) in clusters.cycle().zip(dags) {
+            dag.cluster(cluster);
+        }
     }
 
     /// Returns how the cores are divided, unless the commit is to find that.
