@@ -57,18 +57,17 @@ fn with_state(held: &[Arc<Meeting>; 3]) -> Plan {
     let dag = create_dag();
     let state = dag.state("pair", (0_u64, 0_u64));
     let [update, first, second] = held.clone();
-    dag.using(state.update()).register_periodic_subtask(
-        move |pair: &mut (u64, u64)| {
+    dag.period(PERIOD)
+        .using(state.update())
+        .source(move |pair: &mut (u64, u64)| {
             pair.0 += 1;
             update.wait();
             update.wait();
             pair.1 += 1;
             (pair.0,)
-        },
-        vec!["count"],
-        PERIOD,
-        named("update"),
-    );
+        })
+        .writes(&["count"])
+        .register(named("update"));
     let read = |held: Arc<Meeting>| {
         move |pair: &(u64, u64), (count,): (u64,)| {
             assert_eq!((pair.0, pair.1), (count, count), "in mid-change");
@@ -79,13 +78,15 @@ fn with_state(held: &[Arc<Meeting>; 3]) -> Plan {
     };
     let counts = || vec!["count"];
     dag.using(state.read())
-        .register_subtask(read(first), counts(), vec!["first"], named("first"));
-    dag.using(state.read()).register_subtask(
-        read(second),
-        counts(),
-        vec!["second"],
-        named("second"),
-    );
+        .subtask(read(first))
+        .reads(&counts())
+        .writes(&["first"])
+        .register(named("first"));
+    dag.using(state.read())
+        .subtask(read(second))
+        .reads(&counts())
+        .writes(&["second"])
+        .register(named("second"));
     let join = |(first, second): (u64, u64)| assert_eq!(first, second);
     dag.register_sink_subtask(join, vec!["first", "second"], PERIOD, named("join"));
     commit(&[dag])
@@ -174,8 +175,10 @@ fn sampled(of: &Arc<()>) -> (Plan, Told, Arc<Meeting>) {
     let reader = create_dag();
     reader.relative_deadline(PERIOD);
     let of_reader = Arc::clone(&held);
-    reader.using(latest.sample()).register_periodic_subtask(
-        move |sample: Option<Sample<'_, Whole>>| {
+    reader
+        .period(PERIOD)
+        .using(latest.sample())
+        .source(move |sample: Option<Sample<'_, Whole>>| {
             let look = || {
                 let sample = sample?;
                 assert_eq!(sample.value.copies, [sample.value.job; 8], "torn");
@@ -186,11 +189,8 @@ fn sampled(of: &Arc<()>) -> (Plan, Told, Arc<Meeting>) {
             of_reader.wait();
             assert_eq!(look(), first, "a sample does not change during an instance");
             tells.send(first).expect("the test listens");
-        },
-        vec![],
-        PERIOD,
-        named("sample"),
-    );
+        })
+        .register(named("sample"));
     (commit(&[writer, reader]), told, held)
 }
 
@@ -251,21 +251,20 @@ fn completions_too_many_and_too_few_show_what_was_run_last() {
 fn a_signal_is_raised_once_however_often_it_is_completed() {
     let sporadic = create_dag();
     sporadic.relative_deadline(PERIOD);
-    let signal = sporadic.register_sporadic_subtask(|| (), vec![], PERIOD, named("answer"));
+    let signal = sporadic.sporadic(PERIOD);
+    sporadic.source(|| ()).register(named("answer"));
     let dag = create_dag();
     dag.relative_deadline(PERIOD);
     let mut is_first = true;
-    dag.using(signal.raising()).register_periodic_subtask(
-        move |mut signal: Raiser<'_>| {
+    dag.period(PERIOD)
+        .using(signal.raising())
+        .source(move |mut signal: Raiser<'_>| {
             if std::mem::take(&mut is_first) {
                 signal.raise();
                 signal.raise();
             }
-        },
-        vec![],
-        PERIOD,
-        named("ask"),
-    );
+        })
+        .register(named("ask"));
     let mut plan = commit(&[dag, sporadic]);
     let ask = &mut plan.bodies[0][0];
     let mut raised = Vec::new();

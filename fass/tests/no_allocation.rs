@@ -96,30 +96,30 @@ fn states_latest_values_and_signals_allocate_nothing() {
     let named = SubtaskAttributes::named;
     let answers = create_dag();
     answers.relative_deadline(period);
-    let signal = answers.register_sporadic_subtask(|| (), vec![], period, named("answer"));
+    let signal = answers.sporadic(period);
+    answers.source(|| ()).register(named("answer"));
     let dag = create_dag();
     dag.relative_deadline(period);
     let state = dag.state("count", 0_u64);
-    dag.using((state.update(), signal.raising()))
-        .register_periodic_subtask(
-            |(count, mut signal): (&mut u64, Raiser<'_>)| {
-                *count += 1;
-                signal.raise();
-                (*count,)
-            },
-            vec!["count"],
-            period,
-            named("count"),
-        );
+    dag.period(period)
+        .using((state.update(), signal.raising()))
+        .source(|(count, mut signal): (&mut u64, Raiser<'_>)| {
+            *count += 1;
+            signal.raise();
+            (*count,)
+        })
+        .writes(&["count"])
+        .register(named("count"));
     let latest = dag.latest::<u64>("count");
     let reader = create_dag();
     reader.relative_deadline(period);
-    reader.using(latest.sample()).register_periodic_subtask(
-        |count: Option<Sample<'_, u64>>| assert!(count.is_some_and(|c| *c.value == c.job + 1)),
-        vec![],
-        period,
-        named("read"),
-    );
+    reader
+        .period(period)
+        .using(latest.sample())
+        .source(|count: Option<Sample<'_, u64>>| {
+            assert!(count.is_some_and(|c| *c.value == c.job + 1))
+        })
+        .register(named("read"));
     let mut plan = commit(&[dag, reader, answers]);
 
     let before = allocated().0;
@@ -140,15 +140,12 @@ fn wires_allocate_nothing() {
     let period = Duration::from_millis(10);
     let (wire, dag) = (Wire::new("numbers"), create_dag());
     dag.relative_deadline(period);
-    dag.using((wire.receiving(|line| line.first().copied()), wire.sending()))
-        .register_periodic_subtask(
-            |(packets, mut wire): (Received<'_, u8>, Sender<'_>)| {
-                packets.for_each(|packet| wire.send(&[packet.value]));
-            },
-            vec![],
-            period,
-            SubtaskAttributes::named("echo"),
-        );
+    dag.period(period)
+        .using((wire.receiving(|line| line.first().copied()), wire.sending()))
+        .source(|(packets, mut wire): (Received<'_, u8>, Sender<'_>)| {
+            packets.for_each(|packet| wire.send(&[packet.value]));
+        })
+        .register(SubtaskAttributes::named("echo"));
     let mut plan = commit(&[dag]);
 
     let before = allocated().0;

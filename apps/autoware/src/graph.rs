@@ -206,28 +206,26 @@ impl Builder<'_> {
         self.transform(&dag, "PointCloudFusion", "RayGroundFilter");
 
         let (attributes, mut crunch) = self.worker("NDTLocalizer", 1);
-        dag.using(map.sample()).register_subtask(
-            move |_: Sampled<'_>, (points,): (Origin,)| {
+        dag.using(map.sample())
+            .subtask(move |_: Sampled<'_>, (points,): (Origin,)| {
                 crunch.work();
                 (points,)
-            },
-            vec!["VoxelGridDownsampler"],
-            vec!["NDTLocalizer"],
-            attributes,
-        );
+            })
+            .reads(&["VoxelGridDownsampler"])
+            .writes(&["NDTLocalizer"])
+            .register(attributes);
 
         // Two independent transforms in one node.
         let (attributes, mut crunch) = self.worker("EuclideanClusterDetector", 2);
-        dag.using(settings.sample()).register_subtask(
-            move |_: Sampled<'_>, (points,): (Origin,)| {
+        dag.using(settings.sample())
+            .subtask(move |_: Sampled<'_>, (points,): (Origin,)| {
                 crunch.work();
                 crunch.work();
                 (points, points)
-            },
-            vec!["RayGroundFilter"],
-            vec!["EuclideanClusterDetector", "EuclideanIntersection"],
-            attributes,
-        );
+            })
+            .reads(&["RayGroundFilter"])
+            .writes(&["EuclideanClusterDetector", "EuclideanIntersection"])
+            .register(attributes);
         self.transform(&dag, "EuclideanClusterDetector", "ObjectCollisionEstimator");
         dag.register_sink_subtask(
             |(_,): (Origin,)| (),
@@ -245,16 +243,14 @@ impl Builder<'_> {
         let dag = self.dag("route", LIDAR);
         Self::source(&dag, "Lanelet2Map", LIDAR, || None);
         let (attributes, mut crunch) = self.worker("Lanelet2GlobalPlanner", 1);
-        dag.using((goal.sample(), pose.sample()))
-            .register_periodic_subtask(
-                move |(_, pose): (Sampled<'_>, Sampled<'_>)| {
-                    crunch.work();
-                    (pose.and_then(|pose| *pose.value),)
-                },
-                vec!["Lanelet2GlobalPlanner"],
-                LIDAR,
-                attributes,
-            );
+        dag.period(LIDAR)
+            .using((goal.sample(), pose.sample()))
+            .source(move |(_, pose): (Sampled<'_>, Sampled<'_>)| {
+                crunch.work();
+                (pose.and_then(|pose| *pose.value),)
+            })
+            .writes(&["Lanelet2GlobalPlanner"])
+            .register(attributes);
         let inputs = ["Lanelet2GlobalPlanner", "Lanelet2Map"];
         self.fusion(&dag, inputs, "Lanelet2MapLoader");
         self.transform(&dag, "Lanelet2MapLoader", "ParkingPlanner");
@@ -286,24 +282,25 @@ impl Builder<'_> {
             parking.sample(),
             lane.sample(),
         );
-        dag.using(uses).register_periodic_subtask(
-            move |(obstacles, ..): (
-                Sampled<'_>,
-                Sampled<'_>,
-                Sampled<'_>,
-                Sampled<'_>,
-                Sampled<'_>,
-                Sampled<'_>,
-            )| {
-                // Sampled at the start, so what comes meanwhile is for the next job.
-                let origin = obstacles.and_then(|obstacles| *obstacles.value);
-                crunch.work();
-                (origin,)
-            },
-            vec!["BehaviorPlanner"],
-            LIDAR,
-            attributes,
-        );
+        dag.period(LIDAR)
+            .using(uses)
+            .source(
+                move |(obstacles, ..): (
+                    Sampled<'_>,
+                    Sampled<'_>,
+                    Sampled<'_>,
+                    Sampled<'_>,
+                    Sampled<'_>,
+                    Sampled<'_>,
+                )| {
+                    // Sampled at the start, so what comes meanwhile is for the next job.
+                    let origin = obstacles.and_then(|obstacles| *obstacles.value);
+                    crunch.work();
+                    (origin,)
+                },
+            )
+            .writes(&["BehaviorPlanner"])
+            .register(attributes);
         self.transform(&dag, "BehaviorPlanner", "MPCController");
         let inputs = ["MPCController", "BehaviorPlanner"];
         self.fusion(&dag, inputs, "VehicleInterface");

@@ -71,19 +71,15 @@ pub fn build(wire: &Wire, releases: Releases, decode: Decoder, jobs: u64) -> [Da
         let fresh = newest.filter(|packet| age_ns(packet.received_ns) < FRESH_NS);
         (fresh.map(|packet| packet.value),)
     };
-    let receiving = cruise.using(wire.receiving(decode));
     match releases {
-        Releases::Period => {
-            cruise.jobs(jobs);
-            let attributes = taking("measure", 300);
-            receiving.register_periodic_subtask(measure, vec!["gap"], PERIOD, attributes);
-        }
-        Releases::Packets => {
-            let attributes = taking("measure", 300);
-            // The wire raises the signal.
-            let _ = receiving.register_sporadic_subtask(measure, vec!["gap"], PERIOD, attributes);
-        }
+        Releases::Period => _ = cruise.jobs(jobs).period(PERIOD),
+        Releases::Packets => _ = cruise.sporadic(PERIOD), // the wire raises the signal
     }
+    cruise
+        .using(wire.receiving(decode))
+        .source(measure)
+        .writes(&["gap"])
+        .register(taking("measure", 300));
     let mut speed = 0_i32;
     let control = move |(gap,): (Option<i32>,)| {
         speed = gap.map_or(0, |gap| {
@@ -96,12 +92,12 @@ pub fn build(wire: &Wire, releases: Releases, decode: Decoder, jobs: u64) -> [Da
         // Sending never fails: what finds no room is lost, and counted.
         let _ = writeln!(wire, "speed {speed}");
     };
-    cruise.using(wire.sending()).register_sink_subtask(
-        drive,
-        vec!["speed"],
-        PERIOD,
-        taking("drive", 100),
-    );
+    cruise
+        .using(wire.sending())
+        .subtask(drive)
+        .reads(&["speed"])
+        .due(PERIOD)
+        .register(taking("drive", 100));
 
     let clock = create_dag();
     clock

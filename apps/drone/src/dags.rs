@@ -124,12 +124,11 @@ impl Workload {
             self.spend("measure");
             (airframe.measure(&mut noise),)
         };
-        dag.using(airframe.read()).register_periodic_subtask(
-            measure,
-            vec!["measured"],
-            PERIOD,
-            taking("measure"),
-        );
+        dag.period(PERIOD)
+            .using(airframe.read())
+            .source(measure)
+            .writes(&["measured"])
+            .register(taking("measure"));
 
         let mut believed: Option<Estimate> = None;
         let estimate = move |(measured,): (Measured,)| {
@@ -164,12 +163,11 @@ impl Workload {
             views.goal.sample(),
             views.height.sample(),
         );
-        dag.using(uses).register_subtask(
-            control,
-            vec!["estimate"],
-            vec!["force"],
-            taking("control"),
-        );
+        dag.using(uses)
+            .subtask(control)
+            .reads(&["estimate"])
+            .writes(&["force"])
+            .register(taking("control"));
 
         let flight = flight.clone();
         let proceed = move |airframe: &mut Airframe, (force,): (Force,)| {
@@ -179,12 +177,11 @@ impl Workload {
             flight.moved(acos(upright), airframe.pose.position[2]);
             (airframe.pose,)
         };
-        dag.using(airframe.update()).register_subtask(
-            proceed,
-            vec!["force"],
-            vec!["pose"],
-            taking("move"),
-        );
+        dag.using(airframe.update())
+            .subtask(proceed)
+            .reads(&["force"])
+            .writes(&["pose"])
+            .register(taking("move"));
     }
 
     fn register_camera(self, dag: &Dag, views: &Views, flight: &Flight) {
@@ -194,8 +191,11 @@ impl Workload {
             let estimate = estimate.map(|estimate| *estimate.value);
             (capture(&pose), (pose, estimate))
         };
-        dag.using((views.pose.sample(), views.estimate.sample()))
-            .register_periodic_subtask(take, vec!["image", "taken"], FRAME, taking("capture"));
+        dag.period(FRAME)
+            .using((views.pose.sample(), views.estimate.sample()))
+            .source(take)
+            .writes(&["image", "taken"])
+            .register(taking("capture"));
 
         // Beyond its WCET, frames are skipped; beyond its budget the camera is at fault.
         let slow = taking("detect").budget(Duration::from_millis(100));
@@ -222,7 +222,9 @@ impl Workload {
                 in_all: self.survived,
             });
             dag.restarting(make)
-                .register_subtask(vec!["image"], vec!["beacon"], slow);
+                .reads(&["image"])
+                .writes(&["beacon"])
+                .register(slow);
         } else {
             dag.register_subtask(make(), vec!["image"], vec!["beacon"], slow);
         }
@@ -267,13 +269,12 @@ impl Workload {
             }
             (goal,)
         };
-        dag.using((views.is_low.sample(), landing.entering()))
-            .register_sporadic_subtask(
-                decide,
-                vec!["goal"],
-                Duration::from_millis(200),
-                taking("decide"),
-            )
+        let uses = (views.is_low.sample(), landing.entering());
+        dag.using(uses)
+            .source(decide)
+            .writes(&["goal"])
+            .register(taking("decide"));
+        dag.sporadic(Duration::from_millis(200))
     }
 
     fn register_descent(self, dag: &Dag, views: &Views) {
@@ -285,13 +286,11 @@ impl Workload {
             ahead = Some(height);
             (height,)
         };
-        dag.using(views.estimate.sample())
-            .register_periodic_subtask(
-                descend,
-                vec!["height"],
-                Duration::from_millis(50),
-                taking("descend"),
-            );
+        dag.period(Duration::from_millis(50))
+            .using(views.estimate.sample())
+            .source(descend)
+            .writes(&["height"])
+            .register(taking("descend"));
     }
 
     fn register_safety(self, dag: &Dag, landing: &Mode, flight: &Flight) -> Signal {
@@ -301,12 +300,10 @@ impl Workload {
             flight.decided(true);
             landing.at_once();
         };
-        dag.using(landing.entering()).register_sporadic_subtask(
-            alarm,
-            vec![],
-            PERIOD,
-            taking("alarm"),
-        )
+        dag.using(landing.entering())
+            .source(alarm)
+            .register(taking("alarm"));
+        dag.sporadic(PERIOD)
     }
 
     fn register_battery(
@@ -329,12 +326,11 @@ impl Workload {
             (is_low,)
         };
         let uses = (views.force.sample(), changed.raising(), reserve.reading());
-        dag.using(uses).register_periodic_subtask(
-            drain,
-            vec!["is_low"],
-            Duration::from_millis(100),
-            taking("drain"),
-        );
+        dag.period(Duration::from_millis(100))
+            .using(uses)
+            .source(drain)
+            .writes(&["is_low"])
+            .register(taking("drain"));
     }
 
     fn register_mission(self, dag: &Dag, views: &Views, changed: &Signal) {
@@ -349,12 +345,10 @@ impl Workload {
                 }
             };
         let uses = (views.fix.sample(), views.goal.sample(), changed.raising());
-        dag.using(uses).register_periodic_subtask(
-            watch,
-            vec![],
-            Duration::from_millis(50),
-            taking("watch"),
-        );
+        dag.period(Duration::from_millis(50))
+            .using(uses)
+            .source(watch)
+            .register(taking("watch"));
     }
 
     /// Takes a subtask's WCET, if that is what subtasks do.

@@ -104,11 +104,10 @@ pub fn restless(faults: u32) -> [Dag; 2] {
             let Unpunished = RECURRING[number]();
         }
     };
-    dag.restarting(move || commit).register_sink_subtask(
-        vec!["restless"],
-        SHORT_PERIOD,
-        attributes(1),
-    );
+    dag.restarting(move || commit)
+        .reads(&["restless"])
+        .due(SHORT_PERIOD)
+        .register(attributes(1));
     [healthy, dag]
 }
 
@@ -162,7 +161,9 @@ fn pipeline(
         Policy::Restart => {
             dag.survive_faults(FAULT_LIMIT);
             dag.restarting(move || process)
-                .register_subtask(topics.0, topics.1, middle);
+                .reads(&topics.0)
+                .writes(&topics.1)
+                .register(middle);
         }
         Policy::FallBack => {
             dag.survive_faults(FAULT_LIMIT);
@@ -171,7 +172,9 @@ fn pipeline(
                 (job,)
             };
             dag.falling_back(process, innocent)
-                .register_subtask(topics.0, topics.1, middle);
+                .reads(&topics.0)
+                .writes(&topics.1)
+                .register(middle);
         }
     }
     dag.register_sink_subtask(

@@ -217,16 +217,8 @@ fn register_frail(dag: &Dag, priority: u32, fault: FaultPlan, frail: &Arc<Frail>
         Then::End => {
             dag.register_untyped_subtask(move |_| frail.call(), attributes);
         }
-        Then::Restart => (dag.restarting(move || call(&frail))).register_subtask(
-            Vec::new(),
-            Vec::new(),
-            attributes,
-        ),
-        Then::FallBack => (dag.falling_back(call(&frail), call(&frail))).register_subtask(
-            Vec::new(),
-            Vec::new(),
-            attributes,
-        ),
+        Then::Restart => (dag.restarting(move || call(&frail))).register(attributes),
+        Then::FallBack => (dag.falling_back(call(&frail), call(&frail))).register(attributes),
     }
 }
 

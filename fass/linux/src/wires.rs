@@ -40,12 +40,10 @@ impl Linux {
     /// let (wire, dag, period) = (Wire::new("keys"), create_dag(), Duration::from_millis(2));
     /// dag.jobs(3).relative_deadline(period);
     /// let hear = |lines: Received<'_, u8>| println!("{} lines", lines.count());
-    /// dag.using(wire.receiving(|line| line.first().copied())).register_periodic_subtask(
-    ///     hear,
-    ///     vec![],
-    ///     period,
-    ///     SubtaskAttributes::named("hear"),
-    /// );
+    /// dag.period(period)
+    ///     .using(wire.receiving(|line| line.first().copied()))
+    ///     .source(hear)
+    ///     .register(SubtaskAttributes::named("hear"));
     /// finish_create_dags(&[dag]).unwrap();
     /// let connection = machine.connect(&wire, &b"one\ntwo\n"[..], std::io::sink()).unwrap();
     /// machine.run().unwrap();

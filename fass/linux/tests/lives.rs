@@ -25,11 +25,12 @@ fn a_fault_costs_a_job_and_the_dag_goes_on() {
         });
         let seen = Arc::new(std::sync::atomic::AtomicU64::new(0));
         let count = Arc::clone(&seen);
-        dag.restarting(move || {
-            let seen = Arc::clone(&count);
-            move |()| assert!(seen.fetch_add(1, Relaxed) != 50, "a broken frame")
-        })
-        .register_periodic_subtask(vec![], ms(2), SubtaskAttributes::named("look"));
+        dag.period(ms(2))
+            .restarting(move || {
+                let seen = Arc::clone(&count);
+                move |()| assert!(seen.fetch_add(1, Relaxed) != 50, "a broken frame")
+            })
+            .register(SubtaskAttributes::named("look"));
         finish_create_dags(&[dag]).unwrap();
         let run = alone.machine.run().unwrap();
         assert_eq!(run.violations().count(), 0);
@@ -82,7 +83,8 @@ fn s1_signals_come_from_other_threads_and_from_files() {
         }
     };
     let named = SubtaskAttributes::named("answer");
-    let signal = dag.register_sporadic_subtask(function, Vec::new(), ms(1), named);
+    let signal = dag.sporadic(ms(1));
+    dag.source(function).register(named);
     finish_create_dags(&[dag]).unwrap();
     alone.machine.raise_on_input(&signal, &far).unwrap();
     let (first, of_thread) = (Arc::clone(&heard), signal.clone());
@@ -186,12 +188,11 @@ fn a_topic_is_seen_and_what_is_set_is_for_the_jobs_to_come() {
             (gain * count,)
         };
         let named = SubtaskAttributes::named;
-        dag.using(gain.reading()).register_periodic_subtask(
-            scale,
-            vec!["scaled"],
-            ms(2),
-            named("scale"),
-        );
+        dag.period(ms(2))
+            .using(gain.reading())
+            .source(scale)
+            .writes(&["scaled"])
+            .register(named("scale"));
         dag.register_sink_subtask(|_: (u64,)| (), vec!["scaled"], ms(2), named("sink"));
         finish_create_dags(&[dag]).unwrap();
         let person = thread::spawn(move || {

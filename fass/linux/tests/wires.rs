@@ -18,16 +18,15 @@ fn number(line: &[u8]) -> Option<u64> {
 
 /// A sink that sends the squares of a job's numbers.
 fn answer(dag: &Dag, wire: &Wire) {
-    dag.using(wire.sending()).register_sink_subtask(
-        |mut wire: Sender<'_>, (numbers,): (Vec<u64>,)| {
+    dag.using(wire.sending())
+        .subtask(|mut wire: Sender<'_>, (numbers,): (Vec<u64>,)| {
             for number in numbers {
                 let _ = writeln!(wire, "{}", number * number);
             }
-        },
-        vec!["numbers"],
-        ms(50),
-        SubtaskAttributes::named("answer"),
-    );
+        })
+        .reads(&["numbers"])
+        .due(ms(50))
+        .register(SubtaskAttributes::named("answer"));
 }
 
 fn receive(numbers: Received<'_, u64>) -> (Vec<u64>,) {
@@ -41,12 +40,11 @@ fn each_packet_is_answered_once_and_in_order() {
         let (wire, dag) = (Wire::new("squares"), create_dag());
         dag.jobs(3);
         let attributes = SubtaskAttributes::named("receive");
-        let _raised = (dag.using(wire.receiving(number))).register_sporadic_subtask(
-            receive,
-            vec!["numbers"],
-            ms(1),
-            attributes,
-        );
+        dag.sporadic(ms(1));
+        dag.using(wire.receiving(number))
+            .source(receive)
+            .writes(&["numbers"])
+            .register(attributes);
         answer(&dag, &wire);
         finish_create_dags(std::slice::from_ref(&dag)).expect("it is sound");
         let (input, mut questions) = io::pipe().expect("a pipe");
@@ -83,12 +81,11 @@ fn what_is_sent_last_goes_when_the_connection_ends_and_losses_are_counted() {
     let (wire, dag) = (Wire::with("squares", options), create_dag());
     dag.jobs(20);
     let attributes = SubtaskAttributes::named("receive");
-    dag.using(wire.receiving(number)).register_periodic_subtask(
-        receive,
-        vec!["numbers"],
-        ms(2),
-        attributes,
-    );
+    dag.period(ms(2))
+        .using(wire.receiving(number))
+        .source(receive)
+        .writes(&["numbers"])
+        .register(attributes);
     answer(&dag, &wire);
     finish_create_dags(&[dag]).expect("it is sound");
     let (mut answers, output) = io::pipe().expect("a pipe");

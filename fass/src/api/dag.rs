@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 use core::time::Duration;
 
-use sched_dag::{Activation, ClusterId, DagId, DagKey, Order, OverrunPolicy, TaskSet};
+use sched_dag::{ClusterId, DagId, DagKey, Order, OverrunPolicy, TaskSet};
 
 use crate::draft::Draft;
 use crate::draft::attributes::SubtaskAttributes;
@@ -222,10 +222,9 @@ impl Dag {
         F: FnMut() -> Ret + Send + 'static,
         Ret: VecToPubs,
     {
-        let mut draft = self.open();
-        let source = move |()| f();
-        let subtask = draft.register(source, &[], &output_topics, attributes);
-        draft.set_period(Activation::Periodic, period, subtask);
+        let source = self.subtask(move |()| f()).writes(&output_topics);
+        let subtask = source.register_labelled(attributes);
+        self.open().set_period(period, subtask);
     }
 
     /// Registers a subtask between the source and the sink: a function from a
@@ -269,8 +268,10 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        self.open()
-            .register(f, &input_topics, &output_topics, attributes);
+        self.subtask(f)
+            .reads(&input_topics)
+            .writes(&output_topics)
+            .register(attributes);
     }
 
     /// Registers a sink: a function that returns nothing and shall have finished by
@@ -302,9 +303,10 @@ impl Dag {
         F: FnMut(Args) + Send + 'static,
         Args: VecToSubs,
     {
-        let mut draft = self.open();
-        let subtask = draft.register(f, &input_topics, &[], attributes);
-        draft.set_sink_deadline(relative_deadline, &subtask);
+        self.subtask(f)
+            .reads(&input_topics)
+            .due(relative_deadline)
+            .register(attributes);
     }
 
     /// Sets the time between two releases, for a DAG of untyped subtasks. (A

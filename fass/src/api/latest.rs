@@ -58,16 +58,15 @@ use crate::run::message::Message;
 ///
 /// let planner = create_dag();
 /// planner.name("planner").jobs(4).relative_deadline(slow);
-/// planner.using(pose.sample()).register_periodic_subtask(
-///     |pose: Option<Sample<'_, u64>>| {
+/// planner
+///     .period(slow)
+///     .using(pose.sample())
+///     .source(|pose: Option<Sample<'_, u64>>| {
 ///         if let Some(pose) = pose {
 ///             assert_eq!(*pose.value, pose.job + 1); // job k writes k + 1
 ///         }
-///     },
-///     vec![],
-///     slow,
-///     named("plan"),
-/// );
+///     })
+///     .register(named("plan"));
 /// let commit = finish_create_dags(&[localizer, planner]).unwrap();
 /// assert_eq!(commit.staleness().len(), 1);
 /// machine.run();

@@ -59,8 +59,10 @@ pub struct Switching {
 ///     _ => camera.pause(), // takes effect when this instance is complete
 /// };
 /// motion
+///     .period(ms(50))
 ///     .using(camera.switching())
-///     .register_periodic_subtask(feel, vec![], ms(50), named("feel"));
+///     .source(feel)
+///     .register(named("feel"));
 /// finish_create_dags(&[camera, motion]).unwrap();
 ///
 /// let report = machine.run();
@@ -121,16 +123,16 @@ pub struct ShuttingDown(());
 /// };
 /// let named = SubtaskAttributes::named;
 /// drive.register_periodic_subtask(step, vec!["distance"], period, named("step"));
-/// drive.using(shutting_down()).register_sink_subtask(
-///     |mut shutdown: Shutdown<'_>, (distance,): (i32,)| {
+/// drive
+///     .using(shutting_down())
+///     .subtask(|mut shutdown: Shutdown<'_>, (distance,): (i32,)| {
 ///         if distance == 0 {
 ///             shutdown.request(); // takes effect when this instance is complete
 ///         }
-///     },
-///     vec!["distance"],
-///     period,
-///     named("arrive"),
-/// );
+///     })
+///     .reads(&["distance"])
+///     .due(period)
+///     .register(named("arrive"));
 /// finish_create_dags(&[drive]).unwrap();
 /// assert_eq!(machine.run().dag("drive").statistics().completed, 5);
 /// ```

@@ -12,6 +12,7 @@ pub(crate) mod record;
 pub(crate) mod replaceable;
 pub(crate) mod signal;
 pub(crate) mod state;
+pub(crate) mod subtask;
 pub(crate) mod untyped;
 pub(crate) mod uses;
 pub(crate) mod using;

@@ -53,8 +53,10 @@ use crate::run::request::{AT_ONCE, Of, WHEN_IDLE, Wish};
 ///     }
 /// };
 /// battery
+///     .period(ms(25))
 ///     .using(landing.entering())
-///     .register_periodic_subtask(watch, vec![], ms(25), SubtaskAttributes::named("watch"));
+///     .source(watch)
+///     .register(SubtaskAttributes::named("watch"));
 ///
 /// finish_create_dags(&[cruise, descend, battery]).unwrap();
 /// let report = machine.run();

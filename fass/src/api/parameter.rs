@@ -40,12 +40,11 @@ use super::uses::{Uses, sealed};
 /// let gain = Parameter::new("gain", 0.5, 0.0..=2.0);
 /// let dag = create_dag();
 /// dag.name("loop").jobs(4);
-/// dag.using(gain.reading()).register_periodic_subtask(
-///     |gain: f64| (gain,),
-///     vec!["gain"],
-///     period,
-///     SubtaskAttributes::named("measure"),
-/// );
+/// dag.period(period)
+///     .using(gain.reading())
+///     .source(|gain: f64| (gain,))
+///     .writes(&["gain"])
+///     .register(SubtaskAttributes::named("measure"));
 /// dag.register_sink_subtask(
 ///     |(gain,): (f64,)| assert!((0.0..=2.0).contains(&gain)),
 ///     vec!["gain"],

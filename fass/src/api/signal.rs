@@ -15,19 +15,16 @@
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
-use alloc::vec::Vec;
 use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
-use sched_dag::{Activation, DagId};
+use sched_dag::DagId;
 
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
-use crate::draft::attributes::SubtaskAttributes;
 use crate::platform;
 use crate::run::signal::{Raised, Target};
-use crate::run::tuple::VecToPubs;
 
 /// What releases a sporadic DAG. Clones are handles of the same signal.
 ///
@@ -47,21 +44,22 @@ use crate::run::tuple::VecToPubs;
 /// let brakes = create_dag();
 /// brakes.name("brakes").relative_deadline(Duration::from_millis(5));
 /// let at_most_every = Duration::from_millis(50);
-/// let obstacle = brakes.register_sporadic_subtask(|| (), vec![], at_most_every, named("brake"));
+/// let obstacle = brakes.sporadic(at_most_every);
+/// brakes.source(|| ()).register(named("brake"));
 ///
 /// let vision = create_dag();
 /// vision.name("vision").jobs(20);
 /// vision.register_periodic_subtask(|| (1,), vec!["frame"], period, named("camera"));
-/// vision.using(obstacle.raising()).register_sink_subtask(
-///     |mut obstacle: Raiser<'_>, (frame,): (i32,)| {
+/// vision
+///     .using(obstacle.raising())
+///     .subtask(|mut obstacle: Raiser<'_>, (frame,): (i32,)| {
 ///         if frame > 0 {
 ///             obstacle.raise(); // takes effect when this instance is complete
 ///         }
-///     },
-///     vec!["frame"],
-///     period,
-///     named("detect"),
-/// );
+///     })
+///     .reads(&["frame"])
+///     .due(period)
+///     .register(named("detect"));
 /// finish_create_dags(&[brakes, vision]).unwrap();
 /// let report = machine.run();
 /// assert_eq!(report.dag("brakes").statistics().released, 5); // at 0, 50, 100, 150 and 200 ms
@@ -122,7 +120,8 @@ impl Signal {
     /// let dag = create_dag();
     /// dag.jobs(1).relative_deadline(Duration::from_millis(5));
     /// let attributes = SubtaskAttributes::named("answer");
-    /// let button = dag.register_sporadic_subtask(|| (), vec![], Duration::from_millis(50), attributes);
+    /// let button = dag.sporadic(Duration::from_millis(50));
+    /// dag.source(|| ()).register(attributes);
     /// finish_create_dags(&[dag]).unwrap();
     /// button.raise();
     /// assert_eq!(machine.run().jobs.len(), 1);
@@ -155,46 +154,19 @@ impl Signal {
 }
 
 impl Dag {
-    /// Registers the source of a sporadic DAG: a function without arguments that a
-    /// signal starts, but never earlier than `min_inter_arrival` after the job before.
+    /// Makes the DAG sporadic, with the least time between two releases, and returns its signal,
+    /// which can be raised by subtasks of all DAGs, or from outside.
     ///
-    /// `output_topics` names one topic for each element of `Ret`. The returned signal
-    /// can be raised by subtasks of all DAGs, or from outside. See [`Signal`].
-    /// Without a limit of [`jobs`](Self::jobs) the DAG keeps no run going: the run
+    /// See [`Signal`]. Without a limit of [`jobs`](Self::jobs) the DAG keeps no run going: the run
     /// ends when all others have ended.
-    #[track_caller]
-    #[must_use = "without its signal the DAG is never released"]
-    pub fn register_sporadic_subtask<F, Ret>(
-        &self,
-        mut f: F,
-        output_topics: Vec<&str>,
-        min_inter_arrival: Duration,
-        attributes: SubtaskAttributes,
-    ) -> Signal
-    where
-        F: FnMut() -> Ret + Send + 'static,
-        Ret: VecToPubs,
-    {
-        let mut draft = self.open();
-        let source = move |()| f();
-        let subtask = draft.register(source, &[], &output_topics, attributes);
-        draft.set_period(Activation::Sporadic, min_inter_arrival, subtask);
-        drop(draft);
-        self.signal()
-    }
-
-    /// Makes a DAG of untyped subtasks sporadic, with the least time between two
-    /// releases, and returns its signal. (A typed source states it itself.)
     ///
     /// ```
     /// use core::time::Duration;
     /// let button = fass::create_dag().sporadic(Duration::from_millis(50));
     /// ```
     #[track_caller]
-    #[must_use = "without its signal the DAG is never released"]
     pub fn sporadic(&self, min_inter_arrival: Duration) -> Signal {
-        self.open().replace_period(min_inter_arrival);
-        self.open().spec.activation = Activation::Sporadic;
+        self.open().set_sporadic(min_inter_arrival);
         self.signal()
     }
 
@@ -213,7 +185,8 @@ impl Dag {
     /// let brakes = create_dag();
     /// brakes.name("brakes").relative_deadline(ms(5));
     /// let hold = SubtaskAttributes::named("hold");
-    /// let stop = brakes.register_sporadic_subtask(|| (), vec![], ms(50), hold);
+    /// let stop = brakes.sporadic(ms(50));
+    /// brakes.source(|| ()).register(hold);
     ///
     /// let steering = create_dag();
     /// steering.name("steering").jobs(10).relative_deadline(ms(10)).on_fault(&stop);

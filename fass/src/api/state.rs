@@ -76,21 +76,19 @@ impl<T: Send + Sync + 'static> StateValue for T {}
 /// let distance = dag.state("distance", 0_u32);
 ///
 /// dag.register_periodic_subtask(|| (5_u32,), vec!["step"], period, SubtaskAttributes::named("wheel"));
-/// dag.using(distance.update()).register_subtask(
-///     |distance: &mut u32, (step,): (u32,)| {
+/// dag.using(distance.update())
+///     .subtask(|distance: &mut u32, (step,): (u32,)| {
 ///         *distance += step;
 ///         (step,)
-///     },
-///     vec!["step"],
-///     vec!["moved"],
-///     SubtaskAttributes::named("add"),
-/// );
-/// dag.using(distance.read()).register_sink_subtask(
-///     |distance: &u32, (moved,): (u32,)| assert_eq!(distance % moved, 0),
-///     vec!["moved"],
-///     period,
-///     SubtaskAttributes::named("show"),
-/// );
+///     })
+///     .reads(&["step"])
+///     .writes(&["moved"])
+///     .register(SubtaskAttributes::named("add"));
+/// dag.using(distance.read())
+///     .subtask(|distance: &u32, (moved,): (u32,)| assert_eq!(distance % moved, 0))
+///     .reads(&["moved"])
+///     .due(period)
+///     .register(SubtaskAttributes::named("show"));
 /// finish_create_dags(&[dag]).unwrap();
 /// machine.run();
 /// ```
@@ -138,7 +136,7 @@ impl<T: StateValue> State<T> {
     /// DAG goes on ([`Dag::survive_faults`]). The commit makes a value for each fault that is
     /// survived.
     ///
-    /// See [`Replaceable`](crate::Replaceable).
+    /// See [`Dag::restarting`](crate::Dag::restarting).
     ///
     /// # Panics
     ///

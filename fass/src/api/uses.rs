@@ -74,12 +74,6 @@ pub trait Uses: sealed::Sealed {
     #[doc(hidden)]
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held;
 
-    /// Notes that the subtask is the source of this DAG, which is sporadic.
-    #[doc(hidden)]
-    fn begins(held: &Self::Held, dag: &Dag) {
-        let _ = (held, dag);
-    }
-
     /// Begins the use at the start of an instance.
     #[doc(hidden)]
     fn enter(held: &mut Self::Held) -> Self::Guard<'_>;
@@ -134,11 +128,6 @@ macro_rules! implement_tuple {
             fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
                 let ($($use_,)*) = self;
                 ($($use_.hold(dag, subtask),)*)
-            }
-
-            fn begins(held: &Self::Held, dag: &Dag) {
-                let ($($use_,)*) = held;
-                $($Use::begins($use_, dag);)*
             }
 
             fn enter(held: &mut Self::Held) -> Self::Guard<'_> {

@@ -3,11 +3,8 @@
 //! The methods are those of [`Dag`]. Each wraps the function in one that begins the
 //! uses, lends them to the function for one call, and ends them.
 
-use alloc::vec::Vec;
-use core::time::Duration;
-
 use super::dag::Dag;
-use super::signal::Signal;
+use super::subtask::Subtask;
 use super::untyped::Untyped;
 use super::uses::Uses;
 use crate::draft::attributes::SubtaskAttributes;
@@ -30,7 +27,7 @@ impl Dag {
     /// Begins the registration of a subtask that uses something besides its inputs.
     ///
     /// See [`Uses`] for what there is, and [`State`](crate::State),
-    /// [`Latest`](crate::Latest) and [`Signal`] for examples.
+    /// [`Latest`](crate::Latest) and [`Signal`](crate::Signal) for examples.
     ///
     /// # Panics
     ///
@@ -46,107 +43,31 @@ impl Dag {
 }
 
 impl<'d, U: Uses> Using<'d, U> {
-    /// Works like [`Dag::register_periodic_subtask`].
+    /// Works like [`Dag::source`].
     ///
-    /// ```
-    /// # use core::time::Duration;
-    /// # use fass::{SubtaskAttributes, create_dag};
-    /// let dag = create_dag();
-    /// let count = dag.state("count", 0_u64);
-    /// dag.using(count.update()).register_periodic_subtask(
-    ///     |count: &mut u64| {
-    ///         *count += 1;
-    ///         (*count,)
-    ///     },
-    ///     vec!["count"],
-    ///     Duration::from_millis(10),
-    ///     SubtaskAttributes::named("counter"),
-    /// );
-    /// ```
+    /// See [`Subtask`].
     #[track_caller]
-    pub fn register_periodic_subtask<F, Ret>(
-        self,
-        mut f: F,
-        output_topics: Vec<&str>,
-        period: Duration,
-        attributes: SubtaskAttributes,
-    ) where
-        F: for<'a> FnMut(U::Borrowed<'a>) -> Ret + Send + 'static,
-        Ret: VecToPubs,
-    {
-        let (dag, mut held) = self.hold();
-        let f = move || f(U::borrow(&mut U::enter(&mut held)));
-        dag.register_periodic_subtask(f, output_topics, period, attributes);
-    }
-
-    /// Works like [`Dag::register_sporadic_subtask`].
-    ///
-    /// ```
-    /// # use core::time::Duration;
-    /// # use fass::{SubtaskAttributes, create_dag};
-    /// let dag = create_dag();
-    /// let presses = dag.state("presses", 0_u64);
-    /// let button = dag.using(presses.update()).register_sporadic_subtask(
-    ///     |presses: &mut u64| {
-    ///         *presses += 1;
-    ///         (*presses,)
-    ///     },
-    ///     vec!["presses"],
-    ///     Duration::from_millis(50),
-    ///     SubtaskAttributes::named("button"),
-    /// );
-    /// ```
-    #[track_caller]
-    pub fn register_sporadic_subtask<F, Ret>(
-        self,
-        mut f: F,
-        output_topics: Vec<&str>,
-        min_inter_arrival: Duration,
-        attributes: SubtaskAttributes,
-    ) -> Signal
+    pub fn source<F, Ret>(self, mut f: F) -> Subtask<'d>
     where
         F: for<'a> FnMut(U::Borrowed<'a>) -> Ret + Send + 'static,
         Ret: VecToPubs,
     {
         let (dag, mut held) = self.hold();
-        U::begins(&held, dag);
-        let f = move || f(U::borrow(&mut U::enter(&mut held)));
-        dag.register_sporadic_subtask(f, output_topics, min_inter_arrival, attributes)
+        dag.source(move || f(U::borrow(&mut U::enter(&mut held))))
     }
 
-    /// Works like [`Dag::register_subtask`]. See [`State`](crate::State).
+    /// Works like [`Dag::subtask`].
+    ///
+    /// See [`State`](crate::State).
     #[track_caller]
-    pub fn register_subtask<F, Args, Ret>(
-        self,
-        mut f: F,
-        input_topics: Vec<&str>,
-        output_topics: Vec<&str>,
-        attributes: SubtaskAttributes,
-    ) where
+    pub fn subtask<F, Args, Ret>(self, mut f: F) -> Subtask<'d>
+    where
         F: for<'a> FnMut(U::Borrowed<'a>, Args) -> Ret + Send + 'static,
         Args: VecToSubs,
         Ret: VecToPubs,
     {
         let (dag, mut held) = self.hold();
-        let f = move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args);
-        dag.register_subtask(f, input_topics, output_topics, attributes);
-    }
-
-    /// Works like [`Dag::register_sink_subtask`]. See [`State`](crate::State).
-    #[track_caller]
-    pub fn register_sink_subtask<F, Args>(
-        self,
-        mut f: F,
-        input_topics: Vec<&str>,
-        relative_deadline: Duration,
-        attributes: SubtaskAttributes,
-    ) where
-        F: for<'a> FnMut(U::Borrowed<'a>, Args) + Send + 'static,
-        Args: VecToSubs,
-    {
-        let (dag, mut held) = self.hold();
-        let f = move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args);
-        dag.register_sink_subtask(f, input_topics, relative_deadline, attributes);
+        dag.subtask(move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args))
     }
 
     /// Works like [`Dag::register_untyped_subtask`].

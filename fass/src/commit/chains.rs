@@ -30,12 +30,11 @@ use crate::run::staleness::Staleness;
 /// let image = camera.latest::<i32>("image");
 /// let motor = create_dag();
 /// motor.name("motor").jobs(300).relative_deadline(ms(10));
-/// motor.using(image.sample()).register_periodic_subtask(
-///     |_: Option<Sample<'_, i32>>| (),
-///     vec![],
-///     ms(10),
-///     taking("drive", 1),
-/// );
+/// motor
+///     .period(ms(10))
+///     .using(image.sample())
+///     .source(|_: Option<Sample<'_, i32>>| ())
+///     .register(taking("drive", 1));
 /// let commit = finish_create_dags(&[camera, motor]).unwrap();
 /// let chains = commit.chains();
 /// assert_eq!(chains[0].to_string(), "camera/expose > motor/drive");

@@ -82,8 +82,8 @@ worded! {
         /// Of two sources of one DAG one is periodic and one sporadic; `subtask` is the one
         /// registered second.
         ActivationsDiffer { dag: DagLabel, subtask: SubtaskLabel } = "activations_differ",
-            "{subtask} makes a second source of {dag}, which is released by the clock for one and \
-             by a signal for the other; make two DAGs, or both sources alike";
+            "{subtask} has a period, and its {dag} is sporadic, released by a signal; make two \
+             DAGs, or leave one of the two out";
         /// The file of observed WCETs does not fit the DAG.
         WcetsRefused { dag: DagLabel, fault: WcetFault } = "wcets_refused", "{fault}: {dag}";
         /// A subtask samples a latest value of a DAG that is not in the commit.

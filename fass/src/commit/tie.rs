@@ -11,7 +11,7 @@ use core::cell::RefCell;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::lifecycle::Lifecycle;
-use sched_dag::{DagId, DagSpec, OnFault, SubtaskSpec, TaskSet};
+use sched_dag::{Activation, DagId, DagSpec, OnFault, SubtaskSpec, TaskSet};
 
 use super::answer::Answers;
 use super::staleness::writer_of;
@@ -56,6 +56,11 @@ pub(crate) fn tie(
             };
             let spec = core::mem::replace(&mut draft.spec, named);
             draft.target.set(number, id);
+            for tell in core::mem::take(&mut draft.receives) {
+                if spec.activation == Activation::Sporadic {
+                    tell(Arc::clone(&draft.target));
+                }
+            }
             let effects = core::mem::take(&mut draft.effects);
             let make_bodies = core::mem::take(&mut draft.make_bodies);
             let resets = core::mem::take(&mut draft.resets);

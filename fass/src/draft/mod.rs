@@ -30,10 +30,8 @@ use crate::run::effect::Effect;
 use crate::run::latest::AnyLatest;
 use crate::run::message::MessageType;
 use crate::run::record::AnyRecorded;
-use crate::run::replaceable::{self, Functions};
 use crate::run::signal::Target;
-use crate::run::subtask::{MakeBody, defer};
-use crate::run::tuple::{VecToPubs, VecToSubs};
+use crate::run::subtask::MakeBody;
 use crate::run::untyped;
 use attributes::SubtaskAttributes;
 use flaw::Flaw;
@@ -53,6 +51,8 @@ pub(crate) struct Draft {
     /// What only this crate can find wrong.
     pub(crate) flaws: Vec<Flaw>,
     pub(crate) is_committed: bool,
+    /// A source that states a period.
+    pub(crate) periodic_source: Option<SubtaskLabel>,
     /// Whether the relative deadline is the DAG's own, rather than its sinks' longest.
     pub(crate) states_deadline: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
@@ -82,6 +82,8 @@ pub(crate) struct Draft {
     pub(crate) check_recorded: Option<modes::Check>,
     /// What makes that which serves requests, if it states something of that kind.
     pub(crate) lifecycle: Option<MakeLifecycle>,
+    /// What is to be told of the DAG's signal if it is sporadic: wires that its source receives on.
+    pub(crate) receives: Vec<Box<dyn FnOnce(Arc<Target>)>>,
     /// What completions of subtasks do beyond the DAG, latest values apart.
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// The subtasks whose functions can be replaced.
@@ -94,54 +96,27 @@ pub(crate) struct Draft {
     pub(crate) on_fault: Option<Arc<Target>>,
 }
 
+/// The topics that a subtask names, and the types of its function.
+pub(crate) struct Ends<'a> {
+    pub(crate) inputs: (&'a [&'a str], &'a [MessageType]),
+    pub(crate) outputs: (&'a [&'a str], &'a [MessageType]),
+}
+
 /// The type of a topic's end that no function states.
 #[derive(Clone)]
 struct Unknown;
 
 impl Draft {
     /// Adds a subtask and returns its label.
-    pub(crate) fn register<F, Args, Ret>(
+    pub(crate) fn register(
         &mut self,
-        f: F,
-        inputs: &[&str],
-        outputs: &[&str],
-        attributes: SubtaskAttributes,
-    ) -> SubtaskLabel
-    where
-        F: FnMut(Args) -> Ret + Send + 'static,
-        Args: VecToSubs,
-        Ret: VecToPubs,
-    {
-        let inputs = (inputs, Args::input_types());
-        let outputs = (outputs, Ret::output_types());
-        self.make_bodies.push(defer(f));
-        self.enter(inputs, outputs, attributes)
-    }
-
-    /// Adds a subtask whose function can be replaced, and returns its label.
-    pub(crate) fn register_replaceable<Args: VecToSubs, Ret: VecToPubs>(
-        &mut self,
-        functions: Functions<Args, Ret>,
-        inputs: &[&str],
-        outputs: &[&str],
+        body: MakeBody,
+        ends: Ends<'_>,
         attributes: SubtaskAttributes,
     ) -> SubtaskLabel {
-        let inputs = (inputs, Args::input_types());
-        let outputs = (outputs, Ret::output_types());
-        self.replaceable.push(self.make_bodies.len());
-        self.make_bodies.push(replaceable::defer(functions));
-        self.enter(inputs, outputs, attributes)
-    }
-
-    /// Notes what a subtask states. Apart, as each of an app's functions has a
-    /// [`register`](Self::register) of its own, and an image has little room.
-    #[inline(never)]
-    fn enter(
-        &mut self,
-        (inputs, input_types): (&[&str], Vec<MessageType>),
-        (outputs, output_types): (&[&str], Vec<MessageType>),
-        attributes: SubtaskAttributes,
-    ) -> SubtaskLabel {
+        let (inputs, input_types) = ends.inputs;
+        let (outputs, output_types) = ends.outputs;
+        self.make_bodies.push(body);
         let subtask = self.next_label(&attributes);
         if input_types.len() != inputs.len() {
             self.flaws.push(Flaw::InputArity {
@@ -159,8 +134,8 @@ impl Draft {
         }
         let spec = self.specify(&subtask, attributes);
         self.spec.subtasks.push(SubtaskSpec {
-            inputs: ports(inputs, &input_types),
-            outputs: ports(outputs, &output_types),
+            inputs: ports(inputs, input_types),
+            outputs: ports(outputs, output_types),
             ..spec
         });
         subtask
@@ -213,19 +188,23 @@ impl Draft {
         self.spec.offset_ns = self.convert(offset, None, "offset").unwrap_or(0);
     }
 
+    /// Makes the DAG sporadic, which it cannot be if a source states a period.
+    pub(crate) fn set_sporadic(&mut self, min_inter_arrival: Duration) {
+        self.spec.activation = Activation::Sporadic;
+        self.replace_period(min_inter_arrival);
+        if let Some(subtask) = self.periodic_source.clone() {
+            self.flaws.push(Flaw::ActivationsDiffer { subtask });
+        }
+    }
+
+    /// States the period of a source, which that of all others must be.
     #[inline(never)]
-    pub(crate) fn set_period(
-        &mut self,
-        activation: Activation,
-        period: Duration,
-        subtask: SubtaskLabel,
-    ) {
-        let is_first = self.spec.period_ns.is_none();
-        if !is_first && self.spec.activation != activation {
+    pub(crate) fn set_period(&mut self, period: Duration, subtask: SubtaskLabel) {
+        if self.spec.activation == Activation::Sporadic {
             self.flaws.push(Flaw::ActivationsDiffer { subtask });
             return;
         }
-        self.spec.activation = activation;
+        self.periodic_source = Some(subtask.clone());
         let Some(period_ns) = self.convert(period, Some(&subtask), "period") else {
             return;
         };

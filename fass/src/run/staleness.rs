@@ -22,12 +22,11 @@ use sched_dag::{DagLabel, SubtaskLabel};
 /// let pose = writer.latest::<i32>("pose");
 /// let reader = create_dag();
 /// reader.name("reader").jobs(3).relative_deadline(period);
-/// reader.using(pose.sample()).register_periodic_subtask(
-///     |_: Option<Sample<'_, i32>>| (),
-///     vec![],
-///     period,
-///     taking("plan", 1),
-/// );
+/// reader
+///     .period(period)
+///     .using(pose.sample())
+///     .source(|_: Option<Sample<'_, i32>>| ())
+///     .register(taking("plan", 1));
 /// let commit = finish_create_dags(&[writer, reader]).unwrap();
 /// assert!(commit.staleness()[0].bound.is_some_and(|bound| bound >= Duration::from_millis(12)));
 /// ```

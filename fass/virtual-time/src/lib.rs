@@ -301,7 +301,8 @@ impl VirtualTime {
     /// let dag = create_dag();
     /// dag.relative_deadline(Duration::from_millis(5));
     /// let answer = SubtaskAttributes::named("answer");
-    /// let button = dag.register_sporadic_subtask(|| (), vec![], Duration::from_millis(50), answer);
+    /// let button = dag.sporadic(Duration::from_millis(50));
+    /// dag.source(|| ()).register(answer);
     /// finish_create_dags(&[dag]).unwrap();
     /// machine.raise_at(&button, Duration::from_millis(7));
     /// machine.raise_at(&button, Duration::from_millis(9)); // early, so at 57 ms

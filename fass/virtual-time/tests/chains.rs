@@ -54,16 +54,16 @@ impl Drawn {
         let period = ms(self.period);
         let (into, out_of) = (format!("into {name}"), format!("out of {name}"));
         match from {
-            Some(latest) => dag.using(latest.sample()).register_periodic_subtask(
-                move |sample: Option<Sample<'_, Origin>>| {
+            Some(latest) => dag
+                .period(period)
+                .using(latest.sample())
+                .source(move |sample: Option<Sample<'_, Origin>>| {
                     let origin = sample.and_then(|sample| *sample.value);
                     take(0);
                     (origin,)
-                },
-                vec![&*into],
-                period,
-                attributes("enter", 0),
-            ),
+                })
+                .writes(&[&*into])
+                .register(attributes("enter", 0)),
             None => {
                 let mut job = 0_u64..;
                 dag.register_periodic_subtask(
@@ -113,12 +113,10 @@ fn run(random: &mut Random) -> (Report, EndToEnd, Vec<Origin>) {
     let end = motor.latest("out of motor");
     let last = create_dag();
     last.name("log").jobs(1).relative_deadline(ms(4000));
-    last.using(end.sample()).register_periodic_subtask(
-        |_: Option<Sample<'_, Origin>>| (),
-        vec![],
-        ms(4000),
-        named("log").wcet(ms(0)),
-    );
+    last.period(ms(4000))
+        .using(end.sample())
+        .source(|_: Option<Sample<'_, Origin>>| ())
+        .register(named("log").wcet(ms(0)));
     let dags = [camera, plan, motor, last];
     let commit = finish_create_dags_with(&dags, construction).expect("a sound set");
     let chains = commit.chains_between("camera/enter", "motor/leave");

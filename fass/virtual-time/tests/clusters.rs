@@ -90,12 +90,11 @@ fn a_latest_value_crosses_at_the_instant_of_its_completion() {
         reader.name("read").cluster(reads).jobs(20);
         reader.relative_deadline(ms(2));
         let (seen, keep) = Seen::shared();
-        reader.using(latest.sample()).register_periodic_subtask(
-            move |count: Option<Sample<'_, u64>>| keep.add(count.map(|count| *count.value)),
-            vec![],
-            ms(2),
-            taking("read", 1),
-        );
+        reader
+            .period(ms(2))
+            .using(latest.sample())
+            .source(move |count: Option<Sample<'_, u64>>| keep.add(count.map(|count| *count.value)))
+            .register(taking("read", 1));
         finish_create_dags(&[writer, reader]).unwrap();
         assert_eq!(machine.run().violations(), []);
         // Sample k is taken at 2k ms, value j shows from 10j + 4 ms on.
@@ -111,8 +110,8 @@ fn a_signal_crosses_at_the_instant_of_its_completion() {
         let answer = create_dag();
         answer.name("answer").cluster(answers);
         answer.relative_deadline(ms(5));
-        let signal =
-            answer.register_sporadic_subtask(|| work(1), vec![], ms(8), taking("answer", 1));
+        let signal = answer.sporadic(ms(8));
+        answer.source(|| work(1)).register(taking("answer", 1));
         let ask = every(10, "ask");
         ask.cluster(raises)
             .jobs(3)

@@ -166,7 +166,9 @@ fn a_call_that_is_to_fail_does_so_in_place_of_its_function() {
     });
     dag.register_periodic_subtask(|| (1,), vec!["number"], ms(10), named("source"));
     dag.restarting(|| |_: (i32,)| execute(ms(1)))
-        .register_sink_subtask(vec!["number"], ms(10), named("sink").wcet(ms(2)));
+        .reads(&["number"])
+        .due(ms(10))
+        .register(named("sink").wcet(ms(2)));
     let report = run(&machine, &[dag]);
     let outcomes: Vec<_> = report.jobs.iter().map(|job| job.outcome).collect();
     let met = Some(JobOutcome::Met);

@@ -58,7 +58,9 @@ fn each_fault_costs_one_job_and_makes_the_function_anew() {
         }
     };
     dag.restarting(make)
-        .register_subtask(vec!["job"], vec!["calls"], named("middle"));
+        .reads(&["job"])
+        .writes(&["calls"])
+        .register(named("middle"));
     let kept = keeping::<(u64, u32)>(&dag, "calls");
     let healthy = pair("healthy", ms(5), ms(5), [ms(1), ms(1)]);
     healthy.jobs(24);
@@ -108,7 +110,9 @@ fn a_fault_while_the_next_function_is_made_ends_the_dag() {
         |(job,): (u64,)| assert!(job != 2 && job != 4, "job {job}")
     };
     dag.restarting(make)
-        .register_sink_subtask(vec!["job"], ms(10), named("sink"));
+        .reads(&["job"])
+        .due(ms(10))
+        .register(named("sink"));
     let report = run(&machine, &[dag]);
     // Jobs 2 and 4 are lost; the function for job 5 cannot be made.
     assert_eq!(counts(report.dag("counting").statistics()), [3, 2, 3]);
@@ -128,7 +132,9 @@ fn the_second_function_is_fallen_back_on_once() {
         (job,)
     };
     dag.falling_back(precise, rough)
-        .register_subtask(vec!["job"], vec!["result"], named("middle"));
+        .reads(&["job"])
+        .writes(&["result"])
+        .register(named("middle"));
     let kept = keeping::<u64>(&dag, "result");
     let report = run(&machine, &[dag]);
     assert_eq!(kept.all(), [0, 10, 20, 4, 5, 6, 7]);
@@ -150,11 +156,11 @@ fn states_that_it_used_are_reset_and_others_are_not() {
             (*sum,)
         }
     };
-    dag.using(sum.update()).restarting(add).register_subtask(
-        vec!["job"],
-        vec!["sum"],
-        named("add"),
-    );
+    dag.using(sum.update())
+        .restarting(add)
+        .reads(&["job"])
+        .writes(&["sum"])
+        .register(named("add"));
     let (kept, keep) = Seen::shared();
     let sink = move |(sum, count): (&u64, &mut u64), (sent,): (u64,)| {
         *count += 1;
@@ -162,7 +168,10 @@ fn states_that_it_used_are_reset_and_others_are_not() {
         keep.add((sent, *count));
     };
     dag.using((sum.read(), count.update()))
-        .register_sink_subtask(sink, vec!["sum"], ms(10), named("sink"));
+        .subtask(sink)
+        .reads(&["sum"])
+        .due(ms(10))
+        .register(named("sink"));
     let report = run(&machine, &[dag]);
     assert_eq!(
         kept.all(),
@@ -191,7 +200,9 @@ fn what_waits_for_the_lost_function_is_for_the_next_one() {
         }
     };
     dag.restarting(make)
-        .register_sink_subtask(vec!["job"], ms(10), named("sink"));
+        .reads(&["job"])
+        .due(ms(10))
+        .register(named("sink"));
     let report = run(&machine, &[dag]);
     assert_eq!(kept.all(), [0, 2, 3, 4, 5]);
     assert_eq!(counts(report.dag("ahead").statistics()), [1, 1, 5]);
@@ -211,8 +222,10 @@ fn a_source_restarts_and_its_latest_value_shows_again() {
             (calls,)
         }
     };
-    dag.restarting(make)
-        .register_periodic_subtask(vec!["pose"], ms(10), named("localize"));
+    dag.period(ms(10))
+        .restarting(make)
+        .writes(&["pose"])
+        .register(named("localize"));
     let pose = dag.latest::<u32>("pose");
     let reader = create_dag();
     reader
@@ -226,8 +239,10 @@ fn a_source_restarts_and_its_latest_value_shows_again() {
         keep.add(seen);
     };
     reader
+        .period(ms(10))
         .using(pose.sample())
-        .register_periodic_subtask(read, vec![], ms(10), named("read"));
+        .source(read)
+        .register(named("read"));
     run(&machine, &[dag, reader]);
     assert_eq!(
         kept.all(),

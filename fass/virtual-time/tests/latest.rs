@@ -30,18 +30,16 @@ fn reader(latest: &Latest<u64>, period_ms: u64, jobs: u64) -> (Dag, Seen<Sampled
         .jobs(jobs)
         .relative_deadline(ms(period_ms));
     let (seen, keep) = Seen::shared();
-    dag.using(latest.sample()).register_periodic_subtask(
-        move |count: Option<Sample<'_, u64>>| {
+    dag.period(ms(period_ms))
+        .using(latest.sample())
+        .source(move |count: Option<Sample<'_, u64>>| {
             let found = count.map(|count| {
                 assert_eq!(*count.value, count.job);
                 (count.job, count.completed_ns / 1_000_000)
             });
             keep.add((fass::now_ns() / 1_000_000, found));
-        },
-        vec![],
-        ms(period_ms),
-        taking("read", 1),
-    );
+        })
+        .register(taking("read", 1));
     (dag, seen)
 }
 
@@ -113,12 +111,10 @@ fn a_message_that_only_moves_has_one_sampler() {
     let key = dag.latest::<Unique<i32>>("key");
     let read = create_dag();
     read.jobs(2).relative_deadline(ms(10)).offset(ms(5));
-    read.using(key.sample()).register_periodic_subtask(
-        |key: Option<Sample<'_, Unique<i32>>>| assert_eq!(**key.unwrap().value, 7),
-        vec![],
-        ms(10),
-        named("read"),
-    );
+    read.period(ms(10))
+        .using(key.sample())
+        .source(|key: Option<Sample<'_, Unique<i32>>>| assert_eq!(**key.unwrap().value, 7))
+        .register(named("read"));
     finish_create_dags(&[dag, read.clone()]).unwrap();
     assert_eq!(machine.run().dag(&read).statistics().completed, 2);
 }
@@ -140,12 +136,10 @@ fn a_panicking_instance_publishes_nothing() {
         let read = create_dag();
         read.jobs(5).relative_deadline(ms(10)).offset(ms(5));
         let (seen, keep) = Seen::shared();
-        read.using(latest.sample()).register_periodic_subtask(
-            move |job: Option<Sample<'_, u64>>| keep.add(*job.unwrap().value),
-            vec![],
-            ms(10),
-            named("read"),
-        );
+        read.period(ms(10))
+            .using(latest.sample())
+            .source(move |job: Option<Sample<'_, u64>>| keep.add(*job.unwrap().value))
+            .register(named("read"));
         (read, seen)
     };
     run(&machine, &[dag, read]);

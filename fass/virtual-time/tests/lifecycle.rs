@@ -133,7 +133,8 @@ fn l3_a_signal_to_a_paused_dag_is_skipped() {
     let machine = VirtualTime::new().cores(2);
     let answers = create_dag();
     answers.name("answers").relative_deadline(ms(5));
-    let signal = answers.register_sporadic_subtask(|| (), vec![], ms(10), named("answer"));
+    let signal = answers.sporadic(ms(10));
+    answers.source(|| ()).register(named("answer"));
     let asks = asking(&answers, 1, 2, |mut switch, job| match job {
         0 => switch.pause(),
         _ => switch.resume(),
@@ -340,9 +341,10 @@ fn a_fault_releases_the_dag_that_brings_about_a_safe_state_and_that_ends_the_run
         work(2);
         shutdown.request();
     };
-    let signal =
-        safe.using(shutting_down())
-            .register_sporadic_subtask(hold, vec![], ms(50), named("hold"));
+    let signal = safe.sporadic(ms(50));
+    safe.using(shutting_down())
+        .source(hold)
+        .register(named("hold"));
     let steering = every(10, "steering");
     steering.on_fault(&signal);
     let steer = |job| assert_ne!(job, 3, "a fault");

@@ -16,8 +16,8 @@ fn commit(gain: &Parameter<f64>) -> Seen<(f64, f64)> {
         work(4);
         (gain,)
     };
-    let source = dag.using(gain.reading());
-    source.register_periodic_subtask(read, vec!["gain"], ms(10), taking("read", 4));
+    let source = dag.period(ms(10)).using(gain.reading()).source(read);
+    source.writes(&["gain"]).register(taking("read", 4));
     for side in ["left", "right"] {
         let pass = |(gain,): (f64,)| {
             work(2);
@@ -104,12 +104,14 @@ fn what_would_give_a_job_two_values_is_refused_by_the_commit() {
     let dag = create_dag();
     for name in ["one", "other"] {
         let source = |gain: f64| (gain,);
-        let using = dag.using(gain.reading());
-        using.register_periodic_subtask(source, vec![name], ms(10), named(name));
+        let source = dag.period(ms(10)).using(gain.reading()).source(source);
+        source.writes(&[name]).register(named(name));
     }
     let sink = |_: f64, _: (f64, f64)| ();
-    let using = dag.using(gain.reading());
-    using.register_sink_subtask(sink, vec!["one", "other"], ms(10), named("sink"));
+    let sink = dag.using(gain.reading()).subtask(sink);
+    sink.reads(&["one", "other"])
+        .due(ms(10))
+        .register(named("sink"));
     // It has no topics, but follows the sink.
     let using = dag.using(gain.reading());
     let untyped = using.register_untyped_subtask(|_: f64, _job| (), named("untyped"));

@@ -96,7 +96,8 @@ fn build(seed: u64, salt: u64) -> Set {
         let source = move || work(&mut state, &[number], longest);
         let named = SubtaskAttributes::named("source");
         if random.below(3) == 0 {
-            let signal = dag.register_sporadic_subtask(source, vec![&topic], period, named);
+            let signal = dag.sporadic(period);
+            dag.source(source).writes(&[&topic]).register(named);
             set.signals.push(signal);
         } else {
             dag.jobs(20);
@@ -150,7 +151,10 @@ fn register(set: &Set, number: usize, (input, output): (&str, &str), random: &mu
                 work(&mut state, &[value, of_sample(sample)], longest)
             };
             dag.using(latest.sample())
-                .register_subtask(f, ins, outs, named);
+                .subtask(f)
+                .reads(&ins)
+                .writes(&outs)
+                .register(named);
         }
         AsksForTheTime => {
             let f = move |(value,): (u64,)| {
@@ -174,7 +178,10 @@ fn register(set: &Set, number: usize, (input, output): (&str, &str), random: &mu
                 window: 1,
                 in_all: 40,
             });
-            dag.restarting(make).register_subtask(ins, outs, named);
+            dag.restarting(make)
+                .reads(&ins)
+                .writes(&outs)
+                .register(named);
         }
         EndsItsDag => {
             let latest: Latest<u64> = set.dags[other].latest(&format!("s{other}"));
@@ -184,7 +191,10 @@ fn register(set: &Set, number: usize, (input, output): (&str, &str), random: &mu
                 work(&mut state, &[value, sampled], longest)
             };
             dag.using(latest.sample())
-                .register_subtask(f, ins, outs, named);
+                .subtask(f)
+                .reads(&ins)
+                .writes(&outs)
+                .register(named);
         }
         Signals if !set.signals.is_empty() => {
             let signal = random.below(set.signals.len() as u64);
@@ -196,13 +206,19 @@ fn register(set: &Set, number: usize, (input, output): (&str, &str), random: &mu
                 work(&mut state, &[value], longest)
             };
             dag.using(signal.raising())
-                .register_subtask(f, ins, outs, named);
+                .subtask(f)
+                .reads(&ins)
+                .writes(&outs)
+                .register(named);
         }
         HasAState => {
             let shared = dag.state(output, state);
             let f = move |state: &mut u64, (value,): (u64,)| work(state, &[value], longest);
             dag.using(shared.update())
-                .register_subtask(f, ins, outs, named);
+                .subtask(f)
+                .reads(&ins)
+                .writes(&outs)
+                .register(named);
         }
         _ => {
             let f = move |(value,): (u64,)| work(&mut state, &[value], longest);

@@ -13,18 +13,17 @@ fn a_signal_takes_effect_at_the_completion_that_raises_it() {
     let machine = VirtualTime::new().cores(2);
     let answers = create_dag();
     answers.name("answers").relative_deadline(ms(5));
-    let event = answers.register_sporadic_subtask(|| work(1), vec![], ms(15), named("answer"));
+    let event = answers.sporadic(ms(15));
+    answers.source(|| work(1)).register(named("answer"));
     let asks = create_dag();
     asks.name("asks").jobs(4).relative_deadline(ms(10));
-    asks.using(event.raising()).register_periodic_subtask(
-        |mut event: Raiser<'_>| {
+    asks.period(ms(10))
+        .using(event.raising())
+        .source(|mut event: Raiser<'_>| {
             event.raise();
             work(3);
-        },
-        vec![],
-        ms(10),
-        named("ask"),
-    );
+        })
+        .register(named("ask"));
     let report = run(&machine, &[answers, asks]);
     let answers = report.dag("answers");
     let releases = answers.jobs();
@@ -77,7 +76,8 @@ fn a_subtask_cannot_raise_a_signal_behind_the_models_back() {
     let machine = VirtualTime::new().contain_panics();
     let answers = create_dag();
     answers.relative_deadline(ms(5));
-    let event = answers.register_sporadic_subtask(|| (), vec![], ms(15), named("answer"));
+    let event = answers.sporadic(ms(15));
+    answers.source(|| ()).register(named("answer"));
     let asks = create_dag();
     asks.jobs(1).relative_deadline(ms(10));
     asks.register_periodic_subtask(move || event.raise(), vec![], ms(10), named("ask"));

@@ -16,26 +16,26 @@ fn sharing(jobs: u64) -> (Dag, Seen<(u64, Vec<&'static str>)>) {
     let source = job_numbers(0);
     dag.register_periodic_subtask(source, vec!["job"], ms(20), named("source"));
     for (name, time_ms) in [("left", 5), ("middle", 3), ("right", 1)] {
-        dag.using(order.update()).register_subtask(
-            move |order: &mut Vec<&'static str>, (job,): (u64,)| {
+        dag.using(order.update())
+            .subtask(move |order: &mut Vec<&'static str>, (job,): (u64,)| {
                 work(time_ms);
                 order.push(name);
                 (job,)
-            },
-            vec!["job"],
-            vec![name],
-            named(name),
-        );
+            })
+            .reads(&["job"])
+            .writes(&[name])
+            .register(named(name));
     }
     let (seen, keep) = Seen::shared();
-    dag.using(order.read()).register_sink_subtask(
-        move |order: &Vec<&'static str>, (job, _, _): (u64, u64, u64)| {
-            keep.add((job, order.clone()));
-        },
-        vec!["left", "middle", "right"],
-        ms(20),
-        named("sink"),
-    );
+    dag.using(order.read())
+        .subtask(
+            move |order: &Vec<&'static str>, (job, _, _): (u64, u64, u64)| {
+                keep.add((job, order.clone()));
+            },
+        )
+        .reads(&["left", "middle", "right"])
+        .due(ms(20))
+        .register(named("sink"));
     (dag, seen)
 }
 
@@ -63,23 +63,21 @@ fn the_bound_counts_the_precedence_of_a_state() {
         dag.register_periodic_subtask(|| (1,), vec!["a"], ms(100), taking("source", 1));
         for name in ["left", "right"] {
             if shares {
-                dag.using(state.update()).register_subtask(
-                    |_: &mut i32, (a,): (i32,)| (a,),
-                    vec!["a"],
-                    vec![name],
-                    taking(name, 10),
-                );
+                dag.using(state.update())
+                    .subtask(|_: &mut i32, (a,): (i32,)| (a,))
+                    .reads(&["a"])
+                    .writes(&[name])
+                    .register(taking(name, 10));
             } else {
                 dag.register_subtask(|(a,): (i32,)| (a,), vec!["a"], vec![name], taking(name, 10));
             }
         }
         let sink = |_: &mut i32, (_, _): (i32, i32)| ();
-        dag.using(state.update()).register_sink_subtask(
-            sink,
-            vec!["left", "right"],
-            ms(100),
-            taking("sink", 1),
-        );
+        dag.using(state.update())
+            .subtask(sink)
+            .reads(&["left", "right"])
+            .due(ms(100))
+            .register(taking("sink", 1));
         let commit = finish_create_dags(&[dag]).unwrap();
         commit.answers()[0].verdict.bound().unwrap()
     };
@@ -93,26 +91,23 @@ fn several_uses_are_a_tuple() {
     let dag = create_dag();
     dag.jobs(3).relative_deadline(ms(10));
     let (sum, count) = (dag.state("sum", 0_u64), dag.state("count", 0_u64));
-    dag.using((sum.update(), count.update()))
-        .register_periodic_subtask(
-            |(sum, count): (&mut u64, &mut u64)| {
-                *count += 1;
-                *sum += *count;
-                (*sum,)
-            },
-            vec!["sum"],
-            ms(10),
-            named("add"),
-        );
+    dag.period(ms(10))
+        .using((sum.update(), count.update()))
+        .source(|(sum, count): (&mut u64, &mut u64)| {
+            *count += 1;
+            *sum += *count;
+            (*sum,)
+        })
+        .writes(&["sum"])
+        .register(named("add"));
     let check = |(sum, count): (&u64, &u64), (sent,): (u64,)| {
         assert_eq!((*sum, *sum), (sent, count * (count + 1) / 2));
     };
-    dag.using((sum.read(), count.read())).register_sink_subtask(
-        check,
-        vec!["sum"],
-        ms(10),
-        named("check"),
-    );
+    dag.using((sum.read(), count.read()))
+        .subtask(check)
+        .reads(&["sum"])
+        .due(ms(10))
+        .register(named("check"));
     finish_create_dags(std::slice::from_ref(&dag)).unwrap();
     assert_eq!(machine.run().dag(&dag).statistics().completed, 3);
 }

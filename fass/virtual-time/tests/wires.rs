@@ -29,12 +29,10 @@ fn look(seen: &Seen) -> impl FnMut(Received<'_, u32>) + Send + use<> {
 fn periodic(wire: &Wire, jobs: u64, seen: &Seen) -> Dag {
     let dag = create_dag();
     dag.jobs(jobs).relative_deadline(ms(10));
-    dag.using(wire.receiving(number)).register_periodic_subtask(
-        look(seen),
-        vec![],
-        ms(10),
-        named("receive").wcet(ms(1)),
-    );
+    dag.period(ms(10))
+        .using(wire.receiving(number))
+        .source(look(seen))
+        .register(named("receive").wcet(ms(1)));
     dag
 }
 
@@ -59,8 +57,9 @@ fn a_packet_raises_the_sporadic_dag_that_receives_it() {
     let dag = create_dag();
     dag.relative_deadline(ms(5));
     let attributes = named("receive").wcet(ms(1));
+    dag.sporadic(ms(10));
     let receiving = dag.using(wire.receiving(number));
-    let _raised = receiving.register_sporadic_subtask(look(&seen), vec![], ms(10), attributes);
+    receiving.source(look(&seen)).register(attributes);
     let machine = VirtualTime::new().silent(Silent::Wcet);
     finish_create_dags(&[dag]).unwrap();
     machine.arrive_at(&wire, ms(3), b"7");
@@ -125,12 +124,9 @@ fn what_is_not_taken_stays_for_the_next_job() {
         }
     };
     let attributes = named("receive");
-    (dag.using(wire.receiving(number))).register_periodic_subtask(
-        one_by_one,
-        vec![],
-        ms(10),
-        attributes,
-    );
+    (dag.period(ms(10)).using(wire.receiving(number)))
+        .source(one_by_one)
+        .register(attributes);
     let machine = VirtualTime::new();
     finish_create_dags(&[dag]).unwrap();
     machine.arrive_at(&wire, ms(1), b"1\n");
@@ -145,16 +141,15 @@ fn sending(wire: &Wire, jobs: u64, panics: bool) -> Dag {
     dag.jobs(jobs);
     let source = move || (job.next().expect("it has no end"),);
     dag.register_periodic_subtask(source, vec!["job"], ms(10), named("count"));
-    dag.using(wire.sending()).register_sink_subtask(
-        move |mut wire: Sender<'_>, (job,): (u32,)| {
+    dag.using(wire.sending())
+        .subtask(move |mut wire: Sender<'_>, (job,): (u32,)| {
             wire.send(format!("job {job}").as_bytes());
             assert!(!panics || job != 1, "job 1");
             wire.send(b"\n");
-        },
-        vec!["job"],
-        ms(10),
-        named("send").wcet(ms(3)),
-    );
+        })
+        .reads(&["job"])
+        .due(ms(10))
+        .register(named("send").wcet(ms(3)));
     dag
 }
 
@@ -193,7 +188,9 @@ fn an_instance_that_sends_too_much_sends_nothing_and_that_is_counted() {
     dag.jobs(3).relative_deadline(ms(10));
     let send = move |mut wire: Sender<'_>| wire.send(&vec![b'x'; lengths.next().unwrap()]);
     let attributes = named("send");
-    (dag.using(wire.sending())).register_periodic_subtask(send, vec![], ms(10), attributes);
+    (dag.period(ms(10)).using(wire.sending()))
+        .source(send)
+        .register(attributes);
     let machine = VirtualTime::new().connect(&wire);
     run(&machine, &[dag]);
     assert_eq!(machine.sent(&wire).len(), 21);
@@ -211,12 +208,9 @@ fn a_decoder_that_panics_is_contained_like_a_function() {
     dag.jobs(3).relative_deadline(ms(10));
     let attributes = named("receive");
     let count = |packets: Received<'_, u32>| assert_eq!(packets.count(), 0);
-    (dag.using(bad.receiving(hostile))).register_periodic_subtask(
-        count,
-        vec![],
-        ms(10),
-        attributes,
-    );
+    (dag.period(ms(10)).using(bad.receiving(hostile)))
+        .source(count)
+        .register(attributes);
     let machine = VirtualTime::new().contain_panics();
     let healthy = periodic(&good, 3, &seen);
     finish_create_dags(&[dag.clone(), healthy.clone()]).unwrap();
@@ -242,18 +236,16 @@ fn a_replay_takes_what_the_receiver_wrote_and_no_bytes() {
         dag.name("sum").record::<u32>("sum");
         let sum = |packets: Received<'_, u32>| (packets.map(|packet| packet.value).sum::<u32>(),);
         let attributes = named("receive");
-        let _raised = (dag.using(wire.receiving(number))).register_sporadic_subtask(
-            sum,
-            vec!["sum"],
-            ms(10),
-            attributes,
-        );
-        dag.using(wire.sending()).register_sink_subtask(
-            |mut wire: Sender<'_>, (sum,): (u32,)| writeln!(wire, "{sum}").unwrap(),
-            vec!["sum"],
-            ms(10),
-            named("send"),
-        );
+        dag.sporadic(ms(10));
+        dag.using(wire.receiving(number))
+            .source(sum)
+            .writes(&["sum"])
+            .register(attributes);
+        dag.using(wire.sending())
+            .subtask(|mut wire: Sender<'_>, (sum,): (u32,)| writeln!(wire, "{sum}").unwrap())
+            .reads(&["sum"])
+            .due(ms(10))
+            .register(named("send"));
         dag
     };
     let wire = Wire::new("numbers");
@@ -298,12 +290,11 @@ fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
     dag.name("far");
     let receive = |_: Received<'_, u32>, _: (u32,)| ();
     let attributes = named("late");
-    (dag.using(Wire::new("radio").receiving(number))).register_sink_subtask(
-        receive,
-        vec!["x"],
-        ms(10),
-        attributes,
-    );
+    (dag.using(Wire::new("radio").receiving(number)))
+        .subtask(receive)
+        .reads(&["x"])
+        .due(ms(10))
+        .register(attributes);
     let _machine = VirtualTime::new();
     let refused = finish_create_dags(&[dag]).unwrap_err().to_string();
     assert!(

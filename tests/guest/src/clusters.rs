@@ -51,8 +51,11 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     };
     let whole = vec!["whole"];
     writer
+        .period(PERIOD)
         .using(answer.raising())
-        .register_periodic_subtask(write, whole, PERIOD, priority(1));
+        .source(write)
+        .writes(&whole)
+        .register(priority(1));
     let latest = writer.latest::<Whole>("whole");
     let reader = create_dag();
     let looks = Duration::from_micros(2300);
@@ -75,8 +78,10 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         }
     };
     reader
+        .period(looks)
         .using(latest.sample())
-        .register_periodic_subtask(read, vec![], looks, priority(1));
+        .source(read)
+        .register(priority(1));
     finish_create_dags(&[writer, echoes, answers, reader, overload()])?;
     let run = machine.run()?;
     report(&run, seen.load(Ordering::Relaxed));
@@ -92,17 +97,18 @@ fn sporadic(name: &str, cluster: u32, raises: Option<&Signal>) -> (Dag, Signal) 
     let least = Duration::from_millis(1);
     let dag = create_dag();
     dag.name(name).cluster(cluster).relative_deadline(PERIOD);
-    let signal = match raises {
-        None => dag.register_sporadic_subtask(|| hold(100), vec![], least, priority(0)),
+    let signal = dag.sporadic(least);
+    match raises {
+        None => dag.source(|| hold(100)).register(priority(0)),
         Some(next) => {
             let answer = |mut next: Raiser<'_>| {
                 hold(100);
                 next.raise();
             };
-            dag.using(next.raising())
-                .register_sporadic_subtask(answer, vec![], least, priority(0))
+            let source = dag.using(next.raising()).source(answer);
+            source.register(priority(0));
         }
-    };
+    }
     (dag, signal)
 }
 

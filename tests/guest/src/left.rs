@@ -32,7 +32,7 @@ pub(crate) fn keep(machine: &Machine) -> Result<(), Ending> {
         assert!(bytes.is_empty(), "they are lost");
     };
     let attributes = SubtaskAttributes::named("lose");
-    (careless.restarting(move || lose)).register_periodic_subtask(vec![], PERIOD, attributes);
+    (careless.period(PERIOD).restarting(move || lose)).register(attributes);
     finish_create_dags(&[tidy, careless])?;
     machine.run().map(drop)
 }

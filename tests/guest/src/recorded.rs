@@ -122,8 +122,8 @@ pub(crate) fn crash(machine: &Machine) -> Result<(), Ending> {
         let told = told.map_or(0, |told| *told.value);
         assert!(told < 30, "found {told}");
     };
-    let frail_using = frail.using(latest.sample());
-    frail_using.register_sink_subtask(see, vec!["start"], PERIOD, named("see"));
+    let see = frail.using(latest.sample()).subtask(see);
+    see.reads(&["start"]).due(PERIOD).register(named("see"));
     finish_create_dags(&[teller, frail])?;
     machine.run().map(drop)
 }

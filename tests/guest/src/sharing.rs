@@ -95,25 +95,23 @@ fn writer() -> (Dag, Latest<Whole>) {
         (1_u64,)
     };
     dag.register_periodic_subtask(source, vec!["tick"], period, taking("source", 100));
-    dag.using(count.update()).register_subtask(
-        |count: &mut u64, (tick,): (u64,)| {
+    dag.using(count.update())
+        .subtask(|count: &mut u64, (tick,): (u64,)| {
             hold(400);
             *count += tick;
             (*count,)
-        },
-        vec!["tick"],
-        vec!["first"],
-        taking("first", 600),
-    );
-    dag.using(count.read()).register_subtask(
-        |count: &u64, (_,): (u64,)| {
+        })
+        .reads(&["tick"])
+        .writes(&["first"])
+        .register(taking("first", 600));
+    dag.using(count.read())
+        .subtask(|count: &u64, (_,): (u64,)| {
             hold(200);
             (*count,)
-        },
-        vec!["tick"],
-        vec!["second"],
-        taking("second", 400),
-    );
+        })
+        .reads(&["tick"])
+        .writes(&["second"])
+        .register(taking("second", 400));
     dag.register_subtask(
         |(first, second): (u64, u64)| {
             assert_eq!(first, second, "the order that the state gives");
@@ -151,20 +149,20 @@ fn reader(
     let attributes = taking("sample", 300);
     match signal {
         None => {
-            dag.using(latest.sample()).register_periodic_subtask(
-                check,
-                vec![],
-                ms(period_ms),
-                attributes,
-            );
+            dag.period(ms(period_ms))
+                .using(latest.sample())
+                .source(check)
+                .register(attributes);
         }
         Some(signal) => {
             let check = move |(whole, mut signal): (Option<Sample<'_, Whole>>, Raiser<'_>)| {
                 check(whole);
                 signal.raise();
             };
-            dag.using((latest.sample(), signal.raising()))
-                .register_periodic_subtask(check, vec![], ms(period_ms), attributes);
+            dag.period(ms(period_ms))
+                .using((latest.sample(), signal.raising()))
+                .source(check)
+                .register(attributes);
         }
     }
     dag
@@ -175,7 +173,8 @@ fn answers(name: &str) -> (Dag, Signal) {
     let dag = create_dag();
     dag.name(name).relative_deadline(ms(5));
     let attributes = taking("answer", 500);
-    let signal = dag.register_sporadic_subtask(|| hold(300), vec![], ANSWERS_APART, attributes);
+    let signal = dag.sporadic(ANSWERS_APART);
+    dag.source(|| hold(300)).register(attributes);
     (dag, signal)
 }
 
@@ -183,6 +182,7 @@ fn answers_to_bytes(jobs: u64) -> (Dag, Signal) {
     let dag = create_dag();
     dag.name("input").jobs(jobs).relative_deadline(ms(5));
     let attributes = taking("byte", 500);
-    let button = dag.register_sporadic_subtask(|| hold(100), vec![], ms(1), attributes);
+    let button = dag.sporadic(ms(1));
+    dag.source(|| hold(100)).register(attributes);
     (dag, button)
 }

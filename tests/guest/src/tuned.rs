@@ -19,8 +19,11 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     dag.name("loop").record::<f64>("gain");
     let named = SubtaskAttributes::named;
     let read = |both: (f64, u32)| (both,);
-    dag.using((gain.reading(), steps.reading()))
-        .register_periodic_subtask(read, vec!["both"], period, named("read"));
+    dag.period(period)
+        .using((gain.reading(), steps.reading()))
+        .source(read)
+        .writes(&["both"])
+        .register(named("read"));
     let part = |(both,): ((f64, u32),)| both;
     dag.register_subtask(part, vec!["both"], vec!["gain", "steps"], named("part"));
     let mut last = None;

@@ -132,7 +132,10 @@ impl Building<'_> {
                 Replaced::ByFallback => dag.falling_back(make(), anew()),
                 _ => dag.restarting(anew),
             };
-            return functions.register_subtask(inputs, outputs, attributes);
+            return functions
+                .reads(&inputs)
+                .writes(&outputs)
+                .register(attributes);
         }
         let place = (inputs, outputs, attributes);
         match &subtask.uses {
@@ -214,7 +217,10 @@ fn using<U: Uses + 'static, I: Inputs, O: Outputs>(
         step.call(inputs, || act(&mut used, true))
     };
     dag.using(uses)
-        .register_subtask(call, inputs, outputs, attributes);
+        .subtask(call)
+        .reads(&inputs)
+        .writes(&outputs)
+        .register(attributes);
 }
 
 fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {

@@ -34,8 +34,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use sched_dag::DagId;
 
-use super::signal::Signal;
 use crate::run::cell::SetOnce;
+use crate::run::signal::Target;
 use crate::run::wire::incoming::{Framing, Incoming};
 use crate::run::wire::outgoing::Outgoing;
 use uses::{Receiving, Sending};
@@ -60,22 +60,20 @@ use uses::{Receiving, Sending};
 /// let ms = Duration::from_millis;
 /// let dag = create_dag();
 /// dag.jobs(2);
-/// dag.using(wire.receiving(number)).register_periodic_subtask(
-///     |numbers: Received<'_, u32>| (numbers.map(|number| number.value).collect::<Vec<_>>(),),
-///     vec!["numbers"],
-///     ms(10),
-///     SubtaskAttributes::named("receive"),
-/// );
-/// dag.using(wire.sending()).register_sink_subtask(
-///     |mut wire: Sender<'_>, (numbers,): (Vec<u32>,)| {
+/// dag.period(ms(10))
+///     .using(wire.receiving(number))
+///     .source(|numbers: Received<'_, u32>| (numbers.map(|number| number.value).collect::<Vec<_>>(),))
+///     .writes(&["numbers"])
+///     .register(SubtaskAttributes::named("receive"));
+/// dag.using(wire.sending())
+///     .subtask(|mut wire: Sender<'_>, (numbers,): (Vec<u32>,)| {
 ///         for number in numbers {
 ///             writeln!(wire, "{}", number * number).unwrap();
 ///         }
-///     },
-///     vec!["numbers"],
-///     ms(10),
-///     SubtaskAttributes::named("answer"),
-/// );
+///     })
+///     .reads(&["numbers"])
+///     .due(ms(10))
+///     .register(SubtaskAttributes::named("answer"));
 ///
 /// let machine = VirtualTime::new().connect(&wire);
 /// finish_create_dags(&[dag]).unwrap();
@@ -96,7 +94,7 @@ struct Shared {
     is_received: AtomicBool,
     is_sent_on: AtomicBool,
     /// What its packets raise, if a sporadic DAG begins with them.
-    signal: SetOnce<Signal>,
+    signal: SetOnce<Arc<Target>>,
 }
 
 /// What an app says about a wire.
@@ -254,7 +252,7 @@ impl Wire {
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.shared.incoming.arrive(bytes, now_ns);
         let signal = self.shared.signal.get().filter(|_| is_whole)?;
-        signal.target()
+        signal.get()
     }
 
     /// Reports whether there is a byte that is to go.

@@ -101,16 +101,16 @@ impl<T: 'static> Uses for Receiving<T> {
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let takes = format!("receives on wire `{}`", self.wire.name());
-        dag.draft.borrow_mut().outside.push((subtask, takes));
+        let mut draft = dag.draft.borrow_mut();
+        draft.outside.push((subtask, takes));
+        let shared = Arc::clone(&self.wire.shared);
+        let tell = move |signal| _ = shared.signal.set(signal);
+        draft.receives.push(Box::new(tell));
         Receiver {
             room: self.wire.shared.incoming.buffer(),
             wire: self.wire,
             decode: self.decode,
         }
-    }
-
-    fn begins(held: &Self::Held, dag: &Dag) {
-        held.wire.shared.signal.set(dag.signal());
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {

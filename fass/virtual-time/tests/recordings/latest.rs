@@ -20,7 +20,10 @@ fn failing(from: u64) -> ([Dag; 3], Signal) {
         .record::<u64>("pressed")
         .relative_deadline(ms(4));
     let press = counting(from);
-    let signal = last.register_sporadic_subtask(press, vec!["pressed"], ms(2), named("press"));
+    let signal = last.sporadic(ms(2));
+    last.source(press)
+        .writes(&["pressed"])
+        .register(named("press"));
     let odd = |(presses,): (u64,)| assert!(presses != 341, "odd");
     last.register_sink_subtask(odd, vec!["pressed"], ms(4), named("odd"));
 
@@ -34,10 +37,18 @@ fn failing(from: u64) -> ([Dag; 3], Signal) {
         (told,)
     };
     let uses = latest.sample();
-    (frail.using(uses)).register_subtask(see, vec!["start"], vec!["seen"], named("see"));
+    (frail.using(uses))
+        .subtask(see)
+        .reads(&["start"])
+        .writes(&["seen"])
+        .register(named("see"));
     let raise = |mut raiser: fass::Raiser<'_>, (_,): (u64,)| raiser.raise();
     let uses = signal.raising();
-    (frail.using(uses)).register_sink_subtask(raise, vec!["seen"], ms(2), named("raise"));
+    (frail.using(uses))
+        .subtask(raise)
+        .reads(&["seen"])
+        .due(ms(2))
+        .register(named("raise"));
     ([teller, last, frail], signal)
 }
 

@@ -203,7 +203,10 @@ fn signals_come_when_they_came() {
             press += 3;
             (press,)
         };
-        let signal = dag.register_sporadic_subtask(source, vec!["press"], ms(5), named("press"));
+        let signal = dag.sporadic(ms(5));
+        dag.source(source)
+            .writes(&["press"])
+            .register(named("press"));
         let mut count = 0;
         let add = move |(press,): (u64,)| {
             count += press;
@@ -247,7 +250,10 @@ fn jobs_of_a_sporadic_dag_that_were_skipped_keep_their_numbers() {
             execute_for(ms(if press == 1 { 8 } else { 1 }), Occupation::Hold);
             (press,)
         };
-        let signal = dag.register_sporadic_subtask(source, vec!["press"], ms(5), named("press"));
+        let signal = dag.sporadic(ms(5));
+        dag.source(source)
+            .writes(&["press"])
+            .register(named("press"));
         let mut sum = 0;
         let add = move |(press,): (u64,)| {
             sum += press;
@@ -291,7 +297,9 @@ fn a_fault_is_replayed() {
                 (input * 10 + calls,)
             }
         })
-        .register_subtask(vec!["input"], vec!["output"], named("work"));
+        .reads(&["input"])
+        .writes(&["output"])
+        .register(named("work"));
         dag.register_sink_subtask(|_: (u32,)| (), vec!["output"], ms(10), named("sink"));
         dag
     };
@@ -318,7 +326,9 @@ fn what_ran_next_to_a_fault_runs_in_its_replay() {
                 (input,)
             }
         })
-        .register_subtask(vec!["in"], vec!["frail"], named("frail"));
+        .reads(&["in"])
+        .writes(&["frail"])
+        .register(named("frail"));
         let mut sum = 0;
         let add = move |(input,): (u32,)| {
             execute_for(ms(1), Occupation::Hold);

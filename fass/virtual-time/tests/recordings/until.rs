@@ -30,12 +30,12 @@ fn two() -> [Dag; 2] {
         assert!(fass::now_ns() != 45_000_000, "at 45 ms");
         ([told, one.into()], String::from("not recorded"))
     };
-    asker.using(told.sample()).register_subtask(
-        pair,
-        vec!["start"],
-        vec!["pair", "text"],
-        named("pair"),
-    );
+    asker
+        .using(told.sample())
+        .subtask(pair)
+        .reads(&["start"])
+        .writes(&["pair", "text"])
+        .register(named("pair"));
     let sink = |_: ([u32; 2], String)| ();
     asker.register_sink_subtask(sink, vec!["pair", "text"], ms(15), named("sink"));
     [teller, asker]

@@ -123,7 +123,11 @@ fn what_is_recorded_in_part_is_refused() {
         half.register_periodic_subtask(|| (1_u8, 2_u8), vec!["a", "b"], ms(10), named("source"));
         let sink = |_: Option<Sample<'_, u8>>, _: (u8, u8)| ();
         let uses = teller.latest::<u8>("told").sample();
-        (half.using(uses)).register_sink_subtask(sink, vec!["a", "b"], ms(10), named("sink"));
+        (half.using(uses))
+            .subtask(sink)
+            .reads(&["a", "b"])
+            .due(ms(10))
+            .register(named("sink"));
         for topic in topics {
             let dag = if *topic == "told" { &teller } else { &half };
             dag.record::<u8>(topic);

@@ -341,9 +341,8 @@ impl<S: System> Machine<S> {
     /// fn answer_keys(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
     ///     let dag = create_dag();
     ///     dag.jobs(10).relative_deadline(Duration::from_millis(5));
-    ///     let least = Duration::from_millis(50);
-    ///     let answer = SubtaskAttributes::named("answer");
-    ///     let key = dag.register_sporadic_subtask(|| (), Vec::new(), least, answer);
+    ///     let key = dag.sporadic(Duration::from_millis(50));
+    ///     dag.source(|| ()).register(SubtaskAttributes::named("answer"));
     ///     finish_create_dags(&[dag])?;
     ///     machine.raise_on_input(&key);
     ///     machine.run().map(drop)

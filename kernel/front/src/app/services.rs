@@ -38,10 +38,11 @@ impl<S: System> Machine<S> {
     ///     machine.options().finish(&[])?;
     ///     let (dag, ms) = (create_dag(), core::time::Duration::from_millis);
     ///     dag.jobs(10).relative_deadline(ms(5));
-    ///     let receiving = dag.using(wire.receiving(|line| line.first().copied()));
+    ///     dag.sporadic(ms(50));
     ///     let hear = |keys: Received<'_, u8>| kernel::println!("{} lines", keys.count());
-    ///     let attributes = SubtaskAttributes::named("hear");
-    ///     let _raised = receiving.register_sporadic_subtask(hear, Vec::new(), ms(50), attributes);
+    ///     dag.using(wire.receiving(|line| line.first().copied()))
+    ///         .source(hear)
+    ///         .register(SubtaskAttributes::named("hear"));
     ///     finish_create_dags(&[dag])?;
     ///     machine.run().map(drop)
     /// }

@@ -8,13 +8,8 @@ use fass::{Dag, Latest, Parameter, Raiser, Sample, SubtaskAttributes, Switch, Un
 use super::{FAULT_LIMIT, PERIOD, joining_sink, named, sound, source};
 
 pub(super) fn activations_differ() -> Vec<Dag> {
-    let dag = named("lidar");
-    source(&dag, "read", "points");
-    let attributes = SubtaskAttributes::named("press");
-    let _ = dag.register_sporadic_subtask(|| (1_u32,), vec!["button"], PERIOD, attributes);
-    let attributes = SubtaskAttributes::named("store");
-    let inputs = vec!["points", "button"];
-    dag.register_sink_subtask(|(_, _): (u32, u32)| (), inputs, PERIOD, attributes);
+    let dag = sound("lidar", "points");
+    dag.sporadic(PERIOD);
     vec![dag]
 }
 
@@ -39,7 +34,10 @@ pub(super) fn state_never_updated() -> Vec<Dag> {
     let attributes = SubtaskAttributes::named("store");
     let store = |_: &u32, (_,): (u32,)| ();
     dag.using(map.read())
-        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+        .subtask(store)
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag]
 }
 
@@ -49,12 +47,11 @@ pub(super) fn state_used_twice() -> Vec<Dag> {
     let map = dag.state("map", 0_u32);
     let attributes = SubtaskAttributes::named("store");
     let store = |(_, _): (&mut u32, &u32), (_,): (u32,)| ();
-    dag.using((map.update(), map.read())).register_sink_subtask(
-        store,
-        vec!["points"],
-        PERIOD,
-        attributes,
-    );
+    dag.using((map.update(), map.read()))
+        .subtask(store)
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag]
 }
 
@@ -67,7 +64,9 @@ pub(super) fn state_without_reset() -> Vec<Dag> {
     let store = || |map: &mut u32, (points,): (u32,)| *map += points;
     dag.using(map.update())
         .restarting(store)
-        .register_sink_subtask(vec!["points"], PERIOD, attributes);
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag]
 }
 
@@ -76,7 +75,9 @@ pub(super) fn replaced_in_vain() -> Vec<Dag> {
     source(&dag, "read", "points");
     let attributes = SubtaskAttributes::named("store");
     dag.restarting(|| |(_,): (u32,)| ())
-        .register_sink_subtask(vec!["points"], PERIOD, attributes);
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag]
 }
 
@@ -92,12 +93,18 @@ pub(super) fn state_over_jobs() -> Vec<Dag> {
     let map = dag.state("map", 0_u32);
     let read = |map: &mut u32| (*map,);
     let attributes = SubtaskAttributes::named("read");
-    dag.using(map.update())
-        .register_periodic_subtask(read, vec!["points"], PERIOD, attributes);
+    dag.period(PERIOD)
+        .using(map.update())
+        .source(read)
+        .writes(&["points"])
+        .register(attributes);
     let attributes = SubtaskAttributes::named("store");
     let store = |_: &u32, (_,): (u32,)| ();
     dag.using(map.read())
-        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+        .subtask(store)
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag]
 }
 
@@ -122,8 +129,10 @@ pub(super) fn latest_type_mismatch() -> Vec<Dag> {
     let plan = |_: Option<Sample<'_, f64>>| ();
     let attributes = SubtaskAttributes::named("plan");
     planner
+        .period(PERIOD)
         .using(points.sample())
-        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+        .source(plan)
+        .register(attributes);
     vec![lidar, planner]
 }
 
@@ -142,8 +151,10 @@ pub(super) fn latest_of_moved() -> Vec<Dag> {
     let plan = |(_, _): (Key<'_>, Key<'_>)| ();
     let attributes = SubtaskAttributes::named("plan");
     planner
+        .period(PERIOD)
         .using((points.sample(), points.sample()))
-        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+        .source(plan)
+        .register(attributes);
     vec![lidar, planner]
 }
 
@@ -160,7 +171,10 @@ pub(super) fn signal_not_committed() -> Vec<Dag> {
     let attributes = SubtaskAttributes::named("store");
     let store = |mut alarm: Raiser<'_>, (_,): (u32,)| alarm.raise();
     dag.using(alarm.raising())
-        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+        .subtask(store)
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag]
 }
 
@@ -171,7 +185,10 @@ pub(super) fn switched_not_committed() -> Vec<Dag> {
     let attributes = SubtaskAttributes::named("store");
     let store = |mut camera: Switch<'_>, (_,): (u32,)| camera.pause();
     dag.using(camera.switching())
-        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+        .subtask(store)
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag] // without `camera`
 }
 
@@ -182,7 +199,10 @@ pub(super) fn taken_by_no_source() -> Vec<Dag> {
     let attributes = SubtaskAttributes::named("store");
     let store = |_nearest: f64, (_,): (u32,)| ();
     dag.using(nearest.reading())
-        .register_sink_subtask(store, vec!["points"], PERIOD, attributes);
+        .subtask(store)
+        .reads(&["points"])
+        .due(PERIOD)
+        .register(attributes);
     vec![dag]
 }
 
@@ -192,12 +212,11 @@ pub(super) fn taken_twice() -> Vec<Dag> {
     for (name, topic) in [("left", "left points"), ("right", "right points")] {
         let attributes = SubtaskAttributes::named(name);
         let read = |_nearest: f64| (1_u32,);
-        dag.using(nearest.reading()).register_periodic_subtask(
-            read,
-            vec![topic],
-            PERIOD,
-            attributes,
-        );
+        dag.period(PERIOD)
+            .using(nearest.reading())
+            .source(read)
+            .writes(&[topic])
+            .register(attributes);
     }
     joining_sink(&dag, "store", ["left points", "right points"]);
     vec![dag]
@@ -222,7 +241,10 @@ pub(super) fn sample_not_recorded() -> Vec<Dag> {
     let plan = |_: Option<Sample<'_, u32>>, (_,): (u32,)| ();
     planner
         .using(points.sample())
-        .register_sink_subtask(plan, vec!["ticks"], PERIOD, attributes);
+        .subtask(plan)
+        .reads(&["ticks"])
+        .due(PERIOD)
+        .register(attributes);
     vec![lidar, planner]
 }
 
@@ -233,7 +255,9 @@ fn planner(latest: &Latest<u32>) -> Dag {
     let plan = |_: Option<Sample<'_, u32>>| ();
     let attributes = SubtaskAttributes::named("plan");
     planner
+        .period(PERIOD)
         .using(latest.sample())
-        .register_periodic_subtask(plan, vec![], PERIOD, attributes);
+        .source(plan)
+        .register(attributes);
     planner
 }
