@@ -2,11 +2,9 @@
 
 mod support;
 
-use support::run;
-
-use fass::{ConstructionPolicy, Dag, Latest, Policy, Raiser, Sample};
+use fass::{ConstructionPolicy, Dag, Latest, Policy, Sample};
 use fass::{create_dag, finish_create_dags, finish_create_dags_with};
-use support::sharing::{Seen, every, job_numbers, ms, named, taking, work};
+use support::sharing::{Seen, every, job_numbers, ms, taking, work};
 use virtual_time::{CoreId, VirtualTime};
 
 /// A DAG of one subtask that takes `work_ms` in each of `jobs` periods of 10 ms.
@@ -52,23 +50,6 @@ fn an_overload_in_one_cluster_leaves_the_other_alone() {
     assert!(answers[1].contains("is not proven"), "{}", answers[1]);
 }
 
-#[test]
-fn a_fault_in_one_cluster_ends_nothing_in_the_other() {
-    let machine = VirtualTime::new()
-        .cores(2)
-        .clusters(&[1, 1])
-        .contain_panics();
-    let calm = busy("calm", 0, 6, 5);
-    let faulty = every(10, "faulty");
-    faulty
-        .cluster(1)
-        .jobs(5)
-        .register_untyped_subtask(|job| assert!(job < 2, "as meant"), named("panic"));
-    let report = run(&machine, &[calm, faulty]);
-    assert_eq!(report.dag("calm").statistics().completed, 5);
-    assert_eq!(report.dag("faulty").statistics().completed, 2);
-}
-
 /// Offers its job's number as `count` after 4 ms.
 fn counting(cluster: u32) -> (Dag, Latest<u64>) {
     let dag = create_dag();
@@ -100,36 +81,6 @@ fn a_latest_value_crosses_at_the_instant_of_its_completion() {
         // Sample k is taken at 2k ms, value j shows from 10j + 4 ms on.
         let expected = (0..20_u64).map(|k| (2 * k).checked_sub(4).map(|since| since / 10));
         assert_eq!(seen.all()[..], expected.collect::<Vec<_>>());
-    }
-}
-
-#[test]
-fn a_signal_crosses_at_the_instant_of_its_completion() {
-    for (raises, answers) in [(0, 1), (1, 0)] {
-        let machine = VirtualTime::new().cores(2).clusters(&[1, 1]);
-        let answer = create_dag();
-        answer.name("answer").cluster(answers);
-        answer.relative_deadline(ms(5));
-        let signal = answer.sporadic(ms(8));
-        answer.source(|| work(1)).register(taking("answer", 1));
-        let ask = every(10, "ask");
-        ask.cluster(raises)
-            .jobs(3)
-            .using(signal.raising())
-            .register_untyped_subtask(
-                |mut signal: Raiser<'_>, _job| {
-                    work(3);
-                    signal.raise();
-                },
-                taking("ask", 3),
-            );
-        // It keeps the other core busy, and ends where the signal comes.
-        let beside = busy("beside", answers, 3, 3);
-        let report = run(&machine, &[ask, answer, beside]);
-        let starts = report.dag("answer").subtask("answer");
-        let starts = starts.iter().map(|record| record.start_ns.unwrap());
-        let expected = [3_000_000, 13_000_000, 23_000_000];
-        assert_eq!(starts.collect::<Vec<_>>(), expected);
     }
 }
 

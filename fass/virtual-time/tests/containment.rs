@@ -4,7 +4,7 @@ mod support;
 
 use fass::{Dag, FaultLimit, OverrunPolicy, Unique, create_dag, finish_create_dags};
 use support::{commit, execute, ms, named, pair, run};
-use virtual_time::{Instance, JobOutcome, Report, VirtualTime};
+use virtual_time::{JobOutcome, VirtualTime};
 
 const MS: u64 = 1_000_000;
 
@@ -31,15 +31,6 @@ fn healthy() -> Dag {
     let dag = pair("healthy", ms(5), ms(5), [ms(1), ms(1)]);
     dag.jobs(30);
     dag
-}
-
-/// Returns the instances of one DAG with their starts and finishes.
-fn schedule(report: &Report, dag: u32) -> Vec<(Instance, Option<u64>, Option<u64>)> {
-    let records = report.instances.iter();
-    records
-        .filter(|record| record.instance.dag.0 == dag)
-        .map(|record| (record.instance, record.start_ns, record.finish_ns))
-        .collect()
 }
 
 #[test]
@@ -76,18 +67,6 @@ fn a_contained_panic_ends_its_dag_at_the_time_of_the_panic() {
     assert_eq!((counted.faults, counted.cut_short), (1, 1));
 }
 
-#[test]
-fn the_other_dags_go_on() {
-    let alone = VirtualTime::new().cores(2);
-    commit(&[healthy()]);
-    let alone = alone.run();
-    let machine = VirtualTime::new().cores(2).contain_panics();
-    let report = run(&machine, &[healthy(), faulty()]);
-    assert_eq!(report.panics.len(), 1);
-    assert_eq!(schedule(&report, 0), schedule(&alone, 0));
-    let counted = report.dag("healthy").statistics();
-    assert_eq!((counted.completed, counted.misses), (30, 0));
-}
 /// A value that the sink of an aborted job leaves behind, and that cannot be dropped.
 struct Sharp(bool);
 

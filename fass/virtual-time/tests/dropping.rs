@@ -120,29 +120,6 @@ fn a_fault_while_the_next_function_is_made_ends_the_dag() {
 }
 
 #[test]
-fn the_second_function_is_fallen_back_on_once() {
-    let machine = VirtualTime::new().contain_panics();
-    let dag = counting(12);
-    let precise = |(job,): (u64,)| {
-        assert!(job != 3, "too hard");
-        (job * 10,)
-    };
-    let rough = |(job,): (u64,)| {
-        assert!(job != 8, "even for this");
-        (job,)
-    };
-    dag.falling_back(precise, rough)
-        .reads(&["job"])
-        .writes(&["result"])
-        .register(named("middle"));
-    let kept = keeping::<u64>(&dag, "result");
-    let report = run(&machine, &[dag]);
-    assert_eq!(kept.all(), [0, 10, 20, 4, 5, 6, 7]);
-    assert!(report.dags().all(|dag| dag.is_degraded()));
-    assert_eq!(counts(report.dag("counting").statistics()), [2, 1, 7]);
-}
-
-#[test]
 fn states_that_it_used_are_reset_and_others_are_not() {
     let machine = VirtualTime::new().contain_panics();
     let dag = counting(7);

@@ -81,16 +81,14 @@ impl Step {
     }
 
     /// Does it, where `act` is what else it may do.
-    fn call<I: Inputs, O: Outputs>(&self, inputs: I, act: impl FnOnce()) -> O {
+    fn call<I: Inputs, O: Outputs>(&self, inputs: I, act: impl FnOnce(u64, bool)) -> O {
         let call = self.calls.fetch_add(1, Relaxed);
         let takes = usize::try_from(call)
             .ok()
             .and_then(|call| self.takes.get(call));
         let takes = takes.or(self.takes.last()).copied().unwrap_or(0);
         execute_for(Duration::from_nanos(takes * UNIT_NS), Occupation::Hold);
-        if self.when.contains(&call) {
-            act();
-        }
+        act(call, self.when.contains(&call));
         assert!(
             !self.fails.contains(&call),
             "call {call} fails, as it is to"
@@ -125,7 +123,7 @@ impl Building<'_> {
         if subtask.replaced != Replaced::Never {
             let make = move || {
                 let step = Arc::clone(&step);
-                move |inputs: I| step.call::<I, O>(inputs, || ())
+                move |inputs: I| step.call::<I, O>(inputs, |_, _| ())
             };
             let anew = make.clone();
             let functions = match subtask.replaced {
@@ -141,54 +139,58 @@ impl Building<'_> {
         match &subtask.uses {
             Use::Nothing if subtask.due.is_some() => {
                 let due = Duration::from_millis(subtask.due.unwrap_or_default());
-                let call = move |inputs: I| step.call::<I, ()>(inputs, || ());
+                let call = move |inputs: I| step.call::<I, ()>(inputs, |_, _| ());
                 dag.register_sink_subtask(call, place.0, due, place.2);
             }
             Use::Nothing => {
-                let call = move |inputs: I| step.call::<I, O>(inputs, || ());
+                let call = move |inputs: I| step.call::<I, O>(inputs, |_, _| ());
                 dag.register_subtask(call, place.0, place.1, place.2);
             }
             Use::Updates(name) => {
                 let state = self.state(name).update();
-                using::<_, I, O>(dag, state, place, step, |value, _| **value += 1);
+                using::<_, I, O>(dag, state, place, step, |value, _, _| **value += 1);
             }
             Use::Reads(name) => {
                 let state = self.state(name).read();
-                using::<_, I, O>(dag, state, place, step, |_, _| ());
+                using::<_, I, O>(dag, state, place, step, |_, _, _| ());
             }
             Use::Samples(name) => {
                 let latest = self.latest[name].sample();
-                using::<_, I, O>(dag, latest, place, step, |_, _| ());
+                using::<_, I, O>(dag, latest, place, step, |_, _, _| ());
             }
             Use::Raises(name) => {
                 let raising = self.signals[name].raising();
-                using::<_, I, O>(dag, raising, place, step, |raiser, acts| {
+                using::<_, I, O>(dag, raising, place, step, |raiser, _, acts| {
                     if acts {
                         raiser.raise();
                     }
                 });
             }
-            Use::Pauses(name) | Use::Resumes(name) => {
-                let pauses = matches!(subtask.uses, Use::Pauses(_));
+            Use::Switches(name, resumes) => {
+                let resumes = resumes.clone();
                 let switching = self.dags[name].switching();
-                using::<_, I, O>(dag, switching, place, step, move |switch, acts| {
-                    match (acts, pauses) {
-                        (false, _) => {}
-                        (true, true) => switch.pause(),
-                        (true, false) => switch.resume(),
+                using::<_, I, O>(dag, switching, place, step, move |switch, call, acts| {
+                    if acts {
+                        switch.pause();
+                    }
+                    if resumes.contains(&call) {
+                        switch.resume();
                     }
                 });
             }
-            Use::Enters(name) => {
+            Use::Enters(name) | Use::EntersIdle(name) => {
+                let at_once = matches!(subtask.uses, Use::Enters(_));
                 let entering = self.modes[name].entering();
-                using::<_, I, O>(dag, entering, place, step, |entrance, acts| {
-                    if acts {
-                        entrance.at_once();
-                    }
+                using::<_, I, O>(dag, entering, place, step, move |entrance, _, acts| match (
+                    acts, at_once,
+                ) {
+                    (false, _) => {}
+                    (true, true) => entrance.at_once(),
+                    (true, false) => entrance.when_idle(),
                 });
             }
             Use::EndsRun => {
-                using::<_, I, O>(dag, shutting_down(), place, step, |shutdown, acts| {
+                using::<_, I, O>(dag, shutting_down(), place, step, |shutdown, _, acts| {
                     if acts {
                         shutdown.request();
                     }
@@ -203,18 +205,17 @@ impl Building<'_> {
     }
 }
 
-/// Registers a subtask that uses something: `act` gets it in each call, and whether this is one in
-/// which it acts.
+/// Registers a subtask that uses something: `act` gets it in each call, with the call's number and
+/// whether this is one in which it acts.
 fn using<U: Uses + 'static, I: Inputs, O: Outputs>(
     dag: &Dag,
     uses: U,
     (inputs, outputs, attributes): (Vec<&str>, Vec<&str>, SubtaskAttributes),
     step: Arc<Step>,
-    act: impl for<'a> Fn(&mut U::Borrowed<'a>, bool) + Send + 'static,
+    act: impl for<'a> Fn(&mut U::Borrowed<'a>, u64, bool) + Send + 'static,
 ) {
     let call = move |mut used: U::Borrowed<'_>, inputs: I| -> O {
-        act(&mut used, false);
-        step.call(inputs, || act(&mut used, true))
+        step.call(inputs, |call, acts| act(&mut used, call, acts))
     };
     dag.using(uses)
         .subtask(call)

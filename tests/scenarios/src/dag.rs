@@ -37,8 +37,8 @@ pub struct DagText {
 /// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `non-preemptive`,
 /// `fails N,N` (in these of its calls, from 0), `restarts` or `falls-back` (what replaces it after
 /// a fault), `updates STATE`, `reads STATE`, `samples NAME` (a subtask of another DAG), and with
-/// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N`, `resumes DAG N`,
-/// `enters MODE N`, `ends-run N`.
+/// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N,N` and then
+/// `resumes DAG N,N`, `enters MODE N` or `enters-idle MODE N`, `ends-run N`.
 ///
 /// `TIMES` are how long its first calls take, separated by `/`; the last of them is that of all
 /// others.
@@ -80,9 +80,10 @@ pub(crate) enum Use {
     Reads(String),
     Samples(String),
     Raises(String),
-    Pauses(String),
-    Resumes(String),
+    /// A DAG, and the calls in which it resumes it.
+    Switches(String, Vec<u64>),
     Enters(String),
+    EntersIdle(String),
     EndsRun,
 }
 
@@ -158,8 +159,15 @@ impl DagText {
             };
             match key {
                 "raises" => (subtask.uses, subtask.when) = acts(Use::Raises)?,
-                "pauses" => (subtask.uses, subtask.when) = acts(Use::Pauses)?,
-                "resumes" => (subtask.uses, subtask.when) = acts(Use::Resumes)?,
+                "pauses" | "resumes" => {
+                    let (name, calls) = (value(words)?.into(), numbers(words)?);
+                    let resumes = match key {
+                        "pauses" => core::mem::replace(&mut subtask.when, calls),
+                        _ => calls,
+                    };
+                    subtask.uses = Use::Switches(name, resumes);
+                }
+                "enters-idle" => (subtask.uses, subtask.when) = acts(Use::EntersIdle)?,
                 "enters" => (subtask.uses, subtask.when) = acts(Use::Enters)?,
                 "ends-run" => (subtask.uses, subtask.when) = (Use::EndsRun, numbers(words)?),
                 "updates" => subtask.uses = Use::Updates(value(words)?.into()),
