@@ -31,6 +31,16 @@ fn each_scenario_is_as_it_says() {
 }
 
 #[test]
+fn each_scenario_is_as_it_says_where_cores_run_side_by_side() {
+    for idle in ["idle=halt", "idle=poll"] {
+        run(|cores| {
+            let guest = Guest::new("guest-tests").word("test=scenarios").word(idle);
+            guest.in_real_time().cores(cores).succeed().transcript
+        });
+    }
+}
+
+#[test]
 #[ignore = "fetches 145 MB of Debian's; `cargo test -p harness --test boot_scenarios -- --ignored` runs it"]
 fn on_debians_linux_each_scenario_is_as_it_says_by_both_mechanisms() {
     let program = image::build_linux("guest-tests", None).expect("it is built");

@@ -76,6 +76,7 @@ fn endure(machine: &Machine, times: u32) -> Result<(), Ending> {
         let dags = restless(faults);
         machine.spread(&dags);
         finish_create_dags(&dags)?;
+        drop(dags);
         let run = machine.run()?;
         let held_bytes = machine.resources().heap_bytes;
         let (healthy, restless) = (*run.statistics("healthy"), *run.statistics("restless"));

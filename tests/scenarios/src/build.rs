@@ -156,7 +156,13 @@ impl Building<'_> {
             }
             Use::Samples(name) => {
                 let latest = self.latest[name].sample();
-                using::<_, I, O>(dag, latest, place, step, |_, _, _| ());
+                let last = AtomicU64::new(0);
+                using::<_, I, O>(dag, latest, place, step, move |sample, _, _| {
+                    let Some(sample) = sample else { return };
+                    assert!(sample.completed_ns <= fass::now_ns(), "it is complete");
+                    let before = last.fetch_max(sample.job, Relaxed);
+                    assert!(before <= sample.job, "job {} after {before}", sample.job);
+                });
             }
             Use::Raises(name) => {
                 let raising = self.signals[name].raising();

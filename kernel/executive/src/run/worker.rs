@@ -87,6 +87,10 @@ fn watch(core: &Core) {
     interrupt_flag::disable();
     core.end_watch();
     heartbeat::keep_beating(core);
+    // It was spared the interrupt that arms it where it is the first of a cluster now.
+    if execution::keeps_time(core) {
+        execution::arm_next_event();
+    }
 }
 
 /// Waits until the run has ended, as the background of core 0: whenever there is
