@@ -213,11 +213,7 @@ fn responses(dag: DagId, run: &Run) -> Distribution {
     {
         return Distribution::counted(times.dag(dag).response_time.clone());
     }
-    let jobs = run.record().numbered(dag);
-    Distribution::new(jobs.filter_map(|(job, times)| {
-        let completion_ns = run.record().completion_ns(dag, job)?;
-        Some(completion_ns.saturating_sub(times.release_ns?))
-    }))
+    Distribution::new(run.response_times_ns(dag))
 }
 
 /// Returns the figures of a DAG's sinks, if there are several.

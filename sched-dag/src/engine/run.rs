@@ -17,17 +17,13 @@ use crate::task_set::TaskSet;
 /// A run that has ended: its model, its times and its counts.
 ///
 /// ```no_run
-/// use sched_dag::DagId;
 /// use sched_dag::engine::Run;
 ///
 /// fn report(run: &Run) {
-///     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-///         let jobs = run.record().numbered(dag);
-///         let response_times = jobs.filter_map(|(job, times)| {
-///             Some(run.record().completion_ns(dag, job)? - times.release_ns?)
-///         });
-///         let misses = run.statistics(dag).misses;
-///         println!("{}: at most {:?} ns, {misses} misses", model.name(), response_times.max());
+///     for dag in run.task_set().dags() {
+///         let longest_ns = run.response_times_ns(dag.name()).max();
+///         let misses = run.statistics(dag.name()).misses;
+///         println!("{}: at most {longest_ns:?} ns, {misses} misses", dag.name());
 ///     }
 ///     for violation in run.violations() {
 ///         println!("{violation}");
@@ -158,15 +154,31 @@ impl Run {
             .get_or_init(|| self.journal.record(&self.task_set))
     }
 
+    /// Returns the response times of a DAG's complete jobs, in nanoseconds; of the latest jobs if
+    /// there was no memory for all events.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG, or no memory for the times.
+    ///
+    /// See [`Run`].
+    #[track_caller]
+    pub fn response_times_ns(&self, dag: impl DagKey) -> impl Iterator<Item = u64> {
+        let (dag, record) = (self.task_set.find(dag), self.record());
+        record.numbered(dag).filter_map(move |(job, times)| {
+            let completion_ns = record.completion_ns(dag, job)?;
+            Some(completion_ns.saturating_sub(times.release_ns?))
+        })
+    }
+
     /// Returns the statistics of all jobs and instances, those included whose events made way for
     /// later ones; `None` if some were not recorded, because of `trace_events=0` or the console's
     /// `trace off`.
     ///
     /// ```no_run
-    /// use sched_dag::DagId;
-    ///
-    /// /// The response time that one job in a thousand exceeds.
-    /// fn tail_ns(run: &sched_dag::engine::Run, dag: DagId) -> Option<u64> {
+    /// /// The response time that one job in a thousand of a DAG exceeds.
+    /// fn tail_ns(run: &sched_dag::engine::Run, dag: &str) -> Option<u64> {
+    ///     let dag = run.task_set().find(dag);
     ///     Some(run.times()?.dag(dag).response_time.per_mille(999))
     /// }
     /// ```

@@ -55,11 +55,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let run = machine.run()?;
 
     let quick = run.task_set().find("quick");
-    let times = (0_u64..).zip(run.record().jobs(quick));
-    let responses = times.filter_map(|(job, times)| {
-        Some(run.record().completion_ns(quick, job)? - times.release_ns?)
-    });
-    let longest_ns = responses.max().unwrap_or(0);
+    let longest_ns = run.response_times_ns(quick).max().unwrap_or(0);
     let dags = (0..run.task_set().dags().len()).map(|dag| u32::try_from(dag).map_or(quick, DagId));
     let misses: Vec<u64> = dags.map(|dag| run.statistics(dag).misses).collect();
     let wrong = wrong.load(Ordering::Relaxed);

@@ -76,8 +76,13 @@ impl System for LinuxSystem {
         let connection = connection.transpose()?;
         // What a person says at the console is no event.
         if let Some(signal) = input.filter(|_| !self.has_console) {
-            let watched = self.linux.raise_on_input(signal, &io::stdin());
-            watched.map_err(|why| failure(format!("standard input cannot be watched: {why}")))?;
+            match self.linux.raise_on_input(signal, &io::stdin()) {
+                Err(why) if why.kind() == io::ErrorKind::PermissionDenied => front::println!(
+                    "note: standard input is a file, in which nothing arrives; it raises no signal"
+                ),
+                watched => watched
+                    .map_err(|why| failure(format!("standard input cannot be watched: {why}")))?,
+            }
         }
         if let Some(control) = self.linux.control() {
             let watched = control.close_when_asked(&self.signals);

@@ -23,11 +23,10 @@ pub enum Source<'a> {
 const WORKSPACE: &str = "/workspace";
 
 /// The packages that the template depends on, by their folders.
-const PACKAGES: [&str; 6] = [
+const PACKAGES: [&str; 5] = [
     "fass",
     "kernel",
     "kernel/on-linux",
-    "sched-dag",
     "fass/virtual-time",
     "boot/link",
 ];

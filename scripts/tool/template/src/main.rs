@@ -10,7 +10,6 @@ use alloc::format;
 use fass::finish_create_dags;
 use kernel::report::{Distribution, Ns};
 use kernel::{Ending, Machine, Run, println};
-use sched_dag::DagId;
 
 kernel::entry!(main);
 
@@ -29,8 +28,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     }
     let run = machine.run()?;
 
-    for (id, dag) in (0..).map(DagId).zip(run.task_set().dags()) {
-        report(&run, id, dag.name());
+    for dag in run.task_set().dags() {
+        report(&run, dag.name());
     }
     println!("{} allocations while jobs ran", run.allocations());
     // A fault is a failure already. A missed deadline is a matter of load. To make it a
@@ -44,17 +43,13 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 /// Says how the jobs of one DAG went.
-fn report(run: &Run, id: DagId, name: &str) {
-    let statistics = run.statistics(id);
+fn report(run: &Run, name: &str) {
+    let statistics = run.statistics(name);
     println!(
         "{name}: {} jobs complete, {} deadlines missed",
         statistics.completed, statistics.misses
     );
-    let record = run.record();
-    let jobs = record.numbered(id);
-    let response_times = Distribution::new(
-        jobs.filter_map(|(job, times)| Some(record.completion_ns(id, job)? - times.release_ns?)),
-    );
+    let response_times = Distribution::new(run.response_times_ns(name));
     // Times are kept of DAGs with a limit of jobs.
     if response_times.count() > 0 {
         println!(
