@@ -1,8 +1,7 @@
 //! The experiment on threads, a hundred times as fast: the joins are what the policy
 //! makes of the publications that really happened.
 
-#[path = "../../pub-sub/tests/support/threads.rs"]
-mod threads;
+mod support;
 
 use std::num::NonZeroUsize;
 use std::thread;
@@ -24,7 +23,7 @@ fn run(matching: Matching, depth: usize) -> Samples {
         period_ns: 250_000,
         execute: |time| thread::sleep(time / 100),
     };
-    experiment.samples(threads::run(experiment.graph(), PARALLEL + 2))
+    experiment.samples(support::run(experiment.graph(), PARALLEL + 2))
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Equal stamps make a set.
 //!
 //! An *entry* is a stamp with a slot for each topic. A message goes into its
-//! topic's slot of its stamp's entry. The numbered steps, which the tests are
-//! named after:
+//! topic's slot of its stamp's entry. The numbered steps, which `tests/steps.rs`
+//! takes one by one:
 //!
 //! 1. Entries are ordered by stamp. A message whose slot is taken replaces the
 //!    older one, silently.
@@ -182,94 +182,5 @@ impl<M> Synchronizer<M> for ExactTime<M> {
         assert!(topic < self.topics, "there is no topic {topic}");
         let slots = self.entries.iter().map(|entry| entry.slots + topic);
         slots.filter(|&slot| self.slots[slot].is_some()).count()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::synchronizer::Written;
-
-    /// Feeds (topic, stamp); message i is the i-th arrival.
-    fn feed(exact: &mut ExactTime<u64>, arrivals: &[(usize, u64)]) -> Written {
-        let mut written = Written::default();
-        for (message, &(topic, stamp_ns)) in (0..).zip(arrivals) {
-            exact.arrive(topic, Stamped { stamp_ns, message }, &mut written);
-        }
-        written
-    }
-
-    #[test]
-    fn step_1_the_newer_message_of_a_stamp_replaces_the_older() {
-        let written = feed(&mut ExactTime::new(2, 5), &[(0, 7), (0, 7), (1, 7)]);
-        assert_eq!(written.sets, [[1, 2]]);
-        assert_eq!(written.replaced, [(0, 0)]);
-        assert_eq!(written.dropped, []);
-    }
-
-    #[test]
-    fn step_2_a_full_entry_is_emitted_and_smaller_ones_dropped() {
-        let mut exact = ExactTime::new(2, 5);
-        let written = feed(&mut exact, &[(0, 2), (0, 1), (1, 4), (0, 3), (1, 3)]);
-        assert_eq!(written.sets, [[3, 4]]);
-        assert_eq!(written.dropped, [(0, 1), (0, 0)], "ascending");
-        assert_eq!(
-            (exact.held(0), exact.held(1)),
-            (0, 1),
-            "the newer one stays"
-        );
-    }
-
-    #[test]
-    fn step_3_too_many_entries_lose_the_smallest_stamp() {
-        let written = feed(&mut ExactTime::new(2, 2), &[(0, 1), (0, 2), (0, 3), (1, 1)]);
-        assert_eq!(written.sets, [] as [Vec<u64>; 0]);
-        assert_eq!(
-            written.dropped,
-            [(0, 0), (1, 3)],
-            "the late message makes the smallest entry, and goes at once"
-        );
-    }
-
-    #[test]
-    fn step_3_a_queue_size_of_0_is_no_limit() {
-        let mut exact = ExactTime::new(2, 0);
-        let arrivals: Vec<_> = (0..100).map(|stamp| (0, stamp)).chain([(1, 0)]).collect();
-        let written = feed(&mut exact, &arrivals);
-        assert_eq!(written.sets, [[0, 100]]);
-        assert_eq!(exact.held(0), 99);
-    }
-
-    #[test]
-    fn step_4_stamps_of_sets_can_go_backwards() {
-        let written = feed(&mut ExactTime::new(2, 5), &[(0, 9), (1, 9), (0, 4), (1, 4)]);
-        assert_eq!(written.sets, [[0, 1], [2, 3]]);
-    }
-
-    #[test]
-    fn one_topic_is_emitted_at_once() {
-        assert_eq!(feed(&mut ExactTime::new(1, 1), &[(0, 3)]).sets, [[0]]);
-    }
-
-    #[test]
-    fn nothing_is_allocated_after_construction() {
-        let mut exact = ExactTime::new(3, 4);
-        let capacities = |exact: &ExactTime<u64>| {
-            let slots = exact.slots.capacity();
-            let (entries, free) = (exact.entries.capacity(), exact.free.capacity());
-            (slots, entries, free, exact.set.capacity())
-        };
-        let before = capacities(&exact);
-        let arrivals: Vec<_> = (0..999_usize)
-            .map(|i| (i % 3, (i * i % 17) as u64))
-            .collect();
-        feed(&mut exact, &arrivals);
-        assert_eq!(capacities(&exact), before);
-    }
-
-    #[test]
-    #[should_panic(expected = "there is no topic 2")]
-    fn an_unknown_topic_is_refused() {
-        feed(&mut ExactTime::new(2, 1), &[(2, 0)]);
     }
 }

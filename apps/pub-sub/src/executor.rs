@@ -4,7 +4,7 @@
 //! callback out of the graph, executes it while the graph is free, gives it back, and
 //! waits when nothing is ready. The host is what they run on: it has the one graph
 //! under a lock, a clock, and something to wait for. So the same loop runs on
-//! threads, as in this crate's tests, and on a machine's cores.
+//! threads, as in the tests of `join-latency`, and on a machine's cores.
 //!
 //! A callback that publishes wakes all workers that wait; the first finds the
 //! message, the others wait again.

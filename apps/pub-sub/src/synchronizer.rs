@@ -93,27 +93,3 @@ impl<M: fmt::Debug> fmt::Debug for Set<'_, M> {
         f.debug_tuple("Set").field(&self.as_slice()).finish()
     }
 }
-
-/// An outlet that writes down what leaves, for the tests of the policies.
-#[cfg(test)]
-#[derive(Debug, Default, PartialEq, Eq)]
-pub(crate) struct Written {
-    pub(crate) sets: Vec<Vec<u64>>,
-    pub(crate) dropped: Vec<(usize, u64)>,
-    pub(crate) replaced: Vec<(usize, u64)>,
-}
-
-#[cfg(test)]
-impl Outlet<u64> for Written {
-    fn emitted(&mut self, set: Set<'_, u64>) {
-        self.sets.push(set.map(|stamped| stamped.message).collect());
-    }
-
-    fn dropped(&mut self, topic: usize, message: Stamped<u64>) {
-        self.dropped.push((topic, message.message));
-    }
-
-    fn replaced(&mut self, topic: usize, message: Stamped<u64>) {
-        self.replaced.push((topic, message.message));
-    }
-}

@@ -8,7 +8,7 @@
 //! contain it have been seen, so the candidate is emitted. A set is better than the
 //! candidate if it ends only a little later (the age penalty tells how little)
 //! and starts later by more. The numbered steps go on where
-//! [`ExactTime`](crate::ExactTime)'s end; the tests are named after them:
+//! [`ExactTime`](crate::ExactTime)'s end:
 //!
 //! 5.  Without a candidate all cursors are at the front.
 //! 6.  An arrival is appended, then searched, and only then overflows: the search
@@ -46,8 +46,6 @@
 
 mod parameters;
 mod ring;
-#[cfg(test)]
-mod tests;
 
 pub use parameters::{AgePenalty, Parameters};
 

@@ -78,9 +78,4 @@ impl<M> Ring<M> {
         self.cursor = self.cursor.checked_sub(1)?;
         self.entries.pop_front()
     }
-
-    #[cfg(test)]
-    pub(super) fn capacity(&self) -> usize {
-        self.entries.capacity()
-    }
 }
