@@ -119,23 +119,7 @@ mod tests {
     use super::*;
     use crate::parse::parse;
     use fass::{ConstructionPolicy, finish_create_dags_with};
-    use virtual_time::{Report, VirtualTime};
-
-    fn run(text: &str, cores: u32, settings: &Settings) -> Report {
-        let machine = VirtualTime::new().cores(cores);
-        let dags = build(&parse(text).unwrap().sets[0], settings);
-        finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
-        let report = machine.run();
-        assert_eq!(report.violations(), []);
-        report
-    }
-
-    const WCET: Settings = Settings {
-        execution: Execution::Wcet,
-        seed: 1,
-        occupation: Occupation::Hold,
-        length: Length::Jobs(3),
-    };
+    use virtual_time::VirtualTime;
 
     /// A fork and a join, and a pair without any edge.
     const TEXT: &str = "
@@ -155,44 +139,21 @@ mod tests {
 
     #[test]
     fn a_set_runs_as_its_file_says() {
-        let report = run(TEXT, 2, &WCET);
+        let settings = Settings {
+            execution: Execution::Wcet,
+            seed: 1,
+            occupation: Occupation::Hold,
+            length: Length::Jobs(3),
+        };
+        let machine = VirtualTime::new().cores(2);
+        let dags = build(&parse(TEXT).unwrap().sets[0], &settings);
+        finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+        let report = machine.run();
+        assert_eq!(report.violations(), []);
         let responses = report.jobs.iter().map(|job| job.response_time_ns());
         let responses: Vec<_> = responses.flatten().collect();
         assert_eq!(responses.len(), 6);
         assert!(responses.contains(&6_000_000), "{responses:?}");
-    }
-
-    #[test]
-    fn a_dag_runs_in_the_cluster_that_its_file_states() {
-        let text = "
-            dag much period 4ms cluster 1
-            subtask a wcet 3ms
-            subtask b wcet 3ms
-            dag little period 4ms cluster 0
-            subtask c wcet 3ms
-            end";
-        let machine = VirtualTime::new().cores(2).clusters(&[1, 1]);
-        let dags = build(&parse(text).unwrap().sets[0], &WCET);
-        finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
-        let report = machine.run();
-        assert_eq!(report.violations(), []);
-        let misses = report.dags().map(|dag| dag.statistics().misses);
-        assert_eq!(misses.collect::<Vec<_>>(), [3, 0]);
-    }
-
-    #[test]
-    fn drawn_times_are_no_longer_than_the_wcets() {
-        for execution in [
-            Execution::Samples,
-            Execution::parse("uniform:0.1..0.5").unwrap(),
-        ] {
-            let settings = Settings { execution, ..WCET };
-            let longest = |report: Report| {
-                let responses = report.jobs.iter().map(|job| job.response_time_ns());
-                responses.flatten().max().unwrap()
-            };
-            assert!(longest(run(TEXT, 4, &settings)) <= 6_000_000);
-        }
     }
 
     #[test]

@@ -53,117 +53,54 @@ fn every_part_of_a_file_that_is_cut_off_is_refused() {
     }
 }
 
-#[test]
-fn an_empty_file_is_refused() {
-    let empty = "line 1: the file ends where a `dag` record should be; it is empty: describe a \
-                 DAG, or name another file";
-    assert_eq!(refusal(""), empty);
-    assert_eq!(
-        refusal("end"),
-        "line 1: the file has no dag; add one before `end`"
-    );
-}
+/// A file that is refused, and the words of the refusal. `{dag}` is a line, `dag x` of
+/// 1 ms, and `{a}` the line of its subtask `a`.
+const REFUSED: &str = r"
+=> line 1: the file ends where a `dag` record should be; it is empty: describe a DAG, or name
+end => line 1: the file has no dag; add one before `end`
+dig x => line 1: expected `set`, `dag`, `subtask`, `edge` or `end`, found `dig`; correct it
+dag x => line 1: dag `x` has no period; add `period 25ms`
+dag => line 1: `dag` lacks its name
+dag x perod 1ms => line 1: unknown key `perod`; a dag has `period`, `deadline`,
+dag x period => line 1: `period` lacks its value
+dag x period 1ms period 2ms => line 1: `period` stands here twice; give it once
+dag x period -1ms => line 1: period: `-1ms` is negative; give a time from 0 on
+dag x period 99999999999s => line 1: period: `99999999999s` is more than 64 bits
+dag x period 1ms overrun wait => overrun: `wait` is none of queue, skip and abort
+dag x period 1ms in-flight 4294967296 => in-flight: `4294967296` is no whole number
+\nsubtask a wcet 1ms => line 2: `subtask` stands before any `dag`; begin with
+{dag}subtask a => line 2: subtask `a` has no wcet; add `wcet 3ms`
+{dag}subtask a wcet 1ms nice 3 => line 2: unknown key `nice`; a subtask has `wcet`,
+{dag}subtask a wcet 1ms samples 1us,2ms => line 2: the sample 2ms is longer than the wcet 1ms
+{dag}subtask a wcet 0ns => line 2: wcet: it is 0, and
+{dag}dag y period 1ms => line 2: dag `x` of line 1 ends here without a subtask
+{dag}{a}{a} => line 3: subtask `a` stands here twice, first on line 2
+{dag}{a}edge a -> b => line 3: no subtask `b` stands before this line
+{dag}{a}edge a b => line 3: expected `edge A -> B`
+{dag}{a}{dag} => line 3: dag `x` stands here twice, first on line 1
+{dag}{a}subtask b wcet 1ms\nedge a -> b\nedge b -> a\nedge a -> b\nend => line 6: the edge from `a` to `b` \
+stands here twice, first on line 4; drop one
+set a\n{dag}{a}set a => line 4: set `a` stands here twice, first on line 1; rename one
+set a\nset b => line 2: set `a` ends here without a DAG
+dag {x period 1ms => line 1: `{x` is no name; give a word
+set {x => line 1: `{x` is no name; give a word
+{dag}{a}end\n\nx => line 5: `x` stands after `end`
+{dag}{a} => line 3: the file ends where `end` should be; a part of it is missing";
 
 #[test]
 fn a_refusal_names_line_offender_and_remedy() {
-    let dag = "dag x period 1ms\n";
-    for (text, words) in [
-        (
-            "dig x",
-            "line 1: expected `set`, `dag`, `subtask`, `edge` or `end`, found `dig`; correct it",
-        ),
-        ("dag x", "line 1: dag `x` has no period; add `period 25ms`"),
-        ("dag", "line 1: `dag` lacks its name"),
-        (
-            "dag x perod 1ms",
-            "line 1: unknown key `perod`; a dag has `period`, `deadline`,",
-        ),
-        ("dag x period", "line 1: `period` lacks its value"),
-        (
-            "dag x period 1ms period 2ms",
-            "line 1: `period` stands here twice; give it once",
-        ),
-        (
-            "dag x period -1ms",
-            "line 1: period: `-1ms` is negative; give a time from 0 on",
-        ),
-        (
-            "dag x period 99999999999s",
-            "line 1: period: `99999999999s` is more than 64 bits",
-        ),
-        (
-            "dag x period 1ms overrun wait",
-            "overrun: `wait` is none of queue, skip and abort",
-        ),
-        (
-            "dag x period 1ms in-flight 4294967296",
-            "in-flight: `4294967296` is no whole number",
-        ),
-        (
-            "\nsubtask a wcet 1ms",
-            "line 2: `subtask` stands before any `dag`; begin with",
-        ),
-        (
-            "{dag}subtask a",
-            "line 2: subtask `a` has no wcet; add `wcet 3ms`",
-        ),
-        (
-            "{dag}subtask a wcet 1ms nice 3",
-            "line 2: unknown key `nice`; a subtask has `wcet`,",
-        ),
-        (
-            "{dag}subtask a wcet 1ms samples 1us,2ms",
-            "line 2: the sample 2ms is longer than the wcet 1ms",
-        ),
-        (
-            "{dag}subtask a wcet 1ms\nsubtask a wcet 1ms",
-            "line 3: subtask `a` stands here twice, first on line 2",
-        ),
-        (
-            "{dag}subtask a wcet 1ms\nedge a -> b",
-            "line 3: no subtask `b` stands before this line",
-        ),
-        (
-            "{dag}subtask a wcet 1ms\nedge a b",
-            "line 3: expected `edge A -> B`",
-        ),
-        (
-            "{dag}dag y period 1ms",
-            "line 2: dag `x` of line 1 ends here without a subtask",
-        ),
-        (
-            "{dag}subtask a wcet 1ms\ndag x period 1ms",
-            "line 3: dag `x` stands here twice, first on line 1",
-        ),
-        (
-            "{dag}subtask a wcet 1ms\nsubtask b wcet 1ms\nedge a -> b\nedge b -> a\nedge a -> b\nend",
-            "line 6: the edge from `a` to `b` stands here twice, first on line 4; drop one",
-        ),
-        ("{dag}subtask a wcet 0ns", "line 2: wcet: it is 0, and"),
-        (
-            "set a\n{dag}subtask a wcet 1ms\nset a\n",
-            "line 4: set `a` stands here twice, first on line 1; rename one",
-        ),
-        ("dag {x period 1ms", "line 1: `{x` is no name; give a word"),
-        ("set {x", "line 1: `{x` is no name; give a word"),
-        (
-            "dag x\u{202e}y period 1ms",
-            "line 1: `x\\u{202e}y` is no name",
-        ),
-        ("\u{1b}[2J", "found `\\u{1b}[2J`"),
-        ("set a\nset b", "line 2: set `a` ends here without a DAG"),
-        (
-            "{dag}subtask a wcet 1ms\nend\n\nx",
-            "line 5: `x` stands after `end`",
-        ),
-        (
-            "{dag}subtask a wcet 1ms\n",
-            "line 3: the file ends where `end` should be; a part of it is missing",
-        ),
-    ] {
-        let message = refusal(&text.replace("{dag}", dag));
+    let rows = REFUSED.replace(" \\\n", " ");
+    for row in rows.lines().skip(1) {
+        let (text, words) = row.split_once("=> ").expect(row);
+        let text = text.trim_end().replace(r"\n", "\n");
+        let text = text.replace("{dag}", "dag x period 1ms\n");
+        let message = refusal(&text.replace("{a}", "subtask a wcet 1ms\n"));
         assert!(message.contains(words), "{message}\n  not: {words}");
     }
+    // What a terminal would act on is written in letters.
+    let right_to_left = refusal("dag x\u{202e}y period 1ms");
+    assert!(right_to_left.contains("line 1: `x\\u{202e}y` is no name"));
+    assert!(refusal("\u{1b}[2J").contains("found `\\u{1b}[2J`"));
 }
 
 #[test]
