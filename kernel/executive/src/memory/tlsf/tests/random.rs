@@ -5,33 +5,22 @@
 //! are returned each region must be one block again. A failing trace prints its
 //! seed, which alone determines it.
 
+#[path = "../../../../../../sched-dag/tests/support/random.rs"]
+mod numbers;
+
 use core::ptr::NonNull;
 use std::collections::BTreeMap;
 
 use super::heap::TestHeap;
+use numbers::Random;
 
 const REGIONS: [usize; 3] = [256 * 1024, 64 * 1024, 5000];
 const STEPS: usize = 3000;
 
-/// Steele, Lea and Flood's SplitMix64, doi 10.1145/2660193.2660195.
-struct Random(u64);
-
-impl Random {
-    /// A number below `bound`.
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^= mixed >> 31;
-        usize::try_from(mixed).expect("a 64-bit host") % bound
-    }
-
-    /// A size in bytes: all orders of magnitude up to `2^log2` alike.
-    fn size(&mut self, log2: usize) -> usize {
-        let bound = 2 << self.below(log2);
-        1 + self.below(bound)
-    }
+/// Draws a size in bytes: all orders of magnitude up to `2^log2` alike.
+fn size(random: &mut Random, log2: usize) -> usize {
+    let bound = 2 << random.below(log2);
+    1 + random.below(bound)
 }
 
 struct Held {
@@ -71,7 +60,7 @@ impl Trace {
         Self {
             heap: TestHeap::new(&REGIONS),
             held: BTreeMap::new(),
-            random: Random(seed),
+            random: Random::new(seed),
         }
     }
 
@@ -92,13 +81,29 @@ impl Trace {
         }
     }
 
+    /// Allocates until hardly anything fits any more.
+    fn exhaust(&mut self) {
+        let mut failures = 0;
+        for _ in 0..STEPS {
+            let before = self.held.len();
+            self.allocate();
+            failures += usize::from(self.held.len() == before);
+        }
+        assert!(failures > STEPS / 2, "{failures} failures: never exhausted");
+        self.heap.validate();
+    }
+
     fn allocate(&mut self) {
-        let size = self.random.size(14);
+        let size = size(&mut self.random, 14);
         let align = 1 << self.random.below(13);
+        let before = self.heap.usage().in_use_bytes;
         let Some(payload) = self.heap.allocate(size, align) else {
             return;
         };
         assert!(payload.addr().get().is_multiple_of(align), "misaligned");
+        // A header, and less than a smallest block that could not be returned.
+        let taken = self.heap.usage().in_use_bytes - before;
+        assert!(taken <= size.next_multiple_of(16) + 16 + 16, "{taken}");
         let pattern = u8::try_from(self.random.below(256)).expect("below 256");
         self.hold(Held {
             payload,
@@ -115,7 +120,7 @@ impl Trace {
     }
 
     fn resize(&mut self) {
-        let new_size = self.random.size(14);
+        let new_size = size(&mut self.random, 14);
         let Some(mut held) = self.pick() else { return };
         let resized = self.heap.reallocate_in_place(held.payload, new_size);
         assert!(resized || new_size > held.size, "shrinking cannot fail");
@@ -166,30 +171,14 @@ impl Trace {
 
 #[test]
 fn random_traces_keep_contents_apart_and_merge_at_the_end() {
-    for seed in 1..=40 {
+    for seed in 1..=50 {
         let mut trace = Trace::new(seed);
-        trace.run();
-        assert!(
-            trace.heap.usage().allocations > 500,
-            "hardly anything happened"
-        );
-        trace.finish();
-    }
-}
-
-#[test]
-fn random_traces_reach_exhaustion_and_recover() {
-    for seed in 101..=110 {
-        let mut trace = Trace::new(seed);
-        let mut failures = 0;
-        for _ in 0..STEPS {
-            let before = trace.held.len();
-            trace.allocate();
-            failures += usize::from(trace.held.len() == before);
+        if seed > 40 {
+            trace.exhaust();
         }
-        assert!(failures > STEPS / 2, "{failures} failures: never exhausted");
-        trace.heap.validate();
         trace.run();
+        let allocations = trace.heap.usage().allocations;
+        assert!(allocations > 500, "hardly anything happened");
         trace.finish();
     }
 }
