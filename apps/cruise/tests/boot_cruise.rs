@@ -104,21 +104,6 @@ fn a_burst_beyond_the_room_is_lost_and_counted() {
 }
 
 #[test]
-fn a_decoder_that_panics_ends_its_dag_alone() {
-    let input = "4ms \"gap 2350\\n\"\n25ms \"ga\\n\"\n";
-    let (outcome, sent) = guest(input).word("decoder=trusting").succeed_sending();
-    let faults: Vec<_> = outcome.transcript.of_kind("fault").collect();
-    assert_eq!(faults.len(), 1);
-    assert_eq!(faults[0].text_at("subtask_name"), Some("measure"));
-    assert_eq!(sent, b"speed 0\nspeed 35\nspeed 70\n");
-    assert!(
-        outcome
-            .serial
-            .contains(&format!("clock: {JOBS} jobs complete"))
-    );
-}
-
-#[test]
 fn a_wire_without_a_port_is_refused() {
     let outcome = Guest::new("cruise").end_in(Status::Usage);
     let reason = outcome.transcript.verdict().expect("checked before").reason;

@@ -119,23 +119,6 @@ fn when_the_camera_fails_the_drone_comes_down_by_its_other_sensors() {
 }
 
 #[test]
-fn a_fault_within_the_limit_costs_a_frame_and_the_drone_flies_on_until_the_next() {
-    let workload = Workload {
-        seconds: 5,
-        fault_at: Some(50),
-        survived: 1,
-        ..WORKLOAD
-    };
-    let (flight, report) = fly(workload, 2, Policy::StaticPriority);
-    assert_eq!(report.panics.len(), 2);
-    let camera = report.dag("camera").statistics();
-    // Frames 0 to 49 and 51 to 100; frame 101 is the 50th that the new function sees.
-    assert_eq!((camera.completed, camera.faults), (100, 2));
-    assert!((3_366_000_000..3_380_000_000).contains(&landed_ns(&report)));
-    assert!(flight.has_landed(), "{flight}");
-}
-
-#[test]
 fn a_person_who_wants_more_reserve_has_the_drone_land_earlier() {
     let machine = machine(2, Policy::StaticPriority);
     let (flight, reserve) = take_off(Workload {
