@@ -108,23 +108,6 @@ mod tests {
     }
 
     #[test]
-    fn what_is_named_twice_is_memory_if_all_say_so() {
-        let told = [
-            (10, 15, false),
-            (0, 20, true),
-            (18, 30, false),
-            (12, 13, true),
-        ];
-        let left = [
-            (0, 10, true),
-            (10, 15, false),
-            (15, 18, true),
-            (18, 30, false),
-        ];
-        assert_eq!(ordered(told).0, left);
-    }
-
-    #[test]
     fn hundreds_of_pieces_become_few() {
         // Every second piece first, so that nothing continues what came last.
         let pieces = |count| (0..count).step_by(2).chain((1..count).step_by(2));

@@ -192,23 +192,6 @@ mod tests {
     }
 
     #[test]
-    fn ranges_that_continue_one_another_become_one() {
-        let pages = (0..100).map(|page| (page << 12, 4096, if page < 60 { 1 } else { 2 }));
-        let info = info(&list(&[map(24, &pages.collect::<Vec<_>>())]));
-        let ends: Vec<u64> = info
-            .memory
-            .as_slice()
-            .iter()
-            .map(|it| it.end >> 12)
-            .collect();
-        assert_eq!(ends, [60, 100]);
-        let split = (0..200).map(|page| (page << 13, 4096, 1));
-        let info = self::info(&list(&[map(24, &split.collect::<Vec<_>>())]));
-        assert_eq!(info.memory.as_slice().len(), 128, "what fits");
-        assert!(info.memory.is_cut);
-    }
-
-    #[test]
     fn the_newer_copy_of_the_root_pointer_wins() {
         let at = |tags: &[(u32, Vec<u8>)]| info(&list(tags)).rsdp;
         let (old, new) = (rsdp(tag::OLD_RSDP, 0), rsdp(tag::NEW_RSDP, 2));

@@ -116,20 +116,6 @@ mod tests {
         assert_eq!(info.memory.as_slice(), &[region]);
     }
 
-    #[test]
-    fn tells_that_a_command_line_was_cut() {
-        for (bytes, is_cut) in [(crate::MOST_COMMAND_LINE_BYTES, false), (2049, true)] {
-            let mut memory = start_info(MAGIC);
-            memory.truncate(160);
-            memory[24] = 160;
-            memory.extend(std::iter::repeat_n(b'x', bytes));
-            memory.push(0);
-            let info = boot_info(&memory, 0);
-            assert_eq!(info.command_line().map(str::len), Ok(2048));
-            assert_eq!(info.is_command_line_cut, is_cut, "{bytes} bytes");
-        }
-    }
-
     /// A start info that names `count` modules in a list at 160, where `entries`
     /// (start and size of each) stand.
     fn with_modules(count: u8, entries: &[(u64, u64)]) -> Vec<u8> {
@@ -145,37 +131,33 @@ mod tests {
         bytes
     }
 
-    fn modules(bytes: &Vec<u8>) -> Vec<(u64, u64)> {
-        let info = boot_info(bytes, 0);
-        let modules = info.modules.as_slice().iter();
-        modules.map(|module| (module.start, module.end)).collect()
-    }
-
     #[test]
-    fn notes_modules_in_their_order() {
-        let bytes = with_modules(2, &[(0x7000, 0x123), (0x5000, 1)]);
-        assert_eq!(modules(&bytes), [(0x7000, 0x7123), (0x5000, 0x5001)]);
-        assert_eq!(modules(&with_modules(0, &[(0x7000, 1)])), []);
-    }
-
-    #[test]
-    fn leaves_out_modules_that_cannot_be() {
-        let bytes = with_modules(4, &[(0x7000, 0), (u64::MAX - 1, 2), (u64::MAX, 1), (9, 1)]);
-        assert_eq!(modules(&bytes), [(9, 10)]);
-    }
-
-    #[test]
-    fn keeps_what_a_truncated_or_endless_list_of_modules_tells() {
-        let mut bytes = with_modules(2, &[(0x7000, 1), (0x8000, 1)]);
-        bytes.truncate(160 + 32 + 15);
-        assert_eq!(modules(&bytes), [(0x7000, 0x7001)]);
-        let bytes = with_modules(255, &[(0x7000, 1)]);
-        assert_eq!(modules(&bytes), [(0x7000, 0x7001)]);
-        let bytes = with_modules(5, &[(1, 1); 5]);
-        assert_eq!(modules(&bytes).len(), crate::MAX_MODULES);
-        let mut bytes = with_modules(1, &[(0x7000, 1)]);
-        bytes[16..24].fill(0xff); // the list lies beyond all memory
-        assert_eq!(modules(&bytes), []);
+    fn keeps_what_modules_there_can_be() {
+        let mut cut = with_modules(2, &[(0x7000, 1), (0x8000, 1)]);
+        cut.truncate(160 + 32 + 15);
+        let mut beyond_all_memory = with_modules(1, &[(0x7000, 1)]);
+        beyond_all_memory[16..24].fill(0xff);
+        let no_modules = [(0x7000, 0), (u64::MAX - 1, 2), (u64::MAX, 1), (9, 1)];
+        for (bytes, expected) in [
+            (
+                with_modules(2, &[(0x7000, 0x123), (0x5000, 1)]),
+                vec![(0x7000, 0x7123), (0x5000, 0x5001)],
+            ),
+            (with_modules(0, &[(0x7000, 1)]), vec![]),
+            (with_modules(4, &no_modules), vec![(9, 10)]),
+            (cut, vec![(0x7000, 0x7001)]),
+            (with_modules(255, &[(0x7000, 1)]), vec![(0x7000, 0x7001)]),
+            (
+                with_modules(5, &[(1, 1); 5]),
+                vec![(1, 2); crate::MAX_MODULES],
+            ),
+            (beyond_all_memory, vec![]),
+        ] {
+            let info = boot_info(&bytes, 0);
+            let modules = info.modules.as_slice().iter();
+            let modules = modules.map(|module| (module.start, module.end));
+            assert_eq!(modules.collect::<Vec<_>>(), expected);
+        }
     }
 
     #[test]

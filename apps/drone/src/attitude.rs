@@ -127,19 +127,4 @@ mod tests {
             assert!((found - angle).abs() < 1e-12, "{found} for {angle}");
         }
     }
-
-    #[test]
-    fn a_goal_ahead_pitches_forward_and_one_to_the_left_rolls_left() {
-        let estimate = Estimate {
-            height: 1.0,
-            ..Estimate::default()
-        };
-        let here = Some((Fix::default(), 0.0));
-        let [_, pitch, _] = control(&estimate, here, [1.0, 0.0, 1.0]).torque;
-        let [roll, ..] = control(&estimate, here, [0.0, 1.0, 1.0]).torque;
-        assert!(pitch > 0.0 && roll < 0.0, "{pitch} {roll}");
-        let blind = control(&estimate, None, [1.0, 1.0, 1.0]);
-        assert_eq!(blind.torque, [0.0; 3]);
-        assert!((blind.thrust - Force::HOVER.thrust).abs() < 1e-12);
-    }
 }

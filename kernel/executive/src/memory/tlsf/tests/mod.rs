@@ -78,19 +78,6 @@ fn a_block_of_the_least_fitting_class_is_taken() {
 }
 
 #[test]
-fn regions_add_up_and_never_merge() {
-    let mut heap = TestHeap::new(&[4096, 16_384]);
-    assert_eq!(heap.allocate(20_000, 8), None);
-    heap.add_region(32_768);
-    let block = heap
-        .allocate(20_000, 8)
-        .expect("memory of the third region");
-    heap.deallocate(block, 20_000, 8);
-    assert_eq!(heap.usage().capacity_bytes, 4096 + 16_384 + 32_768 - 48);
-    assert_eq!(heap.validate().free_sizes, [4080, 16_368, 32_752]);
-}
-
-#[test]
 fn neighbouring_regions_never_merge() {
     let mut memory = [0_u128; 64];
     let start = NonNull::from(&mut memory).cast::<u8>();
