@@ -18,119 +18,116 @@ fn named(name: &str) -> SubtaskAttributes { SubtaskAttributes::named(name) }
 struct NotClone;
 ";
 
-struct Case {
-    what: &'static str,
-    code: &'static str,
-    says: &'static [&'static str],
-}
+/// A program that is wrong, and what the compiler says of it.
+type Case = (&'static str, &'static [&'static str]);
 
 const CASES: &[Case] = &[
-    Case {
-        what: "an argument that is no tuple",
-        code: "fn main() { create_dag().register_subtask(|a: i32| (a,), vec![\"a\"], vec![\"b\"], named(\"f\")); }",
-        says: &[
+    // an argument that is no tuple
+    (
+        "fn main() { create_dag().register_subtask(|a: i32| (a,), vec![\"a\"], vec![\"b\"], named(\"f\")); }",
+        &[
             "`i32` is not the argument of a subtask",
             "should be a tuple of messages, one for each input topic",
             "with one input topic that is `(i32,)`, comma included",
         ],
-    },
-    Case {
-        what: "a result that is no tuple",
-        code: "fn main() { create_dag().register_subtask(|(a,): (i32,)| a, vec![\"a\"], vec![\"b\"], named(\"f\")); }",
-        says: &[
+    ),
+    // a result that is no tuple
+    (
+        "fn main() { create_dag().register_subtask(|(a,): (i32,)| a, vec![\"a\"], vec![\"b\"], named(\"f\")); }",
+        &[
             "`i32` is not the result of a subtask",
             "should be a tuple of messages, one for each output topic",
             "with one output topic that is `(i32,)`, comma included",
         ],
-    },
-    Case {
-        what: "a message that cannot be cloned",
-        code: "fn main() { create_dag().register_periodic_subtask(|| (NotClone,), vec![\"a\"], period(), named(\"f\")); }",
-        says: &[
+    ),
+    // a message that cannot be cloned
+    (
+        "fn main() { create_dag().register_periodic_subtask(|| (NotClone,), vec![\"a\"], period(), named(\"f\")); }",
+        &[
             "`NotClone` cannot travel on a topic",
             "share it as `Arc<NotClone>`",
             "travels as `fass::Unique<NotClone>`",
         ],
-    },
-    Case {
-        what: "a message that cannot change threads",
-        code: "use std::rc::Rc;\nfn main() { create_dag().register_sink_subtask(|(a,): (Rc<u8>,)| (), vec![\"a\"], period(), named(\"f\")); }",
-        says: &["`Rc<u8>` cannot travel on a topic"],
-    },
-    Case {
-        what: "a tuple beyond 16 elements",
-        code: "type T = (u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8);\n\
+    ),
+    // a message that cannot change threads
+    (
+        "use std::rc::Rc;\nfn main() { create_dag().register_sink_subtask(|(a,): (Rc<u8>,)| (), vec![\"a\"], period(), named(\"f\")); }",
+        &["`Rc<u8>` cannot travel on a topic"],
+    ),
+    // a tuple beyond 16 elements
+    (
+        "type T = (u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8, u8);\n\
                fn main() { create_dag().register_sink_subtask(|_: T| (), vec![], period(), named(\"f\")); }",
-        says: &[
+        &[
             "is not the argument of a subtask",
             "one tuple of at most 16 messages",
         ],
-    },
-    Case {
-        what: "a receiver that is none",
-        code: "fn receive<T: MulRecv>() {}\nfn main() { receive::<i32>(); }",
-        says: &[
+    ),
+    // a receiver that is none
+    (
+        "fn receive<T: MulRecv>() {}\nfn main() { receive::<i32>(); }",
+        &[
             "`i32` does not receive a subtask's inputs",
             "`<Args as VecToSubs>::Subs`",
         ],
-    },
-    Case {
-        what: "a sender that is none",
-        code: "fn send<T: MulSend>() {}\nfn main() { send::<i32>(); }",
-        says: &[
+    ),
+    // a sender that is none
+    (
+        "fn send<T: MulSend>() {}\nfn main() { send::<i32>(); }",
+        &[
             "`i32` does not send a subtask's outputs",
             "`<Ret as VecToPubs>::Pubs`",
         ],
-    },
-    Case {
-        what: "a state itself instead of a use of it",
-        code: "fn main() { let dag = create_dag(); let map = dag.state(\"map\", 0_u32); dag.using(map); }",
-        says: &[
+    ),
+    // a state itself instead of a use of it
+    (
+        "fn main() { let dag = create_dag(); let map = dag.state(\"map\", 0_u32); dag.using(map); }",
+        &[
             "`State<u32>` is nothing that a subtask uses",
             "should be a use, or a tuple of up to 8 uses",
             "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`",
         ],
-    },
-    Case {
-        what: "a signal itself instead of a use of it",
-        code: "fn main() { let dag = create_dag(); let alarm = dag.sporadic(period()); dag.using(alarm); }",
-        says: &["Signal` is nothing that a subtask uses"],
-    },
-    Case {
-        what: "a function that can be replaced, of a subtask that samples a latest value",
-        code: "fn main() { let dag = create_dag(); let pose = dag.latest::<u32>(\"pose\"); dag.using(pose.sample()).restarting(|| |_: Option<fass::Sample<'_, u32>>, (_,): (u32,)| ()); }",
-        says: &[
+    ),
+    // a signal itself instead of a use of it
+    (
+        "fn main() { let dag = create_dag(); let alarm = dag.sporadic(period()); dag.using(alarm); }",
+        &["Signal` is nothing that a subtask uses"],
+    ),
+    // a function that can be replaced, of a subtask that samples a latest value
+    (
+        "fn main() { let dag = create_dag(); let pose = dag.latest::<u32>(\"pose\"); dag.using(pose.sample()).restarting(|| |_: Option<fass::Sample<'_, u32>>, (_,): (u32,)| ()); }",
+        &[
             "a subtask that uses `Sampling<u32>` cannot be replaced after a fault",
             "let another subtask sample the latest value or raise the signal, and send along an edge",
         ],
-    },
-    Case {
-        what: "a use among what is none",
-        code: "fn main() { let dag = create_dag(); let map = dag.state(\"map\", 0_u32); dag.using((map.read(), 5)); }",
-        says: &["is nothing that a subtask uses"],
-    },
-    Case {
-        what: "a latest value of what cannot travel",
-        code: "fn main() { create_dag().latest::<NotClone>(\"a\"); }",
-        says: &["`NotClone` cannot travel on a topic"],
-    },
-    Case {
-        what: "a state that cannot change threads",
-        code: "use std::rc::Rc;\nfn main() { create_dag().state(\"map\", Rc::new(0)); }",
-        says: &["`Rc<{integer}>` cannot be a state"],
-    },
-    Case {
-        what: "a state that cannot be read by several threads",
-        code: "use std::cell::Cell;\nfn main() { create_dag().state(\"map\", Cell::new(0)); }",
-        says: &["`Cell<{integer}>` cannot be a state"],
-    },
+    ),
+    // a use among what is none
+    (
+        "fn main() { let dag = create_dag(); let map = dag.state(\"map\", 0_u32); dag.using((map.read(), 5)); }",
+        &["is nothing that a subtask uses"],
+    ),
+    // a latest value of what cannot travel
+    (
+        "fn main() { create_dag().latest::<NotClone>(\"a\"); }",
+        &["`NotClone` cannot travel on a topic"],
+    ),
+    // a state that cannot change threads
+    (
+        "use std::rc::Rc;\nfn main() { create_dag().state(\"map\", Rc::new(0)); }",
+        &["`Rc<{integer}>` cannot be a state"],
+    ),
+    // a state that cannot be read by several threads
+    (
+        "use std::cell::Cell;\nfn main() { create_dag().state(\"map\", Cell::new(0)); }",
+        &["`Cell<{integer}>` cannot be a state"],
+    ),
 ];
 
 /// The traits whose sentences are shown, and the sentences, come from the sources:
 /// a new one without a case fails here.
 #[test]
 fn every_sentence_has_a_case() {
-    let expected: Vec<&str> = CASES.iter().flat_map(|case| case.says).copied().collect();
+    let expected: Vec<&str> = CASES.iter().flat_map(|case| case.1).copied().collect();
     let mut sentences = 0;
     for file in files_in(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src")) {
         let source = fs::read_to_string(file).expect("a source");
@@ -164,9 +161,7 @@ fn wrong_shapes_are_refused_in_our_words() {
     let directory = env::temp_dir().join(format!("fass-diagnostics-{}", std::process::id()));
     fs::create_dir_all(&directory).expect("a temporary directory");
     match usable_library(&directory) {
-        Some(library) => CASES
-            .iter()
-            .for_each(|case| check(case, &library, &directory)),
+        Some(library) => (CASES.iter()).for_each(|case| check(case, &library, &directory)),
         None => panic!(
             "no library next to this test can be used by the `rustc` in the path; \
              put the toolchain that built it there"
@@ -175,14 +170,13 @@ fn wrong_shapes_are_refused_in_our_words() {
     fs::remove_dir_all(&directory).expect("the directory is ours");
 }
 
-fn check(case: &Case, library: &Path, directory: &Path) {
-    let (compiles, output) = compile(case.code, library, directory);
-    assert!(!compiles, "{} is accepted", case.what);
-    for sentence in case.says {
+fn check((code, says): &Case, library: &Path, directory: &Path) {
+    let (compiles, output) = compile(code, library, directory);
+    assert!(!compiles, "it is accepted: {code}");
+    for sentence in *says {
         assert!(
             output.contains(sentence),
-            "{}: the compiler does not say \"{sentence}\", but:\n{output}",
-            case.what
+            "{code}: no \"{sentence}\", but:\n{output}"
         );
     }
 }

@@ -13,7 +13,7 @@ use std::thread;
 
 use fass::{Body, Dag, create_dag};
 use random::Random;
-use support::{PERIOD, commit, named, panic_message};
+use support::{PERIOD, commit, named};
 
 /// A value that knows its job and is counted while it lives.
 struct Counted {
@@ -156,33 +156,4 @@ fn no_order_of_calls_tears_mixes_or_leaks_values() {
         joined.load(Ordering::Relaxed) > rounds,
         "many a join succeeds"
     );
-}
-
-#[test]
-fn an_instance_that_is_run_twice_finds_no_second_input() {
-    let alive = Arc::new(AtomicI64::new(0));
-    let running = Arc::new([const { AtomicU64::new(0) }; 4]);
-    let mut plan = commit(&[diamond(&alive, &running, &Arc::default())]);
-    for body in &mut plan.bodies[0] {
-        body.run(0);
-    }
-    for reader in 1..4 {
-        let again = panic_message(|| plan.bodies[0][reader].run(0));
-        assert!(again.contains("an input of job 0 is missing"), "{again}");
-    }
-    assert_eq!(alive.load(Ordering::Relaxed), 0);
-}
-
-#[test]
-fn a_join_that_is_started_too_early_keeps_no_half_of_its_inputs() {
-    let alive = Arc::new(AtomicI64::new(0));
-    let running = Arc::new([const { AtomicU64::new(0) }; 4]);
-    let mut plan = commit(&[diamond(&alive, &running, &Arc::default())]);
-    plan.bodies[0][0].run(0);
-    plan.bodies[0][1].run(0);
-    let early = panic_message(|| plan.bodies[0][3].run(0));
-    assert!(early.contains("an input of job 0 is missing"), "{early}");
-    plan.bodies[0][2].run(0);
-    drop(plan);
-    assert_eq!(alive.load(Ordering::Relaxed), 0);
 }

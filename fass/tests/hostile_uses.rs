@@ -1,95 +1,39 @@
 //! A platform that keeps no rule, and what subtasks use besides their inputs: states,
-//! latest values and signals. It runs users of a state at once, and completes
-//! instances never, twice, or before they have run.
+//! latest values and signals. It runs users of a state at once, and a writer while its
+//! value is looked at, and completes instances never, twice, or before they have run.
 
 mod support;
 
-use core::time::Duration;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
-use std::thread;
-use std::time::Instant;
 
-use fass::{Plan, Raiser, Request, Sample, create_dag};
+use fass::{Raiser, Request, Sample, create_dag};
 use sched_dag::DagId;
-use support::{PERIOD, commit, named, panic_message};
+use support::{PERIOD, Shared, commit, inside, named, panic_message};
 
-/// How long a test waits for what has to come, on however busy a host.
-const PATIENCE: Duration = Duration::from_secs(300);
-
-/// Where a subtask and the test wait for each other; to wait in vain is a panic.
-#[derive(Default)]
-struct Meeting(AtomicU64);
-
-impl Meeting {
-    fn wait(&self) {
-        let before = self.0.fetch_add(1, Ordering::AcqRel);
-        let both = before / 2 * 2 + 2;
-        let begin = Instant::now();
-        while self.0.load(Ordering::Acquire) < both {
-            assert!(begin.elapsed() < PATIENCE, "nobody comes");
-            thread::yield_now();
-        }
-    }
-}
-
-/// More than a processor stores at once.
-#[derive(Clone)]
-struct Whole {
-    job: u64,
-    copies: [u64; 8],
-    _of: Arc<()>,
-}
-
-impl Whole {
-    fn new(job: u64, of: &Arc<()>) -> Self {
-        Self {
-            job,
-            copies: [job; 8],
-            _of: Arc::clone(of),
-        }
-    }
-}
-
-/// A state that one subtask updates and two others read; each holds it until the test
-/// has met it twice.
-fn with_state(held: &[Arc<Meeting>; 3]) -> Plan {
+/// The bodies of a DAG with a state that its source updates and two others read.
+fn with_state() -> [Shared; 4] {
     let dag = create_dag();
     let state = dag.state("pair", (0_u64, 0_u64));
-    let [update, first, second] = held.clone();
-    dag.period(PERIOD)
-        .using(state.update())
-        .source(move |pair: &mut (u64, u64)| {
-            pair.0 += 1;
-            update.wait();
-            update.wait();
-            pair.1 += 1;
-            (pair.0,)
-        })
-        .writes(&["count"])
-        .register(named("update"));
-    let read = |held: Arc<Meeting>| {
-        move |pair: &(u64, u64), (count,): (u64,)| {
-            assert_eq!((pair.0, pair.1), (count, count), "in mid-change");
-            held.wait();
-            held.wait();
-            (count,)
-        }
+    let update = |pair: &mut (u64, u64)| {
+        pair.0 += 1;
+        inside();
+        pair.1 += 1;
+        (pair.0,)
     };
-    let counts = || vec!["count"];
-    dag.using(state.read())
-        .subtask(read(first))
-        .reads(&counts())
-        .writes(&["first"])
-        .register(named("first"));
-    dag.using(state.read())
-        .subtask(read(second))
-        .reads(&counts())
-        .writes(&["second"])
-        .register(named("second"));
+    let source = dag.period(PERIOD).using(state.update()).source(update);
+    source.writes(&["count"]).register(named("update"));
+    for name in ["first", "second"] {
+        let read = |pair: &(u64, u64), (count,): (u64,)| {
+            assert_eq!((pair.0, pair.1), (count, count), "in mid-change");
+            inside();
+            (count,)
+        };
+        let reader = dag.using(state.read()).subtask(read).reads(&["count"]);
+        reader.writes(&[name]).register(named(name));
+    }
     let join = |(first, second): (u64, u64)| assert_eq!(first, second);
     dag.register_sink_subtask(join, vec!["first", "second"], PERIOD, named("join"));
-    commit(&[dag])
+    Shared::all(commit(&[dag]))
 }
 
 const IN_USE: &str = "a state is in use by another subtask: the platform started the instance \
@@ -97,55 +41,28 @@ const IN_USE: &str = "a state is in use by another subtask: the platform started
 
 #[test]
 fn readers_share_a_state_and_an_update_at_the_same_time_is_refused() {
-    let held = [(); 3].map(|()| Arc::<Meeting>::default());
-    let mut plan = with_state(&held);
-    let [update, first, second, join] = &mut plan.bodies[0][..] else {
-        panic!("four subtasks");
-    };
-    let through = |meeting: &Meeting| {
-        meeting.wait();
-        meeting.wait();
-    };
-    thread::scope(|scope| {
-        scope.spawn(|| update.run(0));
-        through(&held[0]);
-    });
-    thread::scope(|scope| {
-        scope.spawn(|| first.run(0));
-        scope.spawn(|| second.run(0));
-        held[1].wait();
-        held[2].wait();
-        // Both look at it now.
-        assert_eq!(panic_message(|| update.run(1)), IN_USE);
-        held[1].wait();
-        held[2].wait();
+    let [update, first, second, join] = with_state();
+    update.run(0);
+    first.run_while(0, move || {
+        second.run_while(0, move || {
+            // Both look at it now.
+            assert_eq!(panic_message(|| update.run(1)), IN_USE);
+        });
     });
     join.run(0);
 }
 
 #[test]
 fn a_state_that_is_being_changed_is_refused_to_readers() {
-    let held = [(); 3].map(|()| Arc::<Meeting>::default());
-    let mut plan = with_state(&held);
-    let [update, first, second, _] = &mut plan.bodies[0][..] else {
-        panic!("four subtasks");
-    };
-    thread::scope(|scope| {
-        scope.spawn(|| update.run(0));
-        held[0].wait();
-        held[0].wait();
-    });
-    thread::scope(|scope| {
-        scope.spawn(|| {
-            // Its readers have not run: they hold no value of job 1, and both slots.
-            let full = panic_message(|| update.run(1));
-            assert!(full.contains("finds no free slot"), "{full}");
-        });
-        held[0].wait();
+    let [update, first, second, _] = with_state();
+    update.run(0);
+    let full = panic_message(|| {
         // The pair is (2, 1) now.
-        assert_eq!(panic_message(|| first.run(0)), IN_USE);
-        held[0].wait();
+        let look = move || assert_eq!(panic_message(|| first.run(0)), IN_USE);
+        update.run_while(1, look);
     });
+    // Its readers have not run: they hold no value of job 1, and both slots.
+    assert!(full.contains("finds no free slot"), "{full}");
     // The update has ended, if by a panic, and given the state back: it is (2, 2).
     let late = panic_message(|| second.run(0));
     assert!(
@@ -154,97 +71,61 @@ fn a_state_that_is_being_changed_is_refused_to_readers() {
     );
 }
 
+/// A job's number, in more words than a processor stores at once.
+#[derive(Clone)]
+struct Whole {
+    copies: [u64; 8],
+    _alive: Arc<()>,
+}
+
 /// Of which job a sample was, and when that was complete.
 type Told = mpsc::Receiver<Option<(u64, u64)>>;
 
-/// A writer of values, and a subtask of another DAG that samples them: it
-/// tells that it has begun, and looks again once it may end.
-fn sampled(of: &Arc<()>) -> (Plan, Told, Arc<Meeting>) {
+/// A writer of values, and a subtask of another DAG that samples them twice in each instance.
+fn sampled(alive: &Arc<()>) -> ([Shared; 2], Told) {
     let (tells, told) = mpsc::channel();
-    let held = Arc::<Meeting>::default();
-    let writer = create_dag();
-    writer.relative_deadline(PERIOD);
-    let mut count = 0;
-    let of_writer = Arc::clone(of);
+    let (writer, reader) = (create_dag(), create_dag());
+    let (mut next, of_writer) = (0, Arc::clone(alive));
     let count = move || {
-        count += 1;
-        (Whole::new(count - 1, &of_writer),)
+        next += 1;
+        let (copies, _alive) = ([next - 1; 8], Arc::clone(&of_writer));
+        (Whole { copies, _alive },)
     };
     writer.register_periodic_subtask(count, vec!["count"], PERIOD, named("count"));
-    let latest = writer.latest::<Whole>("count");
-    let reader = create_dag();
-    reader.relative_deadline(PERIOD);
-    let of_reader = Arc::clone(&held);
-    reader
-        .period(PERIOD)
-        .using(latest.sample())
-        .source(move |sample: Option<Sample<'_, Whole>>| {
-            let look = || {
-                let sample = sample?;
-                assert_eq!(sample.value.copies, [sample.value.job; 8], "torn");
-                Some((sample.value.job, sample.completed_ns))
-            };
-            let first = look();
-            of_reader.wait();
-            of_reader.wait();
-            assert_eq!(look(), first, "a sample does not change during an instance");
-            tells.send(first).expect("the test listens");
-        })
-        .register(named("sample"));
-    (commit(&[writer, reader]), told, held)
+    let latest = writer.relative_deadline(PERIOD).latest::<Whole>("count");
+    let sample = move |sample: Option<Sample<'_, Whole>>| {
+        let look = || {
+            let sample = sample?;
+            assert_eq!(sample.value.copies, [sample.job; 8], "torn");
+            Some((sample.job, sample.completed_ns))
+        };
+        let first = look();
+        inside();
+        assert_eq!(look(), first, "a sample does not change during an instance");
+        tells.send(first).expect("the test listens");
+    };
+    reader.period(PERIOD).relative_deadline(PERIOD);
+    let source = reader.using(latest.sample()).source(sample);
+    source.register(named("sample"));
+    (Shared::all(commit(&[writer, reader])), told)
 }
 
 #[test]
 fn a_sample_stays_whole_while_its_writer_goes_on() {
-    let jobs = if cfg!(miri) { 20 } else { 5_000 };
-    let of = Arc::new(());
-    let (mut plan, told, held) = sampled(&of);
-    let [writer, reader] = &mut plan.bodies[..] else {
-        panic!("two dags");
-    };
+    let (jobs, alive) = (if cfg!(miri) { 20 } else { 5_000 }, Arc::new(()));
+    let ([writer, reader], told) = sampled(&alive);
     for (round, expected) in [(0, None), (1, Some((jobs - 1, jobs - 1)))] {
-        thread::scope(|scope| {
-            scope.spawn(|| reader[0].run(round));
-            held.wait();
+        let writer = writer.clone();
+        reader.run_while(round, move || {
             for job in round * jobs..(round + 1) * jobs {
-                writer[0].run(job);
-                writer[0].complete(job, &mut |_| ());
+                writer.run(job);
+                writer.complete(job);
             }
-            held.wait();
         });
         assert_eq!(told.try_recv(), Ok(expected));
     }
-    drop(plan);
-    assert_eq!(Arc::strong_count(&of), 1);
-}
-
-#[test]
-fn completions_too_many_and_too_few_show_what_was_run_last() {
-    let of = Arc::new(());
-    let (mut plan, told, held) = sampled(&of);
-    let [writer, reader] = &mut plan.bodies[..] else {
-        panic!("two dags");
-    };
-    let mut sample = || {
-        thread::scope(|scope| {
-            scope.spawn(|| reader[0].run(0));
-            held.wait();
-            held.wait();
-        });
-        told.try_recv().expect("the subtask has told")
-    };
-    writer[0].complete(1, &mut |_| ());
-    assert_eq!(sample(), None, "completed and never run");
-    for job in 0..5 {
-        writer[0].run(job);
-    }
-    assert_eq!(sample(), None, "run five times and not completed");
-    writer[0].complete(7, &mut |_| ());
-    writer[0].complete(8, &mut |_| ());
-    assert_eq!(sample(), Some((4, 7)), "completed twice");
-    assert_eq!(sample(), Some((4, 7)));
-    drop(plan);
-    assert_eq!(Arc::strong_count(&of), 1);
+    drop((writer, reader));
+    assert_eq!(Arc::strong_count(&alive), 1);
 }
 
 #[test]

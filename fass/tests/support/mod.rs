@@ -5,14 +5,17 @@
 use core::time::Duration;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::rc::Rc;
 use std::sync::OnceLock;
 
-use fass::{Dag, LaunchError, Occupation, Plan, Platform, Policy, Preemption, SubtaskAttributes};
+use fass::{Body, ConstructionPolicy, Dag, LaunchError, Occupation, Plan, Platform, Policy};
+use fass::{Preemption, SubtaskAttributes};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 
 thread_local! {
     static PLAN: RefCell<Option<Plan>> = const { RefCell::new(None) };
+    static MEANWHILE: RefCell<Option<Box<dyn FnOnce()>>> = const { RefCell::new(None) };
 }
 
 struct Keeper;
@@ -60,10 +63,10 @@ pub(crate) fn panic_message(action: impl FnOnce()) -> String {
         .expect("a message")
 }
 
-/// Commits DAGs that must be faultless, and returns their plan.
+/// Commits DAGs of any graph that must be faultless, and returns their plan.
 pub(crate) fn commit(dags: &[Dag]) -> Plan {
     install();
-    if let Err(error) = fass::finish_create_dags(dags) {
+    if let Err(error) = fass::finish_create_dags_with(dags, ConstructionPolicy::any_graph()) {
         panic!("{error}");
     }
     take()
@@ -81,5 +84,40 @@ pub(crate) fn run_job(plan: &mut Plan, job: u64) {
     } = plan;
     for subtask in task_set.dags()[0].topological_order() {
         bodies[0][subtask.index()].run(job);
+    }
+}
+
+/// A body that can be run from within another one's function.
+#[derive(Clone)]
+pub(crate) struct Shared(Rc<RefCell<Body>>);
+
+impl Shared {
+    /// Returns the bodies of a plan, those of one DAG after those of the other.
+    pub(crate) fn all<const COUNT: usize>(plan: Plan) -> [Self; COUNT] {
+        let bodies = plan.bodies.into_iter().flatten();
+        let all: Vec<_> = (bodies.map(|body| Self(Rc::new(RefCell::new(body))))).collect();
+        all.try_into().ok().expect("so many subtasks")
+    }
+
+    pub(crate) fn run(&self, job: u64) {
+        self.0.borrow_mut().run(job);
+    }
+
+    /// Runs the body, and does something when its function calls [`inside`].
+    pub(crate) fn run_while(&self, job: u64, action: impl FnOnce() + 'static) {
+        MEANWHILE.set(Some(Box::new(action)));
+        self.run(job);
+        assert!(MEANWHILE.take().is_none(), "it was done");
+    }
+
+    pub(crate) fn complete(&self, finish_ns: u64) {
+        self.0.borrow_mut().complete(finish_ns, &mut |_| ());
+    }
+}
+
+/// Does what is to be done while the function that calls this has not returned.
+pub(crate) fn inside() {
+    if let Some(action) = MEANWHILE.take() {
+        action();
     }
 }

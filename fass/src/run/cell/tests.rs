@@ -1,47 +1,23 @@
 //! Tests of the cells, on real threads. They also serve under Miri, where the
 //! counts shrink so that a run ends.
 
-use super::{SetOnce, Shared, Writer, ring};
+#[path = "../../../../sched-dag/tests/support/random.rs"]
+mod random;
+
+use super::{SetOnce, Shared, ring};
+use random::Random;
+use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::thread::{self, JoinHandle};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
 use std::time::{Duration, Instant};
-use std::{iter, vec::Vec};
+use std::vec::Vec;
 
 const JOBS: u64 = if cfg!(miri) { 100 } else { 200_000 };
 
-/// How long a sender goes on. On a busy host a thread that waits for another one gets a few
+/// How long a race goes on. On a busy host a thread that waits for another one gets a few
 /// turns a second.
 const LONGEST: Duration = Duration::from_secs(1);
-
-/// How many jobs a sender has sent, once it has ended.
-struct End(AtomicU64);
-
-impl End {
-    fn new() -> Arc<Self> {
-        Arc::new(Self(AtomicU64::new(u64::MAX)))
-    }
-
-    /// Calls `send` for one job after the other, until there were enough.
-    fn send_jobs(&self, mut send: impl FnMut(u64)) {
-        let start = Instant::now();
-        let is_in_time = |job: &u64| *job < 8 || start.elapsed() < LONGEST;
-        let sent = (0..JOBS / 8).take_while(is_in_time).map(&mut send).count();
-        self.0.store(sent as u64, Ordering::Release);
-    }
-
-    /// Waits for what `found` finds of a job; `None` if the sender has ended before it.
-    fn wait<T>(&self, job: u64, mut found: impl FnMut() -> Option<T>) -> Option<T> {
-        loop {
-            let is_over = self.0.load(Ordering::Acquire) <= job;
-            let found = found();
-            if found.is_some() || is_over {
-                return found;
-            }
-            thread::yield_now();
-        }
-    }
-}
 
 /// A value that counts how many of its kind are alive.
 struct Counted(Arc<AtomicUsize>, u64);
@@ -59,71 +35,49 @@ impl Drop for Counted {
     }
 }
 
+/// A ring is a small map: whatever is put, taken and given up, and in whatever order, a value is
+/// found under its own job only, a full ring gives it back, and each is dropped once.
 #[test]
-fn a_value_is_found_under_its_own_job_only() {
-    let (mut writer, mut reader) = ring(2);
-    assert_eq!(reader.take(0), None);
-    assert_eq!(writer.put(0, 'a'), Ok(()));
-    assert_eq!(reader.take(2), None, "another job");
-    assert_eq!(reader.take(1), None, "another job");
-    assert_eq!(reader.take(0), Some('a'));
-    assert_eq!(reader.take(0), None, "taken once");
-}
-
-#[test]
-fn jobs_need_not_be_consecutive() {
-    let (mut writer, mut reader) = ring(2);
-    assert_eq!(writer.put(1, 'a'), Ok(()));
-    assert_eq!(writer.put(3, 'b'), Ok(()), "although 1 = 3 (mod 2)");
-    assert_eq!(reader.take(1), Some('a'));
-    assert_eq!(writer.put(100, 'c'), Ok(()));
-    assert_eq!(reader.take(100), Some('c'));
-    assert_eq!(reader.take(3), Some('b'));
-}
-
-/// A value that is never taken costs its slot and nothing else.
-#[test]
-fn a_forgotten_value_blocks_only_its_slot() {
-    let (mut writer, mut reader) = ring(2);
-    assert_eq!(writer.put(0, 0), Ok(()));
-    for job in 1..10 {
-        assert_eq!(writer.put(job, job), Ok(()));
-        assert_eq!(reader.take(job), Some(job));
+fn a_ring_is_a_small_map_from_jobs_to_values() {
+    for seed in 0..if cfg!(miri) { 8 } else { 1_000 } {
+        let (mut random, alive) = (Random::new(seed), Arc::new(AtomicUsize::new(0)));
+        let (slots, room) = [(1, 1), (2, 2), (3, 3), (4, 5)][random.below(4)];
+        let (mut writer, mut reader) = ring(slots);
+        let mut held = BTreeSet::new();
+        for _ in 0..60 {
+            // Some are as far apart as they can be, and equal in the numbers of slots.
+            let job = [0, u64::MAX - 7][random.below(2)] + random.between(0, 7);
+            let before = alive.load(Ordering::Relaxed);
+            match random.below(4) {
+                0 | 1 if !held.contains(&job) => {
+                    let put = writer.put(job, Counted::new(&alive, job));
+                    assert_eq!(put.is_ok(), held.len() < room, "seed {seed}");
+                    if put.is_ok() {
+                        held.insert(job);
+                    }
+                }
+                2 => {
+                    let taken = reader.take(job).map(|value| value.1);
+                    assert_eq!(taken, held.take(&job), "seed {seed}");
+                }
+                _ => {
+                    reader.give_up(job);
+                    held.remove(&job);
+                    assert_eq!(alive.load(Ordering::Relaxed), before, "it is the writer's");
+                }
+            }
+            let alive = alive.load(Ordering::Relaxed);
+            assert!((held.len()..=room).contains(&alive), "seed {seed}");
+        }
+        drop(writer);
+        let first = held.pop_first();
+        assert_eq!(
+            first.and_then(|job| reader.take(job)).map(|value| value.1),
+            first
+        );
+        drop(reader);
+        assert_eq!(alive.load(Ordering::Relaxed), 0, "seed {seed}");
     }
-    assert_eq!(reader.take(0), Some(0));
-}
-
-#[test]
-fn a_full_ring_gives_the_value_back() {
-    let (mut writer, mut reader) = ring(2);
-    assert_eq!(writer.put(0, 'a'), Ok(()));
-    assert_eq!(writer.put(1, 'b'), Ok(()));
-    assert_eq!(writer.put(2, 'c'), Err('c'));
-    assert_eq!(reader.take(0), Some('a'));
-    assert_eq!(writer.put(2, 'c'), Ok(()));
-    assert_eq!(reader.take(1), Some('b'));
-    assert_eq!(reader.take(2), Some('c'));
-}
-
-#[test]
-fn jobs_may_be_written_and_read_out_of_order() {
-    let (mut writer, mut reader) = ring(3);
-    for job in [2, 0, 1] {
-        assert_eq!(writer.put(job, job), Ok(()));
-    }
-    for job in [1, 2, 0] {
-        assert_eq!(reader.take(job), Some(job));
-    }
-}
-
-#[test]
-fn the_last_job_numbers_have_turns() {
-    let (mut writer, mut reader) = ring(1);
-    assert_eq!(writer.put(u64::MAX, 7), Ok(()));
-    assert_eq!(reader.take(0), None);
-    assert_eq!(reader.take(u64::MAX), Some(7));
-    assert_eq!(writer.put(u64::MAX - 1, 7), Ok(()));
-    assert_eq!(reader.take(u64::MAX - 1), Some(7));
 }
 
 #[test]
@@ -132,155 +86,48 @@ fn a_ring_without_slots_is_refused() {
     let _ = ring::<u8>(0);
 }
 
+/// The two ends race at full speed: every value arrives, whole, in its job, or is given up.
 #[test]
-fn values_that_nobody_took_are_dropped_once() {
-    let alive = Arc::new(AtomicUsize::new(0));
-    let (mut writer, mut reader) = ring(3);
-    for job in 0..3 {
-        assert!(writer.put(job, Counted::new(&alive, job)).is_ok());
-    }
-    drop(reader.take(1));
-    assert_eq!(alive.load(Ordering::Relaxed), 2);
-    drop(writer);
-    assert_eq!(alive.load(Ordering::Relaxed), 2, "the reader still could");
-    drop(reader);
-    assert_eq!(alive.load(Ordering::Relaxed), 0);
-}
-
-#[test]
-fn a_value_that_is_given_up_makes_room_and_is_dropped_once() {
-    let alive = Arc::new(AtomicUsize::new(0));
-    let (mut writer, mut reader) = ring(2);
-    assert!(writer.put(0, Counted::new(&alive, 0)).is_ok());
-    assert!(writer.put(1, Counted::new(&alive, 1)).is_ok());
-    reader.give_up(0);
-    reader.give_up(0);
-    reader.give_up(7);
-    assert!(reader.take(0).is_none(), "it is the writer's");
-    assert_eq!(alive.load(Ordering::Relaxed), 2);
-    assert!(writer.put(2, Counted::new(&alive, 2)).is_ok());
-    assert_eq!(alive.load(Ordering::Relaxed), 2, "0 has made way for 2");
-    assert!(writer.put(3, Counted::new(&alive, 3)).is_err(), "full");
-    assert_eq!(reader.take(1).map(|value| value.1), Some(1));
-    reader.give_up(2);
-    drop((writer, reader));
-    assert_eq!(alive.load(Ordering::Relaxed), 0);
-}
-
-/// The message of the races below: several words, so that a torn hand-over would show.
-type Message = ([u64; 5], Counted);
-
-/// Sends every job's message from a thread of its own.
-fn send(mut writer: Writer<Message>, alive: &Arc<AtomicUsize>, end: &Arc<End>) -> JoinHandle<()> {
-    let (alive, end) = (Arc::clone(alive), Arc::clone(end));
-    thread::spawn(move || {
-        end.send_jobs(|job| {
-            let mut message = ([job; 5], Counted::new(&alive, job));
-            while let Err(back) = writer.put(job, message) {
-                message = back;
-                thread::yield_now();
+fn two_threads_hand_over_or_give_up_every_job() {
+    for slots in [1, 2, 3, 8] {
+        let (alive, is_over) = (
+            Arc::new(AtomicUsize::new(0)),
+            Arc::new(AtomicBool::new(false)),
+        );
+        let (mut writer, mut reader) = ring(slots);
+        let sender = thread::spawn({
+            let (alive, is_over) = (Arc::clone(&alive), Arc::clone(&is_over));
+            move || {
+                for job in 0.. {
+                    // Several words, so that a torn hand-over would show.
+                    let mut message = ([job; 5], Counted::new(&alive, job));
+                    while let Err(back) = writer.put(job, message) {
+                        if is_over.load(Ordering::Relaxed) {
+                            return;
+                        }
+                        message = back;
+                        thread::yield_now();
+                    }
+                }
             }
         });
-    })
-}
-
-/// The reader takes every other job's value and gives up the rest, at full speed.
-#[test]
-fn given_up_slots_race_with_their_writer() {
-    for slots in [1, 2, 4] {
-        let (alive, end) = (Arc::new(AtomicUsize::new(0)), End::new());
-        let (writer, mut reader) = ring(slots);
-        let sender = send(writer, &alive, &end);
-        for job in 0.. {
-            let is_there = || {
-                let mut slots = iter::once(&reader.ring.near).chain(&reader.ring.others);
-                let is_its = |slot: &super::Slot<_>| {
-                    slot.turn.load(Ordering::Acquire) == super::turn_of(job)
-                };
-                slots.any(is_its).then_some(())
-            };
-            if end.wait(job, is_there).is_none() {
-                break;
+        let begin = Instant::now();
+        for job in (0..JOBS / 8).take_while(|job| *job < 8 || begin.elapsed() < LONGEST) {
+            while reader.slot_of(job).is_none() {
+                thread::yield_now();
             }
-            if job % 2 == 0 {
+            if job % 3 == 0 {
                 reader.give_up(job);
             } else {
                 let (words, counted) = reader.take(job).expect("it is there");
                 assert_eq!((words, counted.1), ([job; 5], job));
             }
         }
+        is_over.store(true, Ordering::Relaxed);
         sender.join().expect("the sender ends");
         drop(reader);
         assert_eq!(alive.load(Ordering::Relaxed), 0);
     }
-}
-
-/// The two ends race at full speed; every value arrives, whole, in its job.
-#[test]
-fn two_threads_hand_over_every_job_intact() {
-    for slots in [1, 2, 3, 8] {
-        let (alive, end) = (Arc::new(AtomicUsize::new(0)), End::new());
-        let (writer, mut reader) = ring(slots);
-        let sender = send(writer, &alive, &end);
-        for job in 0.. {
-            let Some((words, counted)) = end.wait(job, || reader.take(job)) else {
-                break;
-            };
-            assert_eq!(words, [job; 5]);
-            assert_eq!(counted.1, job);
-        }
-        sender.join().expect("the sender ends");
-        drop(reader);
-        assert_eq!(alive.load(Ordering::Relaxed), 0);
-    }
-}
-
-/// A chain over three threads: what arrives was handed over twice.
-#[test]
-fn a_chain_of_rings_keeps_jobs_apart() {
-    let (mut first_writer, mut first_reader) = ring(2);
-    let (mut second_writer, mut second_reader) = ring(2);
-    let (end, middle_end) = (End::new(), End::new());
-    let source = thread::spawn({
-        let end = Arc::clone(&end);
-        move || {
-            end.send_jobs(|job| {
-                while first_writer.put(job, job * 3).is_err() {
-                    thread::yield_now();
-                }
-            });
-        }
-    });
-    let middle = thread::spawn({
-        let middle_end = Arc::clone(&middle_end);
-        move || {
-            let mut jobs = 0;
-            while let Some(value) = end.wait(jobs, || first_reader.take(jobs)) {
-                while second_writer.put(jobs, value + 1).is_err() {
-                    thread::yield_now();
-                }
-                jobs += 1;
-            }
-            middle_end.0.store(jobs, Ordering::Release);
-        }
-    });
-    for job in 0.. {
-        let Some(value) = middle_end.wait(job, || second_reader.take(job)) else {
-            break;
-        };
-        assert_eq!(value, job * 3 + 1);
-    }
-    source.join().expect("the source ends");
-    middle.join().expect("the middle ends");
-}
-
-#[test]
-fn set_once_keeps_the_first_value() {
-    let cell = SetOnce::new();
-    assert_eq!(cell.get(), None);
-    assert!(cell.set(1));
-    assert!(!cell.set(2));
-    assert_eq!(cell.get(), Some(&1));
 }
 
 #[test]

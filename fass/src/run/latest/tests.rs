@@ -23,7 +23,9 @@ fn what_is_staged_shows_only_when_it_happens() {
         triple: Arc::clone(&triple),
         front: 2,
     };
+    triple.happen(5, &mut |_| ()); // an instance that never ran
     assert_eq!(sample(&mut sampler), None);
+    (0..5).for_each(|job| triple.stage(job, [job; 8]));
     triple.stage(0, [0; 8]);
     assert_eq!(sample(&mut sampler), None);
     triple.happen(10, &mut |_| ());

@@ -51,32 +51,6 @@ fn each_framing_finds_the_packets_and_too_long_ones_are_none() {
 }
 
 #[test]
-fn a_packet_without_room_is_lost_as_a_whole_and_those_before_it_stay() {
-    let incoming = Incoming::new(Framing::Lines, 20, 64);
-    // 12 bytes stand before each, so there is room for three of 8.
-    assert!(incoming.arrive(b"packet 1\npacket 2\npacket 3\npacket 4\n", 7));
-    assert!(!incoming.arrive(b"packet 5\n", 7));
-    assert_eq!(packets(&incoming), ["packet 1", "packet 2", "packet 3"]);
-    assert_eq!((incoming.lost.get(), incoming.lost_bytes.get()), (2, 16));
-    assert_eq!((incoming.packets.get(), incoming.bytes.get()), (3, 24));
-    assert!(incoming.arrive(b"packet 6\n", 7));
-    assert_eq!(packets(&incoming), ["packet 6"]);
-}
-
-#[test]
-fn packets_go_round_the_ring_with_their_times() {
-    let incoming = Incoming::new(Framing::Chunks, 20, 64);
-    let mut buffer = incoming.buffer();
-    for round in 0..1_000_u64 {
-        let bytes = round.to_string();
-        assert!(incoming.arrive(bytes.as_bytes(), round));
-        let taken = incoming.take(incoming.mark(), &mut buffer);
-        assert_eq!(taken, Some((bytes.as_bytes(), round)));
-    }
-    assert_eq!(incoming.lost.get(), 0);
-}
-
-#[test]
 fn what_comes_after_the_mark_waits() {
     let incoming = Incoming::new(Framing::Lines, 20, 64);
     incoming.arrive(b"one\n", 7);
