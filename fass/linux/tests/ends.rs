@@ -3,9 +3,10 @@
 //! The program under test is this very test program, started anew with a part to play.
 
 use std::fs;
+use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
@@ -13,16 +14,17 @@ use linux::{Linux, Mechanism};
 
 const PART: &str = "FASS_LINUX_PART";
 
-/// Starts the part: a run that never ends, or what a stranger is told.
-fn play(part: &str, prepare: impl FnOnce(&mut Command)) -> Child {
-    let program = std::env::current_exe().expect("the program is there");
+/// Returns what starts a program for its part: a run that never ends, or what a stranger is told.
+fn play(part: &str, program: &Path) -> Command {
     let mut command = Command::new(program);
+    command.args(["--exact", "part", "--nocapture"]);
+    command.env(PART, part).stdout(Stdio::piped());
+    command.stderr(Stdio::null());
     command
-        .args(["--exact", "part", "--nocapture"])
-        .env(PART, part);
-    command.stdout(Stdio::piped()).stderr(Stdio::null());
-    prepare(&mut command);
-    command.spawn().expect("it starts")
+}
+
+fn own_program() -> PathBuf {
+    std::env::current_exe().expect("the program is there")
 }
 
 #[test]
@@ -76,7 +78,7 @@ fn classes(process: u32) -> Vec<String> {
 #[test]
 fn a_kill_leaves_nothing_at_a_raised_level() {
     use std::io::{BufRead as _, BufReader};
-    let mut program = play("endless", |_| ());
+    let mut program = play("endless", &own_program()).spawn().expect("it starts");
     let lines = BufReader::new(program.stdout.take().expect("it is piped")).lines();
     let mut words = lines.map_while(Result::ok);
     let child = words.find_map(|line| line.strip_prefix("child ")?.parse::<u32>().ok());
@@ -107,31 +109,17 @@ fn a_kill_leaves_nothing_at_a_raised_level() {
 fn a_stranger_is_told_what_it_may_not() {
     const NOBODY: u32 = 65_534;
     let copy = std::env::temp_dir().join(format!("fass-ends-{}", std::process::id()));
+    let mut command = play("stranger", &own_program());
     // Only root can become somebody else.
-    let as_nobody = |command: &mut Command| {
-        if fs::metadata("/proc/self").is_ok_and(|own| {
-            use std::os::unix::fs::MetadataExt as _;
-            own.uid() == 0
-        }) {
-            // Written by a program of its own: a child that another test starts meanwhile would hold
-            // the file open, and what is open to be written cannot be started.
-            let mut cp = Command::new("cp");
-            cp.arg(std::env::current_exe().expect("it is there"));
-            let copied = cp.arg(&copy).status().expect("`cp` is there");
-            assert!(copied.success(), "it fits");
-            *command = Command::new(&copy);
-            command
-                .args(["--exact", "part", "--nocapture"])
-                .env(PART, "stranger");
-            command
-                .stdout(Stdio::piped())
-                .stderr(Stdio::null())
-                .uid(NOBODY)
-                .gid(NOBODY);
-        }
-    };
-    let program = play("stranger", as_nobody);
-    let output = program.wait_with_output().expect("it has ended");
+    if fs::metadata("/proc/self").is_ok_and(|own| own.uid() == 0) {
+        // Written by a program of its own: a child that another test starts meanwhile would hold
+        // the file open, and what is open to be written cannot be started.
+        let copied = Command::new("cp").arg(own_program()).arg(&copy).status();
+        assert!(copied.expect("`cp` is there").success(), "it fits");
+        command = play("stranger", &copy);
+        command.uid(NOBODY).gid(NOBODY);
+    }
+    let output = command.output().expect("it has ended");
     // Without root there is none.
     let _ = fs::remove_file(copy);
     let text = String::from_utf8_lossy(&output.stdout);

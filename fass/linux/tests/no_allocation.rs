@@ -32,20 +32,19 @@ fn jobs_allocate_nothing_preempted_or_not() {
             }
             (job,)
         };
-        let named = SubtaskAttributes::named;
+        let named = |name| SubtaskAttributes::named(name).priority(0);
         dag.register_periodic_subtask(source, vec!["job"], ms(2), named("source"));
         let sink = |(_,): (u64,)| execute_for(Duration::from_micros(50), Occupation::Spin);
         dag.register_sink_subtask(sink, vec!["job"], ms(2), named("sink"));
         let long = create_dag();
-        long.name("long")
-            .jobs(8)
-            .period(ms(10))
-            .relative_deadline(ms(10));
+        long.name("long").jobs(8);
+        long.period(ms(10)).relative_deadline(ms(10));
         let function = |_job| execute_for(Duration::from_millis(3), Occupation::Spin);
         long.register_untyped_subtask(function, named("long").priority(9));
         finish_create_dags(&[dag, long]).unwrap();
         let run = machine.run().unwrap();
         assert_eq!(run.violations().count(), 0);
+        assert_eq!(run.counts().preemptions > 0, machine.is_preemptive());
         let [first, last] = [&seen[0], &seen[1]].map(|count| count.load(Relaxed));
         assert!(first > 0);
         assert_eq!(last - first, 0, "allocations within {JOBS} jobs");

@@ -5,6 +5,8 @@
 //!
 //! `LINUX_SETS` says how many sets (12), `LINUX_SEED` which (1).
 
+#[path = "../../../sched-dag/tests/support/random.rs"]
+mod random;
 mod support;
 
 use std::fs;
@@ -16,6 +18,7 @@ use fass::{
     execute_for, finish_create_dags_with,
 };
 use linux::{Control, Linux, Mechanism, Run};
+use random::Random;
 use sched_dag::DagId;
 use support::{alone, breaches, ms, spin};
 
@@ -24,12 +27,10 @@ fn random_sets_keep_the_rules() {
     let (sets, first) = (number("LINUX_SETS", 12), number("LINUX_SEED", 1));
     let before = held();
     for seed in first..first + sets {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let (policy, cores) = terms(&mut random);
-        let mechanism = match seed % 2 {
-            0 => Mechanism::Fifo,
-            _ => Mechanism::Poll,
-        };
+        let mechanisms = [Mechanism::Fifo, Mechanism::Poll, Mechanism::Normal];
+        let mechanism = mechanisms[random.below(3)];
         let alone = alone(cores, mechanism).with(|machine| machine.policy(policy));
         let run = run(&alone.machine, &mut random);
         let found = breaches(&run);
@@ -54,25 +55,18 @@ fn held() -> [usize; 2] {
         .map(|folder| fs::read_dir(folder).expect("Linux has it").count())
 }
 
-/// SplitMix64 (doi 10.1145/2660193.2660195).
-#[derive(Clone)]
-struct Random(u64);
-
 impl Random {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ (mixed >> 31)) % limit
+    fn small(&mut self, limit: usize) -> u32 {
+        u32::try_from(self.below(limit)).expect("it is small")
     }
 
-    fn small(&mut self, limit: u64) -> u32 {
-        u32::try_from(self.below(limit)).unwrap_or(0)
-    }
-
-    fn one_in(&mut self, count: u64) -> bool {
+    fn one_in(&mut self, count: usize) -> bool {
         self.below(count) == 0
+    }
+
+    /// Returns so many milliseconds, at least and at most.
+    fn ms(&mut self, least: u64, most: u64) -> Duration {
+        ms(self.between(least, most))
     }
 }
 
@@ -84,7 +78,7 @@ fn terms(random: &mut Random) -> (Policy, u32) {
 
 /// Commits a drawn set on the machine and runs it.
 fn run(machine: &Linux, random: &mut Random) -> Run {
-    let dags: Vec<Dag> = (0..1 + random.below(4))
+    let dags: Vec<Dag> = (0..=random.below(4))
         .map(|number| dag(number, random))
         .collect();
     let sizes: &[u32] = match machine.cores() {
@@ -97,17 +91,17 @@ fn run(machine: &Linux, random: &mut Random) -> Run {
     }
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the set is sound");
     let control = machine.control().expect("it is committed");
-    let meddler = meddle(control, dags.len() as u64, random.clone());
+    let meddler = meddle(control, dags.len(), random.clone());
     let run = machine.run().expect("it is committed");
     meddler.join().expect("it does not panic");
     run
 }
 
-fn dag(number: u64, random: &mut Random) -> Dag {
+fn dag(number: usize, random: &mut Random) -> Dag {
     let dag = create_dag();
-    let period = ms(2 + random.below(9));
+    let period = random.ms(2, 10);
     dag.name(&format!("dag {number}"))
-        .jobs(5 + random.below(20));
+        .jobs(random.between(5, 24));
     dag.period(period).relative_deadline(period);
     dag.in_flight(1 + random.small(3));
     let overruns = [
@@ -116,10 +110,10 @@ fn dag(number: u64, random: &mut Random) -> Dag {
         OverrunPolicy::Abort,
     ];
     dag.overrun(overruns[random.small(3) as usize]);
-    let faulty = random.one_in(8).then(|| random.below(10));
-    let subtasks: Vec<_> = (0..1 + random.below(6))
+    let faulty = random.one_in(8).then(|| random.between(0, 9));
+    let subtasks: Vec<_> = (0..=random.below(6))
         .map(|subtask| {
-            let us = random.below(1_500);
+            let us = random.between(0, 1_499);
             let mut attributes =
                 SubtaskAttributes::named(&format!("subtask {subtask}")).priority(random.small(10));
             if random.one_in(5) {
@@ -141,17 +135,21 @@ fn dag(number: u64, random: &mut Random) -> Dag {
         })
         .collect();
     for (place, later) in subtasks.iter().enumerate().skip(1) {
-        let earlier = usize::try_from(random.below(place as u64)).unwrap_or(0);
-        dag.precede(&subtasks[earlier], later);
+        // Two at most, so that some join.
+        let earlier = [random.below(place), random.below(place)];
+        dag.precede(&subtasks[earlier[0]], later);
+        if earlier[0] != earlier[1] {
+            dag.precede(&subtasks[earlier[1]], later);
+        }
     }
     dag
 }
 
 /// Pauses, resumes and stops DAGs for a while.
-fn meddle(control: Control, dags: u64, mut random: Random) -> JoinHandle<()> {
+fn meddle(control: Control, dags: usize, mut random: Random) -> JoinHandle<()> {
     thread::spawn(move || {
         for _ in 0..random.below(8) {
-            thread::sleep(ms(1 + random.below(8)));
+            thread::sleep(random.ms(1, 8));
             let dag = DagId(random.small(dags));
             match random.below(10) {
                 0 => control.stop(dag),

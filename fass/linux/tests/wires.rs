@@ -5,6 +5,7 @@ mod support;
 use std::fmt::Write as _;
 use std::io::{self, BufRead, BufReader, Read as _, Write as _};
 use std::thread;
+use std::time::Duration;
 
 use fass::{
     Dag, Received, Sender, SubtaskAttributes, Wire, WireOptions, create_dag, finish_create_dags,
@@ -16,36 +17,42 @@ fn number(line: &[u8]) -> Option<u64> {
     str::from_utf8(line).ok()?.parse().ok()
 }
 
-/// A sink that sends the squares of a job's numbers.
-fn answer(dag: &Dag, wire: &Wire) {
-    dag.using(wire.sending())
-        .subtask(|mut wire: Sender<'_>, (numbers,): (Vec<u64>,)| {
-            for number in numbers {
-                let _ = writeln!(wire, "{}", number * number);
-            }
-        })
-        .reads(&["numbers"])
-        .due(ms(50))
+/// A DAG that sends the squares of the numbers that it receives, each when it comes or all of
+/// `period`.
+fn squaring(wire: &Wire, period: Option<Duration>, jobs: u64) -> Dag {
+    let dag = create_dag();
+    dag.jobs(jobs);
+    match period {
+        Some(period) => _ = dag.period(period),
+        None => _ = dag.sporadic(ms(1)),
+    }
+    let receive = |numbers: Received<'_, u64>| -> (Vec<u64>,) {
+        (numbers.map(|packet| packet.value).collect(),)
+    };
+    let source = dag.using(wire.receiving(number)).source(receive);
+    source
+        .writes(&["numbers"])
+        .register(SubtaskAttributes::named("receive"));
+    let answer = |mut wire: Sender<'_>, (numbers,): (Vec<u64>,)| {
+        for number in numbers {
+            let _ = writeln!(wire, "{}", number * number);
+        }
+    };
+    let sink = dag
+        .using(wire.sending())
+        .subtask(answer)
+        .reads(&["numbers"]);
+    sink.due(ms(50))
         .register(SubtaskAttributes::named("answer"));
-}
-
-fn receive(numbers: Received<'_, u64>) -> (Vec<u64>,) {
-    (numbers.map(|packet| packet.value).collect(),)
+    dag
 }
 
 #[test]
 fn each_packet_is_answered_once_and_in_order() {
     for mechanism in mechanisms() {
         let alone = alone(2, mechanism);
-        let (wire, dag) = (Wire::new("squares"), create_dag());
-        dag.jobs(3);
-        let attributes = SubtaskAttributes::named("receive");
-        dag.sporadic(ms(1));
-        dag.using(wire.receiving(number))
-            .source(receive)
-            .writes(&["numbers"])
-            .register(attributes);
-        answer(&dag, &wire);
+        let wire = Wire::new("squares");
+        let dag = squaring(&wire, None, 3);
         finish_create_dags(std::slice::from_ref(&dag)).expect("it is sound");
         let (input, mut questions) = io::pipe().expect("a pipe");
         let (answers, output) = io::pipe().expect("a pipe");
@@ -78,16 +85,8 @@ fn what_is_sent_last_goes_when_the_connection_ends_and_losses_are_counted() {
         room_bytes: 256,
         ..WireOptions::default()
     };
-    let (wire, dag) = (Wire::with("squares", options), create_dag());
-    dag.jobs(20);
-    let attributes = SubtaskAttributes::named("receive");
-    dag.period(ms(2))
-        .using(wire.receiving(number))
-        .source(receive)
-        .writes(&["numbers"])
-        .register(attributes);
-    answer(&dag, &wire);
-    finish_create_dags(&[dag]).expect("it is sound");
+    let wire = Wire::with("squares", options);
+    finish_create_dags(&[squaring(&wire, Some(ms(2)), 20)]).expect("it is sound");
     let (mut answers, output) = io::pipe().expect("a pipe");
     // More than there is room for, whenever the jobs are.
     let input = "1\nx\n".repeat(2_000).into_bytes();

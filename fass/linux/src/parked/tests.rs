@@ -1,5 +1,6 @@
 //! Every order in which a parked instance can end, step by step, without a thread.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
@@ -13,23 +14,14 @@ use fass::Runner;
 
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
 const DAGS: [&str; 3] = ["low", "urgent", "first"];
-const LOW: DagId = DagId(0);
-const URGENT: DagId = DagId(1);
-const FIRST: DagId = DagId(2);
-
-/// What ran on a core, in the journal's order, as `start low 0`: subtask 0 of `low`.
-type Story = Vec<String>;
 
 /// A team whose threads are played by the test.
 struct Stage {
     team: Arc<Team>,
-    cores: u32,
-}
-
-/// An instance that a worker runs.
-struct Running {
-    worker: Number,
-    runner: Box<Runner>,
+    /// What runs, by its DAG's name, with the worker that runs it.
+    running: BTreeMap<&'static str, (Number, Box<Runner>)>,
+    /// By DAG, the worker that began with its job.
+    began: BTreeMap<&'static str, Number>,
 }
 
 impl Stage {
@@ -66,32 +58,79 @@ impl Stage {
         }
         state.time = crate::state::RunTime::beginning(sys::now_ns());
         drop(state);
-        Self { team, cores }
+        let (running, began) = (BTreeMap::new(), BTreeMap::new());
+        Self {
+            team,
+            running,
+            began,
+        }
     }
 
-    /// Releases a DAG's job, and has the core that gets it begin with it.
-    fn begin(&self, dag: DagId) -> Running {
-        let mut state = self.team.lock();
-        state.step(&self.team.workers, |moment| moment.signal(dag));
-        let mut cores = 0..self.cores as usize;
-        let core = cores
-            .find(|core| state.engine.placement.is_wanted(*core))
-            .unwrap();
-        let worker = state.active[core];
-        let runner = state.find_work(worker, &self.team.workers).unwrap();
-        Running { worker, runner }
+    /// Plays a step: what happens, and to which DAG's instance.
+    fn play(&mut self, step: &str) {
+        let (what, name) = step.split_once(' ').unwrap();
+        let mut dags = DAGS.into_iter().zip((0..).map(DagId));
+        let (name, dag) = dags.find(|(of_dag, _)| *of_dag == name).unwrap();
+        let team = Arc::clone(&self.team);
+        match what {
+            // Its job is released, and the core that gets it begins with it, if it does.
+            "signal" | "begin" => {
+                let mut state = team.lock();
+                state.step(&team.workers, |moment| moment.signal(dag));
+                let is_wanted = |core: &usize| state.engine.placement.is_wanted(*core);
+                if what == "begin" {
+                    let worker = state.active[(0..2).find(is_wanted).unwrap()];
+                    self.began.insert(name, worker);
+                    let runner = state.find_work(worker, &team.workers);
+                    self.running.insert(name, (worker, runner.unwrap()));
+                }
+            }
+            // Its function has returned, and its worker waits for the scheduler's lock.
+            "return" => _ = team.workers[self.began[name]].report(None),
+            // Its worker reports that, and runs what it gets.
+            "end" | "fail" | "end-in-vain" => {
+                let (worker, runner) = self.running.remove(name).unwrap();
+                let outcome = match what {
+                    "fail" => Err("meant".to_owned()),
+                    _ => Ok(()),
+                };
+                let next = team.complete(worker, runner, outcome);
+                assert_eq!(next.is_err(), what == "end-in-vain", "{step}");
+                self.go_on(worker, next.ok().flatten());
+            }
+            // Its worker looks whether it reports what it has left, which it does with a core.
+            "look" => {
+                let worker = self.began[name];
+                let mut state = team.lock();
+                if let Some(left) = state.take_left(worker) {
+                    let (runner, finish_ns) = (left.runner, left.finish_ns);
+                    let next = team.report(worker, state, runner, Ok(()), finish_ns);
+                    self.go_on(worker, next);
+                }
+            }
+            // Its budget is exceeded.
+            "abandon" => {
+                let mut state = team.lock();
+                team.abandon(&mut state, CoreId(0));
+                assert_eq!(state.engine.placement.current(0), None);
+                let worker = state.active[0];
+                let next = state.find_work(worker, &team.workers);
+                drop(state);
+                self.go_on(worker, next);
+            }
+            _ => panic!("{step}"),
+        }
     }
 
-    /// A function returns, and its worker reports that. It runs what it gets.
-    fn end(&self, running: Running, outcome: Result<(), String>) -> Option<Running> {
-        let Running { worker, runner } = running;
-        let next = self.team.complete(worker, runner, outcome);
-        let runner = next.ok().expect("it is not abandoned")?;
-        Some(Running { worker, runner })
+    fn go_on(&mut self, worker: Number, next: Option<Box<Runner>>) {
+        if let Some(runner) = next {
+            let name = DAGS[runner.instance.dag.index()];
+            self.running.insert(name, (worker, runner));
+        }
     }
 
     /// Returns the story, after all rules were held against the journal.
-    fn story(&self) -> Story {
+    fn story(&self) -> String {
         let state = self.team.lock();
         assert!(state.left.is_empty());
         let journal = &state.engine.scheduler.log.journal;
@@ -106,140 +145,77 @@ impl Stage {
             let subtask = event.subtask.unwrap().0;
             format!("{} {} {subtask}", event.what, DAGS[event.dag.index()])
         };
-        events.map(line).collect()
+        events.map(line).collect::<Vec<_>>().join(", ")
     }
 }
 
+/// Cores; whether `urgent` keeps its core, or both; the steps; the story.
+type Case = (u32, &'static [bool], &'static str, &'static str);
+
+const CASES: [Case; 7] = [
+    // One that has returned, and waits for the scheduler's lock, ends before the parked one.
+    (
+        1,
+        &[false, true],
+        "begin low, begin urgent, return urgent, end low, end urgent, end low",
+        "start low 0, suspend low 0, start urgent 0, finish urgent 0, resume low 0, \
+         finish low 0, start low 1, finish low 1",
+    ),
+    // One that waits in mid-function loses its core, but only if it may.
+    (
+        1,
+        &[false],
+        "begin low, begin urgent, end low, end urgent, end low",
+        "start low 0, suspend low 0, start urgent 0, suspend urgent 0, resume low 0, \
+         finish low 0, resume urgent 0, finish urgent 0, start low 1, finish low 1",
+    ),
+    (
+        1,
+        &[true],
+        "begin low, begin urgent, end low, end urgent, end low",
+        "start low 0, suspend low 0, start urgent 0, finish urgent 0, resume low 0, \
+         finish low 0, start low 1, finish low 1",
+    ),
+    // A parked one ends at once while nothing has its core.
+    (
+        1,
+        &[true],
+        "begin low, signal urgent, end low",
+        "start low 0, suspend low 0, resume low 0, finish low 0",
+    ),
+    // What was left is reported where it is wanted before: the core that becomes free is for it.
+    (
+        2,
+        &[true],
+        "begin first, begin low, begin urgent, end low, look low, end first, look low, \
+         end low, end urgent",
+        "start first 0, start low 0, suspend low 0, start urgent 0, finish first 0, \
+         resume low 0, finish low 0, start low 1, finish low 1, finish urgent 0",
+    ),
+    // A parked one that fails takes no core from any.
+    (
+        1,
+        &[false, true],
+        "begin low, begin urgent, fail low, end urgent",
+        "start low 0, suspend low 0, start urgent 0, ended low 0, finish urgent 0",
+    ),
+    // What was left to one that is abandoned is reported.
+    (
+        1,
+        &[true],
+        "begin low, begin urgent, end low, abandon urgent, end low, end-in-vain urgent",
+        "start low 0, suspend low 0, start urgent 0, ended urgent 0, resume low 0, \
+         finish low 0, start low 1, finish low 1",
+    ),
+];
+
 #[test]
-fn one_that_has_returned_ends_before_the_parked_one() {
-    for keeps_its_core in [false, true] {
-        let stage = Stage::new(1, keeps_its_core);
-        let low = stage.begin(LOW);
-        let urgent = stage.begin(URGENT);
-        // It waits for the scheduler's lock, and the other one is quicker.
-        stage.team.workers[urgent.worker].report(None);
-        assert!(stage.end(low, Ok(())).is_none());
-        let think = stage.end(urgent, Ok(())).unwrap();
-        assert!(stage.end(think, Ok(())).is_none());
-        let story = stage.story();
-        let expected = [
-            "start low 0",
-            "suspend low 0",
-            "start urgent 0",
-            "finish urgent 0",
-            "resume low 0",
-            "finish low 0",
-            "start low 1",
-            "finish low 1",
-        ];
-        assert_eq!(story, expected, "{keeps_its_core}");
-        assert_eq!(
-            stage.team.lock().engine.scheduler.statistics(LOW).completed,
-            1
-        );
+fn a_parked_one_ends_in_any_order() {
+    for (cores, keeps, steps, story) in CASES {
+        for keeps_its_core in keeps {
+            let mut stage = Stage::new(cores, *keeps_its_core);
+            steps.split(", ").for_each(|step| stage.play(step));
+            assert_eq!(stage.story(), story, "{keeps_its_core}: {steps}");
+        }
     }
-}
-
-#[test]
-fn one_that_waits_in_mid_function_loses_its_core_only_if_it_may() {
-    for keeps_its_core in [false, true] {
-        let stage = Stage::new(1, keeps_its_core);
-        let low = stage.begin(LOW);
-        let urgent = stage.begin(URGENT);
-        assert!(stage.end(low, Ok(())).is_none());
-        let think = stage.end(urgent, Ok(())).unwrap();
-        assert!(stage.end(think, Ok(())).is_none());
-        let story = stage.story();
-        let core = match keeps_its_core {
-            true => &["finish urgent 0", "resume low 0", "finish low 0"][..],
-            false => &[
-                "suspend urgent 0",
-                "resume low 0",
-                "finish low 0",
-                "resume urgent 0",
-                "finish urgent 0",
-            ],
-        };
-        assert_eq!(story[3..story.len() - 2], *core);
-    }
-}
-
-#[test]
-fn a_parked_one_ends_at_once_while_nothing_has_its_core() {
-    let stage = Stage::new(1, true);
-    let low = stage.begin(LOW);
-    let mut state = stage.team.lock();
-    state.step(&stage.team.workers, |moment| {
-        moment.signal(URGENT);
-    });
-    drop(state);
-    assert!(stage.end(low, Ok(())).is_none());
-    let story = stage.story();
-    assert_eq!(
-        story[1..],
-        ["suspend low 0", "resume low 0", "finish low 0"]
-    );
-}
-
-#[test]
-fn what_was_left_is_reported_where_it_is_wanted_before() {
-    let stage = Stage::new(2, true);
-    let first = stage.begin(FIRST);
-    let low = stage.begin(LOW);
-    let parked = low.worker;
-    let urgent = stage.begin(URGENT);
-    assert!(stage.end(low, Ok(())).is_none());
-    let left = stage.team.lock().take_left(parked);
-    assert!(left.is_none(), "it has no core yet");
-    // The core that becomes free is for the parked one.
-    assert!(stage.end(first, Ok(())).is_none());
-    let mut state = stage.team.lock();
-    let left = state.take_left(parked).expect("it has a core now");
-    let next = stage
-        .team
-        .report(parked, state, left.runner, Ok(()), left.finish_ns);
-    let (worker, runner) = (parked, next.unwrap());
-    assert!(stage.end(Running { worker, runner }, Ok(())).is_none());
-    assert!(stage.end(urgent, Ok(())).is_none());
-    let story = stage.story();
-    assert_eq!(
-        story[4..7],
-        ["finish first 0", "resume low 0", "finish low 0"]
-    );
-}
-
-#[test]
-fn a_parked_one_that_fails_takes_no_core_from_any() {
-    for keeps_its_core in [false, true] {
-        let stage = Stage::new(1, keeps_its_core);
-        let low = stage.begin(LOW);
-        let urgent = stage.begin(URGENT);
-        assert!(stage.end(low, Err("meant".to_owned())).is_none());
-        assert!(stage.end(urgent, Ok(())).is_none());
-        let story = stage.story();
-        assert_eq!(story[3..], ["ended low 0", "finish urgent 0"]);
-    }
-}
-
-#[test]
-fn what_was_left_to_one_that_is_abandoned_is_reported() {
-    let stage = Stage::new(1, true);
-    let low = stage.begin(LOW);
-    let urgent = stage.begin(URGENT);
-    assert!(stage.end(low, Ok(())).is_none());
-    let mut state = stage.team.lock();
-    stage.team.abandon(&mut state, CoreId(0));
-    assert_eq!(state.engine.placement.current(0), None);
-    let worker = state.active[0];
-    let runner = state.find_work(worker, &stage.team.workers).unwrap();
-    drop(state);
-    assert!(stage.end(Running { worker, runner }, Ok(())).is_none());
-    let Running { worker, runner } = urgent;
-    assert!(stage.team.complete(worker, runner, Ok(())).is_err());
-    let story = stage.story();
-    assert_eq!(
-        story[3..6],
-        ["ended urgent 0", "resume low 0", "finish low 0"]
-    );
-    assert_eq!(story.last().map(String::as_str), Some("finish low 1"));
 }

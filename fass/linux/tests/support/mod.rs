@@ -80,8 +80,14 @@ pub(crate) fn ticking(name: &str, jobs: u64, period: Duration, priority: u32, us
 
 /// Returns every breach of R1 to R4, and those of R5 that last for longer than this bound: a
 /// second with SCHED_FIFO, ten without. What should run waits for what Linux and a hypervisor
-/// do and, without SCHED_FIFO, for other programs. A breach that lasts longer is ours.
+/// do and, without SCHED_FIFO, for other programs. A breach that lasts longer is ours. Nothing of
+/// a DAG may ever have been on a core of another cluster.
 pub(crate) fn breaches(run: &Run) -> Vec<Violation> {
+    let task_set = run.task_set();
+    for event in run.journal().events() {
+        let own = task_set.cores_of(task_set.dag(event.dag).cluster(), run.options().cores);
+        assert!(own.contains(&event.core.0), "{event:?} is not on {own:?}");
+    }
     let bound_ns = match run.options().preemption {
         Preemption::Enabled => 1_000_000_000,
         Preemption::Disabled => 10_000_000_000,
