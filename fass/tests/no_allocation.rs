@@ -61,7 +61,7 @@ fn a_job_allocates_nothing() {
     let narrow = |(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p): Sixteen| {
         let values = [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p];
         assert!(values.iter().copied().eq(0..16), "each is in its place");
-        (7, [0_u8; 100])
+        (7_u64, [0_u8; 100])
     };
     dag.register_subtask(
         narrow,

@@ -9,22 +9,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::thread;
 
 use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
-use linux::{Live, Mechanism};
-use support::{alone, breaches, mechanisms, ms, spin, ticking};
+use linux::{Linux, Live, Mechanism};
+use support::{alone, alone_on, breaches, chain, mechanisms, ms};
 
 #[test]
 fn a_chain_on_one_core_wakes_nobody() {
     for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
-        let dag = create_dag();
-        dag.name("chain").jobs(40);
-        dag.period(ms(2)).relative_deadline(ms(2));
-        let links = [(); 12]
-            .map(|()| dag.register_untyped_subtask(|_job| spin(10), SubtaskAttributes::default()));
-        for pair in links.windows(2) {
-            dag.precede(&pair[0], &pair[1]);
-        }
-        finish_create_dags(&[dag]).unwrap();
+        finish_create_dags(&[chain("chain", 12, 40, ms(2), 10)]).unwrap();
         let run = alone.machine.run().unwrap();
         assert_eq!(breaches(&run), []);
         let (releases, counts) = (run.statistics("chain").completed, run.counts());
@@ -32,6 +24,28 @@ fn a_chain_on_one_core_wakes_nobody() {
             counts.calls <= releases && counts.hand_offs > 0,
             "{counts:?}"
         );
+    }
+}
+
+#[test]
+fn the_runs_time_skips_what_is_idle() {
+    for sizes in [&[1][..], &[2], &[1, 1]] {
+        let share = || Linux::sharing(sizes.iter().sum(), Mechanism::Poll).unwrap();
+        let alone = alone_on(|| share().clusters(sizes).skipping_idle_time());
+        let clusters = (0..).take(sizes.len());
+        let dags: Vec<_> = clusters
+            .map(|cluster| {
+                let dag = chain(&format!("dag {cluster}"), 3, 500, ms(3_600_000), 0);
+                dag.in_flight(1).cluster(cluster).clone()
+            })
+            .collect();
+        finish_create_dags(&dags).unwrap();
+        let run = alone.machine.run().unwrap();
+        assert_eq!(breaches(&run), []);
+        for dag in &dags {
+            let of = run.statistics(dag);
+            assert_eq!((of.completed, of.misses, of.faults), (500, 0, 0));
+        }
     }
 }
 
@@ -47,7 +61,7 @@ fn an_endless_function_loses_its_core_after_its_budget() {
         let function = move |job| while job == 2 && !flag.load(Relaxed) {};
         let attributes = SubtaskAttributes::named("waits").priority(0).budget(ms(4));
         endless.register_untyped_subtask(function, attributes);
-        let healthy = ticking("healthy", 20, ms(5), 1, 100);
+        let healthy = chain("healthy", 1, 20, ms(5), 100);
         finish_create_dags(&[endless, healthy]).unwrap();
         let run = alone.machine.run().unwrap();
         may_end.store(true, Relaxed);
@@ -133,11 +147,11 @@ fn a_dag_is_paused_resumed_and_stopped_from_outside() {
 fn after_a_run_there_can_be_another() {
     for _ in 0..3 {
         let alone = alone(1, Mechanism::Normal);
-        finish_create_dags(&[ticking("tick", 3, ms(1), 0, 10)]).unwrap();
+        finish_create_dags(&[chain("tick", 1, 3, ms(1), 10)]).unwrap();
         assert_eq!(alone.machine.run().unwrap().statistics("tick").completed, 3);
         let error = alone.machine.run().unwrap_err();
         assert!(error.to_string().starts_with("nothing is committed"));
-        finish_create_dags(&[ticking("tick", 2, ms(1), 0, 10)]).unwrap();
+        finish_create_dags(&[chain("tick", 1, 2, ms(1), 10)]).unwrap();
         assert_eq!(alone.machine.run().unwrap().statistics("tick").completed, 2);
     }
 }

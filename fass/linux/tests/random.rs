@@ -14,8 +14,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use fass::{
-    ConstructionPolicy, Dag, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag,
-    execute_for, finish_create_dags_with,
+    ConstructionPolicy, Dag, Occupation, OverrunPolicy, Policy, Preemption, SubtaskAttributes,
+    create_dag, execute_for, finish_create_dags_with,
 };
 use linux::{Control, Linux, Mechanism, Run};
 use random::Random;
@@ -28,10 +28,10 @@ fn random_sets_keep_the_rules() {
     let before = held();
     for seed in first..first + sets {
         let mut random = Random::new(seed);
-        let (policy, cores) = terms(&mut random);
+        let policy = [Policy::StaticPriority, Policy::Edf][random.below(2)];
         let mechanisms = [Mechanism::Fifo, Mechanism::Poll, Mechanism::Normal];
-        let mechanism = mechanisms[random.below(3)];
-        let alone = alone(cores, mechanism).with(|machine| machine.policy(policy));
+        let alone = alone(1 + random.small(2), mechanisms[random.below(3)]);
+        alone.machine.configure(policy, Preemption::Enabled);
         let run = run(&alone.machine, &mut random);
         let found = breaches(&run);
         assert!(found.is_empty(), "LINUX_SEED={seed}: {found:?}");
@@ -68,12 +68,6 @@ impl Random {
     fn ms(&mut self, least: u64, most: u64) -> Duration {
         ms(self.between(least, most))
     }
-}
-
-/// Draws the policy of a set and the number of its cores.
-fn terms(random: &mut Random) -> (Policy, u32) {
-    let policy = [Policy::StaticPriority, Policy::Edf][usize::from(random.one_in(2))];
-    (policy, 1 + random.small(2))
 }
 
 /// Commits a drawn set on the machine and runs it.

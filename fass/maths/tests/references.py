@@ -25,19 +25,10 @@ def series(first, ratio):
 def arctan(x):
     if abs(x) > D("0.05"):
         return 2 * arctan(x / (1 + (1 + x * x).sqrt()))
-    return x if x == 0 else sum_arctan(x)
+    return series(x, lambda n: -x * x * (2 * n - 1) / (2 * n + 1))
 
 
-def sum_arctan(x):
-    total, power, n = D(0), x, 1
-    while abs(power / n) > D(10) ** -88 * abs(x):
-        total += power / n if n % 4 == 1 else -power / n
-        power *= x * x
-        n += 2
-    return total
-
-
-PI = 16 * sum_arctan(D(1) / 5) - 4 * sum_arctan(D(1) / 239)
+PI = 16 * arctan(D(1) / 5) - 4 * arctan(D(1) / 239)
 
 
 def sin(x):

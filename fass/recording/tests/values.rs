@@ -5,11 +5,14 @@
 
 #[path = "../../../sched-dag/tests/support/counting.rs"]
 mod counting;
+#[path = "../../../sched-dag/tests/support/random.rs"]
+mod random;
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
 use counting::allocated;
+use random::Random;
 use recording::{Decoder, Encoder, MOST_DEPTH, MOST_GROWTH, Recordable, Schema, Shown, to_bytes};
 
 recording::recordable! {
@@ -37,21 +40,7 @@ recording::recordable! {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
-struct Random(u64);
-
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, limit: usize) -> usize {
-        usize::try_from(self.next() % limit as u64).expect("it is small")
-    }
-
     fn text(&mut self) -> String {
         let letters = ['a', '"', '\\', '\n', 'é', '😀', '\0'];
         (0..self.below(6)).map(|_| letters[self.below(7)]).collect()
@@ -131,7 +120,7 @@ fn read<T: Recordable + Debug>(schema: &Schema, bytes: &[u8]) -> Option<T> {
 
 #[test]
 fn values_come_back() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     for _ in 0..2_000 {
         let value = random.value();
         let bytes = to_bytes(&value);
@@ -146,7 +135,7 @@ fn values_come_back() {
 
 #[test]
 fn hostile_bytes_are_refused_or_are_the_value_that_they_say() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let schema = All::schema();
     let (mut accepted, mut refused) = (0, 0);
     for _ in 0..20_000 {
@@ -186,7 +175,7 @@ fn a_promise_of_many_elements_takes_no_memory() {
 
 #[test]
 fn hostile_schemas_are_refused_or_are_what_they_say() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for _ in 0..20_000 {
         let mut bytes = to_bytes(&All::schema());
         for _ in 0..=random.below(3) {
@@ -243,7 +232,7 @@ fn schemas_are_read_as_they_are_shown() {
 
 #[test]
 fn writing_into_a_buffer_allocates_nothing_and_tells_what_it_needs() {
-    let value = Random(4).value();
+    let value = Random::new(4).value();
     let bytes = to_bytes(&value);
     let mut buffer = vec![0; bytes.len()];
     for room in 0..=bytes.len() {

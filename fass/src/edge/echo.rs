@@ -177,12 +177,11 @@ mod tests {
     }
 
     fn record(echo: &mut Echo, channel: u16, job: u64, bytes: &[u8]) {
-        let bytes = Some(bytes);
         let value = Recorded {
             channel,
             job,
             completed_ns: 0,
-            bytes,
+            bytes: Some(bytes),
         };
         echo.record(&value, 0);
     }
@@ -198,14 +197,9 @@ mod tests {
     #[test]
     fn the_latest_value_is_seen_and_others_are_counted() {
         let mut echo = Echo::new(None);
-        open(
-            &mut echo,
-            &[
-                ("pose", Role::Sample),
-                ("speed", Role::Source),
-                ("pose", Role::Result),
-            ],
-        );
+        let speed = ("speed", Role::Source);
+        let topics = [("pose", Role::Sample), speed, ("pose", Role::Result)];
+        open(&mut echo, &topics);
         record(&mut echo, 2, 0, &[1, 0, 0, 0]);
         assert!(!echo.watch(Some("poes")) && echo.watch(Some("pose")));
         assert_eq!(take(&mut echo), None, "what was complete before");
@@ -221,15 +215,11 @@ mod tests {
         echo.watch(None);
         record(&mut echo, 2, 5, &[5, 0, 0, 0]);
         assert_eq!(take(&mut echo), None);
-    }
 
-    #[test]
-    fn topics_of_another_commit_take_the_place_of_those_before() {
-        let mut echo = Echo::new(None);
-        open(&mut echo, &[("old", Role::Source)]);
+        // Topics of another commit take the place of those before.
         echo.is_launched = true;
         open(&mut echo, &[("new", Role::Source)]);
-        assert!(!echo.watch(Some("old")) && echo.watch(Some("new")));
+        assert!(!echo.watch(Some("pose")) && echo.watch(Some("new")));
         record(&mut echo, 0, 1, &[1, 0, 0, 0]);
         assert_eq!(take(&mut echo), Some((1, "1".into(), 0)));
     }

@@ -47,16 +47,6 @@ pub(crate) fn alone_on(make: impl FnOnce() -> Linux) -> Alone {
     }
 }
 
-impl Alone {
-    /// Changes the machine before the commit.
-    pub(crate) fn with(self, change: impl FnOnce(Linux) -> Linux) -> Self {
-        Self {
-            machine: change(self.machine),
-            ..self
-        }
-    }
-}
-
 pub(crate) fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
@@ -66,15 +56,17 @@ pub(crate) fn spin(us: u64) {
     execute_for(Duration::from_micros(us), Occupation::Spin);
 }
 
-/// A DAG of one subtask that computes for `us` in each of its jobs.
-pub(crate) fn ticking(name: &str, jobs: u64, period: Duration, priority: u32, us: u64) -> Dag {
+/// A DAG that is a chain of so many subtasks, each of which computes for `us` in each job.
+pub(crate) fn chain(name: &str, links: usize, jobs: u64, period: Duration, us: u64) -> Dag {
     let dag = create_dag();
-    dag.name(name)
-        .jobs(jobs)
-        .period(period)
-        .relative_deadline(period);
-    let attributes = SubtaskAttributes::named(name).priority(priority);
-    dag.register_untyped_subtask(move |_job| spin(us), attributes);
+    dag.name(name).jobs(jobs);
+    dag.period(period).relative_deadline(period);
+    let compute =
+        |_| dag.register_untyped_subtask(move |_job| spin(us), SubtaskAttributes::default());
+    let subtasks: Vec<_> = (0..links).map(compute).collect();
+    for pair in subtasks.windows(2) {
+        dag.precede(&pair[0], &pair[1]);
+    }
     dag
 }
 
