@@ -26,32 +26,20 @@ pub(crate) enum Levels {
     SchedExt(Seats),
 }
 
-/// What a thread is at its level for.
+/// What a thread is at its level for, the lower ones first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub(crate) enum Role {
-    /// It releases jobs.
-    Release,
-    /// It needs the scheduler's lock at once, whatever its core computes.
-    Report,
-    /// It runs what its core should run.
-    Run,
-    /// It has lost its core.
-    Demoted,
     /// What it runs was ended: it is to delay nobody any more, in no other program either.
     Abandoned,
-}
-
-impl Role {
-    /// Returns its place above what has no level.
-    const fn rank(self) -> u8 {
-        match self {
-            Self::Release => 4,
-            Self::Report => 3,
-            Self::Run => 2,
-            Self::Demoted => 1,
-            Self::Abandoned => 0,
-        }
-    }
+    /// It has lost its core.
+    Demoted,
+    /// It runs what its core should run.
+    Run,
+    /// It needs the scheduler's lock at once, whatever its core computes.
+    Report,
+    /// It releases jobs.
+    Release,
 }
 
 impl Levels {
@@ -74,7 +62,8 @@ impl Levels {
 
     /// Brings a thread to its role's level.
     pub(crate) fn bring(self, thread: ThreadId, role: Role) {
-        let rank = role.rank();
+        // Its place above what has no level.
+        let rank = role as u8;
         // It worked before; a thread that has gone needs no level.
         let _ = match self {
             Self::Fifo(_) if rank == 0 => sys::set_normal(thread),

@@ -15,10 +15,10 @@ use sched_dag::DagId;
 use sched_dag::lifecycle::{Changes, Lifecycle};
 
 use super::dag::Dag;
-use super::uses::{Uses, sealed};
+use super::uses::{Uses, implement_asking, sealed};
 use crate::draft::Draft;
 use crate::draft::modes::dags_of_modes;
-use crate::run::request::{Asked, GO, Of, STOP, Wish, wish};
+use crate::run::request::{GO, Of, STOP, Wish};
 use crate::run::signal::Target;
 
 /// The use of a DAG by a subtask that may pause and resume it: the function gets a [`Switch`].
@@ -207,54 +207,18 @@ pub(super) fn lifecycle(dags: &[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle> {
     Box::new(changes.with_modes(dags_of_modes(dags)))
 }
 
-impl sealed::Sealed for Switching {}
-impl sealed::Sealed for ShuttingDown {}
+implement_asking!(Switching, Switch, |switching, draft, subtask| {
+    (draft.switches).push((subtask, Arc::clone(&switching.target)));
+    ask(draft, subtask, Of::Dag(switching.target))
+});
 
-impl Uses for Switching {
-    type Borrowed<'a> = Switch<'a>;
-    type Held = Wish;
-    type Guard<'a> = &'a AtomicU8;
+implement_asking!(ShuttingDown, Shutdown, |_, draft, subtask| {
+    draft.may_shut_down = true;
+    ask(draft, subtask, Of::Run)
+});
 
-    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let mut draft = dag.draft.borrow_mut();
-        draft.switches.push((subtask, Arc::clone(&self.target)));
-        ask(&mut draft, subtask, Of::Dag(self.target))
-    }
-
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held
-    }
-
-    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        Switch { wish: guard }
-    }
-}
-
-impl Uses for ShuttingDown {
-    type Borrowed<'a> = Shutdown<'a>;
-    type Held = Wish;
-    type Guard<'a> = &'a AtomicU8;
-
-    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let mut draft = dag.draft.borrow_mut();
-        draft.may_shut_down = true;
-        ask(&mut draft, subtask, Of::Run)
-    }
-
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held
-    }
-
-    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        Shutdown { wish: guard }
-    }
-}
-
-/// Notes that completions of a subtask may ask for something.
+/// Notes that completions of a subtask may ask for a change of what is on.
 pub(super) fn ask(draft: &mut Draft, subtask: usize, of: Of) -> Wish {
     draft.lifecycle = Some(lifecycle);
-    let wish = wish();
-    let asked = Asked::new(Arc::clone(&wish), of);
-    draft.effects.push((subtask, Box::new(asked)));
-    wish
+    draft.ask(subtask, of)
 }

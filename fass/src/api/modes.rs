@@ -11,7 +11,8 @@ use sched_dag::ModeId;
 
 use super::dag::Dag;
 use super::lifecycle::{ask, lifecycle};
-use super::uses::{Uses, sealed};
+use super::uses::{Uses, implement_asking, sealed};
+use crate::draft::Draft;
 use crate::draft::modes::{self, ModeDraft};
 use crate::run::request::{AT_ONCE, Of, WHEN_IDLE, Wish};
 
@@ -161,28 +162,11 @@ impl Mode {
     }
 }
 
-impl sealed::Sealed for Entering {}
-
-impl Uses for Entering {
-    type Borrowed<'a> = Entrance<'a>;
-    type Held = Wish;
-    type Guard<'a> = &'a AtomicU8;
-
-    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let mut draft = dag.draft.borrow_mut();
-        draft.modes.push(self.0.modes);
-        draft.check_modes = Some(modes::check);
-        ask(&mut draft, subtask, Of::Mode(self.0.number))
-    }
-
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held
-    }
-
-    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        Entrance { wish: guard }
-    }
-}
+implement_asking!(Entering, Entrance, |entering, draft, subtask| {
+    draft.modes.push(entering.0.modes);
+    draft.check_modes = Some(modes::check);
+    ask(draft, subtask, Of::Mode(entering.0.number))
+});
 
 impl fmt::Debug for Modes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

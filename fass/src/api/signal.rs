@@ -13,18 +13,19 @@
 //! - the platform: a byte from a serial port, say, or a test in virtual time;
 //! - the app's code outside subtasks ([`Signal::raise`]).
 
-use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::fmt;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicU8, Ordering};
 use core::time::Duration;
 
 use sched_dag::DagId;
 
 use super::dag::Dag;
-use super::uses::{Uses, sealed};
+use super::uses::{Uses, implement_asking, sealed};
+use crate::draft::Draft;
 use crate::platform;
-use crate::run::signal::{Raised, Target};
+use crate::run::request::{GO, Of, Wish};
+use crate::run::signal::Target;
 
 /// What releases a sporadic DAG. Clones are handles of the same signal.
 ///
@@ -80,7 +81,7 @@ pub struct Raising(Signal);
 /// What a function raises a signal with. See [`Signal`].
 #[derive(Debug)]
 pub struct Raiser<'a> {
-    raised: &'a AtomicBool,
+    wish: &'a AtomicU8,
 }
 
 impl Raiser<'_> {
@@ -88,7 +89,7 @@ impl Raiser<'_> {
     ///
     /// See [`Signal`].
     pub fn raise(&mut self) {
-        self.raised.store(true, Ordering::Relaxed);
+        self.wish.store(GO, Ordering::Relaxed);
     }
 }
 
@@ -215,30 +216,11 @@ impl Dag {
     }
 }
 
-impl sealed::Sealed for Raising {}
-
-impl Uses for Raising {
-    type Borrowed<'a> = Raiser<'a>;
-    type Held = Arc<AtomicBool>;
-    type Guard<'a> = &'a AtomicBool;
-
-    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let raised = Arc::new(AtomicBool::new(false));
-        let mut draft = dag.draft.borrow_mut();
-        let effect = Raised::new(Arc::clone(&raised), Arc::clone(&self.0.target));
-        draft.effects.push((subtask, Box::new(effect)));
-        draft.raises.push((subtask, self.0.target));
-        raised
-    }
-
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held
-    }
-
-    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        Raiser { raised: guard }
-    }
-}
+implement_asking!(Raising, Raiser, |raising, draft, subtask| {
+    let target = raising.0.target;
+    draft.raises.push((subtask, Arc::clone(&target)));
+    draft.ask(subtask, Of::Signal(target))
+});
 
 impl fmt::Debug for Signal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

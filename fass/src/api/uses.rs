@@ -110,6 +110,35 @@ pub trait ResettableUses: Uses {
     fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>>;
 }
 
+/// Implements the use of a subtask whose completions may ask for something: what it borrows is a
+/// place for the wish, and `hold` says what that is about.
+macro_rules! implement_asking {
+    ($Use:ty, $Borrowed:ident, $hold:expr) => {
+        impl sealed::Sealed for $Use {}
+
+        impl Uses for $Use {
+            type Borrowed<'a> = $Borrowed<'a>;
+            type Held = Wish;
+            type Guard<'a> = &'a AtomicU8;
+
+            fn hold(self, dag: &Dag, subtask: usize) -> Wish {
+                let hold: fn(Self, &mut Draft, usize) -> Wish = $hold;
+                hold(self, &mut dag.draft.borrow_mut(), subtask)
+            }
+
+            fn enter(held: &mut Wish) -> Self::Guard<'_> {
+                held
+            }
+
+            fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+                $Borrowed { wish: guard }
+            }
+        }
+    };
+}
+
+pub(super) use implement_asking;
+
 /// Implements the traits for tuples.
 macro_rules! implement_tuple {
     ($(($Use:ident $use_:ident $guard:ident))*) => {

@@ -30,6 +30,11 @@ pub struct CommitError {
 }
 
 impl CommitError {
+    pub(super) fn of(fault: Fault, warnings: Vec<Warning>) -> Self {
+        let faults = Vec::from([fault]);
+        Self { faults, warnings }
+    }
+
     /// Returns the faults, at least one.
     ///
     /// ```

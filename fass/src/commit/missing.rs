@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use sched_dag::DagLabel;
 
 use super::fault::Fault;
-use super::staleness;
+use super::staleness::writer_of;
 use crate::api::dag::Dag;
 use crate::run::signal::Target;
 
@@ -14,11 +14,10 @@ use crate::run::signal::Target;
 pub(super) fn others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
     let draft = dag.draft.borrow();
     let samples = draft.samples.iter();
-    let not_there =
-        samples.filter(|(_, latest, _)| staleness::writer_of(dags, &**latest).is_none());
+    let not_there = samples.filter(|(_, latest, _)| writer_of(dags, &**latest).is_none());
     let latest = not_there.map(|(subtask, latest, _)| Fault::LatestNotCommitted {
         dag: label.clone(),
-        subtask: staleness::label_of(dag, *subtask),
+        subtask: draft.label(*subtask),
         topic: latest.topic().into(),
     });
     let is_target =
@@ -30,13 +29,13 @@ pub(super) fn others(dags: &[Dag], dag: &Dag, label: &DagLabel) -> Vec<Fault> {
     let unknown = raises.filter(|(_, signal)| !dags.iter().any(|other| is_target(signal, other)));
     let signals = unknown.map(|(subtask, _)| Fault::SignalNotCommitted {
         dag: label.clone(),
-        subtask: staleness::label_of(dag, subtask),
+        subtask: draft.label(subtask),
     });
     let switches = draft.switches.iter();
     let unknown = switches.filter(|(_, target)| !dags.iter().any(|other| is_target(target, other)));
     let switched = unknown.map(|(subtask, _)| Fault::SwitchedNotCommitted {
         dag: label.clone(),
-        subtask: staleness::label_of(dag, *subtask),
+        subtask: draft.label(*subtask),
     });
     latest.chain(signals).chain(switched).collect()
 }

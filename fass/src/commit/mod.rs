@@ -145,8 +145,7 @@ pub fn finish_create_dags_with(
         mut warnings,
     } = verify(dags, options, platform.wcets().as_deref())?;
     if let Err(error) = platform.assign(&mut task_set) {
-        let faults = Vec::from([Fault::NotAssigned(error)]);
-        return Err(CommitError { faults, warnings });
+        return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
     analysis::fix_orders(&mut task_set, &assign::settings(platform));
     let answers = Answers::new(&task_set, platform);
@@ -171,10 +170,7 @@ pub fn finish_create_dags_with(
             staleness,
             task_set,
         }),
-        Err(error) => Err(CommitError {
-            faults: Vec::from([Fault::NotLaunched(error)]),
-            warnings,
-        }),
+        Err(error) => Err(CommitError::of(Fault::NotLaunched(error), warnings)),
     }
 }
 

@@ -15,7 +15,7 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use sched_dag::{SubtaskId, SubtaskLabel, TaskSet};
+use sched_dag::TaskSet;
 
 use super::answer::Answer;
 use crate::api::dag::Dag;
@@ -26,14 +26,15 @@ use crate::run::staleness::Staleness;
 pub(crate) fn of_all(dags: &[Dag], task_set: &TaskSet, answers: &[Answer]) -> Vec<Staleness> {
     let mut found = Vec::new();
     for (dag, reader) in dags.iter().zip(answers) {
-        for (subtask, latest, _) in &dag.draft.borrow().samples {
+        let draft = dag.draft.borrow();
+        for (subtask, latest, _) in &draft.samples {
             let Some(writer) = writer_of(dags, &**latest) else {
                 continue;
             };
             let model = &task_set.dags()[writer];
             found.push(Staleness {
                 reader_dag: reader.dag.clone(),
-                reader: label_of(dag, *subtask),
+                reader: draft.label(*subtask),
                 writer_dag: answers[writer].dag.clone(),
                 topic: latest.topic().into(),
                 bound: bound(model, &answers[writer]),
@@ -56,14 +57,4 @@ pub(crate) fn writer_of(dags: &[Dag], latest: &dyn AnyLatest) -> Option<usize> {
     };
     dags.iter()
         .position(|dag| dag.draft.borrow().latest.iter().any(is_it))
-}
-
-/// Returns the label of a registered subtask.
-pub(crate) fn label_of(dag: &Dag, subtask: usize) -> SubtaskLabel {
-    let draft = dag.draft.borrow();
-    let spec = draft.spec.subtasks.get(subtask);
-    SubtaskLabel {
-        id: SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX)),
-        name: spec.map(|spec| spec.name.clone()).unwrap_or_default(),
-    }
 }

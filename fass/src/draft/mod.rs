@@ -30,6 +30,7 @@ use crate::run::effect::Effect;
 use crate::run::latest::AnyLatest;
 use crate::run::message::MessageType;
 use crate::run::record::AnyRecorded;
+use crate::run::request::{Asked, Of, Wish, wish};
 use crate::run::signal::Target;
 use crate::run::subtask::MakeBody;
 use crate::run::untyped;
@@ -230,6 +231,14 @@ impl Draft {
             let longest_ns = self.spec.relative_deadline_ns.max(Some(deadline_ns));
             self.spec.relative_deadline_ns = longest_ns;
         }
+    }
+
+    /// Notes that completions of a subtask may ask for something.
+    pub(crate) fn ask(&mut self, subtask: usize, of: Of) -> Wish {
+        let wish = wish();
+        let asked = Asked::new(Arc::clone(&wish), of);
+        self.effects.push((subtask, Box::new(asked)));
+        wish
     }
 
     /// Returns how messages call a subtask that is registered.

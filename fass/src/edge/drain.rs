@@ -7,20 +7,19 @@ use alloc::vec::Vec;
 use core::sync::atomic::Ordering;
 
 use recording::{Encoder, Entry, Header, Recordable, Stream, What};
-use sched_dag::{DagId, TaskSet};
+use sched_dag::{Instance, TaskSet};
 
+use super::guard::narrow;
 use super::lost::Lost;
-use super::ring::{Event, EventReader};
 use super::{Drain, Drained};
-use crate::run::cell::outbox::OutboxReader;
+use crate::run::cell::outbox::{OutboxReader, Published};
 
-/// What an event is, in a word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Tag {
-    pub(super) what: What,
-    pub(super) dag: DagId,
-    pub(super) subtask: u32,
-}
+/// An event in its record: the place of what it is among [`EVENTS`], DAG and subtask, and when the
+/// job was due, where that is known.
+pub(super) type Event = (u8, u16, u16, Option<u64>);
+
+/// The most bytes of an event.
+pub(super) const EVENT_BYTES: usize = 14;
 
 const EVENTS: [What; 6] = [
     What::Signal,
@@ -31,20 +30,16 @@ const EVENTS: [What; 6] = [
     What::Fault,
 ];
 
-impl Tag {
-    pub(super) fn to_word(self) -> u64 {
-        let place = EVENTS.iter().position(|other| *other == self.what);
-        let narrow = |number: u32| u64::from(u16::try_from(number).unwrap_or(u16::MAX));
-        place.unwrap_or(0) as u64 | narrow(self.subtask) << 16 | narrow(self.dag.0) << 32
-    }
-
-    /// Returns what it is, and the numbers of DAG and subtask.
-    fn of_word(word: u64) -> (What, u16, u16) {
-        let [kind, _, s_0, s_1, d_0, d_1, ..] = word.to_le_bytes();
-        let what = EVENTS[usize::from(kind) % EVENTS.len()];
-        let [subtask, dag] = [[s_0, s_1], [d_0, d_1]].map(u16::from_le_bytes);
-        (what, dag, subtask)
-    }
+/// Returns what happened to an instance as a record has it.
+pub(super) fn event(what: What, of: Instance, release_ns: Option<u64>) -> Event {
+    let place = (0..).zip(EVENTS).find(|(_, other)| *other == what);
+    let (dag, subtask) = narrow(of).unwrap_or((u16::MAX, u16::MAX));
+    (
+        place.map_or(0, |(place, _)| place),
+        dag,
+        subtask,
+        release_ns,
+    )
 }
 
 /// The bytes of a list of one time.
@@ -58,7 +53,7 @@ fn write_told(clock_ns: u64, bytes: &mut [u8; TOLD]) -> &[u8] {
 
 /// Makes the file.
 pub(super) struct OfTape {
-    events: EventReader,
+    events: OutboxReader,
     /// By channel.
     records: Vec<OutboxReader>,
     lost: Lost,
@@ -124,7 +119,7 @@ fn place_of(job: u64) -> Option<usize> {
 
 impl OfTape {
     pub(super) fn new(
-        events: EventReader,
+        events: OutboxReader,
         records: Vec<OutboxReader>,
         header: Header,
         lost: Lost,
@@ -213,17 +208,13 @@ impl OfTape {
 
     /// Writes the next event.
     fn write_event(&mut self, send: &mut dyn FnMut(&[u8])) {
-        let Some(event) = self.events.next() else {
+        let Some(Published { job, at_ns, bytes }) = self.events.next() else {
             return;
         };
+        let event = Event::from_bytes(bytes).unwrap_or_default();
         self.events.forget();
-        let Event {
-            tag,
-            job,
-            at_ns,
-            release_ns,
-        } = event;
-        let (what, dag, place) = Tag::of_word(tag);
+        let (what, dag, place, release_ns) = event;
+        let what = EVENTS[usize::from(what) % EVENTS.len()];
         let known = release_ns.or_else(|| self.release_ns(dag, job));
         let release_ns = known.unwrap_or(at_ns);
         if what == What::Signal

@@ -9,8 +9,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::mem;
 
-use recording::{Channel, Entry, Header, Stream};
-use sched_dag::journal::What;
+use recording::{Channel, Entry, Header, Stream, What};
+use sched_dag::journal;
 use sched_dag::{DagId, Instance, Notice};
 
 use super::drain::{Releases, SIGNALS};
@@ -87,7 +87,7 @@ impl Crossing for Latest {
     fn happened(&mut self, notice: &Notice) {
         let (dag, job) = (notice.event.dag.index(), notice.event.job);
         // A skipped job counts, or those after it would be others in a replay.
-        if let What::Due | What::Skipped = notice.event.what
+        if let journal::What::Due | journal::What::Skipped = notice.event.what
             && let Some(kept) = &mut self.kept
             && let Some(release_ns) = notice.at_ns
             && let Some(releases) = kept.releases.get_mut(dag)
@@ -141,55 +141,39 @@ impl Drain for OfLatest {
             ..
         } = &self.kept;
         let mut stream = Stream::begin(header, send);
+        let mut write = |what, dag, place, job, at_ns, value: &[u8]| {
+            let release_ns = releases[usize::from(dag)].of(job).unwrap_or(at_ns);
+            let entry = Entry {
+                what,
+                dag,
+                place,
+                job,
+                release_ns,
+                at_ns,
+                value,
+            };
+            stream.write(&entry, send);
+        };
         for (dag, of_dag) in (0_u16..).zip(releases) {
             if let Releases::Periodic { .. } = of_dag {
                 continue;
             }
             for job in latest.jobs(dag.into()) {
                 if let Some(release_ns) = of_dag.of(job) {
-                    let signal = Entry {
-                        what: recording::What::Signal,
-                        dag,
-                        place: 0,
-                        job,
-                        release_ns,
-                        at_ns: release_ns,
-                        value: &[],
-                    };
-                    stream.write(&signal, send);
+                    write(What::Signal, dag, 0, job, release_ns, &[]);
                 }
             }
         }
         for value in latest.values() {
             let dag = header.channels[usize::from(value.channel)].dag;
-            let release_ns = releases[usize::from(dag)].of(value.job);
-            let lost = recording::What::Lost;
-            let entry = Entry {
-                what: value.bytes.map_or(lost, |_| recording::What::Value),
-                dag,
-                place: value.channel,
-                job: value.job,
-                release_ns: release_ns.unwrap_or(value.completed_ns),
-                at_ns: value.completed_ns,
-                value: value.bytes.unwrap_or_default(),
-            };
-            stream.write(&entry, send);
+            let what = value.bytes.map_or(What::Lost, |_| What::Value);
+            let (at_ns, bytes) = (value.completed_ns, value.bytes.unwrap_or_default());
+            write(what, dag, value.channel, value.job, at_ns, bytes);
         }
         for &(instance, at_ns) in faults {
-            let Some((dag, place)) = narrow(instance) else {
-                continue;
-            };
-            let release_ns = releases[usize::from(dag)].of(instance.job);
-            let fault = Entry {
-                what: recording::What::Fault,
-                dag,
-                place,
-                job: instance.job,
-                release_ns: release_ns.unwrap_or(at_ns),
-                at_ns,
-                value: &[],
-            };
-            stream.write(&fault, send);
+            if let Some((dag, place)) = narrow(instance) {
+                write(What::Fault, dag, place, instance.job, at_ns, &[]);
+            }
         }
         self.stream = Some(stream);
     }

@@ -19,7 +19,6 @@ mod lost;
 mod machine;
 mod of_run;
 mod replay;
-mod ring;
 mod signals;
 mod tape;
 

@@ -11,15 +11,14 @@ use alloc::vec::Vec;
 use core::mem;
 use core::sync::atomic::AtomicU64;
 
-use recording::{Channel, Header};
+use recording::{Channel, Encoder, Header, Recordable};
 use sched_dag::{DagId, Instance, Notice, SubtaskId};
 
-use super::drain::{OfTape, Tag};
+use super::drain::{EVENT_BYTES, OfTape, event};
 use super::lost::{Lost, LostJobs};
 use super::replay::Outcome;
-use super::ring::{Event, EventWriter, WORDS, ring};
 use super::{Crossing, Drain, name, open, recorded};
-use crate::run::cell::outbox::Outbox;
+use crate::run::cell::outbox::{Outbox, outbox, words_of};
 use crate::run::crossing::Recorded;
 use crate::run::line::LineOf;
 use crate::run::plan::Plan;
@@ -29,7 +28,7 @@ pub(super) struct Tape {
     app: &'static str,
     bytes: usize,
     header: Header,
-    events: Option<EventWriter>,
+    events: Option<Outbox>,
     drain: Option<Box<dyn Drain>>,
     lines: Vec<LineOf>,
     /// By channel: where a value is put that is given, for somebody in front of the tape looks.
@@ -58,7 +57,7 @@ impl Tape {
     fn provide(&mut self, plan: &mut Plan) -> Option<()> {
         let channels = &self.header.channels;
         let words = self.bytes / 8 / (channels.len() + 1);
-        let (events, reader) = ring((words / WORDS).max(64))?;
+        let (events, reader) = outbox(words.max(64 * words_of(EVENT_BYTES)))?;
         self.lines = mem::take(&mut plan.lines);
         let records = (self.lines.iter().zip(channels))
             .map(|(of, channel)| of.line.reader(words, channel.schema.least_bytes()));
@@ -76,19 +75,12 @@ impl Tape {
 impl Tape {
     /// Puts an event into its ring; without room the recording ends.
     fn put(&mut self, what: recording::What, of: Instance, release_ns: Option<u64>, at_ns: u64) {
-        let tag = Tag {
-            what,
-            dag: of.dag,
-            subtask: of.subtask.0,
-        };
-        let event = Event {
-            tag: tag.to_word(),
-            job: of.job,
-            at_ns,
-            release_ns,
-        };
-        if let Some(events) = &mut self.events
-            && !events.put(&event)
+        let mut bytes = [0; EVENT_BYTES];
+        let mut out = Encoder::new(&mut bytes);
+        event(what, of, release_ns).encode(&mut out);
+        let length = out.finish().unwrap_or(EVENT_BYTES);
+        if let Some(events) = &self.events
+            && !events.put(of.job, at_ns, &bytes[..length])
         {
             self.lost.end(at_ns);
         }

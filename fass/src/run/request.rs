@@ -13,7 +13,7 @@ use super::signal::Target;
 const NOTHING: u8 = 0;
 /// The wish that a DAG is paused, or that the run ends.
 pub(crate) const STOP: u8 = 1;
-/// The wish that a DAG is resumed.
+/// The wish that a DAG is resumed, or released by its signal.
 pub(crate) const GO: u8 = 2;
 /// The wish that a mode is entered at once.
 pub(crate) const AT_ONCE: u8 = 1;
@@ -31,6 +31,7 @@ pub(crate) fn wish() -> Wish {
 /// What a wish is about.
 pub(crate) enum Of {
     Run,
+    Signal(Arc<Target>),
     Dag(Arc<Target>),
     Mode(ModeId),
 }
@@ -56,6 +57,7 @@ impl Effect for Asked {
         self.wish.store(NOTHING, Ordering::Relaxed);
         ask(match &self.of {
             Of::Run => Request::ShutDown,
+            Of::Signal(target) => Request::Signal(target.dag()),
             Of::Dag(target) if wish == STOP => Request::Pause(target.dag()),
             Of::Dag(target) => Request::Resume(target.dag()),
             Of::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, Entry::AtOnce),
