@@ -18,25 +18,6 @@ use fass::{
 use sched_dag::DagId;
 use support::{commit, run_job};
 
-type Sixteen = (
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-    u8,
-);
-
 const TOPICS: [&str; 16] = [
     "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15",
 ];
@@ -54,12 +35,12 @@ fn a_job_allocates_nothing() {
         period,
         named("source"),
     );
-    let wide = |(_, _): (Arc<[u8; 4096]>, Unique<[u64; 32]>)| -> Sixteen {
+    let wide = |(_, _): (Arc<[u8; 4096]>, Unique<[u64; 32]>)| {
         (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
     };
     dag.register_subtask(wide, vec!["image", "frame"], TOPICS.to_vec(), named("wide"));
-    let narrow = |(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p): Sixteen| {
-        let values = [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p];
+    let narrow = |(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p)| {
+        let values: [i32; 16] = [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p];
         assert!(values.iter().copied().eq(0..16), "each is in its place");
         (7_u64, [0_u8; 100])
     };

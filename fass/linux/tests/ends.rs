@@ -2,15 +2,17 @@
 //!
 //! The program under test is this very test program, started anew with a part to play.
 
+mod support;
+
 use std::fs;
 use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::{Linux, Mechanism};
+use support::{alone, ms};
 
 const PART: &str = "FASS_LINUX_PART";
 
@@ -42,13 +44,9 @@ fn part() {
 
 /// A run whose function also starts a program of its own.
 fn run_endlessly() {
-    let machine = Linux::new(1, Mechanism::Fifo).expect("a processor is there");
-    machine
-        .limit_real_time(Duration::from_secs(5))
-        .expect("a limit may be set");
+    let alone = alone(1, Mechanism::Fifo);
     let dag = create_dag();
-    let period = Duration::from_millis(5);
-    dag.period(period).relative_deadline(period);
+    dag.period(ms(5)).relative_deadline(ms(5));
     let mut children = Vec::new();
     let function = move |job| {
         if job == 0 {
@@ -59,7 +57,7 @@ fn run_endlessly() {
     };
     dag.register_untyped_subtask(function, SubtaskAttributes::named("starts"));
     finish_create_dags(&[dag]).expect("the DAG is right");
-    machine.run().expect("it is committed");
+    alone.machine.run().expect("it is committed");
 }
 
 /// Returns the scheduling class of each thread of a process, 0 being that of all programs.
@@ -85,24 +83,17 @@ fn a_kill_leaves_nothing_at_a_raised_level() {
     let child = child.expect("the function starts a program");
     let threads = classes(program.id());
     let is_raised = threads.iter().any(|class| class == "1");
-    let was_fifo = Linux::new(1, Mechanism::Fifo)
-        .expect("one is there")
-        .is_preemptive();
+    let was_fifo = alone(1, Mechanism::Fifo).machine.is_preemptive();
     assert_eq!(is_raised, was_fifo, "{threads:?}");
-    assert_eq!(
-        classes(child),
-        ["0"],
-        "what a function starts is at no level"
-    );
+    let of_child = classes(child);
+    assert_eq!(of_child, ["0"], "what a function starts is at no level");
     program.kill().expect("it lives");
     let status = program.wait().expect("it has ended");
     assert_eq!(status.signal(), Some(9));
     assert!(!Path::new(&format!("/proc/{}/task", program.id())).exists());
     assert_eq!(classes(child), ["0"]);
-    Command::new("kill")
-        .arg(child.to_string())
-        .status()
-        .expect("`kill` is there");
+    let killed = Command::new("kill").arg(child.to_string()).status();
+    killed.expect("`kill` is there");
 }
 
 #[test]

@@ -17,33 +17,23 @@ fn number(line: &[u8]) -> Option<u64> {
     str::from_utf8(line).ok()?.parse().ok()
 }
 
-/// A DAG that sends the squares of the numbers that it receives, each when it comes or all of
-/// `period`.
+/// A DAG that sends the squares of the numbers that it receives, each when it comes or all of a
+/// period.
 fn squaring(wire: &Wire, period: Option<Duration>, jobs: u64) -> Dag {
     let dag = create_dag();
-    dag.jobs(jobs);
+    dag.jobs(jobs).relative_deadline(ms(50));
     match period {
         Some(period) => _ = dag.period(period),
         None => _ = dag.sporadic(ms(1)),
     }
-    let receive = |numbers: Received<'_, u64>| -> (Vec<u64>,) {
-        (numbers.map(|packet| packet.value).collect(),)
-    };
-    let source = dag.using(wire.receiving(number)).source(receive);
-    source
-        .writes(&["numbers"])
-        .register(SubtaskAttributes::named("receive"));
-    let answer = |mut wire: Sender<'_>, (numbers,): (Vec<u64>,)| {
-        for number in numbers {
+    let square = |(numbers, mut wire): (Received<'_, u64>, Sender<'_>)| {
+        for number in numbers.map(|packet| packet.value) {
             let _ = writeln!(wire, "{}", number * number);
         }
     };
-    let sink = dag
-        .using(wire.sending())
-        .subtask(answer)
-        .reads(&["numbers"]);
-    sink.due(ms(50))
-        .register(SubtaskAttributes::named("answer"));
+    let using = dag.using((wire.receiving(number), wire.sending()));
+    let named = SubtaskAttributes::named("square");
+    using.source(square).register(named);
     dag
 }
 

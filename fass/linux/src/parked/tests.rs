@@ -1,7 +1,8 @@
 //! Every order in which a parked instance can end, step by step, without a thread.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::time::Duration;
 
 use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
 use sched_dag::{CoreId, DagId};
@@ -26,31 +27,28 @@ struct Stage {
 
 impl Stage {
     fn new(cores: u32, urgent_keeps_its_core: bool) -> Self {
-        static RIGHT: Mutex<()> = Mutex::new(());
-        let right = RIGHT.lock().unwrap_or_else(PoisonError::into_inner);
         let machine = Linux::sharing(cores, Mechanism::Normal).unwrap();
         HOST.terms().as_mut().unwrap().preemption = Preemption::Enabled;
         let dags = DAGS.map(|name| {
             let dag = create_dag();
             dag.name(name).jobs(1);
-            dag.relative_deadline(std::time::Duration::from_secs(100));
-            drop(dag.sporadic(std::time::Duration::from_secs(1)));
+            dag.relative_deadline(Duration::from_secs(100));
+            drop(dag.sporadic(Duration::from_secs(1)));
             dag
         });
-        let attributes = |name, priority| SubtaskAttributes::named(name).priority(priority);
-        let read = dags[0].register_untyped_subtask(|_| (), attributes("read", 9));
-        let think = dags[0].register_untyped_subtask(|_| (), attributes("think", 9));
+        let priority = |priority| SubtaskAttributes::default().priority(priority);
+        let [read, think] =
+            [9, 9].map(|low| dags[0].register_untyped_subtask(|_| (), priority(low)));
         dags[0].precede(&read, &think);
-        let urgent = attributes("urgent", 1);
         let urgent = match urgent_keeps_its_core {
-            true => urgent.non_preemptive(),
-            false => urgent,
+            true => priority(1).non_preemptive(),
+            false => priority(1),
         };
         dags[1].register_untyped_subtask(|_| (), urgent);
-        dags[2].register_untyped_subtask(|_| (), attributes("first", 0));
+        dags[2].register_untyped_subtask(|_| (), priority(0));
         finish_create_dags(&dags).unwrap();
         let team = HOST.take_launched().unwrap().teams.remove(0);
-        drop((machine, right));
+        drop(machine);
         team.workers.iter().for_each(|worker| worker.begin());
         let mut state = team.lock();
         for core in 0..cores {
@@ -58,11 +56,10 @@ impl Stage {
         }
         state.time = crate::state::RunTime::beginning(sys::now_ns());
         drop(state);
-        let (running, began) = (BTreeMap::new(), BTreeMap::new());
         Self {
             team,
-            running,
-            began,
+            running: BTreeMap::new(),
+            began: BTreeMap::new(),
         }
     }
 
