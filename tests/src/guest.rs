@@ -333,7 +333,7 @@ pub(crate) fn built(package: &str) -> Result<Image, String> {
         return Ok(image.clone());
     }
     install::ensure_qemu()?;
-    let image = image::build(package).map_err(|error| error.to_string())?;
+    let image = image::build(package)?;
     built.insert(package.into(), image.clone());
     Ok(image)
 }

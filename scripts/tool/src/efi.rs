@@ -58,7 +58,7 @@ pub fn application(image: &Path, words: &str, module: Option<&Path>) -> Result<V
     let read = |path: &Path| files::read(path).map_err(|why| of(path, why));
     let loaded = elf::loaded(read(image)?).map_err(|why| of(image, why))?;
     let module = module.map(read).transpose()?;
-    let built = image::build("boot-efi").map_err(|error| error.to_string())?;
+    let built = image::build("boot-efi")?;
     let own = read(&built.path)?;
     assemble(&own, contents(loaded, words, module)).map_err(|why| of(&built.path, why))
 }

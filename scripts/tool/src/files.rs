@@ -81,6 +81,40 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
+/// Reads the input that an option names.
+///
+/// # Errors
+///
+/// In words, with the option and the file.
+pub(crate) fn read_named(named: &Named<'_>) -> Result<Vec<u8>, String> {
+    read(named.path).map_err(|why| format!("{} {why}; name another file", named.words()))
+}
+
+/// Writes what an option wants to the file that it names.
+///
+/// # Errors
+///
+/// In words, with the option and the file.
+pub(crate) fn write_named(
+    option: &str,
+    path: &Path,
+    content: impl AsRef<[u8]>,
+) -> Result<(), String> {
+    let named = Named { option, path };
+    let written = fs::write(path, content);
+    written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))
+}
+
+/// Writes a file of ours.
+///
+/// # Errors
+///
+/// In words, with the file.
+pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), String> {
+    let written = fs::write(path, content);
+    written.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
+}
+
 /// Reads an input that must be text, of at most 64 MiB. The invisible mark by which some
 /// editors begin UTF-8 is left out.
 ///

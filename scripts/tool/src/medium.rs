@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::efi;
+use crate::files;
 use crate::install;
 use crate::iso;
 use crate::qemu::Loader;
@@ -65,8 +66,7 @@ fn write_fat(stick: &Path, application: &[u8]) -> Result<(), String> {
     let sized = File::create(stick).and_then(|file| file.set_len(bytes));
     sized.map_err(|why| format!("cannot write `{}`: {why}", stick.display()))?;
     let file = stick.with_extension("efi");
-    fs::write(&file, application)
-        .map_err(|why| format!("cannot write `{}`: {why}", file.display()))?;
+    files::write(&file, application)?;
     let tool = |name: &str, words: &[&Path]| {
         let output = Command::new(name).arg("-i").arg(stick).args(words).output();
         let output = output.map_err(|why| format!("`{name}` did not start: {why}"))?;

@@ -102,20 +102,21 @@ pub fn boot_with_input(
         .map_err(|error| format!("cannot read the serial log `{}`: {error}", log.display()))?;
     let serial = String::from_utf8_lossy(&bytes).into_owned();
     let outcome = Outcome {
-        ending,
-        transcript: Transcript::read(&serial),
-        serial,
-        log: log.to_path_buf(),
-        image: image.to_path_buf(),
         asked: running.asked(),
         elapsed: running.elapsed(),
         complaints: running.complaints(),
+        ..Outcome::of(ending, serial, log, image)
     };
     if outcome.transcript.verdict().is_err() {
         // QEMU does not say that it could not write.
         files::check_room(log).map_err(|why| format!("the serial log {why}"))?;
     }
     Ok(outcome)
+}
+
+const fn failure(reason: String) -> Fault {
+    let status = Status::Failure;
+    Fault { status, reason }
 }
 
 /// Judges what a guest has printed: no machine line is damaged, the verdict is success, and
@@ -125,10 +126,6 @@ pub fn boot_with_input(
 ///
 /// The first reason why it is not good.
 pub fn judge_lines(transcript: &Transcript) -> Result<(), Fault> {
-    let failure = |reason: String| Fault {
-        status: Status::Failure,
-        reason,
-    };
     let verdict = transcript.verdict().map_err(failure)?;
     if let Some(fault) = transcript.faults.first() {
         return Err(failure(fault.to_string()));
@@ -150,16 +147,26 @@ pub fn judge_lines(transcript: &Transcript) -> Result<(), Fault> {
 }
 
 impl Outcome {
+    /// Takes the log of a guest apart that has ended, without being asked and without complaints.
+    pub(crate) fn of(ending: Ending, serial: String, log: &Path, image: &Path) -> Outcome {
+        Outcome {
+            ending,
+            transcript: Transcript::read(&serial),
+            serial,
+            log: log.into(),
+            image: image.into(),
+            asked: None,
+            elapsed: Duration::ZERO,
+            complaints: String::new(),
+        }
+    }
+
     /// Judges the run by both witnesses.
     ///
     /// # Errors
     ///
     /// The first reason why it is not good.
     pub fn judge(&self) -> Result<(), Fault> {
-        let failure = |reason: String| Fault {
-            status: Status::Failure,
-            reason,
-        };
         // A kernel that ends says so. Its status alone is one that the app has made.
         let is_odd = matches!(self.ending, Ending::Status(status) if status > 1 && status % 2 == 1);
         if (is_odd || matches!(self.ending, Ending::Guest(_)))
@@ -238,91 +245,72 @@ impl Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::Outcome;
-    use crate::protocol::{Status, Transcript};
+    use super::{Fault, Outcome};
+    use crate::protocol::Status;
     use crate::qemu::Ending;
+    use std::path::Path;
     use std::time::Duration;
 
-    const SUCCESS: &str = "{\"kind\":\"verdict\",\"status\":\"success\",\"reason\":\"\"}\n";
+    const VERDICT: &str = "{\"kind\":\"verdict\",\"status\":\"success\",\"reason\":\"\"}\n";
     const USAGE: &str = "{\"kind\":\"verdict\",\"status\":\"usage\",\"reason\":\"`x=1`: no\"}\n";
 
     fn outcome(ending: Ending, serial: &str) -> Outcome {
-        Outcome {
-            ending,
-            serial: serial.into(),
-            transcript: Transcript::read(serial),
-            log: "the.log".into(),
-            image: "the image".into(),
-            asked: None,
-            elapsed: Duration::ZERO,
-            complaints: String::new(),
-        }
-    }
-
-    fn reason(ending: Ending, serial: &str) -> String {
-        outcome(ending, serial).judge().unwrap_err().reason
+        let (log, image) = (Path::new("the.log"), Path::new("the image"));
+        Outcome::of(ending, serial.into(), log, image)
     }
 
     #[test]
-    fn a_run_is_good_only_if_both_witnesses_say_so() {
-        let success = Ending::Guest(Status::Success);
-        assert_eq!(outcome(success.clone(), SUCCESS).judge(), Ok(()));
-        let by_itself =
-            "but the kernel gave no verdict: the app has written to QEMU's exit port itself";
-        assert_eq!(
-            reason(success.clone(), ""),
-            format!("the guest ended in success, {by_itself}")
-        );
-        assert_eq!(
-            reason(Ending::Status(5), "text\n"),
-            format!("QEMU ended with status 5, {by_itself}")
-        );
-        assert_eq!(reason(Ending::Status(1), ""), "QEMU ended with status 1");
-        assert_eq!(
-            reason(success, USAGE),
-            "the verdict line says Usage, QEMU's exit status Success"
-        );
+    fn a_run_is_good_only_if_both_witnesses_say_so_and_nothing_is_damaged() {
+        let success = || Ending::Guest(Status::Success);
+        assert_eq!(outcome(success(), VERDICT).judge(), Ok(()));
         let timed_out = Ending::TimedOut {
             limit: Duration::from_millis(1500),
             load: "the load".into(),
         };
-        assert_eq!(
-            reason(timed_out, SUCCESS),
-            "no end within 1.5 s, QEMU was killed; the load"
-        );
-        assert!(reason(Ending::Status(0), SUCCESS).contains("triple fault"));
-        assert!(reason(Ending::Status(0), "").contains("a program that is not QEMU"));
+        let no_verdict = ", but the kernel gave no verdict: the app has written to";
+        let damaged = format!("{{\"kind\":\n{VERDICT}");
+        let violated = format!("{{\"kind\":\"own\",\"violations\":3}}\n{VERDICT}");
+        let other = "the verdict line says Usage, QEMU's exit status Success";
+        let damage = "serial line 1: column 9: the line ends where a value must stand";
+        for (ending, serial, parts) in [
+            (success(), "", ["the guest ended in success", no_verdict]),
+            (
+                Ending::Status(5),
+                "x\n",
+                ["ended with status 5", no_verdict],
+            ),
+            (Ending::Status(1), "", ["QEMU ended with status 1", ""]),
+            (success(), USAGE, [other, ""]),
+            (
+                timed_out,
+                VERDICT,
+                ["no end within 1.5 s, QEMU was", "; the load"],
+            ),
+            (Ending::Status(0), VERDICT, ["triple fault", ""]),
+            (Ending::Status(0), "", ["a program that is not QEMU", ""]),
+            (success(), &damaged, [damage, ""]),
+            (
+                success(),
+                &violated,
+                ["serial line 1 reports violations", ""],
+            ),
+        ] {
+            let reason = outcome(ending, serial).judge().unwrap_err().reason;
+            assert!(parts.iter().all(|part| reason.contains(part)), "{reason}");
+        }
         let ended = Outcome {
             complaints: "terminating on signal 15 from pid 7".into(),
-            ..outcome(Ending::Status(0), SUCCESS)
+            ..outcome(Ending::Status(0), VERDICT)
         };
         let reason = ended.judge().unwrap_err().reason;
         assert!(reason.starts_with("a signal ended QEMU; QEMU says: terminating"));
     }
 
     #[test]
-    fn damage_and_violations_outweigh_a_verdict_of_success() {
-        let success = || Ending::Guest(Status::Success);
-        assert_eq!(
-            reason(success(), &format!("{{\"kind\":\n{SUCCESS}")),
-            "serial line 1: column 9: the line ends where a value must stand"
-        );
-        assert_eq!(
-            reason(
-                success(),
-                &format!("{{\"kind\":\"own\",\"violations\":3}}\n{SUCCESS}")
-            ),
-            "serial line 1 reports violations in spite of the verdict"
-        );
-    }
-
-    #[test]
     fn a_refused_command_line_is_told_from_a_failure() {
-        let fault = outcome(Ending::Guest(Status::Usage), USAGE)
-            .judge()
-            .unwrap_err();
-        assert_eq!(fault.status, Status::Usage);
-        assert_eq!(fault.reason, "`x=1`: no");
+        let usage = Ending::Guest(Status::Usage);
+        let (status, reason) = (Status::Usage, "`x=1`: no".into());
+        assert_eq!(outcome(usage, USAGE).judge(), Err(Fault { status, reason }));
     }
 
     #[test]

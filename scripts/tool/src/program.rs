@@ -97,9 +97,13 @@ pub fn run_for(
     tail.finish(show);
     let bytes = fs::read(log).map_err(|error| format!("cannot read `{place}`: {error}"))?;
     let serial = String::from_utf8_lossy(&bytes).into_owned();
-    let transcript = Transcript::read(&serial);
-    let ending = match waited {
-        Waited::Ended(status) => ending_of(status, code(&status), &transcript),
+    let mut outcome = Outcome {
+        asked,
+        elapsed: child.elapsed(),
+        ..Outcome::of(Ending::Killed, serial, log, program)
+    };
+    outcome.ending = match waited {
+        Waited::Ended(status) => ending_of(status, code(&status), &outcome.transcript),
         Waited::Killed => Ending::Killed,
         Waited::TimedOut | Waited::GivenUp => Ending::Program(format!(
             "no end within {} s, the program was killed; {}; `--timeout SECONDS` gives it longer",
@@ -107,16 +111,7 @@ pub fn run_for(
             system::host_load()
         )),
     };
-    Ok(Outcome {
-        ending,
-        transcript,
-        serial,
-        log: log.to_path_buf(),
-        image: program.to_path_buf(),
-        asked,
-        elapsed: child.elapsed(),
-        complaints: String::new(),
-    })
+    Ok(outcome)
 }
 
 fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> Ending {

@@ -8,7 +8,6 @@
 
 use std::ffi::OsString;
 use std::fs;
-use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -17,7 +16,7 @@ use crate::files;
 use crate::image;
 use crate::iso;
 use crate::medium::Medium;
-use crate::options::{Command, Parsed, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::qemu::{Loader, Qemu};
 
 /// The table of `image`.
@@ -56,21 +55,11 @@ exit codes: 0 the files are there; 1 one could not be made; 2 a refused command 
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn image(words: &[OsString]) -> ExitCode {
-    let options = match IMAGE.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    let guest_words = match check(&options) {
-        Ok(words) => words,
-        Err(line) => return IMAGE.refuse(&line),
-    };
-    match make(&options, &guest_words) {
-        Ok(lines) => {
-            print!("{lines}");
-            ExitCode::SUCCESS
-        }
-        Err(line) => IMAGE.fail(&line),
-    }
+    IMAGE.carry_out(words, |options| {
+        let guest_words = check(options).map_err(Refusal::Usage)?;
+        print!("{}", make(options, &guest_words)?);
+        Ok(ExitCode::SUCCESS)
+    })
 }
 
 /// Makes sure of everything that can be refused, and returns the words for the guest.
@@ -91,7 +80,7 @@ fn check(options: &Parsed) -> Result<String, String> {
     }
     if !options.is_given("image") {
         let app = options.text("app").unwrap_or_default();
-        image::check_app(app).map_err(|error| error.to_string())?;
+        image::check_app(app)?;
     }
     let words = options.files().map(Path::to_string_lossy);
     let guest_words = words.collect::<Vec<_>>().join(" ");
@@ -110,21 +99,15 @@ fn check(options: &Parsed) -> Result<String, String> {
 fn make(options: &Parsed, words: &str) -> Result<String, String> {
     let image = match options.path("image") {
         Some(path) => path.into(),
-        None => {
-            let built = image::build(options.text("app").unwrap_or_default());
-            built.map_err(|error| error.to_string())?.path
-        }
+        None => image::build(options.text("app").unwrap_or_default())?.path,
     };
     let module = options.path("module");
-    let written = |option: &str, path: &Path, why: io::Error| {
-        let place = files::place(path);
-        format!("`--{option} {place}`: cannot be written: {why}")
-    };
     let mut lines = String::new();
     if let Some(path) = options.path("iso") {
         let made = Medium::new(Loader::Bios, &image, words, module)?;
-        let bytes = fs::copy(made.path(), path).map_err(|why| written("iso", path, why))?;
         let place = files::place(path);
+        let bytes = fs::copy(made.path(), path)
+            .map_err(|why| format!("`--iso {place}`: cannot be written: {why}"))?;
         lines += &format!(
             "{place}: {} KiB that boot under BIOS and UEFI; `cp {place} /dev/DEVICE` writes it to a \
              stick, and what was there is lost\n",
@@ -133,7 +116,7 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
     }
     if let Some(path) = options.path("efi") {
         let made = efi::application(&image, words, module)?;
-        fs::write(path, &made).map_err(|why| written("efi", path, why))?;
+        files::write_named("efi", path, &made)?;
         let place = files::place(path);
         lines += &format!(
             "{place}: {} KiB that boot under UEFI; copy it to {} of a FAT stick\n",

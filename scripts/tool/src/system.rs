@@ -7,9 +7,11 @@ use std::fs;
 use std::io::{self, IsTerminal};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::json::{self, Value};
 
 /// Returns the root of the workspace: as `scripts/tool/start` says, or else where this tool
 /// was built, which is another place once the workspace has been moved.
@@ -44,6 +46,22 @@ pub fn cargo() -> Command {
     let mut command = Command::new(program);
     command.current_dir(workspace());
     command
+}
+
+/// Runs cargo, whose errors go to standard error as they come, and returns the messages that it
+/// prints as JSON, and why it failed if it did.
+pub(crate) fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String>) {
+    let output = match cargo.stdin(Stdio::null()).stderr(Stdio::inherit()).output() {
+        Ok(output) => output,
+        Err(error) => return (Vec::new(), Err(format!("cannot start cargo: {error}"))),
+    };
+    let said = String::from_utf8_lossy(&output.stdout);
+    let messages = said.lines().filter_map(|line| json::parse(line).ok());
+    let ended = match output.status.success() {
+        true => Ok(()),
+        false => Err("see cargo's errors above".into()),
+    };
+    (messages.collect(), ended)
 }
 
 /// Returns where a program lies: a path that is one itself, or a name found

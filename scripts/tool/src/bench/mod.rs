@@ -23,7 +23,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use crate::lasting::Lasting;
-use crate::options::{Choice, Command, Menu, Parsed};
+use crate::options::{Choice, Command, Menu, Parsed, Refusal};
 
 static BENCH: Menu = Menu {
     invocation: "./scripts/bench",
@@ -80,17 +80,9 @@ fn by_plan<Plan>(
     plan: impl Fn(&Parsed) -> Result<Plan, String>,
     measure: impl Fn(&Plan) -> Result<bool, String>,
 ) -> ExitCode {
-    let options = match table.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    let plan = match plan(&options) {
-        Ok(plan) => plan,
-        Err(line) => return table.refuse(&line),
-    };
-    match measure(&plan) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(line) => table.fail(&line),
-    }
+    table.carry_out(words, |options| {
+        let plan = plan(options).map_err(Refusal::Usage)?;
+        let is_good = measure(&plan)?;
+        Ok(ExitCode::from(u8::from(!is_good)))
+    })
 }

@@ -10,9 +10,10 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
+use super::by_plan;
 use super::code::{self, Frames};
 use crate::image;
-use crate::options::{Command, Takes, options};
+use crate::options::{Command, Parsed, Takes, options};
 use crate::places::Frame;
 use crate::system;
 
@@ -38,24 +39,16 @@ const LIBRARY: &str = "the library, and what drops values";
 
 /// Weighs, and prints.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    let options = match TABLE.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
+    let app = |options: &Parsed| {
+        let app = options.text("app").unwrap_or_default();
+        image::check_app(app).map(|()| app.to_string())
     };
-    let app = options.text("app").unwrap_or_default();
-    if let Err(error) = image::check_app(app) {
-        return TABLE.refuse(&error.to_string());
-    }
-    match weigh(app) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(line) => TABLE.fail(&line),
-    }
+    by_plan(&TABLE, words, app, |app| weigh(app))
 }
 
 /// Prints what the parts of an app's image take, and returns whether all are within its limit.
 fn weigh(app: &str) -> Result<bool, String> {
-    let image = image::build(app).map_err(|error| error.to_string())?;
+    let image = image::build(app)?;
     let stripped = image.stripped_bytes()?;
     let addresses: Vec<u64> = code::instructions(&image.path)?.into_keys().collect();
     let mut parts = parts(&addresses, &code::frames(&image.path, &addresses)?);

@@ -115,58 +115,46 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::{Format, name_of, parse, rd_gen, stg};
+    use crate::random::Random;
     use crate::system::workspace;
     use dag_file::{DagFile, Malformed, is_name};
     use std::path::Path;
 
     #[test]
     fn every_file_name_becomes_a_name_and_its_ending_tells_the_format() {
-        for (file, name) in [
-            ("a/gnp_01.yaml", "gnp_01"),
-            ("a b.yaml", "a_b"),
-            ("#h.yaml", "_#h"),
-            ("->.yaml", "_->"),
-            ("{x.yaml", "_{x"),
-            ("a\u{1b}\u{202e}b.yaml", "a__b"),
+        for (file, name, format) in [
+            ("a/gnp_01.yaml", "gnp_01", Some(Format::RdGen)),
+            ("a b.Yml", "a_b", Some(Format::RdGen)),
+            ("#h.YAML", "_#h", Some(Format::RdGen)),
+            ("->.dag", "_->", Some(Format::Ours)),
+            ("{x.JSON", "_{x", Some(Format::TaskGraphs)),
+            ("a\u{1b}\u{202e}b.txt", "a__b", None),
+            ("yaml", "yaml", None),
         ] {
             assert_eq!(name_of(Path::new(file)), name);
             assert!(is_name(name), "{name}");
-        }
-        for (file, format) in [
-            ("x.dag", Some(Format::Ours)),
-            ("G.YAML", Some(Format::RdGen)),
-            ("g.Yml", Some(Format::RdGen)),
-            ("S.JSON", Some(Format::TaskGraphs)),
-            ("x.txt", None),
-            ("yaml", None),
-        ] {
             assert_eq!(Format::of(Path::new(file)), format, "{file}");
         }
     }
 
     /// Changes, drops or repeats a part of a text, differently for each number.
     fn damaged(text: &str, number: u64) -> String {
-        // Two steps of a linear congruential generator (Knuth's MMIX).
-        let next = |state: u64| {
-            state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407)
+        let mut random = Random::new(number);
+        let mut below = |most: usize| {
+            let drawn = random.within(0, most as u64 - 1);
+            usize::try_from(drawn).expect("less than that")
         };
-        let (one, other) = (next(number), next(next(number)));
-        let below =
-            |number: u64, most: usize| usize::try_from(number >> 33).unwrap_or(0) % most.max(1);
-        let from = below(one, text.len());
-        let to = (from + below(other, 12)).min(text.len());
-        match number % 4 {
-            0 => format!("{}{}", &text[..from], &text[to..]),
-            1 => format!("{}{}{}", &text[..to], &text[from..to], &text[to..]),
-            2 => format!(
-                "{}{}{}",
-                &text[..from],
-                ["-", "#", "\n", "9", " ", "'"][below(other, 6)],
-                &text[from..]
-            ),
-            _ => text[..from].into(),
+        let from = below(text.len());
+        let to = (from + below(12)).min(text.len());
+        let (before, part, rest) = (&text[..from], &text[from..to], &text[to..]);
+        match below(4) {
+            0 => [before, rest].concat(),
+            1 => [before, part, part, rest].concat(),
+            2 => {
+                let other = ["-", "#", "\n", "9", " ", "'"][below(6)];
+                [before, other, part, rest].concat()
+            }
+            _ => before.into(),
         }
     }
 
@@ -176,31 +164,29 @@ mod tests {
         let yaml = std::fs::read_to_string(data.join("rd-gen/chain_03.yaml")).unwrap();
         let json = r#"{"graphs":[{"name":"g","c":[0,3,4,0],"edges":[[0,1],[1,2],[2,3]],"optimal":{"2":7}}]}"#;
         let ours = rd_gen::read(&yaml, "x", 1000).unwrap().to_string();
-        let in_file = |faults: &[Malformed], text: &str, number: u64| {
-            let lines = text.lines().count() + 1;
-            let is_in = |fault: &Malformed| (1..=lines).contains(&fault.line);
-            assert!(faults.iter().all(is_in), "damage {number}: {faults:?}");
-        };
-        // What is accepted here is written for the guest, whose reader is ours.
-        let by_guest = |file: &DagFile, number: u64| {
-            let refused = parse(&file.to_string()).err();
-            assert_eq!(refused, None, "damage {number}:\n{file}");
-        };
+        type Read = fn(&str) -> Result<DagFile, Vec<Malformed>>;
+        let readers: [(&str, Read); 3] = [
+            (&yaml, |text| rd_gen::read(text, "x", 1000)),
+            (&ours, |text| parse(text).map_err(|fault| vec![fault])),
+            (json, |text| {
+                stg::read(text, None, 1000).map_err(|fault| vec![fault])
+            }),
+        ];
         for number in 0..4000 {
-            let text = damaged(&yaml, number);
-            match rd_gen::read(&text, "x", 1000) {
-                Ok(file) => by_guest(&file, number),
-                Err(faults) => in_file(&faults, &text, number),
-            }
-            let text = damaged(&ours, number);
-            match parse(&text) {
-                Ok(file) => by_guest(&file, number),
-                Err(fault) => in_file(&[fault], &text, number),
-            }
-            let text = damaged(json, number);
-            match stg::read(&text, None, 1000) {
-                Ok(file) => by_guest(&file, number),
-                Err(fault) => in_file(&[fault], &text, number),
+            for (text, read) in readers {
+                let text = damaged(text, number);
+                match read(&text) {
+                    // What is accepted here is written for the guest, whose reader is ours.
+                    Ok(file) => {
+                        let refused = parse(&file.to_string()).err();
+                        assert_eq!(refused, None, "damage {number}:\n{file}");
+                    }
+                    Err(faults) => {
+                        let lines = 1..=text.lines().count() + 1;
+                        let is_in = |fault: &Malformed| lines.contains(&fault.line);
+                        assert!(faults.iter().all(is_in), "damage {number}: {faults:?}");
+                    }
+                }
             }
         }
     }

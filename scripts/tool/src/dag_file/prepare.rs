@@ -69,9 +69,7 @@ impl Prepared {
     /// In words: it cannot be written.
     pub fn write_module(&mut self, before: &str) -> Result<(), String> {
         let module = system::new_log("dag-file")?.with_extension("dag");
-        let written = fs::write(&module, format!("{before}{}", self.file));
-        let written =
-            written.map_err(|error| format!("cannot write `{}`: {error}", module.display()));
+        let written = files::write(&module, format!("{before}{}", self.file));
         self.module = Some(module);
         written
     }
@@ -100,22 +98,16 @@ impl Drop for Prepared {
 /// Lines for people: what is wrong with the options or with the file.
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     let Some(path) = options.path("dag") else {
-        let lonely = COMPANIONS.iter().find(|name| options.is_given(name));
-        return lonely.map_or(Ok(None), |name| {
+        return options.given_of(&COMPANIONS).map_or(Ok(None), |name| {
             Err(vec![format!(
                 "`--{name}` needs `--dag FILE`; give that, too"
             )])
         });
     };
     let refuse = |line: String| vec![line];
-    if options.is_given("app") {
-        let line = "`--app` and `--dag` exclude each other; give one".to_string();
-        return Err(refuse(line));
-    }
-    if options.is_given("jobs") && options.is_given("seconds") {
-        let line = "`--jobs` and `--seconds` exclude each other; give one".to_string();
-        return Err(refuse(line));
-    }
+    let apart = [("app", "dag"), ("jobs", "seconds")];
+    let apart = apart.map(|(one, other)| (one, other, "exclude each other"));
+    options.check_apart(&apart).map_err(refuse)?;
     if options.number("jobs") == Some(0) {
         let line = "`--jobs 0` has no end, which is for fork-join; with `--dag` give at least 1";
         return Err(refuse(line.into()));
@@ -271,20 +263,10 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST_S, clusters, limit_s, memory_mib, prepare};
+    use super::{MOST_S, limit_s, memory_mib, prepare};
     use crate::run::RUN;
     use crate::system::workspace;
     use dag_file::{DagFile, Length, parse};
-    use sched_dag::Clusters;
-
-    #[test]
-    fn clusters_are_numbers_of_cores_or_left_to_the_commit() {
-        assert_eq!(clusters(None), Ok(Clusters::Undivided));
-        assert_eq!(clusters(Some("auto")), Ok(Clusters::Undivided));
-        assert_eq!(clusters(Some("1,3")), Ok(Clusters::Of(vec![1, 3])));
-        let refused = clusters(Some("1,two")).unwrap_err();
-        assert!(refused.contains("as in 2,2, or auto"), "{refused}");
-    }
 
     fn file(subtasks: usize) -> DagFile {
         let subtasks = (0..subtasks).map(|number| format!("subtask s{number} wcet 1ms\n"));
@@ -306,33 +288,30 @@ mod tests {
     }
 
     #[test]
-    fn memory_grows_with_subtasks_records_and_cores() {
-        let usual = memory_mib(&file(20), Length::Jobs(50), 8);
-        assert!(usual <= 32, "{usual}");
+    fn memory_grows_with_subtasks_records_cores_and_the_file_itself() {
+        let of = |subtasks, jobs, cores| memory_mib(&file(subtasks), Length::Jobs(jobs), cores);
+        let (usual, long) = (of(20, 50, 8), of(20, 1_000_000, 8));
+        assert!(usual <= 32 && of(20, 50, 64) > 2 * usual, "{usual}");
         // A quarter of it holds 10,000 stacks of 64 KiB.
-        assert!(memory_mib(&file(10_000), Length::Jobs(1), 1) >= 4 * 625);
-        let long = memory_mib(&file(20), Length::Jobs(1_000_000), 8);
-        assert!(long > 21 * 200, "{long}");
-        assert!(memory_mib(&file(20), Length::Jobs(50), 64) > 2 * usual);
-        assert!(memory_mib(&file(1), Length::Jobs(u64::MAX), 8) > long);
+        assert!(of(10_000, 1, 1) >= 4 * 625);
+        assert!(long > 21 * 200 && of(1, u64::MAX, 8) > long, "{long}");
+        let samples = vec!["1us"; 2_000_000].join(",");
+        let text = format!("dag x period 1s\nsubtask a wcet 1ms samples {samples}\nend");
+        let many = memory_mib(&parse(&text).unwrap(), Length::Jobs(1), 8);
+        // Measured: a heap of 34 MB at its peak, besides the text of 8 MB.
+        assert!((64..512).contains(&many), "{many}");
     }
 
     #[test]
-    fn the_limit_has_room_for_real_time() {
+    fn the_limit_has_room_for_real_time_and_is_a_day_at_most_if_nobody_says_how_long() {
         assert_eq!(limit_s(&file(1), Length::Jobs(101)), 120 + 100);
         assert!(limit_s(&file(1), Length::Jobs(u64::MAX)) > MOST_S);
         // DAGs of a set run side by side, sets one after the other.
         let dag = |name: &str| format!("dag {name} period 10s\nsubtask a wcet 1s\n");
         let text = format!("set one\n{}{}set two\n{}end", dag("x"), dag("y"), dag("z"));
-        let file = parse(&text).unwrap();
-        assert_eq!(
-            limit_s(&file, Length::Jobs(11)),
-            120 + (100 + 22) + (100 + 11)
-        );
-    }
+        let of_sets = limit_s(&parse(&text).unwrap(), Length::Jobs(11));
+        assert_eq!(of_sets, 120 + (100 + 22) + (100 + 11));
 
-    #[test]
-    fn a_run_of_more_than_a_day_is_refused_if_nobody_says_how_long() {
         let name = format!("century-{}.dag", std::process::id());
         let path = std::env::temp_dir().join(name);
         std::fs::write(&path, "dag x period 3153600000s\nsubtask a wcet 1ms\nend\n").unwrap();
@@ -344,14 +323,5 @@ mod tests {
         assert!(prepared("--jobs 2 --timeout 60").is_ok());
         assert!(prepared("--jobs 2 --print-dag").is_ok());
         std::fs::remove_file(path).unwrap();
-    }
-
-    #[test]
-    fn memory_grows_with_the_file_itself() {
-        let samples = vec!["1us"; 2_000_000].join(",");
-        let text = format!("dag x period 1s\nsubtask a wcet 1ms samples {samples}\nend");
-        let many = memory_mib(&parse(&text).unwrap(), Length::Jobs(1), 8);
-        // Measured: a heap of 34 MB at its peak, besides the text of 8 MB.
-        assert!((64..512).contains(&many), "{many}");
     }
 }

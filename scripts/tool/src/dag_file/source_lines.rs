@@ -55,32 +55,26 @@ mod tests {
     use dag_file::parse;
     use std::path::Path;
 
+    /// What the guest says, and what the person is told.
+    const SAID: &str = r"DAG file, line 1: late; drop it | f.dag:3: late; drop it
+DAG file, line 2: a | f.dag:5: a
+DAG file, line 4: a | f.dag:8: a
+DAG file, line 1: a: b; c; line 6: d | f.dag:3: a: b; c\nf.dag:9: d
+DAG file, line 99: a | f.dag: a
+DAG file: too large | f.dag: too large";
+
     #[test]
     fn the_guests_lines_become_those_of_the_file() {
         let text = "# one\n\ndag x period 1s\n# two\nsubtask a wcet 1ms\nsubtask b wcet 1ms\n\n\
                     edge a -> b\ndag y period 1s\nsubtask a wcet 1ms\nend";
         let file = parse(text).unwrap();
-        assert!(
-            file.to_string().starts_with("dag x "),
-            "the guest's has no comments"
-        );
-        for (said, expected) in [
-            (
-                "DAG file, line 1: late; drop it",
-                Some("f.dag:3: late; drop it"),
-            ),
-            ("DAG file, line 2: a", Some("f.dag:5: a")),
-            ("DAG file, line 4: a", Some("f.dag:8: a")),
-            (
-                "DAG file, line 1: a: b; c; line 6: d",
-                Some("f.dag:3: a: b; c\nf.dag:9: d"),
-            ),
-            ("DAG file, line 99: a", Some("f.dag: a")),
-            ("DAG file: too large", Some("f.dag: too large")),
-            ("`jbos` is no option", None),
-        ] {
-            let found = translate(said, Path::new("f.dag"), &file);
-            assert_eq!(found.as_deref(), expected, "{said}\n{file}");
+        // The guest's has no comments.
+        assert!(file.to_string().starts_with("dag x "));
+        let told = |said: &str| translate(said, Path::new("f.dag"), &file);
+        for row in SAID.lines() {
+            let (said, expected) = row.split_once(" | ").expect(row);
+            assert_eq!(told(said), Some(expected.replace(r"\n", "\n")), "{said}");
         }
+        assert_eq!(told("`jbos` is no option"), None);
     }
 }

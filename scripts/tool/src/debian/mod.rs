@@ -14,7 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::files::Temporary;
+use crate::files::{Temporary, write};
 use crate::install;
 use crate::lasting::Lasting;
 use crate::qemu::{Mode, PROGRAM};
@@ -78,7 +78,7 @@ impl Guest {
         let console = log.with_extension("console");
         let files = order.pack(&packages)?;
         write(&own.with_extension("cpio"), files.finish())?;
-        write(&own.with_extension("end"), Vec::new())?;
+        write(&own.with_extension("end"), "")?;
         let mut words: Vec<OsString> = Vec::new();
         let accelerator: &[&str] = match order.mode {
             Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
@@ -219,8 +219,4 @@ fn file(before: &str, path: &Path) -> OsString {
 
 fn read(path: &Path) -> Result<Vec<u8>, String> {
     fs::read(path).map_err(|why| format!("cannot read `{}`: {why}", path.display()))
-}
-
-fn write(path: &Path, bytes: Vec<u8>) -> Result<(), String> {
-    fs::write(path, bytes).map_err(|why| format!("cannot write `{}`: {why}", path.display()))
 }

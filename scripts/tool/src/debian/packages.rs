@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::run;
+use crate::files;
 use crate::lasting::Lasting;
 use crate::system::{self, find_program};
 
@@ -48,8 +49,7 @@ impl Packages {
         let (root, ready) = (folder.join("root"), folder.join("kernel"));
         if !ready.is_file() {
             let kernel = fetch(&folder)?;
-            fs::write(&ready, kernel)
-                .map_err(|why| format!("cannot write `{}`: {why}", ready.display()))?;
+            files::write(&ready, kernel)?;
         }
         let kernel = fs::read_to_string(&ready)
             .map_err(|why| format!("cannot read `{}`: {why}", ready.display()))?;
@@ -124,8 +124,7 @@ fn fetch(folder: &Path) -> Result<String, String> {
     };
     let sources = line("trixie") + &line("trixie-backports");
     for (name, text) in [("sources.list", sources.as_str()), ("status", "")] {
-        fs::write(folder.join(name), text)
-            .map_err(|why| format!("cannot write `{}`: {why}", folder.join(name).display()))?;
+        files::write(&folder.join(name), text)?;
     }
     run(apt("apt-get", folder).arg("update"))?;
     let names = run(apt("apt-cache", folder).args(["pkgnames", "linux-image-"]))?;

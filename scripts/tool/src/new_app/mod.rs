@@ -22,6 +22,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::options::{Parsed, Refusal};
 use crate::system;
 
 pub use name::check;
@@ -56,45 +57,28 @@ const FILES: &[AppFile] = &[
     ),
 ];
 
-/// Why there is no new app.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum NewAppError {
-    /// The name cannot be used: exit code 2.
-    Name(String),
-    /// The files cannot be written: exit code 1.
-    Files(String),
-}
-
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn new_app(words: &[OsString]) -> ExitCode {
-    let options = match NEW_APP.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
+    NEW_APP.carry_out(words, |options| {
+        print!("{}", make(options)?);
+        Ok(ExitCode::SUCCESS)
+    })
+}
+
+/// Makes the app, and returns what to do with it.
+fn make(options: &Parsed) -> Result<String, Refusal> {
+    let usage = |line: &str| Err(Refusal::Usage(line.into()));
     let Some(name) = options.positional() else {
-        return NEW_APP.refuse("which name? give one, such as `./scripts/new-app brake-assist`");
+        return usage("which name? give one, such as `./scripts/new-app brake-assist`");
     };
-    let made = match (options.path("out"), options.text("git")) {
-        (None, Some(_)) => {
-            return NEW_APP.refuse("`--git` is for a repository; add its folder, `--out DIR`");
-        }
+    match (options.path("out"), options.text("git")) {
+        (None, Some(_)) => usage("`--git` is for a repository; add its folder, `--out DIR`"),
         (None, None) => create(system::workspace(), name).map(|_| next_steps(name)),
         (Some(out), git) => {
-            let source = match git {
-                Some(url) => Source::Git(url),
-                None => Source::Folder(system::workspace()),
-            };
+            let source = git.map_or(Source::Folder(system::workspace()), Source::Git);
             create_repository(out, name, source).map(|()| repository::next_steps(out, source))
         }
-    };
-    match made {
-        Ok(lines) => {
-            print!("{lines}");
-            ExitCode::SUCCESS
-        }
-        Err(NewAppError::Name(line)) => NEW_APP.refuse(&line),
-        Err(NewAppError::Files(line)) => NEW_APP.fail(&line),
     }
 }
 
@@ -103,8 +87,8 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
 /// # Errors
 ///
 /// The name is refused, or a file cannot be written; nothing is left then.
-pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, NewAppError> {
-    check(workspace, name).map_err(NewAppError::Name)?;
+pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, Refusal> {
+    check(workspace, name).map_err(Refusal::Usage)?;
     let folder = workspace.join("apps").join(name);
     let files = [MANIFEST].into_iter().chain(FILES.iter().copied());
     // Another command has been as quick.
@@ -126,20 +110,20 @@ fn write_folder(
     files: impl Iterator<Item = AppFile>,
     change: impl Fn(&str) -> String,
     taken: impl Fn() -> String,
-) -> Result<(), NewAppError> {
+) -> Result<(), Refusal> {
     let failed = |error| format!("cannot write `{}`: {error}", folder.display());
     if let Some(parent) = folder.parent() {
-        fs::create_dir_all(parent).map_err(|error| NewAppError::Files(failed(error)))?;
+        fs::create_dir_all(parent).map_err(|error| Refusal::Failure(failed(error)))?;
     }
     fs::create_dir(folder).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => NewAppError::Name(taken()),
-        _ => NewAppError::Files(failed(error)),
+        ErrorKind::AlreadyExists => Refusal::Usage(taken()),
+        _ => Refusal::Failure(failed(error)),
     })?;
     write_all(folder, name, files, change).map_err(|line| {
         // What cannot be written can perhaps not be removed either; the line
         // names the place.
         let _ = fs::remove_dir_all(folder);
-        NewAppError::Files(line)
+        Refusal::Failure(line)
     })
 }
 
@@ -185,7 +169,7 @@ apps/{name} is there:
 
 #[cfg(test)]
 mod tests {
-    use super::{FILES, MANIFEST, NewAppError, PLACEHOLDER, create};
+    use super::{FILES, MANIFEST, PLACEHOLDER, Refusal, create};
     use std::fs;
 
     #[test]
@@ -205,7 +189,7 @@ mod tests {
             "all but build.rs and the program for Linux have the app's name"
         );
         let again = create(&workspace, "brake-assist").unwrap_err();
-        let NewAppError::Name(line) = again else {
+        let Refusal::Usage(line) = again else {
             panic!("{again:?}");
         };
         assert_eq!(
@@ -240,7 +224,7 @@ mod tests {
         fs::create_dir_all(&workspace).unwrap();
         // A file where a folder has to be.
         fs::write(workspace.join("apps"), "").unwrap();
-        let NewAppError::Files(line) = create(&workspace, "brake-assist").unwrap_err() else {
+        let Refusal::Failure(line) = create(&workspace, "brake-assist").unwrap_err() else {
             panic!("a file has become a folder");
         };
         assert!(line.starts_with("cannot write `"), "{line}");

@@ -8,7 +8,8 @@ use std::path::Path;
 
 use replay::shown::quoted;
 
-use super::{AppFile, FILES, NewAppError, name, write_folder};
+use super::{AppFile, FILES, name, write_folder};
+use crate::options::Refusal;
 
 /// Where a repository's app has the crates from, and cargo its runner.
 #[derive(Clone, Copy, Debug)]
@@ -61,13 +62,13 @@ const OWN_FILES: [AppFile; 6] = [
 /// # Errors
 ///
 /// The name or the folder is refused, or a file cannot be written; nothing is left then.
-pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(), NewAppError> {
-    name::check_word(name).map_err(NewAppError::Name)?;
+pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(), Refusal> {
+    name::check_word(name).map_err(Refusal::Usage)?;
     if PACKAGES
         .iter()
         .any(|package| package.replace("fass/", "").replace('/', "-") == name)
     {
-        return Err(NewAppError::Name(format!(
+        return Err(Refusal::Usage(format!(
             "{} cannot be an app's name: it is that of a package that the app needs; choose another",
             quoted(name)
         )));
@@ -76,13 +77,13 @@ pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(
     let change = match source {
         Source::Git(url) if url.contains(['"', '\\', '\n']) => {
             let line = format!("`--git {}`: no URL has such a character", quoted(url));
-            return Err(NewAppError::Name(line));
+            return Err(Refusal::Usage(line));
         }
         Source::Folder(root) => match root.to_str().filter(|root| !root.contains(['"', '\\'])) {
             Some(root) => from_folder(root),
             None => {
                 let line = format!("{shown}: cargo cannot name the folder of these commands");
-                return Err(NewAppError::Files(line));
+                return Err(Refusal::Failure(line));
             }
         },
         Source::Git(url) => from_git(url),
@@ -148,7 +149,7 @@ git init                # docs/guide.md goes on from here
 #[cfg(test)]
 mod tests {
     use super::{Source, create_repository};
-    use crate::new_app::NewAppError;
+    use crate::new_app::Refusal;
     use crate::system::workspace;
     use std::fs;
     use std::path::{Path, PathBuf};
@@ -230,7 +231,7 @@ mod tests {
             (out.join("new"), "Brake", "'B' is in it; "),
         ] {
             let refused = create_repository(&out, name, Source::Git("https://example.org"));
-            let Err(NewAppError::Name(line)) = refused else {
+            let Err(Refusal::Usage(line)) = refused else {
                 panic!("{name} is made: {refused:?}");
             };
             assert!(line.contains(part), "{line}");

@@ -27,6 +27,8 @@ use replay::shown::quoted;
 
 pub use menu::{Choice, Menu};
 pub use parsed::Parsed;
+pub(crate) use read::BY_PERSON;
+pub use read::Refusal;
 pub use sched_dag::nearest;
 
 /// A subcommand of the tool.

@@ -94,6 +94,28 @@ impl Parsed {
         Ok(())
     }
 
+    /// Makes sure that of each pair of options at most one is given.
+    ///
+    /// # Errors
+    ///
+    /// In words, with both and what they do, such as to exclude each other.
+    pub fn check_apart(&self, pairs: &[(&str, &str, &str)]) -> Result<(), String> {
+        let both =
+            |(one, other, _): &&(&str, &str, &str)| self.is_given(one) && self.is_given(other);
+        match pairs.iter().find(both) {
+            Some((one, other, do_what)) => {
+                Err(format!("`--{one}` and `--{other}` {do_what}; give one"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the first of these options that is given.
+    #[must_use]
+    pub fn given_of<'n>(&self, names: &[&'n str]) -> Option<&'n str> {
+        names.iter().copied().find(|name| self.is_given(name))
+    }
+
     /// Returns the same command line with another value of an option, as if the
     /// person had given it.
     #[must_use]

@@ -1,4 +1,4 @@
-//! From a command line to work, or to the exit code that ends the tool: the part that
+//! From a command line to work, and to the exit code that ends the tool: the part that
 //! is the same for all commands.
 
 use std::ffi::OsString;
@@ -8,7 +8,42 @@ use replay::shown::visible;
 
 use super::{Command, Parsed, Request};
 
+/// The exit code of a run that a person has ended before its time, as a shell has it for ctrl-C.
+pub(crate) const BY_PERSON: u8 = 130;
+
+/// Why a command's work has come to nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// The command line, or a file that it names, is at fault: exit code 2.
+    Usage(String),
+    /// Something else is: exit code 1.
+    Failure(String),
+    /// A person has ended a run before others that were to follow: exit code [`BY_PERSON`].
+    ByPerson,
+}
+
+impl From<String> for Refusal {
+    fn from(lines: String) -> Refusal {
+        Refusal::Failure(lines)
+    }
+}
+
 impl Command {
+    /// Does the work that a command line asks for, and returns the exit code. What is refused,
+    /// or failed, is said here.
+    pub(crate) fn carry_out(
+        &self,
+        words: &[OsString],
+        work: impl FnOnce(&Parsed) -> Result<ExitCode, Refusal>,
+    ) -> ExitCode {
+        match self.read(words).map(|options| work(&options)) {
+            Err(code) | Ok(Ok(code)) => code,
+            Ok(Err(Refusal::Usage(lines))) => self.refuse(&lines),
+            Ok(Err(Refusal::Failure(lines))) => self.fail(&lines),
+            Ok(Err(Refusal::ByPerson)) => ExitCode::from(BY_PERSON),
+        }
+    }
+
     /// Returns the options that a command line gives. Help, and what is wrong with the
     /// command line, are shown here.
     ///

@@ -28,7 +28,7 @@ use std::process::ExitCode;
 use replay::lines::Malformed;
 
 use crate::files;
-use crate::options::{Choice, Command, Menu};
+use crate::options::{Choice, Command, Menu, Refusal};
 use crate::progress::Progress;
 
 /// One kind of reference file: how to read its cases and how to check one.
@@ -102,28 +102,23 @@ pub fn oracle(words: &[OsString]) -> ExitCode {
 }
 
 fn run_files<Case>(kind: &Kind<Case>, words: &[OsString]) -> ExitCode {
-    let options = match kind.table.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    let cases = match read(options.files(), kind.parse) {
-        Ok(cases) => cases,
-        Err(line) => return kind.table.refuse(&line),
-    };
-    let mut failed = 0_usize;
-    let mut progress = Progress::new(cases.len() as u64, "cases");
-    for (over, case) in (1..).zip(&cases) {
-        let checked = (kind.check)(case);
-        progress.show(over);
-        if let Err(difference) = checked {
-            failed += 1;
-            progress.end();
-            println!("{}: {difference}", (kind.name)(case));
+    kind.table.carry_out(words, |options| {
+        let cases = read(options.files(), kind.parse).map_err(Refusal::Usage)?;
+        let mut failed = 0_usize;
+        let mut progress = Progress::new(cases.len() as u64, "cases");
+        for (over, case) in (1..).zip(&cases) {
+            let checked = (kind.check)(case);
+            progress.show(over);
+            if let Err(difference) = checked {
+                failed += 1;
+                progress.end();
+                println!("{}: {difference}", (kind.name)(case));
+            }
         }
-    }
-    progress.end();
-    println!("{} passed, {failed} failed", cases.len() - failed);
-    ExitCode::from(u8::from(failed > 0))
+        progress.end();
+        println!("{} passed, {failed} failed", cases.len() - failed);
+        Ok(ExitCode::from(u8::from(failed > 0)))
+    })
 }
 
 /// Reads the cases of all files, of which there must be one.

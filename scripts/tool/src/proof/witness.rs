@@ -1,6 +1,5 @@
 //! The witnesses of a guest's bounds, in files for `./scripts/check-witness`.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use sched_dag::analysis;
@@ -19,10 +18,8 @@ pub fn write(path: &Path, commits: &[Commit]) -> Result<String, String> {
     for commit in commits {
         let path = file(path, commit.number);
         let text = analysis::witness(&commit.task_set, &commit.settings);
-        let name = files::place(&path);
-        fs::write(&path, text)
-            .map_err(|error| format!("`--witness {name}`: cannot be written: {error}"))?;
-        names.push(name);
+        files::write_named("witness", &path, text)?;
+        names.push(files::place(&path));
     }
     match names.join(" ") {
         none if none.is_empty() => Err("the guest has committed no DAG".into()),

@@ -1,48 +1,26 @@
 //! What brings the image into the guest's memory: QEMU itself, or a firmware, with GRUB or
 //! without.
 
-use std::fmt;
-
 use super::LEAST_MEMORY_MIB;
 
 /// Where Debian's package `ovmf` has its firmware.
 pub const OVMF_FILE: &str = "/usr/share/ovmf/OVMF.fd";
 
-/// What brings the image into the guest's memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Loader {
-    /// QEMU's `-kernel`: the image is there at the reset.
-    Pvh,
-    /// GRUB, started by QEMU's BIOS from a stick.
-    Bios,
-    /// GRUB, started from a stick by UEFI.
-    Uefi,
-    /// An application of our own, started from a stick by UEFI.
-    Efi,
+named! {
+    /// What brings the image into the guest's memory.
+    Loader {
+        /// QEMU's `-kernel`: the image is there at the reset.
+        Pvh = "pvh",
+        /// GRUB, started by QEMU's BIOS from a stick.
+        Bios = "bios",
+        /// GRUB, started from a stick by UEFI.
+        Uefi = "uefi",
+        /// An application of our own, started from a stick by UEFI.
+        Efi = "efi",
+    }
 }
 
 impl Loader {
-    /// The words for [`Loader`] on command lines.
-    pub const NAMES: &[&str] = &["pvh", "bios", "uefi", "efi"];
-
-    /// Returns the loader of that name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Loader> {
-        let all = [Loader::Pvh, Loader::Bios, Loader::Uefi, Loader::Efi];
-        all.into_iter().find(|loader| loader.name() == name)
-    }
-
-    /// Returns the loader's name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Loader::Pvh => "pvh",
-            Loader::Bios => "bios",
-            Loader::Uefi => "uefi",
-            Loader::Efi => "efi",
-        }
-    }
-
     /// Reports whether it loads from a stick, by the firmware of a PC.
     #[must_use]
     pub fn needs_stick(self) -> bool {
@@ -68,11 +46,5 @@ impl Loader {
             Loader::Pvh | Loader::Bios => LEAST_MEMORY_MIB,
             Loader::Uefi | Loader::Efi => 96,
         }
-    }
-}
-
-impl fmt::Display for Loader {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }

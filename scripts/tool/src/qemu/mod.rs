@@ -10,13 +10,15 @@
 //! drops bytes. The guest ends its run by writing to the port of QEMU's
 //! `isa-debug-exit` device, see [`Ending`]. Input to the serial port comes from us by a pipe.
 
+#[macro_use]
+mod named;
+
 mod loader;
 mod machine;
 mod process;
 mod second;
 
 use std::ffi::OsString;
-use std::fmt;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -37,38 +39,19 @@ pub const LEAST_MEMORY_MIB: u64 = 16;
 /// The most processors that a guest gets.
 pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
 
-/// What time means in the guest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Real cores in real time, by the host's virtualization.
-    Kvm,
-    /// One instruction is one virtual nanosecond; every run is the same.
-    Deterministic,
-    /// Emulated cores in real time, one host thread each.
-    Threads,
+named! {
+    /// What time means in the guest.
+    Mode {
+        /// Real cores in real time, by the host's virtualization.
+        Kvm = "kvm",
+        /// One instruction is one virtual nanosecond; every run is the same.
+        Deterministic = "deterministic",
+        /// Emulated cores in real time, one host thread each.
+        Threads = "threads",
+    }
 }
 
 impl Mode {
-    /// The words for [`Mode`] on command lines.
-    pub const NAMES: &[&str] = &["kvm", "deterministic", "threads"];
-
-    /// Returns the mode of that name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Mode> {
-        let all = [Mode::Kvm, Mode::Deterministic, Mode::Threads];
-        all.into_iter().find(|mode| mode.name() == name)
-    }
-
-    /// Returns the mode's name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Mode::Kvm => "kvm",
-            Mode::Deterministic => "deterministic",
-            Mode::Threads => "threads",
-        }
-    }
-
     /// Says in one sentence what a time printed in this mode is worth.
     #[must_use]
     pub fn meaning(self) -> &'static str {
@@ -104,12 +87,6 @@ impl Mode {
             ],
             Mode::Threads => &["-accel", "tcg,thread=multi", "-cpu", "max"],
         }
-    }
-}
-
-impl fmt::Display for Mode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }
 
@@ -303,98 +280,82 @@ mod tests {
     use std::ffi::OsStr;
     use std::path::Path;
 
-    fn line(qemu: &Qemu) -> String {
-        let words = qemu.arguments(Path::new("image"), Path::new("a,b.log"));
-        let line = words.join(OsStr::new(" "));
-        line.into_string().unwrap()
-    }
-
     #[test]
     fn names_are_read_back() {
         for name in Mode::NAMES {
             assert_eq!(Mode::from_name(name).map(Mode::name), Some(*name));
         }
-        for name in Machine::NAMES {
-            assert_eq!(Machine::from_name(name).map(Machine::name), Some(*name));
-        }
-        for name in Loader::NAMES {
-            assert_eq!(Loader::from_name(name).map(Loader::name), Some(*name));
-        }
         assert_eq!(Mode::from_name("fast"), None);
+    }
+
+    /// Holds QEMU's words for a guest to those that are in it, and those that are not.
+    fn has(qemu: &Qemu, parts: &[&str], others: &[&str]) {
+        let words = qemu.arguments(Path::new("image"), Path::new("a,b.log"));
+        let line = words.join(OsStr::new(" ")).into_string().unwrap();
+        let missing = parts.iter().find(|part| !line.contains(**part));
+        assert_eq!(missing, None, "{line}");
+        let odd = others.iter().find(|other| line.contains(**other));
+        assert_eq!(odd, None, "{line}");
     }
 
     #[test]
     fn a_deterministic_guest_sees_nothing_of_the_host() {
-        let line = line(&Qemu::default());
-        for part in [
+        let parts = [
             "-machine microvm",
             "-accel tcg -icount shift=0,sleep=off -cpu max",
             "-seed 1 -rtc base=2000-01-01,clock=vm",
             "-smp 1 -m 32M",
             "-serial file:a,,b.log",
             "-nodefaults -no-user-config -display none -no-reboot",
+        ];
+        let others = ["-gdb", "stdio", "-initrd", "debugcon"];
+        has(&Qemu::default(), &parts, &others);
+        for (mode, accelerator) in [
+            (Mode::Kvm, "-accel kvm -cpu host"),
+            (Mode::Threads, "-accel tcg,thread=multi -cpu max"),
         ] {
-            assert!(line.contains(part), "`{part}` is not in `{line}`");
+            let guest = Qemu {
+                mode,
+                ..Qemu::default()
+            };
+            has(&guest, &[accelerator], &[]);
         }
-        assert!(!line.contains("-gdb"));
-        assert!(!line.contains("stdio"));
-        assert!(!line.contains("-initrd"));
     }
 
     #[test]
-    fn a_guest_with_input_still_writes_to_the_file() {
-        let line = line(&Qemu {
+    fn input_and_recordings_have_ports_and_the_log_is_a_file_all_the_same() {
+        let talks = Qemu {
             has_input: true,
-            ..Qemu::default()
-        });
-        let port = "-chardev stdio,id=console,signal=off,logfile=a,,b.log -serial chardev:console";
-        assert!(line.contains(port), "{line}");
-        assert!(!line.contains("file:a"));
-    }
-
-    #[test]
-    fn only_a_guest_that_records_has_a_debug_port() {
-        assert!(!line(&Qemu::default()).contains("debugcon"));
-        let line = line(&Qemu {
             records: Some("a,b.rec".into()),
             ..Qemu::default()
-        });
-        let port = "-chardev file,id=edge,path=a,,b.rec -device isa-debugcon,iobase=0x402,";
-        assert!(line.contains(port), "{line}");
+        };
+        let serial =
+            "-chardev stdio,id=console,signal=off,logfile=a,,b.log -serial chardev:console";
+        let records = "-chardev file,id=edge,path=a,,b.rec -device isa-debugcon,iobase=0x402,";
+        has(&talks, &[serial, records], &["file:a"]);
     }
 
     #[test]
     fn a_firmware_gets_a_stick_that_has_the_words() {
-        let with = |loader| {
-            line(&Qemu {
+        let firmware = "-bios /usr/share/ovmf/OVMF.fd";
+        let stick = "readonly=on,file=image ";
+        for (loader, parts, others) in [
+            (
+                Loader::Pvh,
+                &["-kernel image -append jobs=3"][..],
+                &[stick][..],
+            ),
+            (Loader::Bios, &[stick], &["-kernel", "jobs", "-bios"]),
+            (Loader::Uefi, &[stick, firmware], &["-kernel", "jobs"]),
+            (Loader::Efi, &[stick, firmware], &["-kernel", "jobs"]),
+        ] {
+            let guest = Qemu {
                 loader,
+                machine: Machine::Q35,
                 guest_words: "jobs=3".into(),
                 ..Qemu::default()
-            })
-        };
-        assert!(with(Loader::Pvh).contains("-kernel image -append jobs=3"));
-        let (bios, uefi) = (with(Loader::Bios), with(Loader::Uefi));
-        let efi = with(Loader::Efi);
-        for line in [&bios, &uefi, &efi] {
-            assert!(line.contains("readonly=on,file=image "), "{line}");
-            assert!(
-                !line.contains("-kernel") && !line.contains("jobs"),
-                "{line}"
-            );
+            };
+            has(&guest, parts, others);
         }
-        let firmware = "-bios /usr/share/ovmf/OVMF.fd";
-        assert!(uefi.contains(firmware) && efi.contains(firmware) && !bios.contains("-bios"));
-    }
-
-    #[test]
-    fn each_mode_has_its_accelerator() {
-        let with = |mode| {
-            line(&Qemu {
-                mode,
-                ..Qemu::default()
-            })
-        };
-        assert!(with(Mode::Kvm).contains("-accel kvm -cpu host"));
-        assert!(with(Mode::Threads).contains("-accel tcg,thread=multi -cpu max"));
     }
 }

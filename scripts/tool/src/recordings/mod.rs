@@ -21,7 +21,7 @@ use std::process::{self, ExitCode};
 use recording::Recording;
 
 use crate::files::{self, Named};
-use crate::options::{Command, Parsed, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 
 /// The table of `recording`.
 pub static RECORDING: Command = Command {
@@ -63,26 +63,12 @@ file that is no whole and unaltered recording, or no such table
 ",
 };
 
-/// Why nothing came of it.
-enum Refusal {
-    /// The command line or a file is at fault: exit code 2.
-    Usage(String),
-    /// Something else is: exit code 1.
-    Failure(String),
-}
-
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn recording(words: &[OsString]) -> ExitCode {
-    let options = match RECORDING.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    match attempt(&options) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Refusal::Usage(line)) => RECORDING.refuse(&line),
-        Err(Refusal::Failure(line)) => RECORDING.fail(&line),
-    }
+    RECORDING.carry_out(words, |options| {
+        attempt(options).map(|()| ExitCode::SUCCESS)
+    })
 }
 
 fn attempt(options: &Parsed) -> Result<(), Refusal> {
@@ -95,7 +81,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     if options.is_given("from-csv") {
         let bytes = table_in::convert(file, options).map_err(Refusal::Usage)?;
         let out = options.path("out").unwrap_or(Path::new(""));
-        write(out, |out| out.write_all(&bytes)).map_err(Refusal::Failure)?;
+        write(out, |out| out.write_all(&bytes))?;
         println!("{}: {} bytes", files::place(out), bytes.len());
         return Ok(());
     }
@@ -108,7 +94,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     if let Some(folder) = options.path("csv") {
         for (name, table) in table_out::tables(&recording) {
             let path = folder.join(name);
-            write(&path, |out| out.write_all(table.as_bytes())).map_err(Refusal::Failure)?;
+            write(&path, |out| out.write_all(table.as_bytes()))?;
             println!("{}", files::place(&path));
         }
     }
@@ -117,8 +103,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
         write(path, |out| {
             messages = mcap::write(&recording, out)?;
             Ok(())
-        })
-        .map_err(Refusal::Failure)?;
+        })?;
         println!("{}: {messages} messages", files::place(path));
     }
     Ok(())
@@ -126,23 +111,18 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
 
 /// Makes sure of the options and of all files, before any is opened.
 fn check(file: &Path, options: &Parsed) -> Result<(), String> {
-    let (of_tables, of_recordings) = (["out", "dag", "topic"], ["csv", "mcap", "until"]);
-    let others = ["type", "ignore", "period"];
+    let of_tables = ["out", "dag", "topic"];
     if options.is_given("from-csv") {
         if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {
             return Err(format!("`--from-csv` needs `--{name}`; give it, too"));
         }
-        if let Some(name) = of_recordings
-            .into_iter()
-            .find(|name| options.is_given(name))
-        {
+        if let Some(name) = options.given_of(&["csv", "mcap", "until"]) {
             let line = "`--from-csv` exclude each other; convert what it has written";
             return Err(format!("`--{name}` and {line}"));
         }
-    } else if let Some(name) = of_tables
-        .into_iter()
-        .chain(others)
-        .find(|name| options.is_given(name))
+    } else if let Some(name) = options
+        .given_of(&of_tables)
+        .or(options.given_of(&["type", "ignore", "period"]))
     {
         return Err(format!("`--{name}` needs `--from-csv`; give it, too"));
     }

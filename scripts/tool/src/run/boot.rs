@@ -74,6 +74,5 @@ fn for_linux(app: Option<&str>) -> Result<PathBuf, String> {
     let (app, folder) = package.ok_or(
         "`--on`: which package is the image of? say `cargo run -- --on linux` in the app's folder",
     )?;
-    let built = image::build_linux(app, Some(Path::new(&folder)));
-    Ok(built.map_err(|error| error.to_string())?.path)
+    Ok(image::build_linux(app, Some(Path::new(&folder)))?.path)
 }

@@ -2,15 +2,12 @@
 
 use std::process::ExitCode;
 
-use super::{Booted, RUN, Refusal, on_linux, prove};
+use super::{Booted, RUN, on_linux, prove};
 use crate::asking::Asked;
 use crate::dag_file::Prepared;
-use crate::options::Parsed;
+use crate::options::{BY_PERSON, Parsed, Refusal};
 use crate::protocol::{Status, Transcript};
 use crate::qemu::Ending;
-
-/// The exit code of a run that a person has ended before its time, as a shell has it for ctrl-C.
-pub(super) const BY_PERSON: u8 = 130;
 
 /// Says how a run has ended, and returns the exit code.
 pub(super) fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitCode {

@@ -16,12 +16,12 @@ use std::process::{self, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 use super::handed::Handed;
-use super::{RUN, Refusal, check_files, choose_app, gdb, loading};
+use super::{RUN, check_files, choose_app, gdb, loading};
 use crate::child;
 use crate::files;
 use crate::image::{self, Profile};
 use crate::install;
-use crate::options::{Command, Opt, Parsed, Request, Takes};
+use crate::options::{Command, Opt, Parsed, Refusal, Request, Takes};
 use crate::qemu::{Mode, Qemu};
 use crate::system;
 
@@ -91,19 +91,11 @@ const fn is_same(one: &[u8], other: &[u8]) -> bool {
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn debug(words: &[OsString]) -> ExitCode {
-    let options = match DEBUG.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    match attempt(&options) {
-        Ok(never) => match never {},
-        Err(Refusal::Usage(lines)) => DEBUG.refuse(&lines),
-        Err(Refusal::Failure(line)) => DEBUG.fail(&line),
-        Err(Refusal::ByPerson) => ExitCode::from(super::BY_PERSON),
-    }
+    DEBUG.carry_out(words, attempt)
 }
 
-fn attempt(own: &Parsed) -> Result<std::convert::Infallible, Refusal> {
+/// Does so. Where all is well gdb takes this process over, and this never returns.
+fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let run = as_run(own)?;
     check_files(&run)?;
     let commands = own.path("commands");
@@ -115,7 +107,7 @@ fn attempt(own: &Parsed) -> Result<std::convert::Infallible, Refusal> {
     let app = choose_app(&run, false)?;
     let memory_mib = loading::choose_memory(&run, None)?;
     let program = loading::choose_program(&run)?;
-    install::ensure(&install::GDB).map_err(Refusal::Failure)?;
+    install::ensure(&install::GDB)?;
     let handed = Handed::read(&run, true)?;
     let mode = run.text("mode").and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
@@ -129,23 +121,17 @@ fn attempt(own: &Parsed) -> Result<std::convert::Infallible, Refusal> {
         Some(path) => path.into(),
         None => {
             eprintln!("building `{app}` by the profile `gdb`");
-            let built = image::build_by(&app, Profile::Gdb);
-            built
-                .map_err(|error| Refusal::Failure(error.to_string()))?
-                .path
+            image::build_by(&app, Profile::Gdb)?.path
         }
     };
     let places = own.text("break").unwrap_or_default();
     let places = gdb::resolve(&image, &app, places).map_err(Refusal::Usage)?;
-    let log = system::new_log(&format!("{app}-gdb")).map_err(Refusal::Failure)?;
+    let log = system::new_log(&format!("{app}-gdb"))?;
     let socket = log.with_extension("socket");
     let script = log.with_extension("gdb");
     let text = gdb::script(&socket, &places);
-    fs::write(&script, text).map_err(|error| {
-        let place = script.display();
-        Refusal::Failure(format!("cannot write `{place}`: {error}"))
-    })?;
-    start(qemu, &image, &log, &socket).map_err(Refusal::Failure)?;
+    files::write(&script, text)?;
+    start(qemu, &image, &log, &socket)?;
     let error = gdb::command(&image, &script, commands).exec();
     Err(Refusal::Failure(format!("cannot start gdb: {error}")))
 }

@@ -4,31 +4,32 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use super::{RUN, Refusal, boot_app, conclude, go_on, prepare, prove};
+use super::{RUN, boot_app, conclude, go_on, prepare, prove};
 use crate::dag_file::batch;
 use crate::files;
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::protocol::Status;
+
+/// The options that say something of one run.
+const FOR_ONE_FILE: [&str; 10] = [
+    "print-dag",
+    "graph",
+    "trace",
+    "serial",
+    "dot",
+    "witness",
+    "observe",
+    "wcets",
+    "console",
+    "gdb",
+];
 
 /// Runs all files. A refused or failed one does not keep the others from running;
 /// the exit code is that of the worst.
 pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> {
-    for name in [
-        "print-dag",
-        "graph",
-        "trace",
-        "serial",
-        "dot",
-        "witness",
-        "observe",
-        "wcets",
-        "console",
-        "gdb",
-    ] {
-        if options.is_given(name) {
-            let line = format!("`--{name}` is for one file; name one with `--dag`");
-            return Err(Refusal::Usage(line));
-        }
+    if let Some(name) = options.given_of(&FOR_ONE_FILE) {
+        let line = format!("`--{name}` is for one file; name one with `--dag`");
+        return Err(Refusal::Usage(line));
     }
     let files = batch::files(folder).map_err(Refusal::Usage)?;
     if options.is_given("prove") {

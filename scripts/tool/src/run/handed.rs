@@ -1,12 +1,11 @@
 //! What `--wcets`, `--replay`, `--module` and `--input` hand to the guest: all in one boot
 //! module, in this order.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{Refusal, wire};
+use super::wire;
 use crate::files::{self, Temporary};
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::proof::wcets;
 use crate::system;
 
@@ -29,13 +28,14 @@ impl Handed {
         let read = |path: &Path| wcets::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
         let replayed = super::recording::read(options)?;
-        let own = options.path("module").map(read_module).transpose()?;
+        let own = options.named(&["module"]).first().map(files::read_named);
+        let own = own.transpose().map_err(Refusal::Usage)?;
         let input = wire::script(options)?;
         let mut module = Temporary(None);
         if is_alone
             && (text.is_some() || !replayed.is_empty() || own.is_some() || !input.is_empty())
         {
-            let path = system::new_log("module").map_err(Refusal::Failure)?;
+            let path = system::new_log("module")?;
             let path = path.with_extension("module");
             let parts = [
                 text.as_deref().unwrap_or_default().as_bytes(),
@@ -43,11 +43,8 @@ impl Handed {
                 &own.unwrap_or_default(),
                 &input,
             ];
-            let written = fs::write(&path, parts.concat());
             module.0 = Some(path.clone());
-            written.map_err(|error| {
-                Refusal::Failure(format!("cannot write `{}`: {error}", path.display()))
-            })?;
+            files::write(&path, parts.concat())?;
         }
         Ok(Handed {
             text: text.unwrap_or_default(),
@@ -80,12 +77,4 @@ impl Handed {
             .map(|(name, bytes)| format!(" {name}={bytes}"))
             .collect()
     }
-}
-
-/// Reads a person's boot module.
-fn read_module(path: &Path) -> Result<Vec<u8>, Refusal> {
-    files::read(path).map_err(|why| {
-        let place = files::place(path);
-        Refusal::Usage(format!("`--module {place}` {why}; name another file"))
-    })
 }

@@ -3,11 +3,10 @@
 
 use std::path::PathBuf;
 
-use super::Refusal;
 use crate::dag_file::Prepared;
 use crate::files;
 use crate::install;
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::qemu::{Loader, Machine, Mode, PROGRAM};
 use crate::system;
 
@@ -94,7 +93,7 @@ pub(super) fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
             Refusal::Usage(format!("`--qemu {place}`: there is no such program"))
         });
     }
-    install::ensure_qemu().map_err(Refusal::Failure)?;
+    install::ensure_qemu()?;
     Ok(PROGRAM.into())
 }
 

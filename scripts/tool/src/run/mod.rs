@@ -39,11 +39,11 @@ use crate::files;
 use crate::image;
 use crate::install;
 use crate::iso;
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::qemu::{Mode, Qemu};
-use conclusion::{BY_PERSON, conclude, go_on};
+use conclusion::{conclude, go_on};
 use handed::Handed;
 use log::Log;
 use recording::Recorded;
@@ -53,64 +53,41 @@ pub use boot::boot;
 pub use debug::debug;
 pub use table::RUN;
 
-/// Why a run ended before the guest did.
-enum Refusal {
-    /// The command line is at fault: exit code 2.
-    Usage(String),
-    /// Something else is: exit code 1.
-    Failure(String),
-    /// A person has ended a run before others that were to follow: exit code [`BY_PERSON`].
-    ByPerson,
-}
+/// Options that exclude each other, whatever is run, and in one run that is not observed.
+const APART: [(&str, &str, &str); 2] = [
+    ("json", "plain", "exclude each other"),
+    ("trace", "serial", "both name the serial log"),
+];
+const APART_IN_ONE: [(&str, &str, &str); 3] = [
+    (
+        "dag",
+        "module",
+        "exclude each other: the DAGs are the module",
+    ),
+    ("replay", "record", "exclude each other"),
+    ("replay", "dag", "exclude each other"),
+];
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn run(words: &[OsString]) -> ExitCode {
-    let options = match RUN.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    match attempt(&options) {
-        Ok(code) => code,
-        Err(Refusal::Usage(lines)) => RUN.refuse(&lines),
-        Err(Refusal::Failure(line)) => RUN.fail(&line),
-        Err(Refusal::ByPerson) => ExitCode::from(BY_PERSON),
-    }
+    RUN.carry_out(words, attempt)
 }
 
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     let options = &on_linux::settle(options)?;
-    if options.is_given("json") && options.is_given("plain") {
-        let line = "`--json` and `--plain` exclude each other; give one";
-        return Err(Refusal::Usage(line.into()));
-    }
-    if options.is_given("trace") && options.is_given("serial") {
-        let line = "`--trace` and `--serial` both name the serial log; give one";
-        return Err(Refusal::Usage(line.into()));
-    }
+    options.check_apart(&APART).map_err(Refusal::Usage)?;
     if let Some(folder) = dag_file::batch::folder(options) {
         return folder::run(options, &folder);
     }
     if prove::is_asked_for(options) {
         return prove::run(options);
     }
-    let lonely = ["margin", "seeds"]
-        .into_iter()
-        .find(|name| options.is_given(name));
-    if let Some(name) = lonely {
+    if let Some(name) = options.given_of(&["margin", "seeds"]) {
         let line = format!("`--{name}` needs `--observe FILE` or `--prove`; give one, too");
         return Err(Refusal::Usage(line));
     }
-    if options.is_given("dag") && options.is_given("module") {
-        let line = "`--dag` and `--module` exclude each other: the DAGs are the module; give one";
-        return Err(Refusal::Usage(line.into()));
-    }
-    let lone = ["record", "replay"].map(|name| options.is_given(name));
-    if lone == [true, true] || lone[1] && options.is_given("dag") {
-        let other = if lone[0] { "record" } else { "dag" };
-        let line = format!("`--replay` and `--{other}` exclude each other; give one");
-        return Err(Refusal::Usage(line));
-    }
+    options.check_apart(&APART_IN_ONE).map_err(Refusal::Usage)?;
     check_files(options)?;
     let mut dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
@@ -165,13 +142,13 @@ fn boot_app(
     let named = options.text("mode").and_then(Mode::from_name);
     loading::check(options, named).map_err(Refusal::Usage)?;
     let program = loading::choose_program(options)?;
-    install::ensure_loader(loading::chosen(options)).map_err(Refusal::Failure)?;
+    install::ensure_loader(loading::chosen(options))?;
 
     let handed = Handed::read(options, dags.is_none())?;
     let parameters = params::guest_word(options)?;
-    let recorded = Recorded::new(options, &app).map_err(Refusal::Failure)?;
+    let recorded = Recorded::new(options, &app)?;
     if let Some(dags) = dags.as_deref_mut() {
-        dags.write_module(handed.text()).map_err(Refusal::Failure)?;
+        dags.write_module(handed.text())?;
     }
     let dags = dags.as_deref();
     let describe = |mode| {
@@ -190,15 +167,10 @@ fn boot_app(
     if longest.loader.is_grub() {
         iso::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
     }
-    let log = Log::choose(options, &app).map_err(Refusal::Failure)?;
+    let log = Log::choose(options, &app)?;
     let image = match options.path("image") {
         Some(path) => path.into(),
-        None => {
-            let built = image::build(&app);
-            built
-                .map_err(|error| Refusal::Failure(error.to_string()))?
-                .path
-        }
+        None => image::build(&app)?.path,
     };
     // A person needs time to type, and a firmware takes long where instructions are counted.
     let is_live = options.is_given("console") || wire::is_live(options);
@@ -207,7 +179,7 @@ fn boot_app(
         false => Mode::Deterministic,
     };
     let chosen = probe::choose(named, otherwise, &describe(Mode::Kvm), &image);
-    let (mode, why) = chosen.map_err(Refusal::Failure)?;
+    let (mode, why) = chosen?;
     let qemu = describe(mode);
     let limit = limit(options, dags);
     let mut screen = Screen::new(options, &image);
@@ -222,12 +194,9 @@ fn boot_app(
     let talk = seeing::relay(options, &log.path);
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
-    let outcome = outcome.map_err(Refusal::Failure)?;
+    let outcome = outcome?;
     written::say_trace(&screen, options);
-    if let Some(line) = recorded
-        .write(options, &outcome)
-        .map_err(Refusal::Failure)?
-    {
+    if let Some(line) = recorded.write(options, &outcome)? {
         screen.say(&line);
     }
     let booted = Booted {
@@ -251,7 +220,7 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
         return Err(Refusal::Usage(line.into()));
     }
     let Some(path) = options.path("image") else {
-        image::check_app(app).map_err(|error| Refusal::Usage(error.to_string()))?;
+        image::check_app(app).map_err(Refusal::Usage)?;
         return Ok(app.into());
     };
     let place = files::place(path);

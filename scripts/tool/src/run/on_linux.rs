@@ -6,11 +6,11 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use super::{Booted, Refusal, limit, prove, seeing, table, wire, written};
+use super::{Booted, limit, prove, seeing, table, wire, written};
 use crate::dag_file::Prepared;
 use crate::debian::{Guest, Order};
 use crate::image;
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::program;
 use crate::qemu::{Ending, Mode};
 
@@ -41,9 +41,8 @@ fn is_in_guest(options: &Parsed) -> bool {
 
 /// Refuses what there is not on Linux, and settles how many cores there are.
 pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
-    let given = |names: &[&'static str]| names.iter().copied().find(|name| options.is_given(name));
     if !is_asked_for(options) {
-        return match given(&["mechanism", "busy"]) {
+        return match options.given_of(&["mechanism", "busy"]) {
             None => Ok(options.clone()),
             Some(name) => Err(Refusal::Usage(format!(
                 "`--{name}` is for Linux; leave it out, or give `--on linux` or `--on debian`"
@@ -51,7 +50,7 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
         };
     }
     let on = options.text("on").unwrap_or_default();
-    if let Some(name) = given(&FOREIGN) {
+    if let Some(name) = options.given_of(&FOREIGN) {
         let line = format!("`--{name}` is for the bare machine; leave it or `--on {on}` out");
         return Err(Refusal::Usage(line));
     }
@@ -59,7 +58,7 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
         true => (&NOT_IN_GUEST[..], "linux"),
         false => (&ONLY_IN_GUEST[..], "debian"),
     };
-    if let Some(name) = given(others) {
+    if let Some(name) = options.given_of(others) {
         let line =
             format!("`--{name}` is not for `--on {on}`; leave it out, or give `--on {place}`");
         return Err(Refusal::Usage(line));
@@ -96,7 +95,7 @@ pub(super) fn run_app(
     }
     let handed = Handed::read(options, dags.is_none())?;
     if let Some(dags) = dags.as_deref_mut() {
-        dags.write_module(handed.text()).map_err(Refusal::Failure)?;
+        dags.write_module(handed.text())?;
     }
     let dags = dags.as_deref();
     let module = dags.and_then(|dags| dags.module.clone());
@@ -107,7 +106,7 @@ pub(super) fn run_app(
         word.push(path);
         words.push(word);
     }
-    let recorded = Recorded::new(options, app).map_err(Refusal::Failure)?;
+    let recorded = Recorded::new(options, app)?;
     let raw = recorded.raw().filter(|_| options.is_given("record"));
     let replayed = options.path("replay").map(Path::to_path_buf);
     for (name, path) in [("record=", raw), ("replay=", replayed)] {
@@ -117,14 +116,10 @@ pub(super) fn run_app(
             words.push(word);
         }
     }
-    let log = Log::choose(options, app).map_err(Refusal::Failure)?;
+    let log = Log::choose(options, app)?;
     let image = match given {
         Some(path) => path.into(),
-        None => {
-            let built = image::build_linux(app, None);
-            let built = built.map_err(|error| Refusal::Failure(error.to_string()))?;
-            built.path
-        }
+        None => image::build_linux(app, None)?.path,
     };
     let mut screen = Screen::new(options, &image);
     let mode = options.text("mode").and_then(Mode::from_name);
@@ -178,13 +173,13 @@ pub(super) fn run_app(
         }
     };
     screen.end();
-    let mut outcome = outcome.map_err(Refusal::Failure)?;
+    let mut outcome = outcome?;
     if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
     written::say_trace(&screen, options);
     let said = recorded.write(options, &outcome);
-    if let Some(line) = said.map_err(Refusal::Failure)? {
+    if let Some(line) = said? {
         screen.say(&line);
     }
     Ok(Booted {
@@ -248,7 +243,8 @@ fn words(options: &Parsed, dags: Option<&Prepared>) -> Vec<OsString> {
 #[cfg(test)]
 mod tests {
     use super::settle;
-    use crate::run::{RUN, Refusal};
+    use crate::options::Refusal;
+    use crate::run::RUN;
 
     #[test]
     fn what_is_only_on_the_machine_is_refused_in_one_line() {

@@ -5,18 +5,16 @@
 
 use replay::shown::{quoted, shown};
 
-use super::Refusal;
-use crate::files;
-use crate::options::Parsed;
+use crate::files::{self, Named};
+use crate::options::{Parsed, Refusal};
 
 /// Returns the guest's word after a blank, if one is wanted.
 pub(super) fn guest_word(options: &Parsed) -> Result<String, Refusal> {
     let mut parts = Vec::new();
     if let Some(path) = options.path("params") {
         let place = files::place(path);
-        let bytes = files::read(path).map_err(|why| {
-            Refusal::Usage(format!("`--params {place}` {why}; name another file"))
-        })?;
+        let option = "params";
+        let bytes = files::read_named(&Named { option, path }).map_err(Refusal::Usage)?;
         let text = String::from_utf8_lossy(&bytes);
         parts.extend(of_file(&text).map_err(|line| Refusal::Usage(format!("{place}:{line}")))?);
     }

@@ -4,14 +4,13 @@
 //! twice: the first run is observed, the second one commits with the WCETs and the overheads
 //! that the first has shown, except for what the person states.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use super::{Booted, RUN, Refusal, boot_app, check_files, conclude, go_on, prepare};
+use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::states_overheads;
 use crate::files::{self, Temporary};
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::progress::Progress;
 use crate::proof::observed::{self, OfDag};
 use crate::proof::overheads::{self, Measured};
@@ -28,10 +27,7 @@ pub(super) fn is_asked_for(options: &Parsed) -> bool {
 
 /// Does what the options ask for.
 pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
-    if let Some(name) = ["console", "gdb", "print-dag"]
-        .into_iter()
-        .find(|name| options.is_given(name))
-    {
+    if let Some(name) = options.given_of(&["console", "gdb", "print-dag"]) {
         let line = format!("`--{name}` is for a run that is not observed; leave one of them out");
         return Err(Refusal::Usage(line));
     }
@@ -117,7 +113,7 @@ struct Proven {
 /// Observes a run, commits with what it has shown, and compares; `None` if the first run has
 /// failed, which has been said.
 fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
-    let log = system::new_log("observed").map_err(Refusal::Failure)?;
+    let log = system::new_log("observed")?;
     let own = Temporary(Some(log.with_extension("wcets")));
     let Some(proving) = observe_first(options, own.0.as_deref())? else {
         return Ok(None);
@@ -161,7 +157,7 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
         next = next.with("wcets", file);
     }
     if measures {
-        let measured = seen.map_err(Refusal::Failure)?;
+        let measured = seen?;
         let margin = options.number("margin").unwrap_or(wcets::MARGIN_PERCENT);
         let line = measured.line(margin);
         say(options, &measured.text(margin), [line].into_iter());
@@ -200,16 +196,14 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         if !is_well {
             return Ok(None);
         }
-        observed::add(&mut all, &booted.outcome.transcript).map_err(Refusal::Failure)?;
+        observed::add(&mut all, &booted.outcome.transcript)?;
         log = booted.outcome.serial;
     }
     let margin = options.number("margin").unwrap_or(wcets::MARGIN_PERCENT);
     say(options, &wcets::table(&all, margin), observed::lines(&all));
     if let Some(path) = file {
         let place = files::place(path);
-        fs::write(path, wcets::text(&all, margin)).map_err(|error| {
-            Refusal::Failure(format!("`--observe {place}`: cannot be written: {error}"))
-        })?;
+        files::write_named("observe", path, wcets::text(&all, margin))?;
         if options.is_given("observe") && !options.is_given("json") {
             println!("{place}: the WCETs; `--wcets {place}` commits with them");
         }

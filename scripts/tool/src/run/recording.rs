@@ -7,9 +7,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::Refusal;
 use crate::files::{self, Temporary};
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::protocol::Status;
 use crate::qemu::Ending;
@@ -76,8 +75,7 @@ impl Recorded {
                 Err(_) => return Ok(Some(format!("{file}: not written, nothing was recorded"))),
             },
         };
-        fs::write(path, &bytes)
-            .map_err(|error| format!("`--record {file}`: cannot be written: {error}"))?;
+        files::write_named("record", path, &bytes)?;
         Ok(Some(format!(
             "{file}: a recording, {how}{} bytes; `./scripts/recording {file}` shows it",
             bytes.len()

@@ -43,9 +43,8 @@ impl Screen {
             quiet: options.is_given("quiet"),
             // A person who wants these in a file does not want megabytes of them here.
             traces: !options.is_given("trace") && !super::prove::is_asked_for(options),
-            graphs: !["dot", "trace", "witness", "observe", "prove"]
-                .iter()
-                .any(|name| options.is_given(name)),
+            // Nor does one who wants something made of them.
+            graphs: super::seeing::graph_word(options).is_none(),
             times: !super::prove::is_asked_for(options),
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,

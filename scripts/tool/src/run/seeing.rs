@@ -44,18 +44,15 @@ pub(super) fn can_stop(options: &Parsed) -> bool {
 
 /// Returns the word by which commits print their DAGs, if the options ask for what needs them.
 pub(super) fn graph_word(options: &Parsed) -> Option<String> {
-    let wants_graphs = ["dot", "trace", "witness", "observe", "prove"]
-        .iter()
-        .any(|name| options.is_given(name));
-    wants_graphs.then(|| "graph=dump".into())
+    let of_graphs = ["dot", "trace", "witness", "observe", "prove"];
+    let is_wanted = options.given_of(&of_graphs).is_some();
+    is_wanted.then(|| "graph=dump".into())
 }
 
 /// Reports whether a person watches, and does not talk meanwhile.
 fn is_watched(options: &Parsed) -> bool {
-    let silent = ["quiet", "json", "gdb"];
-    stdout().is_terminal()
-        && system::stderr_moves()
-        && !silent.into_iter().any(|name| options.is_given(name))
+    let is_silent = options.given_of(&["quiet", "json", "gdb"]).is_some();
+    stdout().is_terminal() && system::stderr_moves() && !is_silent
 }
 
 /// Writes the DAGs that a run has committed, if the options ask for it, and returns
@@ -68,9 +65,8 @@ pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<Option<St
     let Some(path) = options.path("dot") else {
         return Ok(None);
     };
-    let text = dot::text(&outcome.transcript)?;
+    files::write_named("dot", path, dot::text(&outcome.transcript)?)?;
     let file = files::place(path);
-    fs::write(path, text).map_err(|error| format!("`--dot {file}`: cannot be written: {error}"))?;
     Ok(Some(format!(
         "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
     )))

@@ -5,9 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Refusal;
 use crate::files::{self, Named};
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::qemu::Second;
 use crate::wire_script;
@@ -39,9 +38,7 @@ pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
     if options.path("output") == Some(Path::new(STREAM)) {
         return usage("`--output -`: standard output is the guest's text; name a file");
     }
-    let wire = ["input", "output"]
-        .into_iter()
-        .find(|name| options.is_given(name));
+    let wire = options.given_of(&["input", "output"]);
     match wire.filter(|_| options.is_given("dag")) {
         Some(name) => Err(Refusal::Usage(format!(
             "`--{name}` and `--dag` exclude each other: DAGs of a file have no wire; give --app"
@@ -86,8 +83,9 @@ pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{check, second};
+    use crate::options::Refusal;
     use crate::qemu::Second;
-    use crate::run::{RUN, Refusal};
+    use crate::run::RUN;
 
     #[test]
     fn what_standard_streams_cannot_do_is_refused() {

@@ -1,9 +1,9 @@
 //! The files that the options want of a run, besides its log.
 
 use super::screen::Screen;
-use super::{Booted, Refusal, seeing, wire};
+use super::{Booted, seeing, wire};
 use crate::files;
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 
 /// Says where the trace is, if there is one.
 pub(super) fn say_trace(screen: &Screen, options: &Parsed) {
@@ -27,7 +27,7 @@ pub(super) fn write(options: &Parsed, booted: &Booted) -> Result<(), Refusal> {
             // There are worse news.
             break;
         }
-        if let Some(line) = written.map_err(Refusal::Failure)? {
+        if let Some(line) = written? {
             booted.screen.say(&line);
         }
     }

@@ -9,7 +9,7 @@ use replay::shown::shown;
 use super::figures::Figures;
 use super::plan::{Length, Part, Plan, usual_bound_ns};
 use super::{Report, run};
-use crate::options::{Command, Parsed, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::progress::Progress;
 use crate::qemu::{MOST_CORES, Mode};
 
@@ -71,29 +71,21 @@ exit codes: 0 no round failed; 1 some did; 2 a refused command line
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn soak(words: &[OsString]) -> ExitCode {
-    let options = match SOAK.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    let plan = match plan(&options) {
-        Ok(plan) => plan,
-        Err(reason) => return SOAK.refuse(&reason),
-    };
-    println!(
-        "{} rounds of {} ms on {} cores, seed {}, mode {}",
-        plan.rounds(),
-        plan.round.as_millis(),
-        plan.cores,
-        plan.seed,
-        plan.mode
-    );
-    let mut progress = Progress::new(plan.rounds(), "rounds");
-    let report = run(&plan, |over| progress.show(over));
-    progress.end();
-    match report {
-        Ok(report) => conclude(&report),
-        Err(reason) => SOAK.fail(&reason),
-    }
+    SOAK.carry_out(words, |options| {
+        let plan = plan(options).map_err(Refusal::Usage)?;
+        println!(
+            "{} rounds of {} ms on {} cores, seed {}, mode {}",
+            plan.rounds(),
+            plan.round.as_millis(),
+            plan.cores,
+            plan.seed,
+            plan.mode
+        );
+        let mut progress = Progress::new(plan.rounds(), "rounds");
+        let report = run(&plan, |over| progress.show(over));
+        progress.end();
+        Ok(conclude(&report?))
+    })
 }
 
 /// Makes the plan that the options ask for.

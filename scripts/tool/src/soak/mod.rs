@@ -64,7 +64,7 @@ pub struct Report {
 /// In words: there is no QEMU or no image, or a guest could not be started.
 pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
     install::ensure_qemu()?;
-    let image = image::build("soak").map_err(|error| error.to_string())?;
+    let image = image::build("soak")?;
     let machine = Qemu {
         cores: plan.cores,
         memory_mib: MEMORY_MIB,

@@ -83,7 +83,7 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     }
     let name = "a guest runs under KVM";
     if plan.wants(name) {
-        let image = image::build("fork-join").map_err(|error| error.to_string());
+        let image = image::build("fork-join");
         match image.and_then(|image| probe::kvm(&Qemu::default(), &image.path)) {
             Ok(()) => tally.add(name, Ok(())),
             Err(why) => tally.skip(name, &why),
@@ -152,7 +152,7 @@ fn complain(
 }
 
 fn image_is_light(app: &str) -> Result<(), String> {
-    let image = image::build(app).map_err(|error| error.to_string())?;
+    let image = image::build(app)?;
     let bytes = image.stripped_bytes()?;
     println!("image of {app}: {bytes} bytes stripped");
     let most = image::most_stripped_bytes(app);

@@ -1,11 +1,9 @@
 //! Which test binaries there are: cargo compiles them and says where.
 
-use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
-use std::process::Stdio;
 
 use crate::install::{self, Need};
-use crate::json::{self, Value};
+use crate::json::Value;
 use crate::lasting::Lasting;
 use crate::system;
 
@@ -62,37 +60,18 @@ const NEEDS: [(&str, &[&Need]); 4] = [
 pub(super) fn compile() -> (Vec<TestBinary>, Result<(), String>) {
     let _lasting = Lasting::new("compiling the tests");
     let mut command = system::cargo();
-    command.args([
-        "test",
-        "--workspace",
-        "--no-run",
-        "--no-fail-fast",
-        "--quiet",
-    ]);
-    command.arg("--message-format=json-render-diagnostics");
-    command.stdin(Stdio::null()).stdout(Stdio::piped());
-    let mut cargo = match command.spawn() {
-        Ok(cargo) => cargo,
-        Err(error) => return (Vec::new(), Err(format!("cannot start cargo: {error}"))),
-    };
-    let output = cargo.stdout.take().map(BufReader::new);
-    let lines = output
-        .into_iter()
-        .flat_map(|output| output.lines().map_while(Result::ok));
-    let mut binaries: Vec<TestBinary> = lines.filter_map(|line| binary(&line)).collect();
+    let words = "test --workspace --no-run --no-fail-fast --quiet \
+                 --message-format=json-render-diagnostics";
+    command.args(words.split_whitespace());
+    let (messages, compiled) = system::messages_of(&mut command);
+    let mut binaries: Vec<TestBinary> = messages.iter().filter_map(binary).collect();
     // Cheap ones first: a mistake shows soon.
     binaries.sort_by_key(|binary| (binary.boots_guests(), binary.name()));
-    let compiled = match cargo.wait() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(_) => Err("cargo's errors stand above".into()),
-        Err(error) => Err(format!("cargo was lost: {error}")),
-    };
     (binaries, compiled)
 }
 
 /// Reads one of cargo's messages: the test binary, if it announces one.
-fn binary(message: &str) -> Option<TestBinary> {
-    let message = json::parse(message).ok()?;
+fn binary(message: &Value) -> Option<TestBinary> {
     let is_test = message.at(&["profile", "test"]).and_then(Value::as_bool);
     if is_test != Some(true) {
         return None;
@@ -120,23 +99,18 @@ fn binary(message: &str) -> Option<TestBinary> {
 #[cfg(test)]
 mod tests {
     use super::binary;
+    use crate::json::parse;
 
     #[test]
     fn a_message_about_a_test_binary_is_told_from_others() {
-        let message = |test: bool| {
-            format!(
-                r#"{{"reason":"compiler-artifact","manifest_path":"/w/a/Cargo.toml",
-                "target":{{"kind":["test"],"name":"boot_x"}},
-                "profile":{{"test":{test}}},"executable":"/w/target/boot_x-1"}}"#
-            )
-        };
-        let found = binary(&message(true)).unwrap();
-        assert_eq!(found.name(), "/w/a: boot_x");
-        assert!(found.boots_guests());
-        assert_eq!(binary(&message(false)), None);
-        assert_eq!(
-            binary(r#"{"reason":"build-finished","success":true}"#),
-            None
-        );
+        let message = r#"{"reason":"compiler-artifact","manifest_path":"/w/a/Cargo.toml",
+            "target":{"kind":["test"],"name":"boot_x"},
+            "profile":{"test":true},"executable":"/w/target/boot_x-1"}"#;
+        let found = binary(&parse(message).unwrap()).unwrap();
+        assert!(found.name() == "/w/a: boot_x" && found.boots_guests());
+        let of_product = message.replace("true", "false");
+        for other in [&of_product, r#"{"reason":"build-finished","success":true}"#] {
+            assert_eq!(binary(&parse(other).unwrap()), None);
+        }
     }
 }

@@ -11,7 +11,7 @@ use super::chains::Measured;
 use super::model::Run;
 use super::{bound, chains, check, read, report};
 use crate::files;
-use crate::options::{Command, Parsed, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 
 /// The table of `check-trace`.
 pub static CHECK_TRACE: Command = Command {
@@ -62,34 +62,29 @@ well-formed trace with events
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn check_trace(words: &[OsString]) -> ExitCode {
-    let options = match CHECK_TRACE.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
+    CHECK_TRACE.carry_out(words, |options| {
+        let breaches = judge_all(options).map_err(Refusal::Usage)?;
+        Ok(ExitCode::from(u8::from(breaches > 0)))
+    })
+}
+
+/// Judges the runs of all files, and returns how many breaches there are.
+fn judge_all(options: &Parsed) -> Result<usize, String> {
     if options.files().len() == 0 {
-        return CHECK_TRACE.refuse("which files? name at least one serial log with a trace");
+        return Err("which files? name at least one serial log with a trace".into());
     }
-    if let Err(line) = files::check_once(options.files()) {
-        return CHECK_TRACE.refuse(&line);
-    }
+    files::check_once(options.files())?;
     let mut runs = Vec::new();
     for file in options.files() {
-        match read_file(file) {
-            Ok(found) => runs.extend(found.into_iter().map(|run| (files::place(file), run))),
-            Err(line) => return CHECK_TRACE.refuse(&line),
-        }
+        let found = read_file(file)?.into_iter();
+        runs.extend(found.map(|run| (files::place(file), run)));
     }
     // A wrong name is told before anything is shown.
-    let measured = runs.iter().map(|(_, run)| chains::measure(run, &options));
-    let measured: Vec<_> = match measured.collect() {
-        Ok(measured) => measured,
-        Err(line) => return CHECK_TRACE.refuse(&line),
-    };
-    let mut breaches = 0;
-    for ((file, run), chains) in runs.iter().zip(&measured) {
-        breaches += judge(file, run, chains, &options);
-    }
-    ExitCode::from(u8::from(breaches > 0))
+    let measured = runs.iter().map(|(_, run)| chains::measure(run, options));
+    let measured: Vec<_> = measured.collect::<Result<_, _>>()?;
+    let judged = runs.iter().zip(&measured);
+    let breaches = judged.map(|((file, run), chains)| judge(file, run, chains, options));
+    Ok(breaches.sum())
 }
 
 /// Reads a file's runs, of which at least one must have events.

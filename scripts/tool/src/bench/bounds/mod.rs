@@ -22,7 +22,7 @@ use std::process::ExitCode;
 
 use super::plots;
 use crate::files;
-use crate::options::{Command, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use curves::{Point, measure};
 
 static TABLE: Command = Command {
@@ -52,13 +52,13 @@ Exit code: 0 counted; 1 a set was proven before and is not now, or nothing can b
 
 /// Runs `bench bounds` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    let options = match TABLE.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    if let Err(line) = options.check_distinct(&["cores"]) {
-        return TABLE.refuse(&line);
-    }
+    TABLE.carry_out(words, |options| {
+        options.check_distinct(&["cores"]).map_err(Refusal::Usage)?;
+        measure_all(options).map(|()| ExitCode::SUCCESS)
+    })
+}
+
+fn measure_all(options: &Parsed) -> Result<(), Refusal> {
     let cores = options.text("cores").unwrap_or_default().split(',');
     let cores = cores.filter_map(|number| number.parse().ok());
     let sets = options.number("sets").unwrap_or(200);
@@ -67,24 +67,22 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     print!("{}", curves::table(&points));
     let counts = small::measure(100 * sets, seed);
     print!("{}", small::table(&counts));
-    match stg::measure() {
-        Ok(means) => print!("{}", stg::table(&means)),
-        Err(line) => return TABLE.fail(&line),
-    }
+    print!("{}", stg::table(&stg::measure()?));
     if let Some(out) = options.path("out") {
         let file = out.join("bounds.csv");
         let written = fs::create_dir_all(out).and_then(|()| fs::write(&file, curves::csv(&points)));
-        if let Err(error) = written {
-            return TABLE.fail(&format!("`--out {}`: {error}", files::place(out)));
-        }
+        written.map_err(|error| format!("`--out {}`: {error}", files::place(out)))?;
         match plots::draw("bounds.py", out) {
             Ok(()) => println!("{}", out.join("plots/bounds.svg").display()),
             Err(line) => println!("{line}"),
         }
     }
     let lost = points.iter().map(|point| point.lost);
-    match lost.chain(counts.iter().map(|count| count.lost)).sum() {
-        0 => ExitCode::SUCCESS,
-        lost => TABLE.fail(&format!("{lost} sets were proven before and are not now")),
+    match lost
+        .chain(counts.iter().map(|count| count.lost))
+        .sum::<u64>()
+    {
+        0 => Ok(()),
+        lost => Err(format!("{lost} sets were proven before and are not now").into()),
     }
 }

@@ -31,7 +31,8 @@ fn margin(figure: &Figure) -> (u128, u128) {
     }
 }
 
-fn has_grown(now: &Figure, before: &Figure) -> bool {
+/// Reports whether a figure has grown since the baseline.
+pub(super) fn has_grown(now: &Figure, before: &Figure) -> bool {
     let (percent, instructions) = margin(now);
     let grows = |now_is: u64, was: u64| {
         // Both for the same number of steps.
@@ -40,17 +41,6 @@ fn has_grown(now: &Figure, before: &Figure) -> bool {
         growth > u128::from(now.per) * instructions && growth * 100 > was * percent
     };
     grows(now.median, before.median) || (now.cores == 1 && grows(now.p99, before.p99))
-}
-
-/// How a figure stands to its baseline.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Standing {
-    /// There is none to compare with.
-    New,
-    /// As good as it was, or better.
-    Kept,
-    /// Worse by more than the margin.
-    Grown,
 }
 
 /// Reads a baseline.
@@ -93,19 +83,6 @@ pub(super) fn text(figures: &[Figure]) -> String {
     text + "]}\n"
 }
 
-/// Compares a figure with that of the baseline.
-pub(super) fn standing(now: &Figure, baseline: &[Figure]) -> (Option<Figure>, Standing) {
-    let Some(before) = baseline.iter().find(|before| before.is_same(now)) else {
-        return (None, Standing::New);
-    };
-    let standing = if has_grown(now, before) {
-        Standing::Grown
-    } else {
-        Standing::Kept
-    };
-    (Some(before.clone()), standing)
-}
-
 /// Returns the figures of a baseline that were not measured now.
 pub(super) fn missing<'a>(
     now: &'a [Figure],
@@ -119,7 +96,8 @@ pub(super) fn missing<'a>(
 mod tests {
     use super::*;
 
-    fn figure(median: u64, p99: u64, per: u64) -> Figure {
+    /// Makes a figure of median, p99 and steps.
+    fn figure([median, p99, per]: [u64; 3]) -> Figure {
         Figure {
             cores: 1,
             workload: "chain-64".into(),
@@ -131,63 +109,44 @@ mod tests {
         }
     }
 
-    fn on(cores: u64, figure: Figure) -> Figure {
-        Figure { cores, ..figure }
-    }
-
-    fn stands(now: &Figure, before: Figure) -> Standing {
-        standing(now, &[before]).1
-    }
-
     #[test]
     fn a_figure_has_grown_beyond_both_margins() {
-        let before = || figure(1000, 1000, 1);
-        assert_eq!(stands(&figure(1030, 1030, 1), before()), Standing::Kept);
-        assert_eq!(stands(&figure(1031, 1000, 1), before()), Standing::Grown);
-        assert_eq!(stands(&figure(900, 1031, 1), before()), Standing::Grown);
-        // 40 % of 10 instructions are 4.
-        assert_eq!(
-            stands(&figure(14, 14, 1), figure(10, 10, 1)),
-            Standing::Kept
-        );
-        assert_eq!(
-            stands(&figure(15, 15, 1), figure(10, 10, 1)),
-            Standing::Grown
-        );
-        let two = |median, p99| on(2, figure(median, p99, 1));
-        assert_eq!(stands(&two(1100, 9000), two(1000, 1000)), Standing::Kept);
-        assert_eq!(stands(&two(1101, 1000), two(1000, 1000)), Standing::Grown);
-        // From nothing: an allocation in every job of ten.
-        assert_eq!(
-            stands(&figure(50, 50, 10), figure(0, 0, 10)),
-            Standing::Grown
-        );
-        let allocations = |count| Figure {
-            figure: "allocations".into(),
-            ..figure(count, count, 200)
-        };
-        assert_eq!(stands(&allocations(1), allocations(0)), Standing::Grown);
-        assert_eq!(standing(&figure(1, 1, 1), &[]).1, Standing::New);
+        for (cores, name, now, before, expected) in [
+            (1, "hop", [1030, 1030, 1], [1000, 1000, 1], false),
+            (1, "hop", [1031, 1000, 1], [1000, 1000, 1], true),
+            (1, "hop", [900, 1031, 1], [1000, 1000, 1], true),
+            // 40 % of 10 instructions are 4.
+            (1, "hop", [14, 14, 1], [10, 10, 1], false),
+            (1, "hop", [15, 15, 1], [10, 10, 1], true),
+            (2, "hop", [1100, 9000, 1], [1000, 1000, 1], false),
+            (2, "hop", [1101, 1000, 1], [1000, 1000, 1], true),
+            // From nothing.
+            (1, "hop", [50, 50, 10], [0, 0, 10], true),
+            (1, "allocations", [1, 1, 200], [0, 0, 200], true),
+        ] {
+            let [now, before] = [now, before].map(|numbers| Figure {
+                cores,
+                figure: name.into(),
+                ..figure(numbers)
+            });
+            assert_eq!(has_grown(&now, &before), expected, "{now:?}, {before:?}");
+        }
     }
 
     #[test]
-    fn a_baseline_is_read_back() {
+    fn a_baseline_is_read_back_and_what_it_alone_has_is_found() {
         let folder = std::env::temp_dir().join(format!("hand-off-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let file = folder.join("baseline.json");
-        let figures = [figure(1, 2, 3), figure(4, 5, 6)];
+        let figures = [figure([1, 2, 3]), figure([4, 5, 6])];
         write(&file, &figures).unwrap();
-        assert_eq!(read(&file).unwrap(), figures);
+        let before = read(&file).unwrap();
+        assert_eq!(before, figures);
+        assert_eq!(missing(&[], &before).count(), 2);
+        assert_eq!(missing(&figures, &before).count(), 0);
         fs::write(&file, "{}").unwrap();
         assert!(read(&file).unwrap_err().contains("holds no figures"));
         fs::remove_dir_all(folder).unwrap();
         assert!(read(&file).unwrap_err().contains("--save-baseline"));
-    }
-
-    #[test]
-    fn a_figure_that_is_no_longer_measured_is_found() {
-        let before = [figure(1, 1, 1)];
-        assert_eq!(missing(&[], &before).count(), 1);
-        assert_eq!(missing(&before, &before).count(), 0);
     }
 }

@@ -27,7 +27,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use figure::Figure;
-use plan::{Boot, Plan};
+use plan::{Boot, Kind, Plan};
 
 use super::by_plan;
 use crate::golden::Golden;
@@ -59,7 +59,7 @@ pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     };
     install::ensure_qemu()?;
     let before = plan.before.as_deref().unwrap_or_default();
-    let image = image::build("hand-off").map_err(|error| error.to_string())?;
+    let image = image::build("hand-off")?;
     let now = measure_mode(&plan, Mode::Deterministic, &image.path)?;
     let comparison = report::comparison(&now, before);
     print!("{}", comparison.text);
@@ -80,7 +80,7 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
     if let Some(scale) = &plan.scale {
         return measure_scale(scale).map(|()| true);
     }
-    let image = image::build("hand-off").map_err(|error| error.to_string())?;
+    let image = image::build("hand-off")?;
     if let Some((boot, file)) = &plan.listing {
         return listing::list(boot, &image.path, file).map(|()| true);
     }
@@ -114,32 +114,27 @@ fn measure_all(plan: &Plan) -> Result<bool, String> {
 
 /// Counts what more cores and more subtasks cost.
 fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
-    let image = image::build("hand-off").map_err(|error| error.to_string())?;
-    let count = |cores, largest, sizes: &str| {
-        let boot = Boot::of_scale(cores, scale.jobs, largest, sizes);
-        let figures = measure(&boot, Mode::Deterministic, &image.path)?;
-        for figure in &figures {
-            println!("{}", figure.machine_line(Mode::Deterministic));
-        }
-        Ok::<_, String>(figures)
+    let image = image::build("hand-off")?;
+    let count = |sizes: &[u64], boot: &dyn Fn(u64) -> Boot| {
+        let counted = sizes.iter().map(|&size| {
+            let figures = measure(&boot(size), Mode::Deterministic, &image.path)?;
+            for figure in &figures {
+                println!("{}", figure.machine_line(Mode::Deterministic));
+            }
+            Ok((size, figures))
+        });
+        counted.collect::<Result<Vec<_>, String>>()
     };
-    let mut by_cores = Vec::new();
-    for &cores in &scale.cores {
-        by_cores.push((cores, count(cores, scale::LARGEST, scale::SIZES)?));
-    }
-    let mut by_subtasks = Vec::new();
-    for &subtasks in &scale.subtasks {
-        by_subtasks.push((subtasks, count(1, subtasks, &scale::sizes(subtasks))?));
-    }
-    let mut by_clusters = Vec::new();
-    for clusters in scale::CLUSTERS {
-        let boot = Boot::of_clusters(clusters, scale.jobs);
-        let figures = measure(&boot, Mode::Deterministic, &image.path)?;
-        for figure in &figures {
-            println!("{}", figure.machine_line(Mode::Deterministic));
-        }
-        by_clusters.push((clusters, figures));
-    }
+    let jobs = scale.jobs;
+    let by_cores = count(&scale.cores, &|cores| {
+        Boot::of_scale(cores, jobs, scale::LARGEST, scale::SIZES)
+    })?;
+    let by_subtasks = count(&scale.subtasks, &|subtasks| {
+        Boot::of_scale(1, jobs, subtasks, &scale::sizes(subtasks))
+    })?;
+    let by_clusters = count(&scale::CLUSTERS, &|clusters| {
+        Boot::of_clusters(clusters, jobs)
+    })?;
     println!("medians of the instructions that all cores together executed:");
     print!("{}", scale::by_cores(&by_cores));
     println!("layered random graphs on one core:");
@@ -185,14 +180,13 @@ fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, St
 fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     let log = system::new_log("hand-off")?;
     let recording = log.with_extension("rec");
-    let outcome = if what.is_recorded || what.is_divided {
-        let guest = image::build("guest-tests").map_err(|error| error.to_string())?;
-        let mut qemu = what.qemu(mode);
-        qemu.records = what.is_recorded.then(|| recording.clone());
-        boot(&qemu, &guest.path, &log, LIMIT, |_| {})?
-    } else {
-        boot(&what.qemu(mode), image, &log, LIMIT, |_| {})?
+    let mut qemu = what.qemu(mode);
+    qemu.records = (what.kind == Kind::Recorded).then(|| recording.clone());
+    let image = match what.kind {
+        Kind::Figures | Kind::Trace => image.to_path_buf(),
+        Kind::Recorded | Kind::Divided => image::build("guest-tests")?.path,
     };
+    let outcome = boot(&qemu, &image, &log, LIMIT, |_| {})?;
     if let Err(fault) = outcome.judge() {
         return Err(format!(
             "the guest on {} cores, mode {mode}, failed: {}\n{}",
@@ -201,10 +195,9 @@ fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String>
             outcome.tail()
         ));
     }
-    let figures = if what.is_traced {
-        traced::read_all(&outcome.serial, what.cores)?
-    } else {
-        Figure::read_all(&outcome.transcript, what.cores)?
+    let figures = match what.kind {
+        Kind::Trace => traced::read_all(&outcome.serial, what.cores)?,
+        _ => Figure::read_all(&outcome.transcript, what.cores)?,
     };
     if figures.is_empty() {
         return Err(format!("the guest printed no figures\n{}", outcome.tail()));

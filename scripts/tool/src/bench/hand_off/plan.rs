@@ -16,28 +16,30 @@ pub(super) const BASELINE: &str = "tests/baselines/hand-off.json";
 /// The options of a baseline: it is of the defaults of these.
 const SIZES: &[&str] = &["jobs", "chain", "branches", "layered", "seed", "append"];
 
-/// Returns the memory, in MiB, for DAGs of `subtasks` subtasks: each needs a stack, each
-/// core two, and the kernel leaves a quarter of the memory for stacks.
-fn memory_mib(subtasks: u64, cores: u64) -> u64 {
-    256.max((subtasks + 2 * cores) * 3 / 10)
-}
-
 /// Numbers of cores whose figures the baseline keeps, too, where instructions are counted: more
 /// than a host is sure to have, so they say nothing of time.
 const MANY_CORES: [u64; 2] = [8, 64];
 
+/// What tells what a boot has measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Its own figures.
+    Figures,
+    /// Its trace.
+    Trace,
+    /// Its own figures; it is recorded, for that is what is measured, by a guest of the tests.
+    Recorded,
+    /// Its own figures; its cores are divided, in which that guest can, too.
+    Divided,
+}
+
 /// What one boot measures.
 #[derive(Clone, Debug)]
 pub(super) struct Boot {
+    pub(super) kind: Kind,
     pub(super) cores: u64,
     memory_mib: u64,
     words: String,
-    /// Whether its trace tells what was measured, rather than its own figures.
-    pub(super) is_traced: bool,
-    /// Whether it is recorded, for that is what is measured, by a guest of the tests.
-    pub(super) is_recorded: bool,
-    /// Whether its cores are divided, in which that guest can, too.
-    pub(super) is_divided: bool,
 }
 
 /// Everything that is to be measured.
@@ -170,36 +172,46 @@ fn boots(options: &Parsed) -> Vec<Boot> {
     let numbers = [chain, layered].map(|sizes| sizes.split(','));
     let numbers = numbers.into_iter().flatten().map(str::parse);
     let largest = numbers.filter_map(Result::ok).max().unwrap_or(0);
-    let boot = |cores, part: &str, words: String| Boot {
-        cores,
-        memory_mib: memory_mib(largest, cores),
-        words: format!("part={part} {words} {}", text("append")),
-        is_traced: part == "traced",
-        is_recorded: false,
-        is_divided: false,
+    let boot = |kind, cores, words: String| {
+        let words = format!("{words} {}", text("append"));
+        Boot::new(kind, cores, largest, words)
     };
     // A trace shows what it shows in a few jobs.
-    let traced = format!("jobs=20 branches={branches} trace=dump");
-    let many =
-        MANY_CORES.map(|cores| boot(cores, "workloads", format!("jobs={jobs} {}", scale::SIZES)));
+    let traced = |cores| {
+        let words = format!("part=traced jobs=20 branches={branches} trace=dump");
+        boot(Kind::Trace, cores, words)
+    };
+    let many = MANY_CORES.map(|cores| {
+        let words = format!("part=workloads jobs={jobs} {}", scale::SIZES);
+        boot(Kind::Figures, cores, words)
+    });
+    let recorded = format!("test=values jobs={jobs} record=1024");
     let few = [
-        boot(1, "hand-off", format!("jobs={jobs} {sizes}")),
-        boot(1, "traced", traced.clone()),
-        Boot {
-            cores: 1,
-            memory_mib: memory_mib(0, 1),
-            words: format!("test=values jobs={jobs} record=1024 {}", text("append")),
-            is_traced: false,
-            is_recorded: true,
-            is_divided: false,
-        },
-        boot(2, "elsewhere", format!("jobs={jobs}")),
-        boot(2, "traced", traced),
+        boot(
+            Kind::Figures,
+            1,
+            format!("part=hand-off jobs={jobs} {sizes}"),
+        ),
+        traced(1),
+        boot(Kind::Recorded, 1, recorded),
+        boot(Kind::Figures, 2, format!("part=elsewhere jobs={jobs}")),
+        traced(2),
     ];
     few.into_iter().chain(many).collect()
 }
 
 impl Boot {
+    /// Describes a boot with DAGs of up to so many subtasks: each needs a stack, each core two,
+    /// and the kernel leaves a quarter of the memory for stacks.
+    fn new(kind: Kind, cores: u64, subtasks: u64, words: String) -> Boot {
+        Boot {
+            kind,
+            cores,
+            memory_mib: 256.max((subtasks + 2 * cores) * 3 / 10),
+            words,
+        }
+    }
+
     /// Reports whether it measures something in this mode.
     pub(super) fn is_for(&self, mode: Mode) -> bool {
         mode == Mode::Deterministic || !MANY_CORES.contains(&self.cores)
@@ -208,40 +220,24 @@ impl Boot {
     /// Returns a boot that runs the workloads alone, for what their size and the
     /// number of cores cost; `largest` is the most subtasks of a DAG among them.
     pub(super) fn of_scale(cores: u64, jobs: u64, largest: u64, sizes: &str) -> Boot {
-        Boot {
-            cores,
-            memory_mib: memory_mib(largest, cores),
-            words: format!("part=workloads jobs={jobs} {sizes}"),
-            is_traced: false,
-            is_recorded: false,
-            is_divided: false,
-        }
+        let words = format!("part=workloads jobs={jobs} {sizes}");
+        Boot::new(Kind::Figures, cores, largest, words)
     }
 
     /// Returns a boot that runs a layered graph in each of so many clusters.
     pub(super) fn of_clusters(clusters: u64, jobs: u64) -> Boot {
-        let cores = clusters * scale::CORES_OF_A_CLUSTER;
-        let sizes = (0..clusters).map(|_| scale::CORES_OF_A_CLUSTER.to_string());
-        let sizes: Vec<String> = sizes.collect();
-        Boot {
-            cores,
-            memory_mib: memory_mib(clusters * scale::OF_A_CLUSTER, cores),
-            words: format!(
-                "test=cluster_scale jobs={jobs} clusters={}",
-                sizes.join(",")
-            ),
-            is_traced: false,
-            is_recorded: false,
-            is_divided: true,
-        }
+        let each = scale::CORES_OF_A_CLUSTER;
+        let sizes: Vec<String> = (0..clusters).map(|_| each.to_string()).collect();
+        let sizes = sizes.join(",");
+        let words = format!("test=cluster_scale jobs={jobs} clusters={sizes}");
+        let subtasks = clusters * scale::OF_A_CLUSTER;
+        Boot::new(Kind::Divided, clusters * each, subtasks, words)
     }
 
     /// Returns the boot whose hops are logged: a chain, and few jobs, as a log is long.
     fn of_listing(options: &Parsed) -> Boot {
-        let sizes = format!(
-            "chain=64 branches=1 layered=3 {}",
-            options.text("append").unwrap_or_default()
-        );
+        let append = options.text("append").unwrap_or_default();
+        let sizes = format!("chain=64 branches=1 layered=3 {append}");
         Boot::of_scale(1, 5, 64, &sizes)
     }
 
@@ -274,24 +270,27 @@ mod tests {
         assert!(plan.boots.iter().any(|boot| boot.cores == 2));
     }
 
+    /// Command lines, and what is said of them. More are in `tests/named_files.rs`.
+    const REFUSED: &str = "--compare --jobs 5 | the default of `--jobs`
+--compare --mode threads | leave `--mode` out
+--save-baseline --mode threads | `--save-baseline`
+--scale --compare | leave `--compare` out
+--scale --chain 5 | leave `--chain` out
+--cores 5 | without `--scale`
+--listing x --chain 5 | leave `--chain` out
+--listing x --scale | a run of its own
+--listing /none/x | cannot be written
+--scale --cores 2,2 | `2` stands twice
+--baseline x | without `--compare`
+--compare --baseline /none/x --mode deterministic | the baseline `/none/x`: ";
+
     #[test]
     fn what_cannot_be_is_refused() {
-        let refused = |line| plan(line).unwrap_err();
-        assert!(refused("--compare --jobs 5").contains("the default of `--jobs`"));
-        assert!(refused("--compare --mode threads").contains("leave `--mode` out"));
-        assert!(refused("--save-baseline --mode threads").contains("`--save-baseline`"));
-        assert!(refused("--scale --compare").contains("leave `--compare` out"));
-        assert!(refused("--scale --chain 5").contains("leave `--chain` out"));
-        assert!(refused("--cores 5").contains("without `--scale`"));
-        assert!(refused("--listing x --chain 5").contains("leave `--chain` out"));
-        assert!(refused("--listing x --scale").contains("a run of its own"));
-        assert!(refused("--listing /none/x").contains("cannot be written"));
-        assert!(refused("--scale --cores 2,2").contains("`2` stands twice"));
-        assert!(refused("--baseline x").contains("without `--compare`"));
-        let missing = refused("--compare --baseline /none/x --mode deterministic");
-        assert!(missing.starts_with("the baseline `/none/x`: "), "{missing}");
-        let unwritable = refused("--save-baseline --baseline /none/x --mode deterministic");
-        assert!(unwritable.contains("cannot be written"), "{unwritable}");
+        for row in REFUSED.lines() {
+            let (line, words) = row.split_once(" | ").expect(row);
+            let refused = plan(line).expect_err(line);
+            assert!(refused.contains(words), "{refused}");
+        }
         assert!(plan("--scale --cores 5 --jobs 9").is_ok());
         assert!(plan("--listing /dev/null --append trace_events=0").is_ok());
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::baseline::{MARGIN_RULE, Standing, missing, standing};
+use super::baseline::{MARGIN_RULE, has_grown, missing};
 use super::figure::Figure;
 use crate::qemu::Mode;
 
@@ -69,7 +69,13 @@ pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
             let _ = writeln!(text, "{heading}");
             workload = heading;
         }
-        let (before, standing) = standing(figure, baseline);
+        let before = baseline.iter().find(|before| before.is_same(figure));
+        let grown = before.is_some_and(|before| has_grown(figure, before));
+        let mark = match before {
+            None => "  new: save the baseline to keep it",
+            Some(_) if grown => "  GROWN",
+            Some(_) => "",
+        };
         let (was, p99_was, ratio) = before.map_or_else(Default::default, |before| {
             let ratio = match (figure.median, before.median) {
                 (0, 0) => 1.0,
@@ -81,12 +87,7 @@ pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
                 format!("{ratio:.3}"),
             )
         });
-        let mark = match standing {
-            Standing::New => "  new: save the baseline to keep it",
-            Standing::Kept => "",
-            Standing::Grown => "  GROWN",
-        };
-        if standing == Standing::Grown {
+        if grown {
             let place = &workload;
             let [now, p99] = [figure.median, figure.p99].map(|number| figure.one(number));
             complaints.push(format!(

@@ -11,6 +11,7 @@ use sched_dag::DagId;
 use sched_dag::journal::{Event, What};
 
 use super::figure::Figure;
+use crate::trace::figures::Distribution;
 use crate::trace::model::Run;
 use crate::trace::read;
 
@@ -112,19 +113,24 @@ fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
         "preemption of another core"
     };
     let figures = PARTS.iter().zip(samples);
+    let figures = figures.filter(|(_, samples)| !samples.is_empty());
     figures
-        .filter_map(|(part, mut samples)| {
-            samples.sort_unstable();
-            let rank = |percent: usize| samples.get((samples.len() * percent).div_ceil(100) - 1);
-            Some(Figure {
+        .map(|(part, samples)| {
+            let Distribution {
+                median_ns,
+                p99_ns,
+                max_ns,
+                ..
+            } = Distribution::of(samples);
+            Figure {
                 cores,
                 workload: workload.into(),
                 figure: (*part).into(),
                 per: 1,
-                max: *samples.last()?,
-                median: *rank(50)?,
-                p99: *rank(99)?,
-            })
+                median: median_ns,
+                p99: p99_ns,
+                max: max_ns,
+            }
         })
         .collect()
 }
@@ -133,8 +139,9 @@ fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
 mod tests {
     use super::read_all;
 
-    fn log(name: &str, events: &str) -> String {
-        format!(
+    /// Returns the first figure's workload and steps, and the medians of all, of such events.
+    fn measured(name: &str, events: &str) -> (String, u64, Vec<u64>) {
+        let log = format!(
             r#"{{"kind":"trace_begin","policy":"static","preemption":"on","cores":1,"run":0}}
 {{"kind":"trace_dag","dag":0,"name":"{name}","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,null],["b",1,0,null],["c",2,0,null]],"edges":[[0,1],[1,2]]}}
 {{"kind":"trace_dag","dag":1,"name":"low","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",9,0,null]],"edges":[]}}
@@ -142,31 +149,20 @@ mod tests {
 {{"kind":"trace_end","events":{},"lost":0,"complete":true}}
 "#,
             events.matches("[").count()
-        )
-    }
-
-    #[test]
-    fn counts_how_often_the_sink_is_made_ready() {
-        let events = r#"[0,"released",0,0,0,-1],[1,"ready",0,0,0,1],[2,"ready",0,0,0,2],[3,"start",0,0,0,2],[4,"ready",0,0,0,2]"#;
-        let figures = read_all(&log("fork-join", events), 1).unwrap();
-        assert_eq!(figures.len(), 1);
-        let figure = &figures[0];
-        assert_eq!(
-            (&*figure.workload, figure.per, figure.median),
-            ("fork-join-1", 1, 2)
         );
+        let figures = read_all(&log, 1).unwrap();
+        let medians = figures.iter().map(|figure| figure.median).collect();
+        (figures[0].workload.clone(), figures[0].per, medians)
     }
 
     #[test]
-    fn takes_a_preemption_apart() {
-        let events = r#"[10,"request",0,0,0,0],[13,"suspend",0,1,0,0],[20,"start",0,0,0,0],[30,"finish",0,0,0,0],[45,"resume",0,1,0,0]"#;
-        let figures = read_all(&log("preemptor", events), 1).unwrap();
-        let medians: Vec<u64> = figures.iter().map(|figure| figure.median).collect();
-        assert_eq!(medians, [3, 7, 15]);
-    }
-
-    #[test]
-    fn a_trace_of_something_else_is_refused() {
+    fn wake_ups_of_a_sink_are_counted_and_a_preemption_is_taken_apart() {
+        let ready = r#"[0,"released",0,0,0,-1],[1,"ready",0,0,0,1],[2,"ready",0,0,0,2],[3,"start",0,0,0,2],[4,"ready",0,0,0,2]"#;
+        let expected = ("fork-join-1".into(), 1, vec![2]);
+        assert_eq!(measured("fork-join", ready), expected);
+        let preempted = r#"[10,"request",0,0,0,0],[13,"suspend",0,1,0,0],[20,"start",0,0,0,0],[30,"finish",0,0,0,0],[45,"resume",0,1,0,0]"#;
+        let expected = ("preemption".into(), 1, vec![3, 7, 15]);
+        assert_eq!(measured("preemptor", preempted), expected);
         assert!(read_all("", 1).unwrap_err().contains("shows no fork-join"));
     }
 }

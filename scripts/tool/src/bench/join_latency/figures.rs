@@ -6,6 +6,8 @@
 
 use join_latency::Samples;
 
+use crate::trace::figures::Distribution;
+
 /// The time between two releases, in nanoseconds.
 pub(super) const PERIOD_NS: u64 = 25_000_000;
 
@@ -85,9 +87,17 @@ impl Figures {
         }
     }
 
-    /// Returns the distribution of a metric.
+    /// Returns the distribution of a metric, by nearest rank as the guest's own.
     pub(super) fn distribution(&self, metric: usize) -> Distribution {
-        Distribution::new(self.samples[metric].iter().map(|(_, ns)| *ns))
+        let samples = self.samples[metric].iter();
+        Distribution::of(samples.map(|(_, ns)| *ns).collect())
+    }
+
+    /// Returns the mean of a metric in nanoseconds, rounded down; 0 without samples.
+    pub(super) fn mean_ns(&self, metric: usize) -> u128 {
+        let samples = &self.samples[metric];
+        let sum: u128 = samples.iter().map(|(_, ns)| u128::from(*ns)).sum();
+        sum / samples.len().max(1) as u128
     }
 
     /// Returns the joins per job.
@@ -96,67 +106,22 @@ impl Figures {
     }
 }
 
-/// Figures of one metric, all in nanoseconds; all 0 without samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Distribution {
-    pub(super) count: usize,
-    /// The middle sample: at least half of all are not larger.
-    pub(super) median_ns: u64,
-    /// The mean, rounded down.
-    pub(super) mean_ns: u64,
-    /// The sample that at least 99 % do not exceed.
-    pub(super) p99_ns: u64,
-    pub(super) max_ns: u64,
-}
-
-impl Distribution {
-    fn new(samples_ns: impl Iterator<Item = u64>) -> Self {
-        let mut sorted_ns: Vec<u64> = samples_ns.collect();
-        sorted_ns.sort_unstable();
-        let count = sorted_ns.len();
-        // Nearest rank, as the guest's own figures.
-        let at = |percent: usize| {
-            let rank = (count * percent).div_ceil(100).max(1);
-            sorted_ns.get(rank - 1).copied().unwrap_or(0)
-        };
-        let sum: u128 = sorted_ns.iter().map(|ns| u128::from(*ns)).sum();
-        let mean = sum / u128::try_from(count.max(1)).unwrap_or(1);
-        Self {
-            count,
-            median_ns: at(50),
-            mean_ns: u64::try_from(mean).unwrap_or(u64::MAX),
-            p99_ns: at(99),
-            max_ns: at(100),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Distribution, Figures, PERIOD_NS};
+    use super::{Figures, PERIOD_NS};
     use join_latency::{Joined, Samples, Span};
-
-    const fn span(start_ns: u64, finish_ns: u64) -> Span {
-        Span {
-            start_ns,
-            finish_ns,
-        }
-    }
 
     /// Two parallel subtasks, three jobs; the only join has jobs 1 and 2.
     fn samples() -> Samples {
-        let second = PERIOD_NS + 10;
-        let third = 2 * PERIOD_NS + 10;
+        let [first, second, third] = [0, PERIOD_NS + 10, 2 * PERIOD_NS + 10];
+        let span = |start_ns, finish_ns| Span {
+            start_ns,
+            finish_ns,
+        };
+        let taking = |ns| [1, second, third].map(|start_ns| span(start_ns, start_ns + ns));
         Samples {
-            source: vec![
-                span(0, 1),
-                span(PERIOD_NS, PERIOD_NS + 1),
-                span(third, third + 1),
-            ],
-            parallel: vec![
-                vec![span(1, 5), span(second, second + 5), span(third, third + 5)],
-                vec![span(1, 9), span(second, second + 9), span(third, third + 9)],
-            ],
+            source: [first, PERIOD_NS, third].map(|ns| span(ns, ns + 1)).into(),
+            parallel: vec![taking(5).into(), taking(9).into()],
             joins: vec![Joined {
                 ready_ns: third + 20,
                 span: span(third + 21, third + 30),
@@ -167,45 +132,22 @@ mod tests {
     }
 
     #[test]
-    fn metrics_are_what_they_are_defined_to_be() {
+    fn metrics_are_what_they_are_defined_to_be_and_pooled() {
         let figures = Figures::of(&samples());
-        assert_eq!(
-            (figures.joins, figures.same_index, figures.cross_index),
-            (1, 0, 1)
-        );
+        let joins = (figures.joins, figures.same_index, figures.cross_index);
+        assert_eq!(joins, (1, 0, 1));
         assert_eq!((figures.missing, figures.uncovered), (2, 1));
         let third = 2 * PERIOD_NS + 10;
         let expected = [
-            vec![(0, third + 20 - 9)],
-            vec![(0, third + 20 - 9), (1, third + 20 - (PERIOD_NS + 19))],
+            vec![(0, third + 20 - 10)],
+            vec![(0, third + 20 - 10), (1, third + 20 - (PERIOD_NS + 19))],
             vec![(0, 21 - 9)],
             vec![(0, third + 30), (1, third + 30 - PERIOD_NS)],
         ];
         assert_eq!(figures.samples, expected);
-    }
-
-    #[test]
-    fn figures_of_several_runs_are_pooled() {
-        let mut both = Figures::of(&samples());
-        both.add(Figures::of(&samples()));
+        let mut both = figures.clone();
+        both.add(figures);
         assert_eq!((both.jobs, both.joins, both.missing), (6, 2, 4));
-        assert_eq!(both.distribution(1).count, 4);
-    }
-
-    #[test]
-    fn a_distribution_is_by_nearest_rank() {
-        let distribution = Distribution::new([4, 1, 2, 10].into_iter());
-        let expected = Distribution {
-            count: 4,
-            median_ns: 2,
-            mean_ns: 4,
-            p99_ns: 10,
-            max_ns: 10,
-        };
-        assert_eq!(distribution, expected);
-        assert_eq!(
-            Distribution::new(std::iter::empty()),
-            Distribution::default()
-        );
+        assert_eq!((both.distribution(1).count, both.mean_ns(2)), (4, 12));
     }
 }

@@ -49,19 +49,15 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 
 /// Measures what is not there yet, and writes all results.
 fn measure_all(plan: &Plan) -> Result<(), String> {
-    let built = match plan.on_linux {
-        true => image::build_linux("join-latency", None),
+    let (image, mode, why) = match plan.on_linux {
+        true => (image::build_linux("join-latency", None)?, plan.mode, None),
         false => {
             install::ensure_qemu()?;
-            image::build("join-latency")
-        }
-    };
-    let image = built.map_err(|error| error.to_string())?;
-    let (mode, why) = match plan.on_linux {
-        true => (plan.mode, None),
-        false => {
+            let image = image::build("join-latency")?;
             let machine = plan.qemu(&plan.conditions[0]);
-            probe::choose(plan.named, Mode::Deterministic, &machine, &image.path)?
+            let otherwise = Mode::Deterministic;
+            let (mode, why) = probe::choose(plan.named, otherwise, &machine, &image.path)?;
+            (image, mode, why)
         }
     };
     let plan = &Plan {

@@ -4,12 +4,12 @@ use std::fmt::Write;
 
 /// A distribution of times, in nanoseconds.
 pub(super) struct Figure {
-    pub(super) workload: String,
+    workload: String,
     /// What is measured: one step of what.
-    pub(super) what: &'static str,
+    what: &'static str,
     /// What runs it.
-    pub(super) runner: String,
-    pub(super) workers: u32,
+    runner: &'static str,
+    workers: u32,
     /// Sorted.
     samples: Vec<f64>,
 }
@@ -19,7 +19,7 @@ impl Figure {
     pub(super) fn new(
         workload: impl ToString,
         what: &'static str,
-        runner: impl Into<String>,
+        runner: &'static str,
         workers: u32,
         mut samples: Vec<f64>,
     ) -> Self {
@@ -27,7 +27,7 @@ impl Figure {
         Self {
             workload: workload.to_string(),
             what,
-            runner: runner.into(),
+            runner,
             workers,
             samples,
         }
@@ -54,12 +54,8 @@ impl Figure {
         );
         let mut last = "";
         for figure in figures {
-            let name = if figure.workload == last {
-                ""
-            } else {
-                &figure.workload
-            };
-            last = &figure.workload;
+            let is_same = std::mem::replace(&mut last, &figure.workload) == figure.workload;
+            let name = if is_same { "" } else { last };
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,

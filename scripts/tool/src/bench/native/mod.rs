@@ -29,6 +29,7 @@ use workload::Graph;
 
 use replay::shown::quoted;
 
+use super::by_plan;
 use crate::options::{Command, Parsed, Takes, options};
 use crate::progress::Progress;
 
@@ -68,14 +69,7 @@ const CLUSTERS: &str = "clusters";
 
 /// Runs `bench native` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    let options = match TABLE.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    match Plan::read(&options) {
-        Ok(plan) => measure(&plan),
-        Err(line) => TABLE.refuse(&line),
-    }
+    by_plan(&TABLE, words, Plan::read, measure)
 }
 
 /// What is to be measured.
@@ -128,48 +122,44 @@ impl Plan {
     }
 }
 
-fn measure(plan: &Plan) -> ExitCode {
-    let mut figures = Vec::new();
+/// Measures, and prints; returns that nothing has a limit.
+fn measure(plan: &Plan) -> Result<bool, String> {
     let total = throughput::passes(&plan.graphs, &plan.workers);
-    let mut progress = Progress::new(total, "passes");
-    let mut over = 0;
+    let (mut progress, mut over) = (Progress::new(total, "passes"), 0);
+    let mut figures = Vec::new();
     for &graph in &plan.graphs {
-        match throughput::measure(graph, &plan.workers, plan.rounds, || {
-            over += 1;
-            progress.show(over);
-        }) {
-            Ok(of_graph) => figures.extend(of_graph),
-            Err(line) => return TABLE.fail(&line),
-        }
+        figures.extend(throughput::measure(
+            graph,
+            &plan.workers,
+            plan.rounds,
+            || {
+                over += 1;
+                progress.show(over);
+            },
+        )?);
     }
     progress.end();
     if plan.with_join {
-        match join::measure(plan.jobs) {
-            Ok(of_join) => figures.extend(of_join),
-            Err(line) => return TABLE.fail(&line),
-        }
+        figures.extend(join::measure(plan.jobs)?);
     }
-    let mut together = None;
-    if plan.with_clusters {
-        match clusters::measure(plan.rounds) {
-            Ok(mut of_clusters) => {
-                figures.append(&mut of_clusters.figures);
-                together = Some(of_clusters);
-            }
-            Err(line) => return TABLE.fail(&line),
-        }
-    }
+    let together = match plan.with_clusters {
+        true => clusters::measure(plan.rounds, &mut figures)?,
+        false => Vec::new(),
+    };
     print!("{}", Figure::table(&figures));
-    if let Some(together) = &together {
-        print!("{}", together.lines());
+    for (graph, times) in &together {
+        println!("{graph}: two clusters of one core each do {times:.2} times what one core does");
     }
     for figure in &figures {
         println!("{}", figure.json());
     }
-    if let Some(together) = &together {
-        print!("{}", together.json());
+    for (graph, times) in &together {
+        println!(
+            "{{\"kind\":\"bench\",\"name\":\"native-clusters\",\"workload\":\"{graph}\",\
+             \"clusters\":2,\"times\":{times:.3}}}"
+        );
     }
-    ExitCode::SUCCESS
+    Ok(true)
 }
 
 #[cfg(test)]
@@ -181,36 +171,31 @@ mod tests {
     }
 
     #[test]
-    fn workloads_are_chosen_by_name() {
-        let plan = plan("--only fork-join-4,chain-64 --workers 1").expect("right");
-        assert_eq!(plan.graphs, [Graph::Chain, Graph::ForkJoin(4)]);
-        assert!(!plan.with_join && !plan.with_clusters);
-    }
-
-    #[test]
-    fn an_unknown_workload_is_refused_with_those_there_are() {
+    fn workloads_are_chosen_by_name_and_unknown_ones_refused_with_those_there_are() {
+        let chosen = plan("--only fork-join-2,chain-64 --workers 1").expect("right");
+        assert_eq!(chosen.graphs, [Graph::CHAIN, Graph::JOIN]);
+        assert!(!chosen.with_join && !chosen.with_clusters);
         let line = plan("--only chain-65").err().expect("refused");
         assert!(line.contains("called `chain-65`") && line.contains("chain-64, fork-join-2"));
-    }
-
-    #[test]
-    fn more_workers_than_processors_are_refused() {
         let most = linux::processors();
-        if most < 64 {
-            let line = plan("--workers 64").err().expect("refused");
-            assert!(line.contains(&format!("{most} processors")), "{line}");
-        }
+        let line = plan("--workers 64").err().filter(|_| most < 64);
+        assert!(most == 64 || line.is_some_and(|it| it.contains(&format!("{most} processors"))));
     }
 
+    /// One test, since only one thread of a program may measure at a time.
     #[test]
-    fn a_short_run_measures_every_graph() {
+    fn a_short_run_measures_every_graph_alone_and_in_clusters() {
         for graph in Graph::ALL {
             let figures = throughput::measure(graph, &[1], 3, || {}).expect("it runs");
-            assert_eq!(
-                figures.len(),
-                3 + usize::from(graph.has_values()),
-                "{graph}"
-            );
+            let expected = 3 + usize::from(graph.has_values());
+            assert_eq!(figures.len(), expected, "{graph}");
+        }
+        let mut figures = Vec::new();
+        // On a host that never gives us both processors there is nothing to see.
+        if linux::processors() > 1
+            && let Ok(together) = clusters::measure(600, &mut figures)
+        {
+            assert_eq!((together.len(), figures.len()), (2, 4));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use sched_dag::Policy;
 
 use super::figure::Figure;
-use super::workload::{Graph, Rounds, commit, commit_typed, empty, machine};
+use super::workload::{Graph, Rounds, commit, commit_typed, empty, machine, run};
 
 /// How often each runner gets its turn, so that a change of the host's speed meets all.
 const PASSES: usize = 3;
@@ -57,26 +57,21 @@ pub(super) fn measure(
             show();
         }
     }
-    let (step, steps) = graph.steps();
-    let jobs_a_round = as_f64(jobs_a_round(graph));
-    let figures = runners
-        .iter()
-        .zip(samples)
-        .map(|(&(runner, workers), samples)| {
-            let per_step = |round: Duration| round.as_secs_f64() * 1e9 / jobs_a_round / steps;
-            let samples = samples.into_iter().map(per_step).collect();
-            Figure::new(graph, step, runner.name(), workers, samples)
-        });
-    Ok(figures.collect())
+    let (step, steps) = graph.steps;
+    let steps = jobs_a_round(graph) as f64 * f64::from(steps);
+    let of_runner = |(&(runner, workers), samples): (&(Runner, u32), Vec<Duration>)| {
+        let per_step = |round: Duration| round.as_secs_f64() * 1e9 / steps;
+        let samples = samples.into_iter().map(per_step).collect();
+        Figure::new(graph, step, runner.name(), workers, samples)
+    };
+    Ok(runners.iter().zip(samples).map(of_runner).collect())
 }
 
 fn runners(graph: Graph, workers: &[u32]) -> Vec<(Runner, u32)> {
     let mut runners = vec![(Runner::Floor, 1)];
     for &workers in workers {
-        runners.extend([
-            (Runner::Closures(Policy::StaticPriority), workers),
-            (Runner::Closures(Policy::Edf), workers),
-        ]);
+        let policies = [Policy::StaticPriority, Policy::Edf];
+        runners.extend(policies.map(|policy| (Runner::Closures(policy), workers)));
         runners.extend(graph.has_values().then_some((Runner::Typed, workers)));
     }
     runners
@@ -86,12 +81,7 @@ fn jobs_a_round(graph: Graph) -> u64 {
     (INSTANCES_A_ROUND / graph.instances()) as u64
 }
 
-/// A small count, exactly.
-fn as_f64(count: u64) -> f64 {
-    f64::from(u32::try_from(count).unwrap_or(u32::MAX))
-}
-
-/// Runs the rounds, and some before to warm up.
+/// Runs the rounds, and some before to warm up, and returns what each took.
 fn pass(
     graph: Graph,
     runner: Runner,
@@ -100,8 +90,8 @@ fn pass(
 ) -> Result<Vec<Duration>, String> {
     let jobs_a_round = jobs_a_round(graph);
     let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
-    let times = Rounds::default();
-    let mut functions = empty(graph, &times, jobs_a_round);
+    let marks = Rounds::default();
+    let mut functions = empty(graph, &marks, jobs_a_round);
     match runner {
         Runner::Floor => {
             for job in 0..jobs {
@@ -111,13 +101,15 @@ fn pass(
         Runner::Closures(policy) => {
             let machine = machine(policy, workers)?;
             commit(graph, jobs, vec![functions]);
-            machine.run(jobs)?;
+            run(&machine, jobs)?;
         }
         Runner::Typed => {
             let machine = machine(Policy::StaticPriority, workers)?;
-            commit_typed(graph, jobs, &times, jobs_a_round);
-            machine.run(jobs)?;
+            commit_typed(graph, jobs, &marks, jobs_a_round);
+            run(&machine, jobs)?;
         }
     }
-    Ok(times.durations())
+    let times = marks.times();
+    let durations = times.windows(2).map(|pair| pair[1] - pair[0]);
+    Ok(durations.skip(times.len() / 10).collect())
 }

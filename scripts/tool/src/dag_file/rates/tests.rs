@@ -2,124 +2,97 @@
 
 use super::{Graph, Subtask, split};
 
-/// Makes a graph of 1 ms subtasks; timers are given with their periods in ms.
-fn graph(subtasks: &[(&str, Option<u64>)], edges: &[(usize, usize)]) -> Graph {
+const MS: u64 = 1_000_000;
+
+/// Makes a graph of subtasks of 1 ms, such as `a:10 b`, of which those with a period in ms are
+/// timers, and of edges between them, such as `ab`, on the lines from 10 on.
+fn graph(subtasks: &str, edges: &str) -> Graph {
     let mut graph = Graph::default();
-    for (name, period_ms) in subtasks {
+    for subtask in subtasks.split(' ') {
+        let period_ms: Option<u64> = subtask.get(2..).map(|ms| ms.parse().unwrap());
         graph.add(Subtask {
-            name: (*name).into(),
-            wcet_ns: 1_000_000,
-            period_ns: period_ms.map(|ms| ms * 1_000_000),
+            name: subtask[..1].into(),
+            wcet_ns: MS,
+            period_ns: period_ms.map(|ms| ms * MS),
             ..Subtask::default()
         });
     }
-    let lined = edges.iter().zip(10..).map(|(&(a, b), line)| (a, b, line));
-    graph.edges = lined.collect();
+    let end = |edge: &str, at: usize| graph.position(&edge[at..=at]).unwrap();
+    let edges = edges.split_whitespace().zip(10..);
+    let edges = edges.map(|(edge, line)| (end(edge, 0), end(edge, 1), line));
+    graph.edges = edges.collect();
     graph
 }
 
-/// Describes DAGs: name, period in ms, subtasks, number of edges, remarks.
-fn described(graph: &Graph) -> Vec<String> {
-    let dags = split(graph, "g").unwrap();
-    let described = dags.iter().map(|dag| {
-        let names = dag.spec.subtasks.iter().map(|one| one.name.as_str());
-        format!(
-            "{} {} {} {} {}",
-            dag.spec.name,
-            dag.spec.period_ns.unwrap() / 1_000_000,
-            names.collect::<String>(),
-            dag.spec.edges.len(),
-            dag.remarks
-                .iter()
-                .filter(|remark| remark.contains("latest"))
-                .count()
-        )
-    });
-    described.collect()
-}
-
 #[test]
-fn one_rate_is_one_dag_with_all_edges() {
-    let two_sources = [("a", Some(10)), ("b", Some(10)), ("c", None)];
-    let graph = graph(&two_sources, &[(0, 2), (1, 2)]);
-    assert_eq!(described(&graph), ["g 10 abc 2 0"]);
-}
-
-#[test]
-fn a_join_of_two_rates_belongs_to_the_slower_one() {
-    let subtasks = [
-        ("a", Some(10)),
-        ("b", Some(20)),
-        ("c", None),
-        ("d", None),
-        ("e", None),
-    ];
-    let graph = graph(&subtasks, &[(0, 2), (2, 3), (1, 3), (3, 4)]);
-    assert_eq!(described(&graph), ["g-a 10 ac 1 0", "g-b 20 bde 2 1"]);
-    let dags = split(&graph, "g").unwrap();
+fn a_graph_becomes_dags_of_one_rate_each() {
+    // Of each DAG: name, period in ms, subtasks, and how many edges it has and has not.
+    for (subtasks, edges, expected) in [
+        // One rate is one DAG with all edges.
+        ("a:10 b:10 c", "ac bc", "g 10 abc 2 0"),
+        // A join of two rates belongs to the slower one.
+        (
+            "a:10 b:20 c d e",
+            "ac cd bd de",
+            "g-a 10 ac 1 0, g-b 20 bde 2 1",
+        ),
+        // A timer in mid-chain begins a DAG of its own.
+        ("a:10 b t:10 u", "ab bt tu", "g-a 10 ab 1 0, g-t 10 tu 1 1"),
+        // Without timer it is the longest period there is, or else all execution times.
+        ("a:7 b:9 c", "", "g-a 7 a 0 0, g-b 9 b 0 0, g-c 9 c 0 0"),
+        ("a b c", "ab bc", "g 3 abc 2 0"),
+    ] {
+        let dags = split(&graph(subtasks, edges), "g").unwrap();
+        let described = dags.iter().map(|dag| {
+            let names = dag.spec.subtasks.iter().map(|one| one.name.as_str());
+            let names: String = names.collect();
+            let (name, period_ns) = (&dag.spec.name, dag.spec.period_ns.unwrap());
+            let edges = dag.spec.edges.len();
+            let latest = |remark: &&String| remark.contains("latest");
+            let left_out = dag.remarks.iter().filter(latest).count();
+            format!("{name} {} {names} {edges} {left_out}", period_ns / MS)
+        });
+        assert_eq!(described.collect::<Vec<_>>().join(", "), expected);
+    }
+    let dags = split(&graph("a:10 b:20 c d e", "ac cd bd de"), "g").unwrap();
     assert_eq!(dags[1].edge_lines, [12, 13]);
-    assert!(dags[1].remarks[0].contains("no deadline") || dags[1].remarks[1].contains("line 11"));
+    assert!(dags[1].remarks.iter().any(|it| it.contains("line 11")));
 }
 
 #[test]
-fn a_timer_in_mid_chain_begins_a_dag_of_its_own() {
-    let subtasks = [("a", Some(10)), ("b", None), ("t", Some(10)), ("u", None)];
-    let graph = graph(&subtasks, &[(0, 1), (1, 2), (2, 3)]);
-    assert_eq!(described(&graph), ["g-a 10 ab 1 0", "g-t 10 tu 1 1"]);
-}
-
-#[test]
-fn missing_times_have_their_defaults() {
-    let untimed = graph(&[("a", None), ("b", None), ("c", None)], &[(0, 1), (1, 2)]);
-    let dag = &split(&untimed, "g").unwrap()[0];
-    assert_eq!(dag.spec.period_ns, Some(3_000_000));
-    assert_eq!(dag.spec.relative_deadline_ns, Some(6_000_000));
-    // A longest path of 3 ms, a period of 2 ms.
-    let fast = graph(
-        &[("a", Some(2)), ("b", None), ("c", None)],
-        &[(0, 1), (1, 2)],
-    );
-    let dag = &split(&fast, "g").unwrap()[0];
-    assert_eq!(dag.spec.relative_deadline_ns, Some(4_000_000));
-    // The period is the longest there is, or else the deadline.
-    let mixed = graph(&[("a", Some(7)), ("b", Some(9)), ("c", None)], &[]);
-    assert_eq!(
-        described(&mixed),
-        ["g-a 7 a 0 0", "g-b 9 b 0 0", "g-c 9 c 0 0"]
-    );
-    let mut by_deadline = graph(&[("a", None)], &[]);
-    by_deadline.subtasks[0].deadline_ns = Some(5_000_000);
-    assert_eq!(described(&by_deadline), ["g 5 a 0 0"]);
-}
-
-#[test]
-fn each_sink_has_its_own_deadline() {
-    let mut fork = graph(
-        &[("a", Some(20)), ("b", None), ("c", None), ("d", None)],
-        &[(0, 1), (0, 2), (0, 3)],
-    );
-    fork.subtasks[1].deadline_ns = Some(5_000_000);
-    fork.subtasks[2].deadline_ns = Some(9_000_000);
-    let deadlines = |graph: &Graph| {
-        let spec = split(graph, "g").unwrap().remove(0).spec;
-        let of_sinks = spec.subtasks.iter().map(|one| one.relative_deadline_ns);
-        (spec.relative_deadline_ns, of_sinks.collect::<Vec<_>>())
-    };
-    let own = vec![None, Some(5_000_000), None, None];
-    assert_eq!(deadlines(&fork), (Some(9_000_000), own));
-    // That of a subtask with successors is one of all that follows.
-    fork.subtasks[0].deadline_ns = Some(4_000_000);
-    assert_eq!(deadlines(&fork), (Some(4_000_000), vec![None; 4]));
+fn deadlines_are_those_of_the_graph_or_fit_the_longest_path() {
+    // Subtasks, edges, deadlines; the DAG's deadline, those of its sinks: in ms.
+    for (subtasks, edges, given, expected) in [
+        ("a b c", "ab bc", "", "6"),
+        // A longest path of 3 ms, a period of 2 ms.
+        ("a:2 b c", "ab bc", "", "4"),
+        ("a", "", "a5", "5"),
+        // Each sink has its own; that of a subtask with successors is one of all that follows.
+        ("a:20 b c d", "ab ac ad", "b5 c9", "9 b5"),
+        ("a:20 b c d", "ab ac ad", "b5 c9 a4", "4"),
+    ] {
+        let mut graph = graph(subtasks, edges);
+        for deadline in given.split_whitespace() {
+            let subtask = graph.position(&deadline[..1]).unwrap();
+            let ms: u64 = deadline[1..].parse().unwrap();
+            graph.subtasks[subtask].deadline_ns = Some(ms * MS);
+        }
+        let spec = split(&graph, "g").unwrap().remove(0).spec;
+        let of_sink = |one: &sched_dag::SubtaskSpec| {
+            let deadline_ns = one.relative_deadline_ns?;
+            Some(format!(" {}{}", one.name, deadline_ns / MS))
+        };
+        let sinks: String = spec.subtasks.iter().filter_map(of_sink).collect();
+        let of_dag = spec.relative_deadline_ns.unwrap() / MS;
+        assert_eq!(format!("{of_dag}{sinks}"), expected, "{given}");
+    }
 }
 
 #[test]
 fn a_cycle_is_refused_even_through_a_timer() {
-    let graph = graph(&[("a", Some(10)), ("b", None)], &[(0, 1), (1, 0)]);
-    let faults = split(&graph, "g").unwrap_err();
-    assert_eq!((faults.len(), faults[0].line), (1, 11));
-    assert!(
-        faults[0].reason.contains("has a cycle"),
-        "{}",
-        faults[0].reason
-    );
+    let faults = split(&graph("a:10 b", "ab ba"), "g").unwrap_err();
+    let [fault] = &faults[..] else {
+        panic!("{faults:?}");
+    };
+    assert!(fault.line == 11 && fault.reason.contains("has a cycle"));
 }

@@ -54,38 +54,31 @@ empty:
     assert_eq!(read("a: it's # no\nb: c#d"), "{a=`it's`,b=`c#d`}");
 }
 
+/// What is refused, and why.
+const REFUSED: &str = r#"# nothing\n | line 1: the file is empty
+a: 1\na: 2\n | line 2: key `a` stands here twice
+a: 1\n  b: 2\n | line 2: this line's indentation fits nothing above
+a: 1\n\tb: 2\n | line 2: a tab indents this line
+a: &x 1\n | line 1: `&x 1`: only plain scalars
+a: {b: 1}\n | line 1: `{b: 1}`: only plain scalars
+a: |\n  text\n | line 1: `|`: only plain scalars
+a: 'open\n | line 1: `'open`: its quote does not close
+a: "x\\"\n | escapes are not read
+a: 1\nnothing\n | line 2: `nothing` is no `key: value`
+a: 1\n---\nb: 2\n | line 2: a second document begins here"#;
+
 #[test]
-fn values_know_their_lines() {
+fn lines_are_known_and_what_is_not_read_is_refused_with_its_own() {
     let Value::Mapping(members) = parse("a: 1\n\n# c\nb:\n- 2\n").unwrap().value else {
         panic!("it is a mapping");
     };
     assert_eq!((members[0].1.line, members[1].1.line), (1, 5));
-}
-
-#[test]
-fn what_is_not_read_is_refused_with_its_line() {
-    for (text, words) in [
-        ("", "line 1: the file is empty"),
-        ("# nothing\n", "line 1: the file is empty"),
-        ("a: 1\na: 2\n", "line 2: key `a` stands here twice"),
-        (
-            "a: 1\n  b: 2\n",
-            "line 2: this line's indentation fits nothing above",
-        ),
-        ("a: 1\n\tb: 2\n", "line 2: a tab indents this line"),
-        ("a: &x 1\n", "line 1: `&x 1`: only plain scalars"),
-        ("a: {b: 1}\n", "line 1: `{b: 1}`: only plain scalars"),
-        ("a: |\n  text\n", "line 1: `|`: only plain scalars"),
-        ("a: 'open\n", "line 1: `'open`: its quote does not close"),
-        ("a: \"x\\n\"\n", "escapes are not read"),
-        ("a: 1\nnothing\n", "line 2: `nothing` is no `key: value`"),
-        ("a: 1\n---\nb: 2\n", "line 2: a second document begins here"),
-    ] {
-        let message = parse(text).unwrap_err().to_string();
+    for row in REFUSED.lines() {
+        let (text, words) = row.rsplit_once(" | ").expect(row);
+        let text = text.replace(r"\n", "\n").replace(r"\t", "\t");
+        let message = parse(&text).unwrap_err().to_string();
         assert!(message.contains(words), "{message}\n  not: {words}");
     }
-    let deep = format!("{}x", "- ".repeat(100));
-    assert!(parse(&deep).unwrap_err().reason.contains("levels deep"));
 }
 
 #[test]

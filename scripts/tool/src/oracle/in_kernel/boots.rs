@@ -11,7 +11,7 @@ use super::{Judged, Settings};
 use crate::outcome::{Outcome, boot};
 use crate::progress::Progress;
 use crate::qemu::Qemu;
-use crate::{image, install, probe, system};
+use crate::{files, image, install, probe, system};
 
 /// The most cases of one boot: the guest has them all in memory.
 const MOST_CASES: usize = 64;
@@ -27,7 +27,7 @@ const MEMORY_MIB: u64 = 64;
 /// In words: there is no QEMU, no image, or a file cannot be written.
 pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<Judged>, String> {
     install::ensure_qemu()?;
-    let image = image::build("replay").map_err(|error| error.to_string())?;
+    let image = image::build("replay")?;
     let machine = Qemu {
         machine: settings.machine,
         cores: cases
@@ -86,8 +86,7 @@ fn boot_with(
     let log = system::new_log("replay")?;
     let module = log.with_extension("cases");
     let text: String = cases.iter().map(|(_, text)| *text).collect();
-    fs::write(&module, text)
-        .map_err(|error| format!("cannot write `{}`: {error}", module.display()))?;
+    files::write(&module, text)?;
     let Settings {
         mode,
         machine,

@@ -7,7 +7,7 @@ use replay::Case;
 use replay::lines::Malformed;
 
 use super::{Deviation, Judged, Settings, run};
-use crate::options::{Command, Parsed, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::oracle::{read, schedules};
 use crate::qemu::{MOST_CORES, Machine, Mode};
 
@@ -58,21 +58,18 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 
 /// Runs the command with the words after `schedules`.
 pub(in crate::oracle) fn command(words: &[OsString]) -> ExitCode {
-    let options = match IN_KERNEL.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    let settings = settings(&options);
+    IN_KERNEL.carry_out(words, run_files)
+}
+
+fn run_files(options: &Parsed) -> Result<ExitCode, Refusal> {
+    let settings = settings(options);
     let most_us = settings.unit_us / 4;
     if settings.window_us > most_us || settings.guard_us > most_us {
-        return IN_KERNEL.refuse(&format!(
+        return Err(Refusal::Usage(format!(
             "the window and the guard may be a quarter of a unit at most, here {most_us} us"
-        ));
+        )));
     }
-    let mut cases = match read(options.files(), with_texts) {
-        Ok(cases) => cases,
-        Err(reason) => return IN_KERNEL.refuse(&reason),
-    };
+    let mut cases = read(options.files(), with_texts).map_err(Refusal::Usage)?;
     let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
     let all = cases.len();
     cases.retain(|(case, _)| u64::from(case.cores) <= most_cores);
@@ -81,10 +78,8 @@ pub(in crate::oracle) fn command(words: &[OsString]) -> ExitCode {
         println!("{left_out} cases for more than {most_cores} cores are left out");
     }
     let (cases, texts): (Vec<Case>, Vec<String>) = cases.into_iter().unzip();
-    match run(&cases, &texts, &settings) {
-        Ok(judged) => ExitCode::from(u8::from(report(&judged, &settings) > 0)),
-        Err(reason) => IN_KERNEL.fail(&reason),
-    }
+    let failed = report(&run(&cases, &texts, &settings)?, &settings);
+    Ok(ExitCode::from(u8::from(failed > 0)))
 }
 
 fn settings(options: &Parsed) -> Settings {

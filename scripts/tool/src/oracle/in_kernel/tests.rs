@@ -1,9 +1,9 @@
 //! The comparison on the host: what is near, what is not, and what is missing.
 
 use super::compare::compare;
-use super::transcript::{Ran, read};
+use super::transcript::read;
 use super::{Deviation, Settings};
-use crate::oracle::schedules::{Case, parse};
+use crate::oracle::schedules::parse;
 use crate::protocol::Transcript;
 
 const CASE: &str = "case small 1 0 1 1
@@ -31,72 +31,38 @@ const LOG: &str = r#"
 {"kind":"replay","case":"next","cores":1,"violations":0,"allocations":0}
 "#;
 
-fn case() -> Case {
-    parse(CASE).expect("well formed").remove(0)
-}
-
-fn ran(from: &str, to: &str) -> Option<Ran> {
-    assert!(LOG.contains(from), "{from}");
-    read(&Transcript::read(&LOG.replace(from, to)), &case())
-}
-
-fn compared(from: &str, to: &str) -> Result<Deviation, String> {
-    let settings = Settings::for_unit(1000);
-    compare(&case(), &ran(from, to).expect("all is there"), &settings)
-}
+/// What stands in the log, what is put in its place, and the difference that makes; none if not
+/// all of the run is there.
+const ALTERED: &str = r#"[0,1,0,5010000, | [0,1,0,5021000, | dag 0 job 1 subtask 0: start: expected at 5, ran at 5.021 units
+4990000,0]] | 4979999,0]] | dag 0 job 0 subtask 1: finish: expected at 5, ran at 4.979 units
+9990000,0]] | 9990000,1]] | dag 0 job 1 subtask 1: preemptions: expected 0, ran 1
+4000000, | 4000001, | dag 0 job 1: release: expected 4000000, ran 4000001
+9990000,1]] | 9990000,0]] | dag 0 job 1: missed: expected 1, ran 0
+"small","cores":1,"violations":0 | "small","cores":1,"violations":2 | the run breaks the model's rules in 2 places
+"small" | "smart"
+,[0,1,1,6010000,9990000,0] |
+[0,0,0,4990000,1], |
+[0,1,0,5010000, | [0,0,0,5010000,
+[0,1,0,5010000, | [0,1,0,null,"#;
 
 #[test]
-fn what_is_near_passes_with_its_deviation() {
+fn what_is_near_passes_and_the_first_difference_is_named() {
+    let case = parse(CASE).expect("well formed").remove(0);
+    let settings = Settings::for_unit(1000);
+    let compared = |log: &str| {
+        let ran = read(&Transcript::read(log), &case)?;
+        Some(compare(&case, &ran, &settings))
+    };
     let deviation = Deviation {
         earliest_ns: -10_000,
         latest_ns: 10_000,
     };
-    assert_eq!(compared("small", "small"), Ok(deviation));
-}
-
-#[test]
-fn the_first_difference_in_time_is_named() {
-    for (from, to, difference) in [
-        (
-            "[0,1,0,5010000,",
-            "[0,1,0,5021000,",
-            "dag 0 job 1 subtask 0: start: expected at 5, ran at 5.021 units",
-        ),
-        (
-            "4990000,0]]",
-            "4979999,0]]",
-            "dag 0 job 0 subtask 1: finish: expected at 5, ran at 4.979 units",
-        ),
-        (
-            "9990000,0]]",
-            "9990000,1]]",
-            "dag 0 job 1 subtask 1: preemptions: expected 0, ran 1",
-        ),
-        (
-            "4000000,",
-            "4000001,",
-            "dag 0 job 1: release: expected 4000000, ran 4000001",
-        ),
-        (
-            "9990000,1]]",
-            "9990000,0]]",
-            "dag 0 job 1: missed: expected 1, ran 0",
-        ),
-        (
-            "\"small\",\"cores\":1,\"violations\":0",
-            "\"small\",\"cores\":1,\"violations\":2",
-            "the run breaks the model's rules in 2 places",
-        ),
-    ] {
-        assert_eq!(compared(from, to), Err(difference.into()), "{to}");
+    assert_eq!(compared(LOG), Some(Ok(deviation)));
+    for row in ALTERED.lines() {
+        let mut cells = row.split('|').map(str::trim);
+        let (from, to) = (cells.next().expect(row), cells.next().expect(row));
+        assert!(LOG.contains(from), "{from}");
+        let difference = cells.next().map(|difference| Err(difference.into()));
+        assert_eq!(compared(&LOG.replace(from, to)), difference, "{to}");
     }
-}
-
-#[test]
-fn a_run_that_is_not_all_there_is_none() {
-    assert_eq!(ran("\"small\"", "\"smart\""), None);
-    assert_eq!(ran(",[0,1,1,6010000,9990000,0]", ""), None);
-    assert_eq!(ran("[0,0,0,4990000,1],", ""), None);
-    assert_eq!(ran("[0,1,0,5010000,", "[0,0,0,5010000,"), None);
-    assert_eq!(ran("[0,1,0,5010000,", "[0,1,0,null,"), None);
 }

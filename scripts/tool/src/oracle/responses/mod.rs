@@ -57,26 +57,23 @@ struct Seen {
 
 /// Runs `oracle responses` with the words after its name.
 pub(super) fn command(words: &[OsString]) -> ExitCode {
-    let options = match TABLE.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    let sets = options.number("sets").unwrap_or(1_000);
-    let first = options.number("seed").unwrap_or(1);
-    let mut progress = Progress::new(sets, "accepted sets");
-    let mut seen = Seen::default();
-    for seed in first.. {
-        if seen.accepted == sets {
-            break;
+    TABLE.carry_out(words, |options| {
+        let sets = options.number("sets").unwrap_or(1_000);
+        let mut seeds = options.number("seed").unwrap_or(1)..;
+        let mut progress = Progress::new(sets, "accepted sets");
+        let mut seen = Seen::default();
+        while seen.accepted < sets
+            && let Some(seed) = seeds.next()
+        {
+            for line in seen.add(seed) {
+                println!("{line}");
+            }
+            progress.show(seen.accepted);
         }
-        for line in seen.add(seed) {
-            println!("{line}");
-        }
-        progress.show(seen.accepted);
-    }
-    progress.end();
-    print!("{}", seen.text());
-    ExitCode::from(u8::from(seen.above > 0))
+        progress.end();
+        print!("{}", seen.text());
+        Ok(ExitCode::from(u8::from(seen.above > 0)))
+    })
 }
 
 impl Seen {

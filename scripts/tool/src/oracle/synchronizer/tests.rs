@@ -67,22 +67,16 @@ fn the_first_difference_is_named() {
 }
 
 #[test]
-fn the_order_of_what_leaves_in_no_set_means_nothing() {
-    let text = "case e exact 2 5\na 0 0 1\na 0 1 1\na 0 2 2\na 0 3 3\na 1 0 3\n\
-                s 4 3 0\nr 4 0 2\nr 1 0 0\nr 4 0 1\nend\n";
-    assert_eq!(check(&parse(text).unwrap()[0]), Ok(()));
-}
-
-#[test]
-fn a_queue_of_any_size_costs_no_more_than_the_arrivals() {
-    let largest = usize::MAX.to_string();
-    for (text, from) in [(EXACT, "exact 2 5"), (APPROXIMATE, "approximate 2 5")] {
-        let to = from.replace('5', &largest);
-        let cases = parse(&text.replacen(from, &to, 1)).unwrap();
-        assert_eq!(check(&cases[0]), Ok(()));
+fn neither_the_order_of_what_leaves_nor_a_size_of_queues_matters() {
+    let in_any_order = "case e exact 2 5\na 0 0 1\na 0 1 1\na 0 2 2\na 0 3 3\na 1 0 3\n\
+                        s 4 3 0\nr 4 0 2\nr 1 0 0\nr 4 0 1\nend\n";
+    let without_limit = EXACT.replacen("exact 2 5", "exact 2 0", 1);
+    // A queue costs no more than the arrivals.
+    let largest = format!("2 {}", usize::MAX);
+    let [exact, approximate] = [EXACT, APPROXIMATE].map(|text| text.replacen("2 5", &largest, 1));
+    for text in [in_any_order, &without_limit, &exact, &approximate] {
+        assert_eq!(check(&parse(text).unwrap()[0]), Ok(()), "{text}");
     }
-    let unlimited = EXACT.replacen("exact 2 5", "exact 2 0", 1);
-    assert_eq!(check(&parse(&unlimited).unwrap()[0]), Ok(()));
 }
 
 /// The same of what is refused: with its line and the reason.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use super::convert;
 use crate::files::{self, Named};
-use crate::options::{Command, Parsed, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::trace::bound;
 use crate::trace::command::read_file;
 
@@ -39,26 +39,18 @@ line, or a file without a well-formed trace with events
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn trace(words: &[OsString]) -> ExitCode {
-    let options = match TRACE.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    let text = match draw(&options) {
-        Ok(text) => text,
-        Err(line) => return TRACE.refuse(&line),
-    };
-    let Some(out) = options.path("out") else {
-        print!("{text}");
-        return ExitCode::SUCCESS;
-    };
-    let place = files::place(out);
-    match fs::write(out, text) {
-        Ok(()) => {
-            eprintln!("{place}: open it at https://ui.perfetto.dev");
-            ExitCode::SUCCESS
+    TRACE.carry_out(words, |options| {
+        let text = draw(options).map_err(Refusal::Usage)?;
+        match options.path("out") {
+            None => print!("{text}"),
+            Some(out) => {
+                let place = files::place(out);
+                fs::write(out, text).map_err(|error| format!("cannot write {place}: {error}"))?;
+                eprintln!("{place}: open it at https://ui.perfetto.dev");
+            }
         }
-        Err(error) => TRACE.fail(&format!("cannot write {place}: {error}")),
-    }
+        Ok(ExitCode::SUCCESS)
+    })
 }
 
 /// Converts the runs that the options ask for.
