@@ -91,41 +91,39 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_secs(60);
 
-    /// Takes these looks: seconds, signals, bytes. Returns all steps but those that wait.
-    fn steps(looks: &[(u64, u32, u64)]) -> Vec<(u64, Step)> {
-        let mut asking = Asking::new(LIMIT);
-        let looks = looks.iter().map(|&(seconds, signals, bytes)| {
-            let elapsed = Duration::from_secs(seconds);
-            (seconds, asking.step(elapsed, signals, bytes))
-        });
-        looks.filter(|(_, step)| *step != Step::Wait).collect()
-    }
-
     #[test]
-    fn the_first_signal_asks_and_the_second_kills() {
-        let asks = Step::Ask(Asked::ByPerson);
-        let looks = [(1, 0, 9), (2, 1, 9), (3, 1, 9), (4, 2, 9)];
-        assert_eq!(steps(&looks), [(2, asks), (4, Step::Kill)]);
-        // Two at once are one, and nobody is asked who cannot hear.
-        assert_eq!(steps(&[(1, 2, 0), (2, 2, 0), (3, 2, 1)]), [(3, asks)]);
-        assert_eq!(steps(&[(1, 1, 0), (2, 2, 0)]), [(2, Step::Kill)]);
-    }
-
-    #[test]
-    fn at_the_limit_it_is_asked_and_has_as_long_as_it_prints() {
-        let asks = Step::Ask(Asked::ByLimit(LIMIT));
-        let looks = [
-            (59, 0, 9),
-            (60, 0, 9),
-            (69, 0, 10),
-            (78, 0, 10),
-            (79, 0, 10),
-        ];
-        assert_eq!(steps(&looks), [(60, asks), (79, Step::TimeOut)]);
-        assert_eq!(
-            steps(&[(60, 0, 9), (61, 1, 9)]),
-            [(60, asks), (61, Step::Kill)]
-        );
-        assert_eq!(steps(&[(60, 0, 0)]), [(60, Step::TimeOut)]);
+    fn the_first_signal_or_the_limit_asks_and_the_second_or_silence_kills() {
+        let (person, limit) = (Step::Ask(Asked::ByPerson), Step::Ask(Asked::ByLimit(LIMIT)));
+        // Looks: seconds, signals, bytes. Of the steps, those that do not wait.
+        for (looks, expected) in [
+            (
+                &[(1, 0, 9), (2, 1, 9), (3, 1, 9), (4, 2, 9)][..],
+                &[(2, person), (4, Step::Kill)][..],
+            ),
+            // Two at once are one, and nobody is asked who cannot hear.
+            (&[(1, 2, 0), (2, 2, 0), (3, 2, 1)], &[(3, person)]),
+            (&[(1, 1, 0), (2, 2, 0)], &[(2, Step::Kill)]),
+            // After the limit it has as long as it prints.
+            (
+                &[
+                    (59, 0, 9),
+                    (60, 0, 9),
+                    (69, 0, 10),
+                    (78, 0, 10),
+                    (79, 0, 10),
+                ],
+                &[(60, limit), (79, Step::TimeOut)],
+            ),
+            (&[(60, 0, 9), (61, 1, 9)], &[(60, limit), (61, Step::Kill)]),
+            (&[(60, 0, 0)], &[(60, Step::TimeOut)]),
+        ] {
+            let mut asking = Asking::new(LIMIT);
+            let steps = looks.iter().map(|&(seconds, signals, bytes)| {
+                let elapsed = Duration::from_secs(seconds);
+                (seconds, asking.step(elapsed, signals, bytes))
+            });
+            let steps: Vec<_> = steps.filter(|(_, step)| *step != Step::Wait).collect();
+            assert_eq!(steps, expected);
+        }
     }
 }

@@ -320,50 +320,42 @@ mod tests {
         Named { option, path }
     }
 
+    /// Commands that are refused for it are in `tests/named_files.rs`.
     #[test]
     fn one_file_of_two_names_is_found_and_kept() {
         let folder = folder("one-file");
+        let own = folder.file_name().unwrap();
         let (file, link, hard) = (folder.join("a"), folder.join("b"), folder.join("c"));
         fs::write(&file, "kept").unwrap();
         symlink(&file, &link).unwrap();
         fs::hard_link(&file, &hard).unwrap();
-        let dotted = folder
-            .join("../")
-            .join(folder.file_name().unwrap())
-            .join("a");
+        let dotted = folder.join("..").join(own).join("a");
         for other in [&file, &link, &hard, &dotted] {
             let refused = check(&[named("dag", &file)], &[named("dot", other)]).unwrap_err();
-            assert!(refused.starts_with("`--dag "), "{refused}");
-            assert!(refused.ends_with(" are one file, which would be overwritten; name another"));
+            let ends = " are one file, which would be overwritten; name another";
+            assert!(refused.starts_with("`--dag ") && refused.ends_with(ends));
         }
         let twice = check_once([file.as_path(), &folder, &link].into_iter()).unwrap_err();
         assert!(twice.ends_with("/b` are one file; give it once"), "{twice}");
         // Neither is there yet.
-        let new = folder.join("new");
-        let again = folder.join(".").join("new");
+        let (new, again) = (folder.join("new"), folder.join(".").join("new"));
         assert!(check(&[], &[named("dot", &new), named("serial", &again)]).is_err());
         assert_eq!(check(&[named("", &file)], &[named("dot", &new)]), Ok(()));
         assert!(!new.exists(), "the trial is removed");
-        assert_eq!(fs::read(&file).unwrap(), b"kept");
-        fs::remove_dir_all(folder).unwrap();
-    }
 
-    #[test]
-    fn what_cannot_be_written_is_found_before_the_work() {
-        let folder = folder("no-output");
-        let file = folder.join("file");
-        fs::write(&file, "kept").unwrap();
         for path in [file.join("x"), folder.join("none/x"), folder.clone()] {
             let refused = check(&[], &[named("out", &path)]).unwrap_err();
             assert!(refused.contains(": cannot be written: "), "{refused}");
         }
         let refused = check_folder(&named("out", &file.join("x"))).unwrap_err();
-        assert!(
-            refused.ends_with("/file` is no folder; name another folder"),
-            "{refused}"
-        );
+        assert!(refused.ends_with("/a` is no folder; name another folder"));
         assert_eq!(check_folder(&named("out", &folder.join("to/come"))), Ok(()));
-        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 3);
+
+        assert_eq!(check_room(&file), Ok(()));
+        assert_eq!(fs::read(&file).unwrap(), b"kept");
+        let full = check_room(Path::new("/dev/full")).unwrap_err();
+        assert!(full.starts_with("`/dev/full` takes no more: No space left"));
         fs::remove_dir_all(folder).unwrap();
     }
 
@@ -373,52 +365,23 @@ mod tests {
         let file = folder.join("file");
         fs::write(&file, "\u{feff}dag ä\n").unwrap();
         assert_eq!(read_text(&file).as_deref(), Ok("dag ä\n"));
+        let ends = |why: &str| {
+            let said = read_text(&file).unwrap_err();
+            assert!(
+                said.ends_with(&format!("{why}; name another file")),
+                "{said}"
+            );
+        };
         fs::write(&file, b"one\ntwo \xff\n").unwrap();
-        let said = read_text(&file).unwrap_err();
-        assert!(
-            said.ends_with("/file:2: this is not UTF-8 text; name another file"),
-            "{said}"
+        ends("/file:2: this is not UTF-8 text");
+        let long = File::create(&file).unwrap();
+        long.set_len((64 << 20) + 1).unwrap();
+        ends("/file: it is longer than 64 MiB");
+        long.set_len(MOST_BYTES + 1).unwrap();
+        assert_eq!(
+            read(&file).unwrap_err(),
+            "cannot be read: it is longer than 1024 MiB"
         );
-        let opened = File::create(&file).unwrap();
-        opened.set_len((64 << 20) + 1).unwrap();
-        let said = read_text(&file).unwrap_err();
-        assert!(
-            said.ends_with("/file: it is longer than 64 MiB; name another file"),
-            "{said}"
-        );
-        fs::remove_dir_all(folder).unwrap();
-    }
-
-    #[test]
-    fn a_full_disk_is_told_from_one_with_room() {
-        let full = check_room(Path::new("/dev/full")).unwrap_err();
-        assert!(
-            full.starts_with("`/dev/full` takes no more: No space left"),
-            "{full}"
-        );
-        let folder = folder("room");
-        let file = folder.join("file");
-        fs::write(&file, "kept").unwrap();
-        assert_eq!(check_room(&file), Ok(()));
-        assert_eq!(fs::read(&file).unwrap(), b"kept");
-        fs::remove_dir_all(folder).unwrap();
-    }
-
-    #[test]
-    fn only_a_file_of_a_fair_length_is_read() {
-        let folder = folder("no-input");
-        let long = folder.join("long");
-        File::create(&long)
-            .unwrap()
-            .set_len(MOST_BYTES + 1)
-            .unwrap();
-        for (path, why) in [
-            (Path::new("/dev/zero"), "it is a device or a pipe"),
-            (&folder, "it is a folder"),
-            (&long, "it is longer than 1024 MiB"),
-        ] {
-            assert_eq!(read(path).unwrap_err(), format!("cannot be read: {why}"));
-        }
         fs::remove_dir_all(folder).unwrap();
     }
 }

@@ -233,8 +233,8 @@ fn build_target(
     let _lasting = Lasting::new(&format!("building `{package}`"));
     let (messages, ended) = system::messages_of(&mut command);
     ended.map_err(|why| failed(&why))?;
-    let paths = messages.iter().filter_map(|it| executable(it, name));
-    match paths.last() {
+    let mut paths = messages.iter().filter_map(|it| executable(it, name));
+    match paths.next_back() {
         Some(path) => Ok(Image { path }),
         None => Err(failed("cargo built no binary of that name")),
     }

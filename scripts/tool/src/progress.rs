@@ -77,10 +77,13 @@ mod tests {
 
     #[test]
     fn the_time_left_is_in_proportion() {
-        let at = |over, seconds| line(over, 120, "rounds", Duration::from_secs(seconds));
-        assert_eq!(at(60, 50), "progress: 60 of 120 rounds, 50 s left");
-        assert_eq!(at(30, 100), "progress: 30 of 120 rounds, 5 min left");
-        assert_eq!(at(120, 100), "progress: 120 of 120 rounds, 0 s left");
-        assert_eq!(at(0, 7), "progress: 0 of 120 rounds");
+        for (over, seconds, expected) in [
+            (60, 50, "progress: 60 of 120 rounds, 50 s left"),
+            (30, 100, "progress: 30 of 120 rounds, 5 min left"),
+            (0, 7, "progress: 0 of 120 rounds"),
+        ] {
+            let elapsed = Duration::from_secs(seconds);
+            assert_eq!(line(over, 120, "rounds", elapsed), expected);
+        }
     }
 }

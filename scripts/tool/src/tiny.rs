@@ -108,18 +108,3 @@ fn program_header(kind: u32, offset: u32, length: u32) -> Vec<u8> {
     }
     header
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{HEADERS, NOTE, TinyEnd, tiny_image};
-
-    #[test]
-    fn the_parts_stand_where_the_headers_say() {
-        let image = tiny_image("hi", TinyEnd::Exit(0x10));
-        let code_at = usize::try_from(HEADERS + NOTE).unwrap();
-        assert_eq!(image[code_at], 0xbe);
-        let text_at = u32::from_le_bytes(image[code_at + 1..code_at + 5].try_into().unwrap());
-        let text_at = usize::try_from(text_at - super::BASE).unwrap();
-        assert_eq!(&image[text_at..], b"hi");
-    }
-}

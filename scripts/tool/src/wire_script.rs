@@ -138,50 +138,40 @@ mod tests {
     fn texts_and_pairs_become_bytes_at_their_times() {
         let text = "# radar\n\n4ms \"gap 2350\\n\"\n4ms \"\\x00\\\"\\\\ \\r\\t\\0é\"  \n1s 67 0A\n";
         let entries = read(text).unwrap();
+        let expected = [
+            (4_000_000, &b"gap 2350\n"[..]),
+            (4_000_000, b"\0\"\\ \r\t\0\xc3\xa9"),
+            (1_000_000_000, b"g\n"),
+        ];
         assert_eq!(
             entries,
-            [
-                (4_000_000, b"gap 2350\n".to_vec()),
-                (4_000_000, b"\0\"\\ \r\t\0\xc3\xa9".to_vec()),
-                (1_000_000_000, vec![0x67, 0x0a]),
-            ]
+            expected.map(|(at_ns, bytes)| (at_ns, bytes.to_vec()))
         );
         let script = for_guest(&entries[2..]);
         assert_eq!(script, b"\x00\xca\x9a\x3b\0\0\0\0\x02\0g\n");
     }
 
+    /// What is refused, a `/` ending a line, and why.
+    const REFUSED: &str = r#"5 "a" | 1: `5` has no unit; append one of ns, us, ms and s
+# a/soon 0a | 2: `soon` is no time
+5ms | 1: there are no bytes; give a text
+5ms "" | 1: there are no bytes; give a text
+5ms "a | 1: the text has no end; close it
+5ms "a" 0a | 1: something follows the text; write one
+5ms "\q" | 1: a backslash is followed by none of
+5ms "\x1" | 1: `1"` is no pair of hexadecimal digits; write
+5ms 0a0 | 1: `0a0` is no pair of hexadecimal digits; write
+5ms +1 | 1: `+1` is no pair
+5ms 0a/4ms 0a | 2: this is before the line above; put"#;
+
     #[test]
     fn what_is_wrong_is_told_with_its_line_and_the_remedy() {
-        for (text, says) in [
-            (
-                "5 \"a\"",
-                "1: `5` has no unit; append one of ns, us, ms and s",
-            ),
-            ("# a\nsoon 0a", "2: `soon` is no time"),
-            ("5ms", "1: there are no bytes; give a text"),
-            ("5ms \"\"", "1: there are no bytes; give a text"),
-            ("5ms \"a", "1: the text has no end; close it"),
-            ("5ms \"a\" 0a", "1: something follows the text; write one"),
-            ("5ms \"\\q\"", "1: a backslash is followed by none of"),
-            (
-                "5ms \"\\x1\"",
-                "1: `1\"` is no pair of hexadecimal digits; write",
-            ),
-            (
-                "5ms 0a0",
-                "1: `0a0` is no pair of hexadecimal digits; write",
-            ),
-            ("5ms +1", "1: `+1` is no pair"),
-            ("5ms 0a\n4ms 0a", "2: this is before the line above; put"),
-        ] {
-            let refused = read(text).unwrap_err();
+        for row in REFUSED.lines() {
+            let (text, says) = row.split_once(" | ").expect(row);
+            let refused = read(&text.replace('/', "\n")).unwrap_err();
             assert!(refused.starts_with(says), "{text}: {refused}");
         }
-        let long = format!("5ms \"{}\"", "x".repeat(1025));
-        assert!(
-            read(&long)
-                .unwrap_err()
-                .starts_with("1: 1025 bytes arrive at once")
-        );
+        let refused = read(&format!("5ms \"{}\"", "x".repeat(1025))).unwrap_err();
+        assert!(refused.starts_with("1: 1025 bytes arrive at once"));
     }
 }

@@ -204,7 +204,6 @@ mod tests {
 
     #[test]
     fn the_latest_kernel_of_those_that_were_tried_is_taken() {
-        let of = |names: &[&'static str]| choose(names.iter().copied());
         let names = [
             "linux-image-6.12.107+deb13-cloud-amd64",
             "linux-image-6.18.9+deb13-cloud-amd64",
@@ -214,13 +213,10 @@ mod tests {
             "linux-image-7.2.12+deb13-cloud-amd64",
             "linux-image-cloud-amd64",
         ];
+        let of = |names: &[&'static str]| choose(names.iter().copied());
         assert_eq!(of(&names), Some(names[2]));
         assert_eq!(of(&names[5..]), Some(names[5]));
         assert_eq!(of(&names[..1]), None, "it is too old");
-    }
-
-    #[test]
-    fn a_library_is_where_the_loader_finds_it() {
         let line = "\tlibz.so.1 => /a b/libz.so.1 (0x00007f0000000000)";
         assert_eq!(library(line), Some("/a b/libz.so.1".into()));
         assert_eq!(library("\tlinux-vdso.so.1 (0x00007f0000000000)"), None);

@@ -149,94 +149,68 @@ git init                # docs/guide.md goes on from here
 #[cfg(test)]
 mod tests {
     use super::{Source, create_repository};
-    use crate::new_app::Refusal;
+    use crate::options::Refusal;
     use crate::system::workspace;
     use std::fs;
-    use std::path::{Path, PathBuf};
 
-    fn made(name: &str, source: Source<'_>) -> PathBuf {
-        let out = std::env::temp_dir().join(format!("{name}-{}", std::process::id()));
-        create_repository(&out, "brake-assist", source).unwrap();
-        out
-    }
-
-    fn text(out: &Path, place: &str) -> String {
-        fs::read_to_string(out.join(place)).unwrap()
-    }
-
+    /// That the app is built and boots is shown by `tests/tests/boot_new_app.rs`.
     #[test]
-    fn from_a_folder_every_path_is_there_and_nothing_is_installed() {
-        let out = made("from-folder", Source::Folder(workspace()));
-        let places = [text(&out, "Cargo.toml"), text(&out, ".cargo/config.toml")].concat();
-        let paths = places.split('"').filter(|word| word.starts_with('/'));
-        assert_eq!(paths.clone().count(), 7);
-        for path in paths {
-            assert!(Path::new(path).exists(), "{path}");
-        }
-        let steps = text(&out, ".github/workflows/ci.yml");
-        assert!(!steps.contains("install"), "{steps}");
-        fs::remove_dir_all(out).unwrap();
-    }
-
-    #[test]
-    fn from_git_the_url_is_all_that_is_named() {
+    fn from_git_the_url_is_all_that_is_named_and_from_a_folder_nothing_is_installed() {
         let url = "https://example.org/kernel.git";
-        let out = made("from-git", Source::Git(url));
-        let manifest = text(&out, "Cargo.toml");
-        assert_eq!(
-            manifest.matches(&format!("{{ git = \"{url}\" }}")).count(),
-            6
-        );
-        let runner = text(&out, ".cargo/config.toml");
-        assert!(
-            runner.ends_with("runner = [\"fass-tool\", \"boot\"]\n"),
-            "{runner}"
-        );
-        let steps = text(&out, ".github/workflows/ci.yml");
-        let install = format!("- run: cargo install --locked --git {url} tool\n");
-        assert!(steps.contains(&install), "{steps}");
-        for file in [manifest, runner, steps] {
-            assert!(!file.contains("/workspace"), "{file}");
+        for source in [Source::Git(url), Source::Folder(workspace())] {
+            let is_git = matches!(source, Source::Git(_));
+            let out = std::env::temp_dir().join(format!("from-{is_git}-{}", std::process::id()));
+            create_repository(&out, "brake-assist", source).unwrap();
+            let places = [
+                "Cargo.toml",
+                ".cargo/config.toml",
+                ".github/workflows/ci.yml",
+            ];
+            let texts = places.map(|place| fs::read_to_string(out.join(place)).unwrap());
+            let [manifest, runner, steps] = &texts;
+            assert_eq!(steps.contains("install"), is_git, "{steps}");
+            if is_git {
+                let by_url = format!("{{ git = \"{url}\" }}");
+                assert_eq!(manifest.matches(&by_url).count(), 6, "{manifest}");
+                let words = "runner = [\"fass-tool\", \"boot\"]\n";
+                assert!(runner.ends_with(words), "{runner}");
+                let install = format!("- run: cargo install --locked --git {url} tool\n");
+                assert!(steps.contains(&install), "{steps}");
+                assert!(!texts.concat().contains("/workspace"), "{texts:?}");
+            }
+            for (out, name, part) in [
+                (
+                    out.clone(),
+                    "brake",
+                    ": it is there already; name a folder to be made",
+                ),
+                (
+                    out.join("new"),
+                    "boot-link",
+                    "of a package that the app needs; choose",
+                ),
+                (out.join("new"), "Brake", "'B' is in it; "),
+            ] {
+                match create_repository(&out, name, source) {
+                    Err(Refusal::Usage(line)) => assert!(line.contains(part), "{line}"),
+                    other => panic!("{name}: {other:?}"),
+                }
+            }
+            assert!(!out.join("new").exists());
+            fs::remove_dir_all(out).unwrap();
         }
-        fs::remove_dir_all(out).unwrap();
     }
 
     #[test]
     fn it_is_built_for_figures_as_in_the_workspace() {
-        let profile = |manifest: &str| {
+        let profile = |manifest: &'static str| {
             let from = manifest.find("[profile.release]").unwrap();
             let lines = manifest[from..].lines().filter(|line| !line.is_empty());
-            lines.map(String::from).collect::<Vec<_>>()
+            lines.collect::<Vec<_>>()
         };
         let own = profile(include_str!("../../template/repository/manifest.toml"));
         let workspace = profile(include_str!("../../../../Cargo.toml"));
         assert!(own.len() > 8, "{own:?}");
         assert!(own.iter().all(|line| workspace.contains(line)), "{own:?}");
-    }
-
-    #[test]
-    fn a_folder_that_is_there_and_a_name_that_it_needs_are_refused() {
-        let out = made("there", Source::Folder(workspace()));
-        for (out, name, part) in [
-            (
-                out.clone(),
-                "brake-assist",
-                ": it is there already; name a folder to be made",
-            ),
-            (
-                out.join("new"),
-                "boot-link",
-                "of a package that the app needs; choose another",
-            ),
-            (out.join("new"), "Brake", "'B' is in it; "),
-        ] {
-            let refused = create_repository(&out, name, Source::Git("https://example.org"));
-            let Err(Refusal::Usage(line)) = refused else {
-                panic!("{name} is made: {refused:?}");
-            };
-            assert!(line.contains(part), "{line}");
-        }
-        assert!(!out.join("new").exists());
-        fs::remove_dir_all(out).unwrap();
     }
 }

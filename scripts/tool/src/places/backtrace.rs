@@ -149,92 +149,75 @@ fn chain<'f>(
 mod tests {
     use super::*;
 
-    fn frame(function: &str, line: &str) -> Frame {
-        Frame {
-            function: function.into(),
-            line: line.into(),
-        }
+    /// Addresses with what contains them, the innermost first. The worker (0x10) calls `app`
+    /// (0x20) by a pointer, which calls `deep` (0x30), within which `small` is inlined.
+    const IMAGE: &str = "10 executive::run::worker::work /w/worker.rs:1
+14 executive::run::worker::work /w/worker.rs:1
+20 app /w/app.rs:1
+24 app /w/app.rs:5
+30 small /w/small.rs:7 deep /w/deep.rs:1
+34 small /w/small.rs:7 deep /w/deep.rs:9
+40 stale /w/stale.rs:1
+44 stale /w/stale.rs:1";
+
+    fn image(table: &str) -> BTreeMap<u64, Vec<Frame>> {
+        let rows = table.lines().map(|row| {
+            let words: Vec<&str> = row.split(' ').collect();
+            let frame = |pair: &[&str]| Frame {
+                function: pair[0].into(),
+                line: pair[1].into(),
+            };
+            let frames = words[1..].chunks(2).map(frame).collect();
+            (u64::from_str_radix(words[0], 16).unwrap(), frames)
+        });
+        rows.collect()
     }
 
-    /// An image: `worker` (0x10) calls `app` (0x20) by a pointer, which calls `deep` (0x30),
-    /// within which `small` is inlined.
-    fn image() -> BTreeMap<u64, Vec<Frame>> {
-        let worker = vec![frame("executive::run::worker::work", "/w/worker.rs:1")];
-        let app = |line: u32| vec![frame("app", &format!("/w/app.rs:{line}"))];
-        let deep = |line: u32| {
-            let line = format!("/w/deep.rs:{line}");
-            vec![frame("small", "/w/small.rs:7"), frame("deep", &line)]
-        };
-        let stale = vec![frame("stale", "/w/stale.rs:1")];
-        let names = [
-            (0x10, worker.clone()),
-            (0x14, worker),
-            (0x20, app(1)),
-            (0x24, app(5)),
-            (0x30, deep(1)),
-            (0x34, deep(9)),
-            (0x40, stale.clone()),
-            (0x44, stale),
-        ];
-        names.into()
-    }
-
-    fn call(text: &str) -> Call {
-        Call::read(text).unwrap()
+    fn calls(texts: &[&str]) -> Vec<Call> {
+        texts.iter().filter_map(|text| Call::read(text)).collect()
     }
 
     #[test]
     fn the_chain_of_calls_is_followed_past_what_is_left_over() {
-        let calls = [
-            call("0x45 0x40"), // left over
-            call("0x25 0x30"),
-            call("0x15"),
-        ];
-        let told = tell(Some(0x34), &calls, &image()).unwrap();
-        assert_eq!(
-            told,
-            "called, the innermost first:\n    small, /w/small.rs:7\n    deep, /w/deep.rs:9\n    \
-             app, /w/app.rs:5"
-        );
+        // The first is left over, and the last is none.
+        let calls = calls(&["0x45 0x40", "0x25 0x30", "0x15", "?"]);
+        assert_eq!(calls.len(), 3);
+        let told = tell(Some(0x34), &calls, &image(IMAGE));
+        let expected = "called, the innermost first:\n    small, /w/small.rs:7\n    \
+                        deep, /w/deep.rs:9\n    app, /w/app.rs:5";
+        assert_eq!(told.as_deref(), Some(expected));
+        // Without names nothing is told.
+        assert_eq!(tell(Some(1), &calls, &BTreeMap::new()), None);
     }
 
     #[test]
     fn what_called_itself_is_counted_and_long_chains_are_cut() {
-        let image: BTreeMap<u64, Vec<Frame>> = (0..40)
-            .map(|n| (n, vec![frame(&format!("f{}", n.min(20)), "/w/f.rs:1")]))
+        let rows: Vec<String> = (0..40)
+            .map(|n: u64| format!("{n:x} f{} /w/f.rs:1", n.min(20)))
             .collect();
-        let calls: Vec<Call> = (0..40)
-            .map(|n| Call {
-                returns_to: n + 1,
-                callee: None,
-            })
-            .collect();
+        let image = image(&rows.join("\n"));
+        let texts: Vec<String> = (1..=40).map(|n| format!("{n:#x}")).collect();
+        let calls = calls(&texts.iter().map(String::as_str).collect::<Vec<_>>());
         let told = tell(None, &calls, &image).unwrap();
         assert_eq!(told.lines().count(), 1 + SHOWN + 1);
         assert!(told.ends_with("\n    and 9 more"), "{told}");
         let told = tell(None, &calls[19..], &image).unwrap();
-        assert!(
-            told.ends_with("f19, /w/f.rs:1\n    f20, /w/f.rs:1, 20 times"),
-            "{told}"
-        );
+        let ends = "f19, /w/f.rs:1\n    f20, /w/f.rs:1, 20 times";
+        assert!(told.ends_with(ends), "{told}");
     }
 
     #[test]
     fn names_are_told_without_the_types_they_were_made_for() {
-        let turn = "<fass::Turns<F,Subs> as fass::plan::Subtask>::take_turn";
-        assert_eq!(
-            brief(turn),
-            "<fass::Turns as fass::plan::Subtask>::take_turn"
-        );
-        assert_eq!(brief("poll<a::{closure#3}, fn(B<u64>) -> C>"), "poll");
-        assert_eq!(brief("alloc::vec::Vec<T,A>::push"), "alloc::vec::Vec::push");
-        assert_eq!(brief("faults::crimes::panic"), "faults::crimes::panic");
-    }
-
-    #[test]
-    fn without_names_nothing_is_told() {
-        assert_eq!(tell(Some(1), &[call("0x25 0x30")], &BTreeMap::new()), None);
-        assert_eq!(Call::read("?"), None);
-        assert_eq!(Call::list(None), []);
+        for (name, short) in [
+            (
+                "<fass::Turns<F,Subs> as fass::A>::turn",
+                "<fass::Turns as fass::A>::turn",
+            ),
+            ("poll<a::{closure#3}, fn(B<u64>) -> C>", "poll"),
+            ("alloc::vec::Vec<T,A>::push", "alloc::vec::Vec::push"),
+            ("faults::crimes::panic", "faults::crimes::panic"),
+        ] {
+            assert_eq!(brief(name), short);
+        }
     }
 }

@@ -210,11 +210,10 @@ mod tests {
     /// are loaded anywhere.
     fn in_file(address: usize) -> String {
         let program = std::env::current_exe().unwrap();
+        let program = program.to_str().unwrap();
         let maps = fs::read_to_string("/proc/self/maps").unwrap();
-        let first = maps
-            .lines()
-            .find(|map| map.ends_with(program.to_str().unwrap()));
-        let (base, _) = first.unwrap().split_once('-').unwrap();
+        let first = maps.lines().find(|map| map.ends_with(program)).unwrap();
+        let (base, _) = first.split_once('-').unwrap();
         format!("{:#x}", address - usize::from_str_radix(base, 16).unwrap())
     }
 
@@ -223,43 +222,34 @@ mod tests {
         line!()
     }
 
-    fn own_places() -> Places {
-        Places::new(&std::env::current_exe().unwrap())
-    }
-
     #[test]
-    fn an_address_of_a_fault_is_named_with_the_apps_line() {
+    fn an_address_of_a_fault_is_named_with_the_apps_line_and_nothing_else_is() {
+        let places = Places::new(&std::env::current_exe().unwrap());
         let inside = in_file(fuse as *const () as usize);
-        let explained = own_places().explain(&line("exception", &inside)).unwrap();
-        let (place, line) = explained.rsplit_once(':').unwrap();
-        assert_eq!(
-            place,
-            format!("{inside} is tool::places::tests::fuse, of scripts/tool/src/places/mod.rs")
-        );
+        let explained = places.explain(&line("exception", &inside)).unwrap();
+        let (place, found) = explained.rsplit_once(':').unwrap();
+        let name = "tool::places::tests::fuse, of scripts/tool/src/places/mod.rs";
+        assert_eq!(place, format!("{inside} is {name}"));
         // Any of its three lines.
-        assert!(fuse().abs_diff(line.parse().unwrap()) <= 1, "{explained}");
-    }
-
-    #[test]
-    fn names_of_the_library_are_readable_and_its_lines_are_not_the_apps() {
-        let inside = in_file(std::fmt::write as *const () as usize);
+        assert!(fuse().abs_diff(found.parse().unwrap()) <= 1, "{explained}");
+        // Names of the library are readable, and its lines are not the app's.
+        let library = in_file(std::fmt::write as *const () as usize);
+        let expected = format!("{library} is core::fmt::write");
+        assert_eq!(places.explain(&line("panic", &library)), Some(expected));
+        let nowhere = places.explain(&line("panic", "0x10"));
         assert_eq!(
-            own_places().explain(&line("panic", &inside)),
-            Some(format!("{inside} is core::fmt::write"))
+            nowhere.as_deref(),
+            Some("0x10 is in no function of the image")
         );
-    }
-
-    #[test]
-    fn only_addresses_of_faults_are_explained() {
-        let places = own_places();
-        assert_eq!(
-            places.explain(&line("panic", "0x10")),
-            Some("0x10 is in no function of the image".into())
-        );
-        let inside = in_file(fuse as *const () as usize);
-        assert_eq!(places.explain(&line("panic", "main.rs:3:1")), None);
-        assert_eq!(places.explain(&line("own", &inside)), None);
-        assert_eq!(places.explain("  at 0x200004"), None);
+        for other in [
+            line("panic", "main.rs:3:1"),
+            line("own", &inside),
+            "  at 0x20".into(),
+        ] {
+            assert_eq!(places.explain(&other), None);
+        }
+        let missing = Places::new(Path::new("no such image"));
+        assert_eq!(missing.explain(&line("panic", "0x200000")), None);
     }
 
     #[test]
@@ -271,39 +261,26 @@ mod tests {
              {{closure#0}}\n{root}/apps/vision/src/lib.rs:?\n\
              edges\n{root}/apps/my vision/src/lib.rs:7 (discriminator 2)\n\
              {{closure#1}}\n{root}/apps/vision/src/lib.rs:9\n\
-             poll\n{root}/fass/src/run/subtask.rs:81\n"
+             poll\n{root}/fass/src/run/subtask.rs:81\n\
+             0x00000000002070e9\ninterrupt_common\nfaults.2b61-cgu.0:?\n"
         );
-        assert_eq!(
-            sentence(0x20_e0b8, &read_frames(&found)[&0x20_e0b8]),
-            "0x20e0b8 is <fass::subtask::Turns as core::future::Future>::poll, \
-             of apps/my vision/src/lib.rs:7"
-        );
-        let label = "0x00000000002070e9\ninterrupt_common\nfaults.2b61-cgu.0:?\n";
-        assert_eq!(
-            sentence(0x20_70e9, &read_frames(label)[&0x20_70e9]),
-            "0x2070e9 is interrupt_common"
-        );
-    }
-
-    #[test]
-    fn without_an_image_nothing_is_added() {
-        let places = Places::new(Path::new("no such image"));
-        assert_eq!(places.explain(&line("panic", "0x200000")), None);
+        let frames = read_frames(&found);
+        let told = |address: u64| sentence(address, &frames[&address]);
+        let name = "<fass::subtask::Turns as core::future::Future>::poll";
+        let expected = format!("0x20e0b8 is {name}, of apps/my vision/src/lib.rs:7");
+        assert_eq!(told(0x20_e0b8), expected);
+        assert_eq!(told(0x20_70e9), "0x2070e9 is interrupt_common");
     }
 
     #[test]
     fn without_the_program_its_package_is_named_once() {
         let places = Places {
             program: "no-such-addr2line",
-            ..own_places()
+            ..Places::new(Path::new("an image"))
         };
-        assert_eq!(
-            places.explain(&line("panic", "0x200000")).as_deref(),
-            Some(
-                "the function at 0x200000 is not named, as `no-such-addr2line` is not installed; \
-                 install the package binutils"
-            )
-        );
+        let told = places.explain(&line("panic", "0x200000")).unwrap();
+        assert!(told.starts_with("the function at 0x200000 is not named, as `no-such-addr2line`"));
+        assert!(told.ends_with("; install the package binutils"), "{told}");
         assert_eq!(places.explain(&line("panic", "0x200000")), None);
     }
 }

@@ -176,30 +176,22 @@ mod tests {
 
     #[test]
     fn a_function_is_found_by_the_end_of_its_path() {
-        let listed = || functions(LISTED);
-        let own = Ok(vec!["drone::attitude::control".to_string()]);
-        assert_eq!(choose("control", "drone", listed(), &[]), own);
-        assert_eq!(choose("attitude::control", "drone", listed(), &[]), own);
-        let kernels = Ok(vec!["kernel::watch::control".to_string()]);
-        assert_eq!(choose("watch::control", "drone", listed(), &[]), kernels);
-        let refused = choose("contrl", "drone", listed(), &listed()).unwrap_err();
-        assert!(refused.ends_with("did you mean `control`?"), "{refused}");
-        assert!(choose("trol", "drone", listed(), &[]).is_err());
-    }
-
-    #[test]
-    fn a_name_of_many_functions_is_refused() {
-        let all: Vec<String> = (0..9).map(|n| format!("a{n}::new")).collect();
-        let listed = all.iter().map(String::as_str).collect();
-        let refused = choose("new", "drone", listed, &[]).unwrap_err();
-        assert!(refused.contains("9 functions") && refused.contains("`a0::new`"));
-    }
-
-    #[test]
-    fn a_line_is_told_from_a_path() {
-        assert!(is_line("src/lib.rs:40"));
-        for path in ["control", "a::b", "a::9", "lib.rs:"] {
-            assert!(!is_line(path), "{path}");
+        let chosen = |place| choose(place, "drone", functions(LISTED), &functions(LISTED));
+        for (place, path) in [
+            ("control", "drone::attitude::control"),
+            ("attitude::control", "drone::attitude::control"),
+            ("watch::control", "kernel::watch::control"),
+        ] {
+            assert_eq!(chosen(place), Ok(vec![path.to_string()]));
         }
+        let refused = chosen("contrl").unwrap_err();
+        assert!(refused.ends_with("did you mean `control`?"), "{refused}");
+        assert!(chosen("trol").is_err());
+        let all: Vec<String> = (0..9).map(|n| format!("a{n}::new")).collect();
+        let all = all.iter().map(String::as_str).collect();
+        let refused = choose("new", "drone", all, &[]).unwrap_err();
+        assert!(refused.contains("9 functions") && refused.contains("`a0::new`"));
+        let places = ["src/lib.rs:40", "control", "a::b", "a::9", "lib.rs:"];
+        assert_eq!(places.map(is_line), [true, false, false, false, false]);
     }
 }

@@ -246,40 +246,23 @@ mod tests {
     use crate::options::Refusal;
     use crate::run::RUN;
 
+    /// Command lines, and what is said of them; more are in `tests/on_linux.rs`.
+    const REFUSED: &str = "--on linux --machine q35 | `--machine` is for the bare machine; leave
+--on linux --gdb | `--gdb` is for the bare machine; leave
+--on linux --latest 3 | `--latest` is for the bare machine; leave
+--on debian --output x | `--output` is not for `--on debian`; leave it out, or give `--on linux`
+--mechanism fifo | `--mechanism` is for Linux; leave it out, or give
+--on linux --input x | `--input FILE` is for the bare machine, which";
+
     #[test]
     fn what_is_only_on_the_machine_is_refused_in_one_line() {
-        for (line, says) in [
-            (
-                "--on linux --machine q35",
-                "`--machine` is for the bare machine; ",
-            ),
-            (
-                "--on linux --mode threads",
-                "`--mode` is not for `--on linux`; leave it out, or give `--on debian`",
-            ),
-            ("--on linux --gdb", "`--gdb` is for the bare machine; "),
-            (
-                "--on linux --latest 3",
-                "`--latest` is for the bare machine; ",
-            ),
-            (
-                "--on debian --output x",
-                "`--output` is not for `--on debian`; leave it out, or give `--on linux`",
-            ),
-            (
-                "--mechanism fifo",
-                "`--mechanism` is for Linux; leave it out, or give ",
-            ),
-            (
-                "--on linux --input x",
-                "`--input FILE` is for the bare machine, ",
-            ),
-        ] {
+        for row in REFUSED.lines() {
+            let (line, says) = row.split_once(" | ").expect(row);
             match settle(&RUN.right(line)) {
                 Err(Refusal::Usage(why)) => {
                     assert!(why.starts_with(says) && !why.contains('\n'), "{why}");
                 }
-                _ => panic!("`{line}` is not refused"),
+                other => panic!("`{line}`: {other:?}"),
             }
         }
         assert!(settle(&RUN.right("--on linux --input - --trace x --cores 3")).is_ok());

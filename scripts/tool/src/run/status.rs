@@ -62,42 +62,29 @@ fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{WIDTH, describe};
-    use crate::protocol::{MachineLine, read_line};
+    use crate::protocol::read_line;
 
-    fn line(rest: &str) -> MachineLine {
-        let text = format!("{{\"kind\":\"status\",\"time_ns\":5000000000,\"done\":12{rest}}}");
-        read_line(1, &text).expect("a machine line").expect("good")
+    fn described(rest: &str, wall_ns: u64, run_ns: u64) -> Option<String> {
+        let text = format!("{{\"kind\":\"status\",\"time_ns\":5000000000,\"done\":12,{rest}}}");
+        let line = read_line(1, &text).expect("a machine line");
+        describe(&line.expect("good"), wall_ns, run_ns)
     }
 
     #[test]
-    fn says_jobs_misses_load_and_time_left() {
-        let full = line(
-            ",\"total\":60,\"misses\":3,\"load_permille\":[894,1000,4],\"left_ns\":9000000000",
-        );
-        let text = describe(&full, 2_000_000_000, 3_000_000_000);
+    fn says_jobs_misses_load_and_time_left_as_far_as_they_are_known() {
+        let full =
+            "\"total\":60,\"misses\":3,\"load_permille\":[894,1000,4],\"left_ns\":9000000000";
+        let text = described(full, 2_000_000_000, 3_000_000_000);
         let expected = "12 of 60 jobs, 3 missed, load 89 100 0 %, 6 s left";
         assert_eq!(text.as_deref(), Some(expected));
         // At the first line nothing is known of the speed.
-        let text = describe(&full, 0, 0);
-        assert_eq!(
-            text.as_deref(),
-            Some("12 of 60 jobs, 3 missed, load 89 100 0 %")
-        );
-    }
-
-    #[test]
-    fn leaves_out_what_is_not_known() {
-        let endless = line(",\"total\":0,\"misses\":0,\"load_permille\":[]");
-        let text = describe(&endless, 1, 1);
-        assert_eq!(text.as_deref(), Some("12 jobs, 0 missed"));
-    }
-
-    #[test]
-    fn is_never_longer_than_a_line() {
+        let expected = expected.strip_suffix(", 6 s left");
+        assert_eq!(described(full, 0, 0).as_deref(), expected);
+        let endless = "\"total\":0,\"misses\":0,\"load_permille\":[]";
+        let expected = Some("12 jobs, 0 missed");
+        assert_eq!(described(endless, 1, 1).as_deref(), expected);
         let loads = ["1000"; 64].join(",");
-        let many = line(&format!(
-            ",\"total\":60,\"misses\":3,\"load_permille\":[{loads}]"
-        ));
-        assert_eq!(describe(&many, 1, 1).map(|text| text.len()), Some(WIDTH));
+        let many = format!("\"total\":60,\"misses\":3,\"load_permille\":[{loads}]");
+        assert_eq!(described(&many, 1, 1).map(|it| it.len()), Some(WIDTH));
     }
 }

@@ -96,7 +96,7 @@ mod tests {
         ] {
             match check(&RUN.right(line)) {
                 Err(Refusal::Usage(why)) => assert!(why.starts_with(says), "{why}"),
-                _ => panic!("`{line}` is not refused"),
+                other => panic!("`{line}`: {other:?}"),
             }
         }
         assert!(check(&RUN.right("--input - --output x")).is_ok());
@@ -104,18 +104,17 @@ mod tests {
 
     #[test]
     fn the_port_is_there_if_something_is_connected() {
-        assert_eq!(second(&RUN.right("--console")), None);
-        let of = |is_live, output: Option<&str>| {
-            Some(Second {
+        for (line, expected) in [
+            ("--console", None),
+            ("--input a", Some((false, None))),
+            ("--input - --output b", Some((true, Some("b")))),
+            ("--output b", Some((false, Some("b")))),
+        ] {
+            let expected = expected.map(|(is_live, output)| Second {
                 is_live,
                 output: output.map(Into::into),
-            })
-        };
-        assert_eq!(second(&RUN.right("--input a")), of(false, None));
-        assert_eq!(
-            second(&RUN.right("--input - --output b")),
-            of(true, Some("b"))
-        );
-        assert_eq!(second(&RUN.right("--output b")), of(false, Some("b")));
+            });
+            assert_eq!(second(&RUN.right(line)), expected, "{line}");
+        }
     }
 }

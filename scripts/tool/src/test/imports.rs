@@ -192,47 +192,39 @@ fn tokens(code: &str) -> Vec<&str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{names, paths, product};
-
-    fn shown(code: &str) -> Vec<String> {
-        paths(code).iter().map(|path| path.join("::")).collect()
-    }
+    use super::{Module, names, paths, product};
 
     #[test]
     fn a_tree_of_imports_is_written_out() {
-        assert_eq!(
-            shown("use crate::a::{self, B, c::{D as E, f::*}};\nlet x = super::g::H::new(y);"),
-            [
-                "crate::a::self",
-                "crate::a::B",
-                "crate::a::c::D",
-                "crate::a::c::f",
-                "super::g::H::new"
-            ]
-        );
+        let code = "use crate::a::{self, B, c::{D as E, f::*}};\nlet x = super::g::H::new(y);";
+        let paths: Vec<String> = paths(code).iter().map(|path| path.join("::")).collect();
+        let expected = "crate::a::self crate::a::B crate::a::c::D crate::a::c::f super::g::H::new";
+        assert_eq!(paths.join(" "), expected);
     }
 
     #[test]
     fn a_path_leads_into_the_module_that_is_there() {
+        let module =
+            |path: &str| -> Module { path.split_terminator('/').map(String::from).collect() };
         let files = [
-            (vec![], "mod a; mod b;"),
-            (vec!["a"], "mod x; use crate::b::Thing; x::f();"),
+            ("", "mod a; mod b;", ""),
+            ("a", "mod x; use crate::b::Thing; x::f();", "a/x b"),
             (
-                vec!["a", "x"],
+                "a/x",
                 "use super::super::b::y; use std::fs; crate::a::g();",
+                "a b",
             ),
-            (vec!["b"], ""),
+            ("b", "", ""),
         ];
-        let owned = |path: &[&str]| path.iter().map(|word| (*word).into()).collect::<Vec<_>>();
-        let files = files
-            .iter()
-            .map(|(module, code)| (owned(module), (*code).into()))
-            .collect();
-        let names = names(&files);
-        let of = |module: &[&str]| names[&owned(module)].iter().cloned().collect::<Vec<_>>();
-        assert_eq!(of(&["a"]), [owned(&["a", "x"]), owned(&["b"])]);
-        assert_eq!(of(&["a", "x"]), [owned(&["a"]), owned(&["b"])]);
-        assert!(of(&["b"]).is_empty());
+        let names = names(
+            &files
+                .map(|(path, code, _)| (module(path), code.into()))
+                .into(),
+        );
+        for (path, _, named) in files {
+            let expected = named.split_whitespace().map(module).collect();
+            assert_eq!(names[&module(path)], expected, "{path}");
+        }
     }
 
     #[test]

@@ -170,69 +170,47 @@ fn reached_from<'n>(module: &'n Module, names: &'n Names) -> BTreeSet<&'n Module
 
 #[cfg(test)]
 mod tests {
-    use super::{HEADING, Names, Row, circles, rows, strangers, upward, within};
+    use super::{HEADING, Names, circles, rows, strangers, upward, within};
 
-    fn module(path: &str) -> Vec<String> {
-        path.split('/').map(String::from).collect()
-    }
-
-    fn names(arrows: &[(&str, &str)]) -> Names {
+    /// Reads arrows between modules, such as `a/x>b`.
+    fn names(arrows: &str) -> Names {
+        let module = |path: &str| path.split('/').map(String::from).collect::<Vec<_>>();
         let mut names = Names::new();
-        for (from, to) in arrows {
+        for arrow in arrows.split(' ') {
+            let (from, to) = arrow.split_once('>').unwrap();
             names.entry(module(to)).or_default();
             names.entry(module(from)).or_default().insert(module(to));
         }
         names
     }
 
-    fn row() -> Row {
+    #[test]
+    fn arrows_that_point_up_and_layers_that_are_missing_are_named() {
         let page = format!(
             "text\n\n{HEADING}\n\n| crate | layers |\n|---|---|\n| `x/src` | `top`, `low` |\n\n## N\n| `y` | `z` |\n"
         );
-        let mut rows = rows(&page);
-        assert_eq!(rows.len(), 1);
-        rows.remove(0)
-    }
-
-    #[test]
-    fn an_arrow_that_points_up_is_named() {
-        let row = row();
-        assert_eq!(upward(&row, &names(&[("top/a", "low")])), [""; 0]);
-        assert_eq!(
-            upward(&row, &names(&[("low/b", "top/a")])),
-            ["x/src/low/b names `top::a`, a layer above its own"]
-        );
-    }
-
-    #[test]
-    fn a_folder_has_an_order_of_its_own() {
-        let all = names(&[
-            ("x/top/a", "low"),
-            ("x/low/b", "x/top/a"),
-            ("x/low/b", "top"),
-        ]);
-        assert_eq!(
-            upward(&row(), &within("x", &all)),
-            ["x/src/low/b names `top::a`, a layer above its own"]
-        );
-    }
-
-    #[test]
-    fn a_layer_that_the_table_or_the_crate_lacks_is_named() {
-        assert_eq!(
-            strangers(&row(), &names(&[("top", "new")])),
-            [
-                "x/src/new is missing in docs/architecture.md; say which layers it may name",
-                "docs/architecture.md lists `low`, which x/src does not have"
-            ]
-        );
+        let rows = rows(&page);
+        let [row] = &rows[..] else {
+            panic!("{rows:?}");
+        };
+        let up = ["x/src/low/b names `top::a`, a layer above its own"];
+        assert_eq!(upward(row, &names("top/a>low")), [""; 0]);
+        assert_eq!(upward(row, &names("low/b>top/a")), up);
+        // A folder has an order of its own.
+        let all = names("x/top/a>low x/low/b>x/top/a x/low/b>top");
+        assert_eq!(upward(row, &within("x", &all)), up);
+        let strangers = strangers(row, &names("top>new"));
+        let expected = [
+            "x/src/new is missing in docs/architecture.md; say which layers it may name",
+            "docs/architecture.md lists `low`, which x/src does not have",
+        ];
+        assert_eq!(strangers, expected);
     }
 
     #[test]
     fn a_circle_is_named_but_not_one_of_parent_and_child() {
-        let family = names(&[("a", "a/x"), ("a/x", "a")]);
-        assert_eq!(circles(&family).count(), 0);
-        let circle = names(&[("a/x", "b"), ("b", "c"), ("c", "a/x"), ("b", "d")]);
+        assert_eq!(circles(&names("a>a/x a/x>a")).count(), 0);
+        let circle = names("a/x>b b>c c>a/x b>d");
         assert_eq!(circles(&circle).collect::<Vec<_>>(), [["a/x", "b", "c"]]);
     }
 }

@@ -115,17 +115,11 @@ mod tests {
     #[test]
     fn a_filter_by_which_nothing_has_run_is_named() {
         let mut tally = Tally::default();
-        let line = complaint(Some("frobnicate"), &tally).unwrap();
-        assert!(
-            line.starts_with("no test or check has `frobnicate` in its name; "),
-            "{line}"
-        );
+        let line = complaint(Some("frob"), &tally).unwrap();
+        assert!(line.starts_with("no test or check has `frob` in its name; "));
         tally.skip("boot_x", "left out by --quick");
         let line = complaint(Some("boot"), &tally).unwrap();
-        assert_eq!(
-            line,
-            "all that has `boot` in its name was skipped, for the reasons above"
-        );
+        assert!(line.starts_with("all that has `boot` in its name was skipped, "));
         assert_eq!(complaint(None, &tally), None);
         tally.fail("a", "b");
         assert_eq!(complaint(Some("boot"), &tally), None);
