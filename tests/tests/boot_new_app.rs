@@ -1,6 +1,7 @@
 //! A new app as a person gets it, in a repository of its own and under `apps/`: it passes its own
 //! test and the linters, boots, says what the guide shows, and is told what its repository
-//! lacks. So does the README's first app, when the README is followed.
+//! lacks. So does the README's first app, when the README is followed. Its `main` may make every
+//! call that a machine has, and stays one source for all platforms.
 //!
 //! All of them share a target folder, which stays from one run of this test to the next, so that
 //! only the first run compiles everything.
@@ -268,4 +269,87 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
         text: shown,
     };
     golden.assert_is(&excerpt(shown, &boot(&app), str::to_string));
+}
+
+/// The names that these need.
+const USES: &str = r"
+use core::time::Duration;
+use fass::{Parameter, Policy, Preemption, SubtaskAttributes, Wire, create_dag, finish_create_dags};
+";
+
+/// What `main` may do before it commits, in the place of asking for its options' end.
+const BEFORE: &str = r#"
+    machine.configure(Policy::Edf, Preemption::Enabled);
+    machine.offer_clusters()?;
+    machine.divide(&[1, machine.cores() - 1]);
+    machine.offer_overheads()?;
+    machine.set_coincidence(Duration::ZERO);
+    machine.accept_faults();
+    machine.accept_exceeded_bounds();
+    machine.show_topics();
+    let (log, gain) = (Wire::new("log"), Parameter::new("gain", 1_u64, 1..=9));
+    machine.connect(&log)?;
+    machine.offer(&[&gain])?;
+    options.finish(&["jobs", "output", "clusters", "overheads"])?;
+    let other = create_dag();
+    other.name("other").relative_deadline(Duration::from_millis(9));
+    let signal = other.sporadic(Duration::from_millis(9));
+    let read = other.using((gain.reading(), log.sending())).source(|_| ());
+    read.register(SubtaskAttributes::named("read"));
+    let dags = [first_steps::build(jobs), other];
+    machine.spread(&dags);
+"#;
+
+/// What it may do in the place of a plain run.
+const RUN: &str = r#"
+    machine.raise_on_input(&signal);
+    println!("{} and {:?}", machine.has_console(), machine.clusters());
+    println!("{:?} and {:?}", machine.resources(), machine.module());
+    let run = match jobs {
+        20 => machine.run_from(fass::now_ns() + 50_000_000)?,
+        _ => machine.run()?,
+    };
+    machine.report_memory();
+"#;
+
+#[test]
+fn a_main_with_every_call_of_the_machine_is_one_source_on_the_machine_and_on_linux() {
+    for file in ["machine", "services", "division"] {
+        let source = workspace().join(format!("kernel/front/src/app/{file}.rs"));
+        let source = fs::read_to_string(source).expect("the front's");
+        for call in source.split("pub fn ").skip(1) {
+            let (name, arguments) = call.split_once('(').expect("a function");
+            if !arguments.starts_with("&self") {
+                continue;
+            }
+            let is_made = [BEFORE, RUN].concat().contains(&format!("machine.{name}("));
+            assert!(
+                is_made,
+                "`{name}` is not called; write it into `BEFORE` or `RUN`"
+            );
+        }
+    }
+    let app = repository("every-call", NAME);
+    for (file, old, new) in [
+        ("src/main.rs", "    options.finish(&[\"jobs\"])?;\n", BEFORE),
+        ("src/main.rs", "&[first_steps::build(jobs)]", "&dags"),
+        ("src/main.rs", "    let run = machine.run()?;\n", RUN),
+        ("src/main.rs", "use fass::finish_create_dags;", USES),
+        (
+            "Cargo.toml",
+            "/kernel\" }",
+            "/kernel\", features = [\"clusters\"] }",
+        ),
+    ] {
+        let text = fs::read_to_string(app.join(file)).expect("the new app's");
+        assert_eq!(text.matches(old).count(), 1, "{file}: `{old}`");
+        fs::write(app.join(file), text.replace(old, new)).expect("it is ours");
+    }
+    for place in ["--on linux --jobs 20", "--mode deterministic"] {
+        let output = app.join("log").display().to_string();
+        let words = format!("run -- {place} --cores 2 --output {output}");
+        let said = cargo(&app, &words);
+        let success = "{\"kind\":\"verdict\",\"status\":\"success\"}\n";
+        assert!(said.contains(success), "{place}: {said}");
+    }
 }
