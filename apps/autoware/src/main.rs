@@ -12,7 +12,6 @@ use autoware::{Latencies, SUBTASKS, Workload};
 use fass::{Commit, ConstructionPolicy, Count, Occupation, finish_create_dags_with};
 use kernel::report::{Distribution, Ns};
 use kernel::{Ending, Machine, Run, json, println};
-use sched_dag::DagId;
 
 kernel::entry!(main);
 
@@ -98,13 +97,14 @@ impl Bounds {
 }
 
 fn report(run: &Run, latencies: &Latencies, bounds: Bounds, digest: u64) -> Result<(), Ending> {
-    let dags = || (0u32..).map(DagId).zip(run.task_set().dags());
+    let dags = run.task_set().dags().iter();
+    let statistics = dags.map(|dag| run.statistics(dag.name()));
     let violations = run
         .violations()
         .inspect(|found| println!("violation: {found}"));
     let violations = violations.count() as u64;
-    let misses: u64 = dags().map(|(dag, _)| run.statistics(dag).misses).sum();
-    let jobs: u64 = dags().map(|(dag, _)| run.statistics(dag).completed).sum();
+    let misses: u64 = statistics.clone().map(|dag| dag.misses).sum();
+    let jobs: u64 = statistics.map(|dag| dag.completed).sum();
     let hot_path = Distribution::new(latencies.hot_path_ns.iter().copied());
     let to_vehicle = Distribution::new(latencies.to_vehicle_ns.iter().copied());
 

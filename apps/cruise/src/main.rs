@@ -10,7 +10,6 @@ use alloc::format;
 use cruise::{Releases, build, careful, trusting};
 use fass::{Wire, finish_create_dags};
 use kernel::{Ending, Machine, println};
-use sched_dag::DagId;
 
 kernel::entry!(main);
 
@@ -37,8 +36,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     }
     let run = machine.run()?;
     println!();
-    for (id, dag) in (0..).map(DagId).zip(run.task_set().dags()) {
-        let counts = run.statistics(id);
+    for dag in run.task_set().dags() {
+        let counts = run.statistics(dag.name());
         println!(
             "{}: {} jobs complete, {} deadlines missed, {} faults",
             dag.name(),

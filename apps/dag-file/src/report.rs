@@ -39,14 +39,14 @@ struct SinkReport {
 impl Report {
     /// Takes the figures from a run; prints each violation.
     pub(crate) fn new(set: &Set, answers: &[Answer], run: &Run) -> Self {
-        let dags = (0..).map(DagId).zip(&set.dags).zip(answers);
-        let dags = dags.map(|((id, dag), answer)| DagReport {
+        let dags = set.dags.iter().zip(answers);
+        let dags = dags.map(|(dag, answer)| DagReport {
             name: dag.spec.name.clone(),
             subtasks: dag.subtasks.len(),
             answer: answer.verdict.clone(),
-            statistics: *run.statistics(id),
-            responses: responses(id, run),
-            sinks: sinks(id, answer, run),
+            statistics: *run.statistics(answer.dag.id),
+            responses: responses(answer.dag.id, run),
+            sinks: sinks(answer, run),
         });
         let shown = |violation: &Violation| println!("violation: {violation}");
         Self {
@@ -217,7 +217,8 @@ fn responses(dag: DagId, run: &Run) -> Distribution {
 }
 
 /// Returns the figures of a DAG's sinks, if there are several.
-fn sinks(dag: DagId, answer: &Answer, run: &Run) -> Vec<SinkReport> {
+fn sinks(answer: &Answer, run: &Run) -> Vec<SinkReport> {
+    let dag = answer.dag.id;
     if answer.sinks.len() < 2 {
         return Vec::new();
     }

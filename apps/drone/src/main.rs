@@ -12,7 +12,7 @@ use drone::{Flight, Workload};
 use fass::finish_create_dags;
 use kernel::report::Ns;
 use kernel::{Ending, Machine, Run, json, println};
-use sched_dag::{DagId, Vertex};
+use sched_dag::Vertex;
 
 kernel::entry!(main);
 
@@ -57,8 +57,8 @@ fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
     println!("{flight}");
     let mut misses = 0;
     let mut vertices = (0..).map(Vertex);
-    for (id, dag) in (0..).map(DagId).zip(run.task_set().dags()) {
-        let counts = run.statistics(id);
+    for dag in run.task_set().dags() {
+        let counts = run.statistics(dag.name());
         misses += counts.misses;
         println!(
             "  {:<10}{:>7} jobs, {} deadlines missed, {} skipped",

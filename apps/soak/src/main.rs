@@ -257,8 +257,9 @@ fn count_violations(run: &Run) -> u64 {
 
 /// Returns when the last job ended, from the first possible release on.
 fn span_ns(run: &Run) -> u64 {
-    let dags = (0..).map(sched_dag::DagId).zip(run.task_set().dags());
-    let jobs = dags.flat_map(|(dag, _)| run.record().jobs(dag));
+    let dags = run.task_set().dags().iter();
+    let ids = dags.map(|dag| run.task_set().find(dag.name()));
+    let jobs = ids.flat_map(|dag| run.record().jobs(dag));
     jobs.filter_map(|job| job.ended_ns).max().unwrap_or(0)
 }
 

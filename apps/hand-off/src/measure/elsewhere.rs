@@ -6,7 +6,7 @@ use core::time::Duration;
 use hand_off::{Shape, Stamping};
 use kernel::{Ending, Machine};
 
-use super::{Measured, instance, local, since, workload};
+use super::{Measured, local, since, workload};
 use crate::row::Row;
 
 /// A fork into two on an otherwise idle machine: one branch follows on the
@@ -14,8 +14,7 @@ use crate::row::Row;
 pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), Ending> {
     let shape = Shape::ForkJoin(2);
     let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
-    let record = all.run.record();
-    let core = |subtask, job| record.instance(instance(subtask, job)?)?.core;
+    let core = |subtask, job| all.instance(subtask, job)?.core;
     let branches = || all.jobs().flat_map(|job| [(1, job), (2, job)]);
     let elsewhere = || branches().filter(|&(branch, job)| core(branch, job) != core(0, job));
     let first = |(branch, job)| all.stamps.first(branch, job);

@@ -10,6 +10,7 @@ use core::time::Duration;
 use fass::finish_create_dags;
 use hand_off::{Shape, Stamping, Stamps, Workload, build};
 use kernel::{Ending, Machine, Run};
+use sched_dag::law::InstanceRecord;
 use sched_dag::{DagId, Instance, SubtaskId};
 
 use crate::row::Row;
@@ -17,9 +18,6 @@ use crate::row::Row;
 pub(crate) use elsewhere::{joins, woken_cores};
 pub(crate) use local::{budgets, chain, clock, fork_join, layered};
 pub(crate) use preemption::preemption;
-
-/// The only DAG of most runs.
-const DAG: DagId = DagId(0);
 
 /// Describes a workload of empty bodies, released seldom enough for each job to be
 /// complete before the next.
@@ -42,6 +40,7 @@ struct Measured {
     run: Run,
     stamps: Stamps,
     workload: Workload,
+    dag: DagId,
     commit_ns: u64,
 }
 
@@ -50,10 +49,13 @@ impl Measured {
     fn run(machine: &Machine, workload: Workload) -> Result<Self, Ending> {
         let (dag, stamps) = build(&workload);
         let before_ns = fass::now_ns();
-        finish_create_dags(&[dag])?;
+        let dags = [dag];
+        finish_create_dags(&dags)?;
         let commit_ns = fass::now_ns() - before_ns;
+        let run = run(machine)?;
         Ok(Self {
-            run: run(machine)?,
+            dag: run.task_set().find(&dags[0]),
+            run,
             stamps,
             workload,
             commit_ns,
@@ -105,8 +107,16 @@ impl Measured {
 
     /// Returns when the scheduler made an instance ready.
     fn ready_ns(&self, subtask: usize, job: u64) -> Option<u64> {
-        let record = self.run.record().instance(instance(subtask, job)?)?;
-        Some(self.run.epoch_ns() + record.ready_ns?)
+        Some(self.run.epoch_ns() + self.instance(subtask, job)?.ready_ns?)
+    }
+
+    /// Returns what the scheduler did with an instance.
+    fn instance(&self, subtask: usize, job: u64) -> Option<&InstanceRecord> {
+        self.run.record().instance(Instance {
+            dag: self.dag,
+            job,
+            subtask: SubtaskId(u32::try_from(subtask).ok()?),
+        })
     }
 }
 
@@ -117,14 +127,6 @@ fn run(machine: &Machine) -> Result<Run, Ending> {
         return Err(Ending::Failure(alloc::format!("{violation}")));
     }
     Ok(run)
-}
-
-fn instance(subtask: usize, job: u64) -> Option<Instance> {
-    Some(Instance {
-        dag: DAG,
-        job,
-        subtask: SubtaskId(u32::try_from(subtask).ok()?),
-    })
 }
 
 fn since(later: Option<u64>, earlier: Option<u64>) -> Option<u64> {

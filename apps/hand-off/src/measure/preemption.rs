@@ -8,7 +8,7 @@ use core::time::Duration;
 use fass::{ConstructionPolicy, Dag, SubtaskAttributes, create_dag, finish_create_dags_with};
 use hand_off::{Pen, Stamps};
 use kernel::{Ending, Machine};
-use sched_dag::{CoreId, DagId, Instance, SubtaskId};
+use sched_dag::{CoreId, Instance, SubtaskId};
 
 use super::{run, since};
 use crate::row::Row;
@@ -35,7 +35,7 @@ pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), Ending> {
         [PERIOD, OFFSET].map(|time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
     let core = |job| {
         let instance = Instance {
-            dag: DagId(0),
+            dag: run.task_set().find(&dags[0]),
             job,
             subtask: SubtaskId(0),
         };
